@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -134,6 +134,7 @@ def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:
         **({"daylight": daylight_in_words(scene.environment)} if isinstance(scene.environment, SunSky) else {}),
         "lights": len(scene.lights) + sum(any(o.emission) for o in scene.objects),
         "light_groups": {group.name: ", ".join(group.members) for group in groups_as_told(scene)},
+        "variants": _variants(scene.variants),
         "cameras": [camera.name for camera in scene.cameras],
         "paths": [path.name for path in scene.paths],
         "size_m": (high - low).round(3),
@@ -143,6 +144,7 @@ def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:
 
 def inspect_store(file: str) -> Facts:
     """A store: its arrays, complete or not, and whether every chunk on disk is sound."""
+    from lambent.store.contract import SCENE, scene_record
     from lambent.store.light_groups import light_groups
     from lambent.store.store import Store
 
@@ -152,9 +154,20 @@ def inspect_store(file: str) -> Facts:
         "arrays": {a.name: f"{'x'.join(map(str, a.shape))} {a.dtype}, {_health(store, a)}" for a in store.artefacts()},
         "documents": sorted(store.documents),
         "light_groups": {g.name: f"{g.share:.1%} of the light: {', '.join(g.members)}" for g in light_groups(store)},
+        "variants": _variants(scene_record(store).variants if SCENE in store.documents else ()),
         "reflectors": _reflectors(store),
         "inputs": store.inputs,
     }
+
+
+def _variants(variants: Iterable[Any]) -> dict[str, str]:
+    """What each variant changes: materials, and light groups."""
+    found = {}
+    for one in variants:
+        changed = [", ".join(one.looks)] * bool(one.looks)
+        changed += [f"light of {', '.join(one.light.groups)}"] * bool(one.light.groups)
+        found[one.name] = "; ".join(changed) or "as baked"
+    return found
 
 
 def _reflectors(store: Any) -> list[str]:

@@ -14,6 +14,7 @@ from lambent.core.errors import UserError
 if TYPE_CHECKING:
     from lambent.core.false_colour import Range
 
+SHEET_SIZE = "640x360"  # of each of the variants
 MEASURED = {"luminance": "full", "illuminance": "light-map"}  # the part of the light that has it
 SHOWN_BY = (
     "store",
@@ -131,6 +132,16 @@ def command(
             help="MATERIAL=#rrggbb: another diffuse colour, which the baked light answers; path traces it. Repeatable."
         ),
     ] = None,
+    variant: Annotated[
+        str, typer.Option(help="Variant of the scene: its materials and its mix of the light, which answers.")
+    ] = "",
+    variants: Annotated[
+        bool,
+        typer.Option("--variants", help="All variants in one picture, each of --size, with their names. [640x360]"),
+    ] = False,
+    keyframes: Annotated[
+        Path | None, typer.Option(help="File of states of materials and light over the time of a film (.toml).")
+    ] = None,
     fps: Annotated[int, typer.Option(min=1, max=240, help="Frames per second of a film.")] = 30,
     force: Force = False,
     json: Json = False,
@@ -142,6 +153,12 @@ def command(
     Example: lambent render room.store --light sun=off --light lamp=0.5,2700K -o evening.png
 
     Example: lambent render room.store --recolour wall_paint=#31457c -o blue.png
+
+    Example: lambent render house.store --variant walnut -o walnut.png
+
+    Example: lambent render house.store --variants --camera entrance -o sheet.png
+
+    Example: lambent render house.store --path tour --keyframes evening.toml -o evening.mp4
 
     Example: lambent render tray.store --edit tray.edits.json -o tray.png
     """
@@ -160,11 +177,13 @@ def command(
             raise UserError("is shown in false colours", field="--show", got=part, hint="leave out --view")
         part, view = MEASURED[part], "false-colour"
     scale = parse_range(false_range, log=not linear) if false_range is not None else None
+    if variants and not _is_said(context, "size"):
+        size = SHEET_SIZE
     settings = render.Settings(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
         lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb, seed=seed,
         light=parse_light(light) if light else None, sky_turn_deg=sky_turn, light_field_cache=light_field_cache,
-        recolour=parse_recolours(recolour or ()),
+        recolour=parse_recolours(recolour or ()), variant=variant,
     )  # fmt: skip
     settings.check()
     if edit is not None:
@@ -175,8 +194,15 @@ def command(
         return
     if surfaces is not None:
         raise UserError("says what an edited view shows", field="--surfaces", hint="name a session with --edit")
-    moves = output.suffix.lower() == FILM or (path is not None and output.suffix.lower() in SEQUENCES)
-    check_output(output, (*WRITABLE, FILM), force=force or moves)
+    if variants and variant:
+        raise UserError("says one variant and all of them", field="--variant", hint="leave out one of both")
+    if variants and path is not None:
+        raise UserError("a sheet is of one view", field="--path", hint="name it with --camera")
+    suffix = output.suffix.lower()
+    moves = not variants and (suffix == FILM or (path is not None and suffix in SEQUENCES))
+    check_output(output, (".png",) if variants else (*WRITABLE, FILM), force=force or moves)
+    if keyframes is not None and not moves:
+        raise UserError("keyframes are of films", field="--keyframes", hint="write to .mp4, or name a --path")
     if moves and camera is not None:
         raise UserError("a film needs a path", field="--camera", hint="name a path with --path")
     if path is not None and not moves:
@@ -189,7 +215,11 @@ def command(
 
     with progress_bar() as progress:
         if moves:
-            done = render.film(store, output, path, settings, fps=fps, scene=scene, note=note, progress=progress)
+            done = render.film(
+                store, output, path, settings, fps=fps, keyframes=keyframes, scene=scene, note=note, progress=progress
+            )
+        elif variants:
+            done = render.sheet(store, output, camera, settings, scene=scene, note=note, progress=progress)
         else:
             done = render.still(store, output, camera, settings, scene=scene, note=note, progress=progress)
     size = f"{done.width}x{done.height}"
@@ -235,10 +265,15 @@ def parse_surfaces(text: str) -> tuple[int, int]:
     return found
 
 
+def _is_said(context: typer.Context, name: str) -> bool:
+    """Whether an option was given, and is not by default."""
+    source = context.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"
+
+
 def _check_edit(context: typer.Context, session: Path) -> None:
     """Refuse options of which a session leaves no choice."""
     for parameter in context.command.params:
-        source = context.get_parameter_source(parameter.name or "")
-        if parameter.name not in SHOWN_BY and source is not None and source.name == "COMMANDLINE":
+        if parameter.name not in SHOWN_BY and _is_said(context, parameter.name or ""):
             what = "an edited view has its own camera, size and light"
             raise UserError(what, field=parameter.opts[0], hint=f"leave it out, or --edit {session}")

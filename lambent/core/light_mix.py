@@ -153,11 +153,12 @@ def parse_light(texts: Iterable[str]) -> MixTrack:
         of_name = said.setdefault(name, {})
         if time_s in of_name:
             raise UserError("says a light twice", field="--light", got=text, hint="join the values with a comma")
-        of_name[time_s] = _mix_of(value, text)
+        of_name[time_s] = mix_of(value, text)
     return MixTrack({name: tuple(sorted(keys.items(), key=lambda key: key[0])) for name, keys in said.items()})
 
 
-def _mix_of(value: str, text: str) -> GroupMix:
+def mix_of(value: str, text: str) -> GroupMix:
+    """The mix of a value such as "0.5,2700K"; errors show the `text` that it is from."""
     mix, said = AS_BAKED, set[str]()
     for word in (part.strip() for part in value.split(",")):
         if word.lower() in ("on", "off"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -19,18 +20,21 @@ def parse_recolours(texts: Sequence[str]) -> dict[str, Triple]:
     """Linear RGB by material from texts MATERIAL=#rrggbb; `UserError` where one is not of this form."""
     found: dict[str, Triple] = {}
     for text in texts:
-        name, _, colour = text.rpartition("=")
-        digits = colour.strip().removeprefix("#")
-        try:
-            encoded = np.frombuffer(bytes.fromhex(digits), np.uint8) / 255
-        except ValueError:
-            encoded = np.zeros(0)
-        if not name.strip() or len(encoded) != 3 or not colour.strip().startswith("#"):
+        name, _, written = text.rpartition("=")
+        colour = hex_colour(written.strip())
+        if not name.strip() or colour is None:
             raise UserError("not a colour of a material", field=FIELD, got=text, expected="MATERIAL=#rrggbb")
         if name.strip() in found:
             raise UserError("names a material twice", field=FIELD, got=name.strip())
-        found[name.strip()] = triple(srgb_decode(encoded))
+        found[name.strip()] = colour
     return found
+
+
+def hex_colour(text: str) -> Triple | None:
+    """Linear RGB of #rrggbb, which is sRGB; None of any other text."""
+    if not re.fullmatch(r"#[0-9a-fA-F]{6}", text):
+        return None
+    return triple(srgb_decode(np.frombuffer(bytes.fromhex(text[1:]), np.uint8) / 255))
 
 
 def recoloured(materials: Mapping[str, Material], colours: Mapping[str, Triple]) -> dict[str, Material]:

@@ -1,13 +1,15 @@
 """Baked light that answers edited materials: light maps and probes, from a store's answer (`core.answer`).
 
 A texel of a probe keeps what it holds, and the diffuse light that it sees changes by a E' - a E: its edges stay smooth,
-and what mirrors show in it stays as baked. Before the first edit every array is that of the store, to the bit.
+and what mirrors show in it stays as baked. Before the first edit every array is that of the store, to the bit. Where
+light is sorted by group, each group answers by itself, and its light is mixed as baked light is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,7 @@ from lambent.materials.diffuse_albedos import albedos_of, edited_albedos
 from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import finite
+from lambent.realtime.group_arrays import GroupArrays
 from lambent.store.answer import SeenSpots, StoredAnswer
 
 FAINT = 0.01  # of the mean indirect light: darker texels say nothing of how exact the rest is
@@ -26,7 +29,10 @@ FAINT = 0.01  # of the mean indirect light: darker texels say nothing of how exa
 
 @dataclass(frozen=True, eq=False)
 class Lit:
-    """Irradiance (T, 3) of the texels that answer, W/m^2, for materials of these albedos; whether it is as baked."""
+    """Irradiance (G, T, 3) of the texels that answer, by light group, W/m^2, for materials of these albedos.
+
+    `is_baked` says whether it is as baked.
+    """
 
     irradiance: NDArray[np.float32]
     reflected: Floats
@@ -41,7 +47,7 @@ class AnsweredLight:
         self._baked, self._stored = baked, stored
         self._materials = [baked.record.materials[name] for name in stored.materials]
         self._reference = stored.answer.reference()
-        self._as_baked = Lit(stored.answer.baked.sum(axis=0), *_shown(self._materials), is_baked=True)
+        self._as_baked = Lit(stored.answer.baked, *_shown(self._materials), is_baked=True)
 
     @property
     def as_baked(self) -> Lit:
@@ -54,7 +60,7 @@ class AnsweredLight:
         albedos = edited_albedos(self._materials, now)
         if albedos.same_as(self._stored.answer.albedos):
             return self._as_baked
-        light = self._stored.answer.irradiance(albedos, self._reference).sum(axis=0)
+        light = self._stored.answer.irradiance(albedos, self._reference)
         return Lit(light, *_shown(now), is_baked=False)
 
     def maps(self, light: Lit) -> tuple[Floats | None, Floats | None]:
@@ -62,15 +68,18 @@ class AnsweredLight:
         both = self._baked.irradiance, self._baked.irradiance_back
         if light.is_baked:
             return both
-        return self._changed(both[0], light, 0), self._changed(both[1], light, 1)
+        whole = light.irradiance.sum(axis=0)
+        return self.shown_at_texels(both[0], whole, 0), self.shown_at_texels(both[1], whole, 1)
 
-    def _changed(self, baked: Floats | None, light: Lit, side: int) -> Floats | None:
+    def shown_at_texels(self, baked: Floats | None, irradiance: Floats, side: int) -> Floats | None:
+        """A map of a side (..., H, W, 3) in the scene's units with other irradiance (..., T, 3), W/m^2, in it."""
         if baked is None:
             return None
         texels = self._stored.texels
         mine = np.flatnonzero(texels % 2 == side)
         values = np.array(baked, np.float32)
-        values.reshape(-1, 3)[texels[mine] // 2] = light.irradiance[mine] / np.float32(self._baked.unit)
+        flat = values.reshape(*values.shape[:-3], -1, 3)
+        flat[..., texels[mine] // 2, :] = irradiance[..., mine, :] / np.float32(self._baked.unit)
         return values
 
     @property
@@ -80,24 +89,30 @@ class AnsweredLight:
 
     def probe_change(self, name: str, light: Lit) -> NDArray[np.float32]:
         """What is added (6, N, N, 3) to the radiance of a probe, in the scene's units."""
+        return np.asarray(self.probe_changes(name, light).sum(axis=0))
+
+    def probe_changes(self, name: str, light: Lit) -> NDArray[np.float32]:
+        """The same by light group, (G, 6, N, N, 3)."""
         seen, before = self._stored.seen[name], self._as_baked
         at = np.flatnonzero(seen.texel.reshape(-1) >= 0)
         texel = seen.texel.reshape(-1)[at]
-        change = self._sent(seen, at, texel, light) - self._sent(seen, at, texel, before)
-        change *= seen.tint.reshape(-1, 3)[at].astype(np.float32) / np.float32(np.pi * self._baked.unit)
-        found = np.zeros((seen.texel.size, 3), np.float32)
-        found[at] = change
-        return found.reshape(*seen.texel.shape, 3)
+        shown = seen.tint.reshape(-1, 3)[at].astype(np.float32) / np.float32(np.pi * self._baked.unit)
+        found = np.zeros((len(light.irradiance), seen.texel.size, 3), np.float32)
+        for group, of_group in enumerate(found):
+            more = self._sent(seen, at, texel, light, group) - self._sent(seen, at, texel, before, group)
+            of_group[at] = more * shown
+        return found.reshape(len(found), *seen.texel.shape, 3)
 
-    def _sent(self, seen: SeenSpots, at: NDArray[np.intp], texel: NDArray[np.int64], light: Lit) -> Floats:
-        """Diffuse exitance (n, 3) without its texture of the texels that a probe's texels `at` see."""
-        material, other = self._stored.material[texel], self._stored.other[texel]
-        sun = seen.sun.reshape(-1)[at].astype(np.float32)[:, None] * self._stored.sun.astype(np.float32)
-        this_side = light.irradiance[texel] + np.maximum(sun, 0)
+    def _sent(self, seen: SeenSpots, at: NDArray[np.intp], texel: NDArray[np.int64], light: Lit, group: int) -> Floats:
+        """Diffuse exitance (n, 3) by a group, without its texture, of the texels that a probe's texels `at` see."""
+        material, other, irradiance = self._stored.material[texel], self._stored.other[texel], light.irradiance[group]
+        power = self._stored.sun.astype(np.float32) * (group == self._stored.of_sun)
+        sun = seen.sun.reshape(-1)[at].astype(np.float32)[:, None] * power
+        this_side = irradiance[texel] + np.maximum(sun, 0)
         sent = light.reflected[material] * this_side
         crossed = np.flatnonzero((other >= 0) & light.transmitted[material].any(axis=1))
         if len(crossed):
-            other_side = light.irradiance[other[crossed]] + np.maximum(-sun[crossed], 0)
+            other_side = irradiance[other[crossed]] + np.maximum(-sun[crossed], 0)
             sent[crossed] += light.transmitted[material[crossed]] * other_side
         return np.asarray(sent)
 
@@ -106,30 +121,67 @@ class AnsweredLight:
         baked = self._baked.probes[name].irradiance
         return tuple(np.array(baked) + self._baked.unit * irradiance_of(change)) if baked else ()
 
-    def likely_error(self, light: Lit) -> float:
-        """How far the light may be off: root mean square over its mean, by texels.
+    def likely_error(self, light: Lit, factors: Floats | None = None) -> float:
+        """How far the light may be off: root mean square over its mean, by texels, in a mix of `factors` (G, 3).
 
         What an edit changes is taken to be as wrong as this computes the indirect light of the bake itself.
         """
-        answer, before, now = self._stored.answer, self._as_baked.irradiance, light.irradiance
-        indirect = (answer.baked - answer.direct).sum(axis=0)
-        computed = self._reference.sum(axis=0)
+        answer = self._stored.answer
+        shares = np.ones((len(answer.baked), 3)) if factors is None else factors
+
+        def mixed(by_group: Floats) -> Floats:
+            return np.asarray(np.einsum("gtc,gc->tc", by_group, shares))
+
+        before, now = mixed(self._as_baked.irradiance), mixed(light.irradiance)
+        indirect, computed = mixed(answer.baked - answer.direct), mixed(self._reference)
         known = indirect > FAINT * indirect.mean()
         wrong = np.divide(computed, indirect, out=np.ones_like(computed), where=known) - 1
         off = np.clip(wrong, -1, 1) * (now - before)
         return float(np.sqrt((off**2).mean()) / max(float(now.mean()), 1e-30))
+
+    def groups(self, light: Lit) -> GroupArrays | None:
+        """The light by group, to be mixed; as baked before an edit, and None where it is not sorted."""
+        base = self._baked.groups
+        if base is None or light.is_baked:
+            return base
+        return AnsweredGroups(base.records, base.store, base.unit, base=base, answer=self, light=light)
 
     def probe(self, name: str, light: Lit) -> Probe:
         """A probe in other light."""
         baked = self._baked.probes[name]
         if light.is_baked:
             return baked
+        groups = self.groups(light)
+        by_group = None if groups is None else groups.probe(name)
+        if by_group is not None:  # as a mix has it: cut at 0 group by group
+            radiance = np.asarray(by_group.sum(axis=0))
+            own = tuple(map(float, irradiance_of(radiance) * self._baked.unit)) if baked.irradiance else ()
+            return replace(baked, radiance=radiance, irradiance=own)
         change = self.probe_change(name, light)
-        return replace(
-            baked,
-            radiance=np.maximum(finite(baked.radiance)[0] + change, 0),
-            irradiance=self.probe_irradiance(name, change),
-        )
+        radiance = np.maximum(finite(baked.radiance)[0] + change, 0)
+        return replace(baked, radiance=radiance, irradiance=self.probe_irradiance(name, change))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AnsweredGroups(GroupArrays):
+    """Light by group as it answers edited materials: `light` in the place of what `base` holds."""
+
+    base: GroupArrays
+    answer: AnsweredLight
+    light: Lit
+
+    @cached_property
+    def sides(self) -> tuple[Floats | None, ...]:
+        """Light maps by group, as those of `base`."""
+        show, irradiance = self.answer.shown_at_texels, self.light.irradiance
+        return tuple(show(baked, irradiance, side) for side, baked in enumerate(self.base.sides))
+
+    def probe(self, name: str) -> Floats | None:
+        """Radiance of the probe of an object by group, as that of `base`."""
+        by_group = self.base.probe(name)
+        if by_group is None or name not in self.answer.probes:
+            return by_group
+        return np.asarray(np.maximum(by_group + self.answer.probe_changes(name, self.light), 0))
 
 
 def _shown(materials: list[Material]) -> tuple[Floats, Floats]:
@@ -143,6 +195,13 @@ def answered_scene(baked: BakedScene, stored: StoredAnswer, edited: Mapping[str,
     answer = AnsweredLight(baked, stored)
     light = answer.lit(edited)
     front, back = answer.maps(light)
-    record = baked.record.model_copy(update={"materials": {**baked.record.materials, **edited}})
     probes = {**baked.probes, **{name: answer.probe(name, light) for name in answer.probes}}
-    return replace(baked, record=record, irradiance=front, irradiance_back=back, probes=probes)
+    record = baked.record.model_copy(update={"materials": {**baked.record.materials, **edited}})
+    return replace(
+        baked,
+        record=record,
+        irradiance=front,
+        irradiance_back=back,
+        probes=probes,
+        groups=answer.groups(light),
+    )

@@ -104,8 +104,13 @@ def lamp_use(how: Integrator, light: ProbeLight, look_up: LookUp, material: Mate
     return "lamps" if how.lamps and light.lamps.serve(material, widened) else ""
 
 
-def draws_of(state: FrameState, resources: SceneResources, reflecting: Collection[str] = ()) -> list[Draw]:
-    """What a frame draws; objects whose names are in `reflecting` have pixels on planar reflectors."""
+def draws_of(
+    state: FrameState, resources: SceneResources, reflecting: Collection[str] = (), *, stale_fields: bool = False
+) -> list[Draw]:
+    """What a frame draws; objects whose names are in `reflecting` have pixels on planar reflectors.
+
+    With `stale_fields` objects whose look-up is automatic are drawn from their probes, not from their light fields.
+    """
     wanted = INTEGRATORS["diffuse" if SHOW[state.show][3] else state.integrator]
     found = {}
     for name, buffers in resources.materials.items():
@@ -119,7 +124,8 @@ def draws_of(state: FrameState, resources: SceneResources, reflecting: Collectio
     for item in resources.objects:
         material, how, bits = found[item.record.material]
         buffers, light = resources.materials[item.record.material], item.light
-        look_up = light.look_up(state.lookups.get(item.record.name, state.lookup)) if how.specular else light.cheapest
+        wish = state.lookups.get(item.record.name, state.lookup)
+        look_up = light.look_up(wish, stale_fields=stale_fields) if how.specular else light.cheapest
         table = lamp_use(how, light, look_up, material, bits)
         alone = table == "lamps" and light.lamps.all_out(material, bool(bits & WIDENING))
         rough = buffers.textures.rough

@@ -17,7 +17,7 @@ from lambent.store.store import Store
 
 NO_GROUPS = "the store holds no light by group"
 BAKE_GROUPS = "`lambent bake` of the same scene with --light-groups scene adds it"
-FIELDS_STAY = "light fields do not follow the mix: what they show stays as baked"
+FIELDS_STAY = "light fields stay as baked: in other light their objects show their probes, unless a look-up is chosen"
 
 
 @dataclass(frozen=True, eq=False)

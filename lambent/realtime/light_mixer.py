@@ -2,13 +2,14 @@
 
 A thread makes the arrays and touches no GPU; before a frame, whatever is ready is uploaded. A mix that changes while
 the thread works is taken up after the part under way: the light map first, so that a dragged slider shows at once, and
-the probes by turns.
+the probes by turns. So does light that answers edited materials, group by group (`answering.AnsweredGroups`).
 """
 
 from __future__ import annotations
 
 from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +17,7 @@ from lambent.core.arrays import Floats
 from lambent.core.light_mix import Factors
 from lambent.realtime.baked import BakedScene
 from lambent.realtime.cube_mips import finite
+from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.group_light import GroupLight
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.probe_light import ProbeLight
@@ -38,10 +40,12 @@ class LightMixer:
         self._layouts, self._scene, self._resources = layouts, scene, resources
         self.version = 0
         self._wanted: Floats | None = None  # None: as baked, and nothing was read yet
-        self._made: dict[int, bytes] = {}  # mix of each part that was made last
+        self._made: dict[int, bytes] = {}  # state of each part that was made last
         self._ready: deque[tuple[int, Floats, Any]] = deque()
         self._work: Future[None] | None = None
         self._sky_of: Floats | None = None  # mix of the sky that was made last
+        self._answer: GroupLight | None = None  # of edited materials, in the place of the light as baked
+        self._answers = 0  # that were given
 
     @property
     def busy(self) -> bool:
@@ -70,16 +74,23 @@ class LightMixer:
                 return
             self._work = self._thread.submit(self._make)
 
-    def light_from(self, scene: BakedScene) -> None:
-        """Take light by group from another bake of the same geometry, in the same units, from the next frame on."""
-        if self._work is not None:
-            self._work.result()
-        self._work = None
-        self._ready.clear()
-        self._made.clear()
-        self._scene, self._sky_of = scene, None
-        for cached in ("_light", "_owners"):
-            self.__dict__.pop(cached, None)
+    def answer(self, groups: GroupArrays) -> None:
+        """Mix these arrays from the next frame on: light that answers edited materials, or the scene's own again."""
+        if self._wanted is None:
+            self._wanted = groups.factors({})
+        self._answer = replace(self._light, groups=groups)
+        self._answers += 1  # last: the thread reads it first, so that it never takes old light for new
+
+    @property
+    def factors(self) -> Floats | None:
+        """(n, 3) of the mix that is wanted; None while all light is as it was baked."""
+        return self._wanted
+
+    @property
+    def changes(self) -> bool:
+        """Whether the light that is wanted is another one than was baked."""
+        answers = self._answer is not None and self._answer.groups is not self._scene.groups
+        return answers or (self._wanted is not None and bool((self._wanted != 1).any()))
 
     @cached_property
     def _thread(self) -> ThreadPoolExecutor:
@@ -109,7 +120,7 @@ class LightMixer:
     def _stale(self) -> list[int]:
         """Parts that were not made for the mix that is wanted: the light map, then probes, longest ago first."""
         assert self._wanted is not None
-        now, parts = self._wanted.tobytes(), [MAP, *range(len(self._users))]
+        now, parts = self._state(self._wanted), [MAP, *range(len(self._users))]
         age = {part: place for place, part in enumerate(self._made)}
         return [p for p in sorted(parts, key=lambda p: (p != MAP, age.get(p, -1))) if self._made.get(p) != now]
 
@@ -120,14 +131,24 @@ class LightMixer:
             assert self._wanted is not None
             part = stale[1] if turn and stale[0] == MAP and len(stale) > 1 else stale[0]
             turn, factors = part == MAP, self._wanted
+            state = self._state(factors)
             made = self._map(factors) if part == MAP else self._probe(part, factors)
             self._made.pop(part, None)
-            self._made[part] = factors.tobytes()
+            self._made[part] = state
             self._ready.append((part, factors, made))
             self.version += 1
 
+    def _state(self, factors: Floats) -> bytes:
+        """What a part is made from: the light, and the mix."""
+        return self._answers.to_bytes(8) + factors.tobytes()
+
+    @property
+    def _surfaces(self) -> GroupLight:
+        """The light of surfaces and probes."""
+        return self._answer or self._light
+
     def _map(self, factors: Floats) -> Any:
-        sides, before = self._light.light_map(factors), self._sky_of
+        sides, before = self._surfaces.light_map(factors), self._sky_of
         if before is not None and not self._light.turns_sky(factors, before):
             return sides, (None, None)
         self._sky_of = factors
@@ -138,7 +159,7 @@ class LightMixer:
         if owner is None:
             sky = self._light.sky(factors)[1]
             return None if sky is None else light.relit(finite(sky)[0], ())
-        probe = self._light.probe(owner, factors)
+        probe = self._surfaces.probe(owner, factors)
         return None if probe is None else light.relit(probe.radiance, probe.irradiance)
 
     def _show(self, part: int, factors: Floats, made: Any) -> None:

@@ -14,7 +14,7 @@ from lambent.materials.document import Material
 from lambent.realtime.aim import aim_table, aimed_share, widest_lobe
 from lambent.realtime.baked import DARK, Probe
 from lambent.realtime.cube_mips import SMOOTH_AREA, finite, mip_chain, smooth_chain
-from lambent.realtime.incident import LookUp, look_up_of
+from lambent.realtime.incident import AUTO, LookUp, brings_light, look_up_of
 from lambent.realtime.integrators import Cube
 from lambent.realtime.lamps import ProbeLamps
 from lambent.realtime.layouts import Layouts
@@ -118,6 +118,12 @@ class ProbeLight:
         """The look-up of draws that have no lobes."""
         return next(one for one in self._look_ups.values() if one.serves(self.probe))
 
-    def look_up(self, wanted: str) -> LookUp:
-        """The look-up of that name, if it serves the probe, else the preferred one."""
-        return look_up_of(self.probe, wanted, self._look_ups)
+    def look_up(self, wanted: str, *, stale_fields: bool = False) -> LookUp:
+        """The look-up of that name, if it serves the probe, else the preferred one.
+
+        With `stale_fields` one of the probe's own light is preferred: light fields show other light than there is.
+        """
+        among = self._look_ups
+        if stale_fields and wanted == AUTO:
+            among = {name: one for name, one in among.items() if not brings_light(one)}
+        return look_up_of(self.probe, wanted, among)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
 from typing import Any
 
@@ -28,6 +28,7 @@ from lambent.realtime.sun import SunLight, sun_light
 from lambent.realtime.sun_disc import without_sun
 from lambent.realtime.textures import TextureCache
 from lambent.realtime.uploads import upload, with_alpha
+from lambent.scenes.scene import Look
 from lambent.store.contract import MOST_BORDERS, ObjectRecord
 
 
@@ -90,7 +91,8 @@ class SceneResources:
         self.light_layers = list(layers)  # as they are shown
         self._light_texture = upload(device, [layers], "rgba16float")
         self.light_view = self._light_texture.create_view(dimension="2d-array")
-        self.light_version = 0  # grows with every answer of light to edited materials
+        self.light_version = 0  # grows with every answer of light to edited materials, and with other textures
+        self.answers = False  # whether light maps and probes answer edited materials
         sky = scene.far_light or DARK
         self.sky_group = self.sky_group_of(with_alpha(finite(sky.radiance)[0]))
         cleaned = without_sun(sky, scene.sun)
@@ -110,17 +112,27 @@ class SceneResources:
                 ObjectResources(layouts, record, lights[probe], scene.unit, beyond.get(record.name, []))
             )
         textures = TextureCache(device)
-        self.materials = {
+        self._textured = {
             name: MaterialBuffers(layouts, textures.sampler, textures.of_material(scene.textures.get(name)))
-            for name in scene.record.materials
+            for name in ("", *scene.record.materials)
         }
-        records = scene.record.objects
-        self.masked = {record.name for record in records if self.materials[record.material].textures.masked}
-        whole = (r for r in records if r.name not in self.masked)
-        self.whole_ranges = merged(((r.first_face, r.first_face + r.face_count) for r in whole), gap=1)
+        self.dress({})
         self.mixes_parts = any(beyond.values())
         self.sun = sun_light(layouts, scene, self)
         self.reflector_lamps = LampsOverReflectors(layouts, self)
+
+    def dress(self, looks: Mapping[str, Look]) -> None:
+        """Show materials with the textures of others, all those that are left out with their own.
+
+        Documents are those of a frame's state; the sun's shadows keep the holes of the materials as baked.
+        """
+        own = {name: self._textured[name] for name in self.scene.record.materials}
+        self.materials = {**own, **{name: self._textured[look.textures] for name, look in looks.items()}}
+        records = self.scene.record.objects
+        self.masked = {record.name for record in records if self.materials[record.material].textures.masked}
+        whole = (r for r in records if r.name not in self.masked)
+        self.whole_ranges = merged(((r.first_face, r.first_face + r.face_count) for r in whole), gap=1)
+        self.light_version += 1
 
     def show_light_map(self, sides: Sequence[NDArray[np.float16] | None]) -> None:
         """Show other light maps (H, W, 4) on the front and the back; None of a side that stays.

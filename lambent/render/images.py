@@ -24,6 +24,8 @@ from lambent.core.photometry import LUMINANCE, Quantity, photometric
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.core.projections import Projection, View
+from lambent.scenes.look_track import LookTrack
+from lambent.scenes.scene import Variant
 
 PATH_TRACER = "path"
 FALSE_COLOUR, NOISE = "false-colour", "noise"
@@ -78,6 +80,11 @@ class Settings:
         Of the path tracer, 0 or more: other seeds have independent noise.
     recolour : mapping
         Linear RGB by material: its diffuse colour in the images, and the light answers (`realtime.answering`).
+    variant : str
+        Name of one of the scene's variants: its materials, under those of `recolour`, and its mix of the light, where
+        `light` has none. The light answers it.
+    looks : LookTrack, optional
+        Looks of materials over the time of a film, over those of the variant; the light answers them.
     """
 
     width: int = 1280
@@ -99,6 +106,8 @@ class Settings:
     sky_turn_deg: float = 0.0
     light_field_cache: str = LEAST_RECENT
     recolour: Mapping[str, Triple] = field(default_factory=dict)
+    variant: str = ""
+    looks: LookTrack | None = None
 
     @property
     def is_false_coloured(self) -> bool:
@@ -140,6 +149,16 @@ class Images(ABC):
     def light_fields(self) -> dict[str, Any]:
         """Of light fields that have a budget: `realtime.streaming.Streaming.statistics`."""
         return {}
+
+    def wear(self, variant: Variant) -> None:
+        """Show a variant from the next image on; the mix of the settings, where they have one, stands before its own.
+
+        Raises
+        ------
+        UserError
+            Where the renderer has one state of materials alone.
+        """
+        raise UserError("an edited view has no variants", field="--variants")
 
     @abstractmethod
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:

@@ -23,6 +23,8 @@ from lambent.core.projections import Projection
 from lambent.render.images import PATH_TRACER, Images, Settings
 from lambent.render.projected import Projected, faces_settings
 from lambent.scenes.camera_paths import camera_at
+from lambent.scenes.loaders.keyframes import Known, read_keyframes
+from lambent.scenes.variants import looks_as_loaded, variant_named
 from lambent.store.contract import SceneRecord, scene_record
 from lambent.store.light_groups import light_groups
 from lambent.store.store import Store
@@ -91,10 +93,11 @@ def still(
     """
     began, file = time.perf_counter(), Path(file)
     check_writable(file, WRITABLE)
-    opened, record = _opened(store)
-    view = camera if isinstance(camera, Camera) else _named("camera", record.cameras, camera)
+    opened, record = opened_with_views(store)
+    view = view_of(record, camera)
+    settings = _with_mix_of_variant(settings, opened, note)
     if camera is not None and settings.light is None and (mix := read_views(opened.folder).lights.get(view.name)):
-        settings = _lit(settings, opened, MixTrack.of(mix), note)
+        settings = _lit(settings, opened, MixTrack.of(mix), "saved with the view", note)
     drawn = images(opened, settings, scene=scene, note=note)
     write_still(drawn, file, view, progress)
     seconds = time.perf_counter() - began
@@ -131,8 +134,8 @@ def drawn_view(
     progress: Progress = silent,
 ) -> tuple[Floats, Camera]:
     """Radiance (height, width, 3) of a store's view, in memory, and its camera; parameters are those of `still`."""
-    opened, record = _opened(store)
-    view = _named("camera", record.cameras, camera)
+    opened, record = opened_with_views(store)
+    view = view_of(record, camera)
     return images(opened, settings, note=note).radiance(view, progress), view
 
 
@@ -143,6 +146,7 @@ def film(
     settings: Settings = DEFAULT,
     *,
     fps: int = 30,
+    keyframes: Path | None = None,
     scene: str | None = None,
     note: Note = ignore,
     progress: Progress = silent,
@@ -157,15 +161,20 @@ def film(
         A path, or the name of one of the scene or of a recorded walk; by default the scene's first.
     fps : int
         Frames per second.
+    keyframes : path, optional
+        A file of states of materials and light over time (`scenes.loaders.keyframes`).
 
     The other parameters and the errors are those of `still`.
     """
     began, file = time.perf_counter(), Path(file)
     check_writable(file, (FILM, *SEQUENCES))
-    opened, record = _opened(store)
+    opened, record = opened_with_views(store)
     chosen = path if isinstance(path, CameraPath) else _named("path", record.paths, path)
+    if keyframes is not None:
+        settings = _with_keyframes(settings, opened, record, keyframes)
+    settings = _with_mix_of_variant(settings, opened, note)
     if settings.light is None and (track := read_views(opened.folder).tracks.get(chosen.name)):
-        settings = _lit(settings, opened, track, note)
+        settings = _lit(settings, opened, track, "saved with the walk", note)
     if file.suffix.lower() == FILM:
         width, height = even_size(settings.width, settings.height)
         settings = replace(settings, width=width, height=height)
@@ -202,7 +211,7 @@ def images(
     store: Store, settings: Settings = DEFAULT, *, moving: bool = False, scene: str | None = None, note: Note = ignore
 ) -> Images:
     """Renderer of a store's images as arrays; `moving` for those of a film, the other parameters as of `still`."""
-    settings = exposed(settings, store)
+    settings = _with_mix_of_variant(exposed(settings, store), store, note)
     if settings.projection is not Projection.perspective:
         return Projected(images(store, faces_settings(settings), moving=moving, scene=scene, note=note), settings)
     if settings.integrator == PATH_TRACER:
@@ -214,14 +223,33 @@ def images(
     return RealTime(store, settings, moving, note)
 
 
-def _lit(settings: Settings, store: Store, light: MixTrack, note: Note) -> Settings:
-    """Settings with the light of a saved view or walk, where the store can show it and the integrator does."""
+def _with_keyframes(settings: Settings, store: Store, record: SceneRecord, file: Path) -> Settings:
+    """Settings with what a file says of materials and light over time."""
+    looks = looks_as_loaded(record.materials, record.textures)
+    found = read_keyframes(file, Known(looks, record.variants, read_views(store.folder).lights))
+    if not found.light.groups:
+        return replace(settings, looks=found.looks)
+    if settings.light is not None:
+        raise UserError("the keyframes say the light", field="--light", hint="leave it out, or out of the file")
+    return replace(settings, looks=found.looks, light=found.light)
+
+
+def _with_mix_of_variant(settings: Settings, store: Store, note: Note) -> Settings:
+    """Settings with the mix of their variant, if it has one and they have none."""
+    if not settings.variant or settings.light is not None or settings.integrator == PATH_TRACER:
+        return settings
+    mix = variant_named(scene_record(store).variants, settings.variant).light
+    return _lit(settings, store, MixTrack.of(mix), "of the variant", note) if mix.groups else settings
+
+
+def _lit(settings: Settings, store: Store, light: MixTrack, whose: str, note: Note) -> Settings:
+    """Settings with a mix that was not asked for by name, where the store can show it and the integrator does."""
     if settings.integrator == PATH_TRACER:
-        note("the path tracer traces the light of the scene, not the mix that was saved with the view")
+        note(f"the path tracer traces the light of the scene, not the mix {whose}")
         return settings
     missing = sorted(set(light.groups) - {group.name for group in light_groups(store)})
     if missing:
-        note(f"the mix saved with the view is left out: the store has no light group {', '.join(missing)}")
+        note(f"the mix {whose} is left out: the store has no light group {', '.join(missing)}")
         return settings
     return replace(settings, light=light)
 
@@ -235,10 +263,15 @@ def exposed(settings: Settings, store: Store) -> Settings:
     return settings
 
 
-def _opened(store: Store | Path | str) -> tuple[Store, SceneRecord]:
+def opened_with_views(store: Store | Path | str) -> tuple[Store, SceneRecord]:
     """The store, and its scene record with the saved views."""
     opened = store if isinstance(store, Store) else Store.open(Path(store))
     return opened, with_views(scene_record(opened), read_views(opened.folder))
+
+
+def view_of(record: SceneRecord, camera: Camera | str | None) -> Camera:
+    """A camera itself, or that of a name; by default the first of the scene."""
+    return camera if isinstance(camera, Camera) else _named("camera", record.cameras, camera)
 
 
 def _named(kind: str, choices: Iterable[Named], name: str | None) -> Named:

@@ -14,7 +14,10 @@ from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.recolour import recoloured
 from lambent.render.images import Images, Settings
+from lambent.scenes.scene import Scene, Variant
 from lambent.scenes.turned_sky import under_turned_sky
+from lambent.scenes.variants import dressed, variant_named
+from lambent.store.contract import scene_record
 from lambent.store.source import changed_inputs, scene_of
 from lambent.store.store import Store
 
@@ -34,11 +37,24 @@ class PathTraced(Images):
         if settings.planar != "auto":
             got = settings.planar
             raise UserError("the path tracer traces reflectors", field="--planar", got=got, expected="auto")
-        baked = scene_of(store, scene)
-        self._scene = replace(baked, materials={**baked.materials, **recoloured(baked.materials, settings.recolour)})
-        for name in changed_inputs(store, self._scene):
+        self._baked, self._note = scene_of(store, scene), note
+        variants = scene_record(store).variants
+        self.wear(variant_named(variants, settings.variant) if settings.variant else Variant("as baked"))
+        for name in changed_inputs(store, self._baked):
             note(f"{name} has changed since the store was baked")
         engine()
+
+    def wear(self, variant: Variant) -> None:
+        self._variant = variant
+        if variant.light.groups:
+            self._note(f"the path tracer traces the light of the scene, not the mix of {variant.name}")
+
+    def _scene_now(self) -> Scene:
+        """The scene with the materials of the next image."""
+        track = self.settings.looks
+        looks = {**self._variant.looks, **(track.looks_at(self.time_s) if track else {})}
+        worn = dressed(self._baked, replace(self._variant, looks=looks))
+        return replace(worn, materials={**worn.materials, **recoloured(worn.materials, self.settings.recolour)})
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
         from lambent.bake.reference.path_traced import (
@@ -48,5 +64,5 @@ class PathTraced(Images):
         settings = self.settings
         spp, size = settings.samples or SPP, (settings.width, settings.height)
         with TemporaryDirectory() as folder:
-            scene = under_turned_sky(self._scene, settings.sky_turn_deg, Path(folder))
+            scene = under_turned_sky(self._scene_now(), settings.sky_turn_deg, Path(folder))
             return render_reference(scene, camera, *size, spp, settings.seed, progress)[0]

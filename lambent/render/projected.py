@@ -10,6 +10,7 @@ from lambent.core.camera import Camera
 from lambent.core.progress import Progress, part_of, silent
 from lambent.core.projections import Projection
 from lambent.render.images import ANYWHERE, Images, Settings
+from lambent.scenes.scene import Variant
 
 
 def faces_settings(settings: Settings) -> Settings:
@@ -26,6 +27,9 @@ class Projected(Images):
     def __init__(self, faces: Images, settings: Settings) -> None:
         super().__init__(settings)
         self.quantity, self._faces = faces.quantity, faces
+
+    def wear(self, variant: Variant) -> None:
+        self._faces.wear(variant)
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
         around = Around(self.settings.view_of(camera), self.settings.width, self.settings.height)

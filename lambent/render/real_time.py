@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -16,8 +16,6 @@ from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.light_mix import WHITE, MixTrack
 from lambent.core.progress import Progress, silent
-from lambent.materials.recolour import recoloured
-from lambent.realtime.answering import answered_scene
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.frame_state import FrameState, quantity_of
@@ -29,6 +27,9 @@ from lambent.realtime.planar_integrators import check_planar
 from lambent.realtime.renderer import SUPERSAMPLES, Renderer
 from lambent.realtime.turned_sky import under_turned_sky
 from lambent.render.images import NOISE, Images, Settings
+from lambent.render.wearing import Wearing
+from lambent.scenes.scene import Look, Variant
+from lambent.scenes.variants import variant_named
 from lambent.store.answer import read_answer
 from lambent.store.contract import SIDES, noise_name
 from lambent.store.store import Store
@@ -61,27 +62,30 @@ class RealTime(Images):
         )  # fmt: skip
         lookup = known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup")
         baked = read_baked(store, settings.light_field_mb, settings.light_field_cache)
-        if settings.recolour:
-            if settings.light is not None and settings.light.groups:
-                raise UserError(
-                    "other colours answer light as baked", field="--recolour", hint="leave out the mix of light"
-                )
-            edited = recoloured(baked.record.materials, settings.recolour)
-            baked = answered_scene(baked, read_answer(store), edited)
-            note("light and probes of other colours are estimated from the bake, not baked again")
-            if baked.light_fields:
-                note("light fields show the colours that they were baked with")
         baked = under_turned_sky(baked, settings.sky_turn_deg)
         check_serves(baked, lookup, store.folder.name)
         self._renderer = Renderer(open_device(), baked)
         for text in self._renderer.missing:
             note(text)
-        self._check_light(settings.light, note)
+        self._wearing, self._light = Wearing(store, self._renderer, note), settings.light or MixTrack()
+        if settings.recolour and not self._wearing.answers:
+            read_answer(store)  # which says what is missing
+        self._check_light(self._light, note)
+        self._looks: Mapping[str, Look] = {}
+        if settings.variant:
+            self._looks = variant_named(baked.record.variants, settings.variant).looks
+        self._lookups = self._of_probes() if moving and (self._light.groups or settings.looks) else {}
 
-    def _check_light(self, light: MixTrack | None, note: Callable[[str], None]) -> None:
+    def _of_probes(self) -> dict[str, str]:
+        """Look-ups of objects with light fields in films whose light changes: what shows them is one for all frames."""
+        shown = (o for o in self._renderer.resources.objects if o.record.name in self._renderer.scene.light_fields)
+        wanted = self.settings.lookup
+        return {o.record.name: o.light.look_up(wanted, stale_fields=True).NAME for o in shown}
+
+    def _check_light(self, light: MixTrack, note: Callable[[str], None]) -> None:
         """`UserError` where the store lacks the groups of a mix; a note of what does not follow it."""
         scene = self._renderer.scene
-        if light is None or not light.groups:
+        if not light.groups:
             return
         if scene.groups is None:
             raise UserError(NO_GROUPS, field="--light", hint=BAKE_GROUPS)
@@ -89,9 +93,19 @@ class RealTime(Images):
         if scene.light_fields:
             note(FIELDS_STAY)
 
+    def wear(self, variant: Variant) -> None:
+        self._light, self._looks = self.settings.light or MixTrack.of(variant.light), variant.looks
+
     def _state(self, camera: Camera) -> FrameState:
-        light = self.settings.light
-        return self._frame(camera, light={} if light is None else light.factors_at(self.time_s))
+        """The next frame's, its materials and their light on the GPU."""
+        track = self.settings.looks
+        looks = {**self._looks, **(track.looks_at(self.time_s) if track else {})}
+        self._wearing.wear(looks, self.settings.recolour)
+        light = self._light.factors_at(self.time_s)
+        return self._frame(
+            camera, light=light, materials=self._wearing.materials, lookups=self._lookups,
+            maps=self._renderer.light_version,
+        )  # fmt: skip
 
     @property
     def light_fields(self) -> dict[str, Any]:

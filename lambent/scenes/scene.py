@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.camera import Camera, CameraPath
+from lambent.core.light_mix import LightMix
 from lambent.core.plain import Triple
 from lambent.core.surroundings import Axis, Layout
 from lambent.materials.document import Material
@@ -231,6 +232,36 @@ class LightGroup:
 
 
 @dataclass(frozen=True)
+class Look:
+    """A material as a variant shows it, with the textures of the scene's material of that name; "" is none."""
+
+    material: Material
+    textures: str = ""
+
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 - read by pydantic: an unknown key in a file is an error
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A state of the scene's materials and of its light: see `scenes.variants`.
+
+    `looks` are by the name of the material that each stands in for; all others stay, and so do light groups that the
+    mix `light` does not name.
+    """
+
+    name: str
+    looks: Mapping[str, Look] = field(default_factory=dict)
+    light: LightMix = field(default_factory=LightMix)
+
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012
+
+    @property
+    def materials(self) -> dict[str, Material]:
+        """The documents that stand in for others, by the names of these."""
+        return {name: look.material for name, look in self.looks.items()}
+
+
+@dataclass(frozen=True)
 class LightFieldWish:
     """What is asked of an object's offset surface light field (`core.light_field`); None leaves it to the bake.
 
@@ -265,6 +296,7 @@ class Scene:
     probe_centres: Mapping[str, Triple] = field(default_factory=dict)  # object -> centre of its probe, set by the user
     light_fields: Mapping[str, LightFieldWish] = field(default_factory=dict)  # by the object that is to have one
     reflector_rules: tuple[ReflectorRule, ...] = ()  # the last that fits an object counts
+    variants: tuple[Variant, ...] = ()  # other states of the materials and the light
     light_groups: tuple[LightGroup, ...] = ()  # that the user has named; other emitters are in groups by default
     parts: Mapping[str, str] = field(default_factory=dict)  # object that is a part -> name of the whole
     borders: Mapping[str, tuple[Border, ...]] = field(default_factory=dict)  # of parts, as store.contract has them

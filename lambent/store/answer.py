@@ -15,7 +15,10 @@ answer/shares              (T, 8) uint8, what these count
 answer/probe/OBJECT/spots  (6, N, N) uint32, texel that each texel of a probe sees, as above; NO_SPOT for none
 answer/probe/OBJECT/tint   (6, N, N, 3) float16, texture there, relative to the material's colour
 answer/probe/OBJECT/sun    (6, N, N) float16, direct sun there over that on what faces it; negative on the far side
-answer/traced, traced_back (2, H, W, 4) float32, samples of direct light, from which a bake continues
+answer/traced, traced_back (2, H, W, 4) float32, samples of direct light, from which a bake continues; by group too,
+                           traced_by_group, traced_back_by_group (1, H, W, 3 G), where light is sorted
+
+G is the number of light groups, in the order of `store.light_groups`; 1 where light was baked as one.
 """
 
 from __future__ import annotations
@@ -29,12 +32,15 @@ from lambent.core.answer import Answer, Neighbours, Patches
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.materials.diffuse_albedos import albedos_of
+from lambent.scenes.light_groups import SUN
 from lambent.store.contract import SIDES, SceneRecord, scene_record, sun_beside
+from lambent.store.light_groups import group_name, light_groups
 from lambent.store.store import Store
 
 NO_PATCH = 0xFFFF
 NO_SPOT = 0xFFFFFFFF
 DIRECT = ("direct", "direct_back")  # by side
+NO_ANSWER = "the store has no light that answers them (`lambent bake --only answer`)"
 LAST = "answer/shares"  # written last but for probes
 
 
@@ -49,8 +55,11 @@ def probe_spots_name(object_name: str, part: str) -> str:
 
 
 def has_answer(store: Store) -> bool:
-    """Whether a store's light can answer other colours of its materials."""
-    return LAST in store and all(answer_name(part) in store for part in ("transfer", "rays", "near", "texels"))
+    """Whether a store's light can answer other colours of its materials, by group where it is sorted so."""
+    needed = ("transfer", "rays", "near", "texels", "patch_direct", *DIRECT[:1])
+    if LAST not in store or not all(answer_name(part) in store for part in needed):
+        return False
+    return store.artefact(answer_name("patch_direct")).shape[0] == max(1, len(light_groups(store)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +83,7 @@ class StoredAnswer:
     materials : names, by number
     seen : what probes see, by object
     sun : (3,) W/m^2 on what faces it
+    of_sun : number of the sun's light group
     """
 
     answer: Answer
@@ -83,6 +93,7 @@ class StoredAnswer:
     materials: tuple[str, ...]
     seen: dict[str, SeenSpots]
     sun: Floats
+    of_sun: int = 0
 
 
 def read_answer(store: Store) -> StoredAnswer:
@@ -121,11 +132,18 @@ def read_answer(store: Store) -> StoredAnswer:
     )
     if not fits:
         raise UserError("broken store", file=store.folder, field="answer", got="arrays that do not fit together")
-    lights = [f"light_map/{side}" for side in SIDES], [answer_name(part) for part in DIRECT]
+    sorted_light = bool(light_groups(store))
+    maps = [group_name(side) if sorted_light else f"light_map/{side}" for side in SIDES]
+    lights = maps, [answer_name(part) for part in DIRECT]
     baked, directs = (_at_texels(store, of_sides, texels) for of_sides in lights)
-    groups = direct.shape[0]
-    if directs.shape[0] != groups:
-        raise UserError("broken store", file=store.folder, field="answer/direct", got=directs.shape[0], expected=groups)
+    groups = baked.shape[0]
+    if not directs.shape[0] == direct.shape[0] == groups:
+        got, hint = (
+            f"{directs.shape[0]} and {direct.shape[0]} light groups",
+            "bake it with `lambent bake --only answer`",
+        )
+        raise UserError("does not fit the light map", file=store.folder, field="answer", got=got, expected=groups,
+                        hint=hint)  # fmt: skip
     patches = Patches(material.astype(np.int64), paired.astype(np.int64), direct, transfer.astype(np.float32))
     albedos = albedos_of([record.materials[name] for name in names])
     answer = Answer(patches, rays, Neighbours(near, shares), np.minimum(directs, baked), baked, albedos)
@@ -134,9 +152,10 @@ def read_answer(store: Store) -> StoredAnswer:
     of_patch = np.where(flat == NO_PATCH, 0, flat)[texels % 2, texels // 2]
     other = number[(texels ^ 1).astype(np.int64)]
     sun = sun_beside(store)
+    of_sun = next((n for n, group in enumerate(light_groups(store)) if SUN in group.members), 0)
     return StoredAnswer(
         answer, texels, other, material[of_patch].astype(np.int64), names, _seen(store, record, number),
-        np.zeros(3) if sun is None else np.array(sun.irradiance),
+        np.zeros(3) if sun is None else np.array(sun.irradiance), of_sun,
     )  # fmt: skip
 
 

@@ -78,6 +78,12 @@ def _check_names(store: Store, record: SceneRecord) -> None:
     for material in record.textures:
         if material not in record.materials:
             raise _broken(store, "textures", "no such material", material)
+    if len({variant.name for variant in record.variants}) != len(record.variants):
+        raise _broken(store, "variants", "two variants have one name")
+    for variant in record.variants:
+        worn = {*variant.looks, *(look.textures for look in variant.looks.values() if look.textures)}
+        if strange := sorted(worn - set(record.materials)):
+            raise _broken(store, f"variants.{variant.name}", "no such material", strange[0])
     for number, reflector in enumerate(record.reflectors):
         for part in reflector.parts:
             field = f"reflectors.{number}"

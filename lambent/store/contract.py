@@ -122,7 +122,7 @@ from lambent.core.colour import MOST_UNIT
 from lambent.core.errors import UserError, invalid
 from lambent.core.plain import Triple, triple
 from lambent.materials.document import Material
-from lambent.scenes.scene import Border
+from lambent.scenes.scene import Border, Variant
 from lambent.store.consistency import check_record, numbers_of
 from lambent.store.store import MANIFEST, Store
 
@@ -257,6 +257,7 @@ class SceneRecord(_Record):
     bounds: tuple[Triple, Triple]
     warnings: tuple[str, ...] = ()
     textures: dict[str, TexturesRecord] = {}  # by the material's name
+    variants: tuple[Variant, ...] = Field(default=(), exclude_if=lambda variants: not variants)
 
 
 class ViewRecord(_Record):

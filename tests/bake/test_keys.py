@@ -32,6 +32,7 @@ from lambent.scenes.scene import (
     ImageEnvironment,
     LightFieldWish,
     LightGroup,
+    Look,
     MaterialTextures,
     Mesh,
     PointLight,
@@ -40,6 +41,7 @@ from lambent.scenes.scene import (
     SceneObject,
     SunSky,
     Texture,
+    Variant,
 )
 from lambent.scenes.textures import CHANNELS
 from lambent.store.store import Store
@@ -167,6 +169,7 @@ SCENE: Answers = {
     "probe_centres": ({"ball": (0.0, 1.0, 0.2)}, OF_BALL),
     "light_fields": ({"ball": LightFieldWish(), "other ball": LightFieldWish()}, FIELDS),
     "reflector_rules": ((ReflectorRule("floor", use=False),), NOTHING),
+    "variants": ((Variant("walnut", {"worn": Look(Material(kd=0.1))}),), NOTHING),
     "light_groups": ((LightGroup("all", ("sky",)),), NOTHING),  # sorted by them where a bake is asked to
     "parts": ({"ball": "balls"}, NOTHING),  # given by the names of the objects, which are in the key
     "borders": ({"ball": ((1.0, 0.0, 0.0, 0.0),)}, NOTHING),  # given by the faces of the parts, likewise

@@ -8,6 +8,7 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.core.camera import Camera
 from lambent.materials.recolour import recoloured
+from lambent.realtime.answer_shown import answered
 from lambent.realtime.answering import AnsweredLight, answered_scene
 from lambent.realtime.baked import read_baked
 from lambent.realtime.frame_state import FrameState
@@ -15,7 +16,6 @@ from lambent.realtime.renderer import Renderer
 from lambent.realtime.resources import light_layers
 from lambent.store.answer import read_answer
 from lambent.store.store import Store
-from lambent.viewer.modes.walk.answering import answered
 from tests.bake.small_scenes import TINY, room_with_step
 
 VIEW = FrameState(Camera(name="in", position=(1.4, 1.2, -1.4), target=(-0.8, 0.5, 0.0), fov_y_deg=70), 96, 64)

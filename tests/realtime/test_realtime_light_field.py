@@ -55,6 +55,19 @@ def test_methods_rank_as_they_should(renderer: Renderer) -> None:
     np.testing.assert_array_equal(renderer.image(STATE), renderer.image(replace(STATE, lookup="light_field")))
 
 
+def test_in_other_light_than_was_baked_a_probe_stands_in_unless_the_field_is_asked_for(renderer: Renderer) -> None:
+    by_probe = renderer.resources.light_of("ball").look_up("auto", stale_fields=True).NAME
+    as_baked, by_field = renderer.image(STATE), replace(STATE, lookup="light_field")
+    renderer.resources.answers = True
+    try:
+        np.testing.assert_array_equal(renderer.image(STATE), renderer.image(replace(STATE, lookup=by_probe)))
+        np.testing.assert_array_equal(renderer.image(by_field), as_baked)
+    finally:
+        renderer.resources.answers = False
+    np.testing.assert_array_equal(renderer.image(STATE), as_baked)
+    assert not by_probe.startswith("light_field")
+
+
 def test_the_light_field_of_a_store_is_rendered(tmp_path: Path, renderer: Renderer, field: LightField) -> None:
     """In the store's unit; by default it is what the object reflects."""
     store = put_ball(tmp_path / "ball.store", field)

@@ -451,3 +451,23 @@ def test_damaged_bytes_are_one_line_or_a_scene(tmp_path: Path, damage: list[tupl
         assert "\n" not in str(error)
     else:
         assert all(np.isfinite(o.mesh.positions).all() for o in scene.objects)
+
+
+def test_variants_of_primitives_are_variants_of_the_scene(tmp_path: Path) -> None:
+    names = [{"name": "oak"}, {"name": "night"}, {"name": "bare"}]
+    lamp = {"name": "lamp", "emissiveFactor": [1, 1, 1]}
+    content = _worn({"name": "plain"}, [], extensions={"KHR_materials_variants": {"variants": names}})
+    content["materials"] += [{"name": "wood", "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.3, 0.1, 1]}}, lamp]
+    mappings = [{"material": 1, "variants": [0]}, {"material": 2, "variants": [1]}]
+    content["meshes"][0]["primitives"][0]["extensions"] = {"KHR_materials_variants": {"mappings": mappings}}
+    scene = loaded(tmp_path, content)
+    oak, night, bare = scene.variants
+    assert oak.materials["plain"] == scene.materials["wood"] and not night.looks and not bare.looks
+    assert "variant night: thing would emit other light, which stays as baked" in scene.warnings
+    head = 'format = "lambent-scene"\nversion = 1\ngeometry = "thing.gltf"\n'
+    more = 'variant = "oak"\n[[variants]]\nname = "oak"\nlight.sun = "off"\n[[variants]]\nname = "red"\n'
+    (tmp_path / "scene.toml").write_text(f'{head}{more}materials.wood.colour = "#ff0000"\n')
+    chosen = load_scene(tmp_path / "scene.toml")
+    oak, night, bare, red = chosen.variants
+    assert chosen.object("thing").material == "wood" and not oak.looks and not oak.light.of("sun").on
+    assert bare.materials["wood"] == chosen.materials["plain"] and red.materials["wood"].kd[1] == 0

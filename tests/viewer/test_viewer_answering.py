@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
+import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from lambent.bake.bake import bake
 from lambent.core.camera import Camera
+from lambent.realtime.answer_shown import answered
+from lambent.realtime.answering import answered_scene
+from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.renderer import Renderer
+from lambent.scenes.geometry import placed, sphere
+from lambent.scenes.scene import SceneObject
+from lambent.store.answer import read_answer
 from lambent.store.store import Store
+from lambent.viewer.modes.walk import answering
 from lambent.viewer.modes.walk.answering import WITHOUT, Answering, AnsweringLight
 from tests.bake.small_scenes import GREY, TINY, room_with_step
 from tests.viewer.small_store import write_small_store
 
 VIEW = FrameState(Camera(name="in", position=(1.4, 1.2, -1.4), target=(-0.8, 0.5, 0.0), fov_y_deg=70), 96, 64)
+BLUE = {"grey": GREY.model_copy(update={"kd": (0.05, 0.05, 0.5)})}
 RED = {"grey": GREY.model_copy(update={"kd": (0.5, 0.05, 0.05)})}
 
 
@@ -51,3 +63,48 @@ def test_a_store_without_an_answer_is_named(tmp_path: Path) -> None:
     shown = Answering()
     settled(AnsweringLight(store, Renderer(open_device(), store), shown), {"plaster": GREY})
     assert not shown.possible and shown.note == WITHOUT
+
+
+def test_an_edit_drops_the_probes_of_the_one_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first edit's probes are given up after the one under way, and made where the edit comes back."""
+    second = SceneObject("other ball", placed(sphere(0.3, 16, 8), (0.8, 1.2, -0.8)), "mirror")
+    room = replace(room_with_step(), objects=(*room_with_step().objects, second))
+    store = bake(room, tmp_path / "s", quality=TINY)
+    renderer, made, go_on = Renderer(open_device(), store), list[str](), threading.Event()
+    light = AnsweringLight(store, renderer, Answering())
+    assert len(read_answer(store).seen) == 2
+
+    def slow(*given: object) -> ProbeLight:
+        made.append(str(given[2]))
+        assert go_on.wait(60)
+        return answered(*given)
+
+    monkeypatch.setattr(answering, "answered", slow)
+    end = time.monotonic() + 60
+    while not made:
+        light.update(RED)
+        assert time.monotonic() < end
+        time.sleep(0.005)
+    light.update(BLUE)
+    go_on.set()
+    settled(light, RED)
+    assert len(made) == 3, "one probe of the first try, and both of the second"
+    shown = renderer.image(replace(VIEW, materials=RED))
+    light.close()
+    fresh = Renderer(open_device(), answered_scene(read_baked(store), read_answer(store), RED))
+    assert np.allclose(shown, fresh.image(VIEW), rtol=0.02, atol=0.01 * shown.mean())
+
+
+def test_a_store_with_light_groups_answers_in_its_mix(tmp_path: Path) -> None:
+    store = bake(room_with_step(), tmp_path / "s", quality=TINY, light_groups="scene")
+    renderer, shown = Renderer(open_device(), store), Answering()
+    light, mix = AnsweringLight(store, renderer, shown), replace(VIEW, light={"lamp": (0.5, 0.5, 0.5)})
+    before = renderer.image(mix)
+    settled(light, RED)
+    assert shown.possible and shown.note.endswith("%")
+    answered_then_mixed = renderer.image(mix)
+    assert np.allclose(2 * answered_then_mixed, renderer.image(VIEW), rtol=6e-3, atol=4e-3)
+    assert np.abs(answered_then_mixed - before).max() > 0.05 * before.mean()
+    settled(light, {})
+    assert np.array_equal(renderer.image(mix), before) and "as baked" in shown.note
+    light.close()

@@ -34,8 +34,10 @@ class Spots:
         Whether light was sampled there, on the normal's side and on the other.
     there : (2, K) bool
         Whether there is a light map.
-    irradiance, direct : (2, K, 3) float32
-        All light and direct light, W/m^2, the sun's included in both.
+    irradiance : (2, K, 3) float32
+        All light, W/m^2, the sun's included.
+    direct : (G, 2, K, 3) float32
+        Direct light by group, the sun's included.
     area : (K,) m^2, about.
     object, material, chart : (K,) integers.
     position, normal : (K, 3)
@@ -63,8 +65,16 @@ class Spots:
         return np.asarray(reflected * light + transmitted * light[::-1])
 
 
-def spots_of(traced: TracedScene, maps: list[Floats], directs: list[Floats]) -> Spots:
-    """Spots of a light map and of its direct light: maps (H, W, 3) of one or both sides."""
+def spots_of(traced: TracedScene, maps: list[Floats], directs: list[Floats], of_sun: int | None) -> Spots:
+    """Spots of a light map and of its direct light.
+
+    Parameters
+    ----------
+    maps, directs
+        By side, one or both: all light (H, W, 3), and direct light (G, H, W, 3) by group.
+    of_sun : int, optional
+        The sun's group; None where there is no sun.
+    """
     texels, scene = traced.texels, traced.scene
     counts = [len(o.mesh.faces) for o in scene.objects]
     object_of = np.repeat(np.arange(len(counts)), counts)[texels.face[:, 0]]
@@ -72,13 +82,15 @@ def spots_of(traced: TracedScene, maps: list[Floats], directs: list[Floats]) -> 
     material = np.array([names.index(o.material) for o in scene.objects])[object_of]
     count = len(texels.index)
     lit, there = np.zeros((2, count), bool), np.zeros((2, count), bool)
-    light, direct = np.zeros((2, 2, count, 3), np.float32)
+    light, direct = np.zeros((2, count, 3), np.float32), np.zeros((len(directs[0]), 2, count, 3), np.float32)
     sun = sun_at(traced)
     for side, (of_map, of_direct) in enumerate(zip(maps, directs, strict=True)):
         lit[side] = traced.in_view((1.0, -1.0)[side])[0].valid.any(axis=1)
         there[side] = np.ones(count, bool) if side == 0 else traced.crossed[texels.face[:, 0]]
         light[side] = of_map.reshape(-1, 3)[texels.index].astype(np.float32) + sun[side]
-        direct[side] = of_direct.reshape(-1, 3)[texels.index].astype(np.float32) + sun[side]
+        direct[:, side] = of_direct.reshape(len(of_direct), -1, 3)[:, texels.index]
+    if of_sun is not None:
+        direct[of_sun, :, :] += sun
     light *= there[..., None]
     direct *= there[..., None]
     return Spots(

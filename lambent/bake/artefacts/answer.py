@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, finished_maps
+from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, finished_groups, finished_maps
 from lambent.bake.artefacts.probe import sharing
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
 from lambent.bake.keys import key_of
+from lambent.bake.methods import sorts_light
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Floats, Indices
 from lambent.store.answer import DIRECT, NO_PATCH, answer_name, probe_spots_name
 from lambent.store.contract import probe_name, shared_probes
+from lambent.store.store import Writer
 
 if TYPE_CHECKING:
     from lambent.bake.answering.patches import Clusters
@@ -64,12 +66,20 @@ def keys(context: BakeContext) -> dict[str, str]:
     count = 2 if any(context.two_sided) else 1
     effort = [how.patches, how.patch_rays, how.gather_rays, how.block, how.direct_samples, how.importance_rays]
     key = key_of(KIND, REVISION, light, effort, context.seed)
-    found = dict.fromkeys((*TRACED[:count], *MAPS[:count], *map(answer_name, (*PATCH, *BETWEEN))), key)
+    by_group = map(_by_group, TRACED[:count]) if sorts_light(context.methods) else ()
+    found = dict.fromkeys((*TRACED[:count], *by_group, *MAPS[:count]), key)
+    worn = [(o.name, o.material) for o in context.scene.objects]  # patches are of one material, by its name
+    found |= dict.fromkeys(map(answer_name, (*PATCH, *BETWEEN)), key_of(KIND, REVISION, key, worn))
     of_probes = context.keys("probe")
     for o in context.scene.objects:
         if radiance := of_probes.get(probe_name(o.name, "radiance")):
             found |= {probe_spots_name(o.name, part): key_of(KIND, REVISION, key, radiance) for part in SEEN}
     return found
+
+
+def _by_group(name: str) -> str:
+    """Name of the samples by light group that belong to samples."""
+    return f"{name}_by_group"
 
 
 def bake(context: BakeContext) -> None:
@@ -87,39 +97,62 @@ def bake(context: BakeContext) -> None:
 
 
 def _direct(context: BakeContext, side: int) -> Floats:
-    """Direct light (H, W, 3) of a side, at most that of the light map; what lobes alone have sent on counts as such."""
+    """Direct light (G, H, W, 3) of a side by group, at most that of the light map.
+
+    What lobes alone have sent on counts as direct.
+    """
     from lambent.bake.answering.direct import shared_by_charts
-    from lambent.bake.light.sampling import Sampling, sampled_halves, tile_samples
+    from lambent.bake.light.sampling import sampled_halves
 
     if MAPS[side] not in context.stale(KIND):
-        return np.asarray(context.store.read(MAPS[side])[0])
+        return np.asarray(context.store.read(MAPS[side]))
+    labels = _sampled_direct(context, side)
+    halves, known = sampled_halves(context.store.read(TRACED[side]))
+    samples, lit = halves.mean(axis=0)[None], finished_maps(context)[side]
+    if sorts_light(context.methods):
+        parts = context.store.read(_by_group(TRACED[side]))[0]
+        samples, lit = np.moveaxis(parts.reshape(*known.shape, -1, 3), 2, 0), finished_groups(context)[side]
+    assert lit is not None, "two-sided scenes have both maps"
+    by_group = zip(samples, lit.reshape(len(samples), *known.shape, 3), strict=True)
+    direct = np.stack([shared_by_charts(sampled, known, light, labels) for sampled, light in by_group])
+    context.put(KIND, MAPS[side], direct, context.provenance())
+    return direct
+
+
+def _sampled_direct(context: BakeContext, side: int) -> Indices:
+    """Take samples of direct light of a side, those by group beside; returns the charts that viewers see (H, W)."""
+    from lambent.bake.light.groups import BothWriters
+    from lambent.bake.light.sampling import Sampling, tile_samples
+
     how: Settings = context.settings(KIND)
-    texels, tile = context.traced.texels, context.settings("light_map").tile_texels
-    shape, chunk = (2, texels.height, texels.width, 4), (2, tile, tile, 4)
-    writer = context.samples(KIND, TRACED[side], shape, chunk)
-    scene = context.traced.whole(diffuse=False)
-    sides, labels = context.traced.in_view(SIGNS[side])
+    traced, tile = context.traced, context.settings("light_map").tile_texels
+    size = traced.texels.height, traced.texels.width
+    whole = context.samples(KIND, TRACED[side], (2, *size, 4), (2, tile, tile, 4))
+    writer: Writer | BothWriters = whole
+    half, depth = max(1, how.direct_samples // 2), context.settings("light_map").max_depth
+    sampling = Sampling((2 * half, 2 * half), 0.0, depth, half, unseen=traced.unseen(diffuse=False))
+    if sorts_light(context.methods):
+        parts = len(traced.sorted_lights.groups)
+        beside = context.samples(KIND, _by_group(TRACED[side]), (1, *size, 3 * parts), (1, tile, tile, 3 * parts))
+        writer = BothWriters(whole, beside)
+        sampling = replace(sampling, tally=traced.tally(diffuse=False, direct=False), parts=parts)
+    scene = traced.whole(diffuse=False)
+    sides, labels = traced.in_view(SIGNS[side])
     if writer.missing:
-        half = max(1, how.direct_samples // 2)
-        depth, unseen = context.settings("light_map").max_depth, context.traced.unseen(diffuse=False)
-        sampling = Sampling((2 * half, 2 * half), 0.0, depth, half, unseen=unseen)
         run_tiles(
             writer, lambda region, seed: tile_samples(scene, sides, region, seed, sampling), seed=context.seed,
             progress=context.progress, what="direct light" + (", far sides" if side else ""),
         )  # fmt: skip
     writer.finish()
-    lit = finished_maps(context)[side]
-    assert lit is not None, "two-sided scenes have both maps"
-    halves, known = sampled_halves(context.store.read(TRACED[side]))
-    direct = shared_by_charts(halves.mean(axis=0), known, lit, labels)
-    context.put(KIND, MAPS[side], direct[None], context.provenance())
-    return direct
+    return labels
 
 
 def _spots(context: BakeContext, directs: list[Floats]) -> Spots:
     from lambent.bake.answering.spots import spots_of
 
-    return spots_of(context.traced, [light for light in finished_maps(context) if light is not None], directs)
+    maps = [light for light in finished_maps(context) if light is not None]
+    of_sun = context.traced.sorted_lights.sun if sorts_light(context.methods) else 0
+    return spots_of(context.traced, maps, directs, of_sun)
 
 
 def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
@@ -142,7 +175,7 @@ def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
     numbers = {"patch_material": found.material, "patch_paired": found.paired}
     for part, values in numbers.items():
         context.put(KIND, answer_name(part), values.astype(np.uint16), context.provenance())
-    direct = patch_means(spots, found, spots.direct)[None].astype(np.float32)
+    direct = np.stack([patch_means(spots, found, of_group) for of_group in spots.direct]).astype(np.float32)
     context.put(KIND, answer_name("patch_direct"), direct, context.provenance())
     note = context.provenance(materials=list(context.scene.materials))
     context.put(KIND, answer_name("patch"), patch.reshape(2, texels.height, texels.width), note)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from lambent.core.camera import Camera, overview
 from lambent.core.plain import Triple
 from lambent.materials.document import Material
 from lambent.scenes.scene import Environment, Light, MaterialTextures, Scene, SceneObject, SunSky, bounds_of
+from lambent.scenes.variants import Dressed, looks_as_loaded, with_variants
 
 DAYLIGHT = SunSky(sun_direction=(0.4558, 0.7597, 0.4637))
 
@@ -40,7 +41,8 @@ class Contents:
         shines = bool(self.environment or self.lights or any(any(o.emission) for o in self.objects))
         own_light = self.environment is not None or (self.tells_its_light and shines)
         notes = ("nothing in it emits light: it gets daylight",) if self.tells_its_light and not own_light else ()
-        return Scene(
+        sets = {variant: self.dressed(variant) for variant in self.variants}
+        scene = Scene(
             name=name,
             objects=self.objects,
             materials=self.materials,
@@ -48,9 +50,27 @@ class Contents:
             lights=self.lights,
             cameras=self.cameras or (overview(*bounds_of(self.objects)),),
             sources=self.sources,
-            warnings=(*self.warnings, *notes),
+            warnings=(*self.warnings, *notes, *lights_that_stay(self.objects, sets)),
             textures=self.textures,
         )
+        looks = looks_as_loaded(scene.materials, scene.textures)
+        return with_variants(scene, [
+            Dressed(variant, [looks[o.material] for o in objects]) for variant, objects in sets.items()
+        ])  # fmt: skip
+
+    def dressed(self, variant: str | None) -> tuple[SceneObject, ...]:
+        """The objects in a material set of this name, as they are where the file has none."""
+        worn = {} if variant is None else self.variants.get(variant, {})
+        found = ((o, *worn.get(o.name, (o.material, o.emission))) for o in self.objects)
+        return tuple(replace(o, material=material, emission=emission) for o, material, emission in found)
+
+
+def lights_that_stay(objects: Sequence[SceneObject], variants: Mapping[str, Sequence[SceneObject]]) -> Iterator[str]:
+    """A warning for each variant, the same objects in other materials, that would emit other light."""
+    for variant, dressed in variants.items():
+        others = [o.name for o, now in zip(objects, dressed, strict=True) if now.emission != o.emission]
+        if others:
+            yield f"variant {variant}: {', '.join(others[:2])} would emit other light, which stays as baked"
 
 
 class UniqueNames:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.camera import Camera
-from lambent.core.ceilings import NODES, TRIANGLES
+from lambent.core.ceilings import NODES, TRIANGLES, VARIANTS
 from lambent.core.directions import Floats, normalize
 from lambent.core.errors import UserError
 from lambent.core.photometry import radiometric
@@ -109,6 +109,7 @@ class _Reading:
         """Visit every node of the scene once, parents first."""
         gltf, document = self._gltf, self._gltf.document
         NODES.check(len(document.nodes), file=gltf.path)
+        VARIANTS.check(len(document.variants), file=gltf.path)
         if document.scenes:
             roots = gltf.pick(document.scenes, document.scene, "scene").nodes
         else:

@@ -49,11 +49,8 @@ def assembled(contents: Sequence[Contents], variant: str | None, path: Path) -> 
     names = UniqueNames()
     for c in contents:
         called = _own_names(c, materials, textures, warnings)
-        variants = c.variants.get(variant, {}) if variant is not None else {}
-        for o in c.objects:
-            material, emission = variants.get(o.name, (o.material, o.emission))
-            name, material = names.unique(o.name), called.get(material, material)
-            objects.append(replace(o, name=name, material=material, emission=emission))
+        for o in c.dressed(variant):
+            objects.append(replace(o, name=names.unique(o.name), material=called.get(o.material, o.material)))
         materials |= {called[n]: m.model_copy(update={"name": called[n]}) for n, m in c.materials.items()}
         textures |= {called[n]: t for n, t in c.textures.items() if n in called}
         warnings += c.warnings

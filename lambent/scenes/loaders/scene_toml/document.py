@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +13,19 @@ import numpy as np
 from pydantic import ValidationError
 
 from lambent.core.camera import overview
-from lambent.core.ceilings import SCENE_TOML_BYTES, TOML_LEVELS
 from lambent.core.errors import UserError, invalid
 from lambent.core.geometry import triangle_areas
-from lambent.core.inputs import read_bytes, read_head
 from lambent.core.plain import Triple
-from lambent.materials.document import Material, load_material, material_from
+from lambent.materials.document import Material, material_from
 from lambent.scenes.geometry import transformed
 from lambent.scenes.ies import read_ies
 from lambent.scenes.light_groups import SKY, SUN, names_of_lights
-from lambent.scenes.loaders.contents import DAYLIGHT, Contents
+from lambent.scenes.loaders.contents import DAYLIGHT, Contents, lights_that_stay
 from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.assembly import assembled, assigned, check_material, fitting
 from lambent.scenes.loaders.scene_toml.lamps import IesSection, coloured
+from lambent.scenes.loaders.scene_toml.material_files import material_of_file
 from lambent.scenes.loaders.scene_toml.schema import (
     GeometrySection,
     ImageSection,
@@ -35,6 +33,8 @@ from lambent.scenes.loaders.scene_toml.schema import (
     SceneDocument,
     known_keys,
 )
+from lambent.scenes.loaders.scene_toml.text import toml_of
+from lambent.scenes.loaders.scene_toml.variants import variants_told
 from lambent.scenes.scene import (
     Environment,
     ImageEnvironment,
@@ -48,8 +48,8 @@ from lambent.scenes.scene import (
     SceneObject,
     bounds_of,
 )
+from lambent.scenes.variants import with_variants
 
-_DEEP_KEY = re.compile(rb"""(?<![\w"'.-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){9,}""")
 ReadGeometry = Callable[[str, Path, SceneFiles], Contents]  # name as written, the scene.toml, files below its folder
 
 
@@ -74,16 +74,21 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
     objects, centres, planes, light_fields = _apply(document, objects, path)
     for o in objects:
         check_material(o.material, materials, path, f"objects.{o.name}.material")
+    sets = [c.variants for c in contents]
+    dressings = {
+        name: _apply(document, assigned(document.assign, worn.objects, materials, path)[0], path)[0]
+        for name, worn in ((name, assembled(contents, name, path)) for name in dict.fromkeys(chain(*sets)))
+    }
     if isinstance(environment, ImageEnvironment):
         files.use(environment.file)
     cameras = tuple(c.camera(c.name) for c in document.cameras) or tuple(v for c in contents for v in c.cameras)
     lights = (*(light for c in contents for light in c.lights), *_lights(document, path, files))
-    notes = (*whole.warnings, *unfit, *missing)
+    notes = (*whole.warnings, *unfit, *missing, *lights_that_stay(objects, dressings))
     if environment is None and not lights and not any(any(o.emission) for o in objects):
         environment, notes = DAYLIGHT, (*notes, "nothing in it emits light: it gets daylight")
     _check_names([c.name for c in cameras], path, "cameras")
     _check_names([p.name for p in document.paths], path, "paths")
-    return Scene(
+    scene = Scene(
         name=document.name,
         objects=objects,
         materials=materials,
@@ -104,6 +109,13 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         light_groups=_light_groups(document, objects, lights, path),
     )
 
+    def read_material(name: str, field: str) -> Material:
+        return material_of_file(name, field, path, files)
+
+    worn = {name: [o.material for o in worn] for name, worn in dressings.items()}
+    told = variants_told(document.variants, worn, scene, read_material, path)
+    return replace(with_variants(scene, told), sources=tuple(files.sources))
+
 
 def _there(document: SceneDocument, path: Path, files: SceneFiles) -> tuple[list[str | GeometrySection], list[str]]:
     """The geometry files that are there, and a note of each that is not; a `UserError` where none is."""
@@ -119,15 +131,8 @@ def _there(document: SceneDocument, path: Path, files: SceneFiles) -> tuple[list
 
 
 def _parse(path: Path) -> SceneDocument:
-    content = read_bytes(path, SCENE_TOML_BYTES)
-    deepest = max((key[0].count(b".") for key in _DEEP_KEY.finditer(content)), default=0)
-    TOML_LEVELS.check(deepest, file=path)  # the parser's time grows with their square
     try:
-        data = tomllib.loads(content.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise UserError(f"not a TOML document ({error})", file=path) from error
-    try:
-        return SceneDocument.model_validate(data)
+        return SceneDocument.model_validate(toml_of(path))
     except ValidationError as error:
         raise invalid(error, path, known_keys()) from error
 
@@ -166,9 +171,7 @@ def _materials(document: SceneDocument, path: Path, files: SceneFiles) -> dict[s
             field = f"materials.{name}.file"
             if not isinstance(table["file"], str):
                 raise UserError("is not a file name", file=path, field=field, got=table["file"])
-            source = files.path(table["file"], path, field)
-            materials[name] = _material_of_file(source, field, path).model_copy(update={"name": name})
-            files.use(source)
+            materials[name] = material_of_file(table["file"], field, path, files).model_copy(update={"name": name})
         else:
             materials[name] = material_from({"name": name, **table}, where)
     return materials
@@ -181,21 +184,6 @@ def _measured(
     for name in document.measured:
         check_material(name, materials, path, f"measured.{name}")
     return {name: files.path(file, path, f"measured.{name}") for name, file in document.measured.items()}
-
-
-def _material_of_file(source: Path, field: str, path: Path) -> Material:
-    """The material of a document; a `UserError` if the file is a measurement, which has to be fitted first."""
-    from lambent.materials.measured.registry import is_known
-
-    if source.is_file() and not _begins_as_json(source) and is_known(source):
-        fitted = source.with_suffix(".json").name
-        hint = f"fit it first: lambent fit {source.name} -o {fitted}, then file = {fitted!r}"
-        raise UserError("is a measurement, not a material", file=path, field=field, got=source.name, hint=hint)
-    return load_material(source)
-
-
-def _begins_as_json(path: Path) -> bool:
-    return read_head(path, 64).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
 
 
 def _apply(

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, field_validator, model_validator
 
 from lambent.core.camera import Camera, CameraPath
+from lambent.core.ceilings import VARIANTS
 from lambent.core.exposure import exposure_of
 from lambent.core.light_field import LEAST_TEXELS, MOST_POINTS, MOST_TEXELS
 from lambent.core.surroundings import Axis, Layout
@@ -213,6 +214,15 @@ class LightGroupSection(Section):
         return LightGroup(self.name, self.members)
 
 
+class VariantSection(Section):
+    """Other looks of materials, by name; other materials of objects, by pattern; a mix of light groups."""
+
+    name: Annotated[str, Field(min_length=1, max_length=80)]
+    materials: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    objects: dict[str, str] = Field(default_factory=dict)
+    light: dict[str, str | NotNegative] = Field(default_factory=dict)
+
+
 EnvironmentSection = SunSkySection | ImageSection | ConstantSection | ComputedSection
 
 
@@ -234,6 +244,7 @@ class SceneDocument(Section):
     objects: dict[str, ObjectSection] = Field(default_factory=dict)
     lights: tuple[Annotated[LightSection, Field(discriminator="kind")], ...] = ()
     light_groups: Annotated[tuple[LightGroupSection, ...], Field(max_length=MOST_GROUPS - 1)] = ()
+    variants: Annotated[tuple[VariantSection, ...], Field(max_length=VARIANTS.most)] = ()
     cameras: tuple[CameraSection, ...] = ()
     reflectors: tuple[ReflectorSection, ...] = ()
     paths: tuple[PathSection, ...] = ()

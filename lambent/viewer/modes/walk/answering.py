@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress
 from lambent.materials.document import Material
+from lambent.realtime.answer_shown import answered
 from lambent.realtime.answering import AnsweredLight, Lit
-from lambent.realtime.cube_mips import finite
+from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.resources import light_layers
@@ -25,8 +26,6 @@ from lambent.store.store import Store
 from lambent.viewer.work import Work
 
 WITHOUT = "the light of other surfaces stays as baked: this store has no answer (`lambent bake --only answer`)"
-
-WITH_GROUPS = "the light of other surfaces stays as baked: this store has light groups to mix instead"
 
 
 @dataclass
@@ -48,8 +47,11 @@ class Answering:
 
 @dataclass(frozen=True, eq=False)
 class _Maps:
+    """`groups` are mixed where light is sorted so; else `layers` are shown, and probes follow."""
+
     light: Lit
-    layers: NDArray[np.float16]
+    layers: NDArray[np.float16] | None
+    groups: GroupArrays | None
     likely_error: float | None
 
 
@@ -62,13 +64,12 @@ class AnsweringLight:
         self._of: Mapping[str, Material] = {}
         self._work: Work | None = None
         self._probes_of: Lit | None = None  # whose probes are to come
+        self._probing: Lit | None = None  # whose probes are being made
         self._as_baked: dict[str, ProbeLight] | None = None  # by object with a probe, before the first edit
         self._users: dict[str, list[int]] = {}  # numbers of the objects that show each
-        shown.possible = has_answer(store) and renderer.scene.groups is None  # a mix and an edit change the same light
+        shown.possible = has_answer(store)
         if shown.possible:
             shown.said = "light of other surfaces: as baked"
-        elif renderer.scene.groups is not None:
-            shown.said = WITH_GROUPS
 
     def another(self, renderer: Renderer, shown: Answering) -> AnsweringLight:
         """The same for another renderer of the scene; what was read of the store is shared."""
@@ -87,9 +88,10 @@ class AnsweringLight:
             return
         wanted = edited if self._shown.on else {}
         if self._work is not None and self._work.poll():
-            self._work = None
-        if wanted != self._of and self._work is not None and self._probes_of is not None:
-            self._work.cancel()  # probes of an edit before; what is done of them stays until the next
+            self._work = self._probing = None
+        if wanted != self._of and self._work is not None and self._probing is not None:
+            self._work.cancel()  # probes of an edit before: begun anew where that edit comes back
+            self._probes_of, self._probing = self._probing, None
         if self._work is not None:
             return
         if wanted != self._of:
@@ -110,15 +112,20 @@ class AnsweringLight:
         """In the thread: the light maps of edited materials."""
         if self._answer is None:
             self._answer = AnsweredLight(self._renderer.scene, read_answer(self._store))
-        light = self._answer.lit(edited)
-        layers = light_layers(*self._answer.maps(light))
-        return _Maps(light, layers, None if light.is_baked else self._answer.likely_error(light))
+        light, mixer = self._answer.lit(edited), self._renderer.mixer
+        off = None if light.is_baked else self._answer.likely_error(light, mixer.factors)
+        groups = self._answer.groups(light)
+        return _Maps(light, None if groups else light_layers(*self._answer.maps(light)), groups, off)
 
     def _show_maps(self, maps: _Maps) -> None:
-        self._renderer.resources.show_light_map(list(maps.layers))
-        self._renderer.resources.light_version += 1
         self._shown.likely_error = maps.likely_error
-        self._probes_of = maps.light
+        if maps.groups is not None:  # the mixer makes light maps and probes of them
+            self._renderer.mixer.answer(maps.groups)
+        elif maps.layers is not None:
+            self._renderer.resources.answers = not maps.light.is_baked
+            self._renderer.resources.show_light_map(list(maps.layers))
+            self._probes_of = maps.light
+        self._renderer.resources.light_version += 1
 
     def _begin_probes(self, light: Lit) -> None:
         answer, resources = self._answer, self._renderer.resources
@@ -144,14 +151,7 @@ class AnsweringLight:
                     item.relight(made, item.emission)
             resources.light_version += 1
 
-        self._work = Work(run, show, self._failed)
+        self._work, self._probing = Work(run, show, self._failed), light
 
     def _failed(self, error: UserError) -> None:
         self._shown.possible, self._shown.said = False, f"the light of other surfaces stays as baked: {error}"
-
-
-def answered(baked: ProbeLight, answer: AnsweredLight, name: str, light: Lit) -> ProbeLight:
-    """A probe's light in other light of the surfaces that it sees."""
-    change = answer.probe_change(name, light)
-    radiance = np.maximum(finite(baked.probe.radiance)[0] + change, 0)
-    return baked.relit(radiance, answer.probe_irradiance(name, change))

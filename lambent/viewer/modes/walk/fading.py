@@ -8,6 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from lambent.core.camera import Camera
 from lambent.core.light_mix import Factors
 from lambent.materials.document import Material
+from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.resources import SceneResources
 from lambent.viewer.modes.walk.lanes import Lane
 from lambent.viewer.modes.walk.rebaked_light import Rebaked, Step, probe_users, steps
@@ -29,7 +30,7 @@ class Fade:
         self.lane, self.done, self._light, self._rebaked = lane, False, dict(light), rebaked
         self._materials: Mapping[str, Material] = lane.room.materials
         resources, scene = self._resources, lane.renderer.scene
-        self._before = list(resources.light_layers), [item.light for item in resources.objects]
+        self._before = list(resources.light_layers), [item.light for item in resources.objects], resources.answers
         owners = probe_users(scene, resources, range(len(resources.objects)))
         self.left = tuple(name for name in owners if name not in rebaked.scene.probes)
         self._steps = steps(rebaked, scene, resources, light, camera, size)
@@ -41,13 +42,13 @@ class Fade:
         return self.lane.renderer.resources
 
     @property
-    def _mixes(self) -> bool:
-        """Whether the scene has light groups, and the bake, too."""
-        return self.lane.renderer.scene.groups is not None and self._rebaked.scene.groups is not None
+    def _groups(self) -> GroupArrays | None:
+        """Light by group of the bake, where the scene has light groups, too."""
+        return None if self.lane.renderer.scene.groups is None else self._rebaked.scene.groups
 
     def serves(self, lane: Lane, light: Factors) -> bool:
         """Whether this is the light of what the lane shows; once it is there, mixes of its light groups are, too."""
-        same_mix = light == self._light or (self.done and self._mixes)
+        same_mix = light == self._light or (self.done and self._groups is not None)
         return lane is self.lane and lane.room.materials == self._materials and same_mix
 
     def step(self) -> None:
@@ -57,22 +58,26 @@ class Fade:
         upload = self._next.result()
         if upload is not None:
             upload(self._resources)
+            self._resources.answers = True  # light fields have the light of the first bake
             self._resources.light_version += 1
             self._next = self._thread.submit(next, self._steps, None)
             return
         self.done = True
         self._thread.shutdown()
-        if self._mixes:
-            self.lane.renderer.mixer.light_from(self._rebaked.scene)
+        if (groups := self._groups) is not None:
+            self.lane.renderer.mixer.answer(groups)
 
     def end(self, *, answers: bool) -> None:
         """Take it out of the picture again; where `answers`, other light is about to come by itself."""
         self._thread.shutdown(cancel_futures=True)
-        if self._mixes:
-            self.lane.renderer.mixer.light_from(self.lane.renderer.scene)
-        elif not answers:
-            layers, lights = self._before
-            self._resources.show_light_map(layers)
-            for item, light in zip(self._resources.objects, lights, strict=True):
-                item.relight(light, item.emission)
-            self._resources.light_version += 1
+        if answers:
+            return
+        mixer, own = self.lane.renderer.mixer, self.lane.renderer.scene.groups
+        if own is not None:
+            mixer.answer(own)
+            return
+        layers, lights, self._resources.answers = self._before
+        self._resources.show_light_map(layers)
+        for item, light in zip(self._resources.objects, lights, strict=True):
+            item.relight(light, item.emission)
+        self._resources.light_version += 1

@@ -1,0 +1,59 @@
+"""Brings light that answers edited materials onto the GPU, all at once: light maps, then probes.
+
+Light that is sorted by group goes through the renderer's mixer, which mixes it before the next frame.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from lambent.realtime.answering import AnsweredLight, Lit
+from lambent.realtime.cube_mips import finite
+from lambent.realtime.probe_light import ProbeLight
+from lambent.realtime.renderer import Renderer
+from lambent.realtime.resources import light_layers
+
+
+def answered(baked: ProbeLight, answer: AnsweredLight, name: str, light: Lit) -> ProbeLight:
+    """A probe's light in other light of the surfaces that it sees."""
+    change = answer.probe_change(name, light)
+    radiance = np.maximum(finite(baked.probe.radiance)[0] + change, 0)
+    return baked.relit(radiance, answer.probe_irradiance(name, change))
+
+
+class AnswerShown:
+    """The light of a renderer's scene for edited materials; nobody else changes the renderer's light meanwhile."""
+
+    def __init__(self, renderer: Renderer, answer: AnsweredLight) -> None:
+        self._renderer, self._answer = renderer, answer
+        self._shown = answer.as_baked
+        self._baked_probes = {name: renderer.resources.light_of(name) for name in answer.probes}
+        lights = [item.light for item in renderer.resources.objects]
+        self._users = {
+            name: [k for k, one in enumerate(lights) if one is light] for name, light in self._baked_probes.items()
+        }
+
+    def show(self, light: Lit) -> None:
+        """Show this light from the next frame on."""
+        if light is self._shown:
+            return
+        self._shown = light
+        groups = self._answer.groups(light)
+        if groups is not None:
+            self._renderer.mixer.answer(groups)
+            return
+        resources = self._renderer.resources
+        resources.answers = not light.is_baked
+        resources.show_light_map(list(self._layers if light.is_baked else light_layers(*self._answer.maps(light))))
+        for name, baked in self._baked_probes.items():
+            made = baked if light.is_baked else answered(baked, self._answer, name, light)
+            for item in (resources.objects[k] for k in self._users[name]):
+                item.relight(made, item.emission)
+        resources.light_version += 1
+
+    @cached_property
+    def _layers(self) -> np.ndarray:
+        """Light maps as baked."""
+        return light_layers(*self._answer.maps(self._answer.as_baked))

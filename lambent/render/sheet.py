@@ -1,0 +1,136 @@
+"""Contact sheets: all variants of a scene from one view, with their names beneath."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.camera import Camera
+from lambent.core.errors import UserError
+from lambent.core.images import check_writable, write_shown
+from lambent.core.light_mix import LightMix
+from lambent.core.plain import printable
+from lambent.core.progress import Progress, part_of, silent
+from lambent.render.images import PATH_TRACER, Settings
+from lambent.render.output import DEFAULT, Note, Rendered, displayed_as, ignore, images, opened_with_views, view_of
+from lambent.scenes.scene import Variant
+from lambent.scenes.variants import variant_named
+from lambent.store.answer import has_answer
+from lambent.store.light_groups import light_groups
+from lambent.store.store import Store
+from lambent.store.views import read_views
+
+AS_BAKED = "as baked"
+MOST_PIXELS = 1 << 27  # of a sheet
+LEAST_INK_PX = 14  # height of the letters
+PAPER, INK = (255, 255, 255), (30, 30, 30)
+STAYS = "light as baked"
+
+
+def sheet(
+    store: Store | Path | str,
+    file: Path | str,
+    camera: Camera | str | None = None,
+    settings: Settings = DEFAULT,
+    *,
+    scene: str | None = None,
+    note: Note = ignore,
+    progress: Progress = silent,
+) -> Rendered:
+    """Draw every variant of a store's scene from one view into one picture.
+
+    Parameters
+    ----------
+    file : path
+        .png.
+    settings : Settings
+        As of a still; the size is that of each picture. All are displayed with the exposure of the first.
+
+    The other parameters are those of `output.still`.
+
+    Raises
+    ------
+    UserError
+        Where the scene has no variants, the sheet would be too large, or as `output.still` raises it.
+    """
+    began, file = time.perf_counter(), Path(file)
+    check_writable(file, (".png",))
+    opened, record = opened_with_views(store)
+    if not record.variants:
+        variant_named((), "all of them", "--variants")
+    variants = with_the_baked_state(record.variants)
+    columns, rows = shape_of(len(variants), settings.width / settings.height)
+    pixels = columns * rows * settings.width * settings.height
+    if pixels > MOST_PIXELS:
+        got, hint = f"{len(variants)} of {settings.width}x{settings.height}", "choose a smaller --size"
+        raise UserError("the sheet is too large", field="--variants", got=got, hint=hint)
+    view = view_of(record, camera)
+    saved = read_views(opened.folder).lights.get(view.name, LightMix()) if camera is not None else LightMix()
+    drawn = images(opened, replace(settings, variant=""), scene=scene, note=note)
+    pictures, names = [], []
+    for number, variant in enumerate(variants):
+        part = part_of(progress, number / len(variants), (number + 1) / len(variants), variant.name)
+        lit = variant if variant.light.groups else replace(variant, light=saved)
+        shown, stays = _as_possible(lit, opened, settings, note)
+        drawn.wear(shown)
+        pictures.append(drawn.displayed(view, part))
+        names.append(f"{variant.name} ({STAYS})" if stays else variant.name)
+    picture = laid_out(pictures, names, columns)
+    write_shown(file, picture)
+    seconds, said = time.perf_counter() - began, displayed_as(file, drawn)
+    height, width = picture.shape[:2]
+    return Rendered(file, width, height, settings.integrator, len(pictures), seconds, **said)
+
+
+def with_the_baked_state(variants: Sequence[Variant]) -> list[Variant]:
+    """The variants, and before them the scene as it was baked, unless one of them is that."""
+    is_there = any(not one.looks and not one.light.groups for one in variants)
+    return [*variants] if is_there else [Variant(AS_BAKED), *variants]
+
+
+def _as_possible(variant: Variant, store: Store, settings: Settings, note: Note) -> tuple[Variant, bool]:
+    """The variant as the store can show it, and whether light that it asks for stays as baked."""
+    if settings.integrator == PATH_TRACER:
+        return variant, bool(variant.light.groups)
+    stays = bool(variant.looks) and not has_answer(store)
+    missing = sorted(set(variant.light.groups) - {group.name for group in light_groups(store)})
+    if settings.light is None and missing:
+        note(f"{variant.name}: its mix is left out: the store has no light group {', '.join(missing)}")
+        return replace(variant, light=LightMix()), True
+    return variant, stays
+
+
+def shape_of(count: int, aspect: float) -> tuple[int, int]:
+    """Columns and rows of `count` pictures, so that the sheet is about as wide as a page, 4:3, with few empty places.
+
+    `aspect` is width over height of each.
+    """
+    fits = [(columns, math.ceil(count / columns)) for columns in range(1, count + 1)]
+    return min(fits, key=lambda c: abs(math.log(c[0] * aspect / c[1] * 3 / 4)) + 0.5 * (c[0] * c[1] / count - 1))
+
+
+def laid_out(pictures: Sequence[NDArray[np.uint8]], names: Sequence[str], columns: int) -> NDArray[np.uint8]:
+    """One picture of pictures (H, W, 3) of one size, row by row, with names beneath them, cut where they are long."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    height, width = pictures[0].shape[:2]
+    size = max(LEAST_INK_PX, height // 20)
+    gap, caption = size // 2, 2 * size
+    rows = math.ceil(len(pictures) / columns)
+    page = Image.new("RGB", (columns * (width + gap) + gap, rows * (height + caption) + gap), PAPER)
+    draw, font = ImageDraw.Draw(page), ImageFont.load_default(size)
+    for number, (picture, name) in enumerate(zip(pictures, names, strict=True)):
+        row, column = divmod(number, columns)
+        x, y = gap + column * (width + gap), gap + row * (height + caption)
+        page.paste(Image.fromarray(picture), (x, y))
+        words = printable(name)
+        while draw.textlength(words, font) > width and len(words) > 1:
+            words = f"{words.removesuffix('...')[:-1]}..."
+        draw.text((x + width / 2, y + height + caption / 2), words, font=font, fill=INK, anchor="mm")
+    return np.asarray(page, np.uint8)

@@ -1,0 +1,82 @@
+"""Other materials and their light in images of one renderer: variants, colours, and what these change with time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+
+from lambent.core.plain import Triple
+from lambent.materials.document import Material
+from lambent.materials.recolour import recoloured
+from lambent.realtime.answer_shown import AnswerShown
+from lambent.realtime.answering import AnsweredLight
+from lambent.realtime.group_arrays import FIELDS_STAY
+from lambent.realtime.renderer import Renderer
+from lambent.scenes.scene import Look
+from lambent.scenes.variants import looks_as_loaded
+from lambent.store.answer import NO_ANSWER, has_answer, read_answer
+from lambent.store.contract import needs_probe
+from lambent.store.store import Store
+
+ESTIMATED = "light and probes of other materials are estimated from the bake, not baked again"
+
+
+class Wearing:
+    """What a renderer's scene wears: `materials` in the place of the store's, by name, for the states of frames.
+
+    Attributes
+    ----------
+    answers : bool
+        Whether light follows other materials; where it does not, a note says so once.
+    """
+
+    def __init__(self, store: Store, renderer: Renderer, note: Callable[[str], None]) -> None:
+        self._store, self._renderer, self._note = store, renderer, note
+        self._noted: set[str] = set()
+        self.answers = has_answer(store)
+        self.materials: dict[str, Material] = {}
+        self._looks: dict[str, Look] = {}
+
+    def wear(self, looks: Mapping[str, Look], colours: Mapping[str, Triple]) -> None:
+        """Show materials with these looks, then with these diffuse colours, and the light that answers them.
+
+        All that are left out are as baked.
+        """
+        scene = self._renderer.scene
+        loaded = looks_as_loaded(scene.record.materials, scene.textures)
+        worn = {name: look for name, look in looks.items() if look != loaded[name]}
+        documents = {name: look.material for name, look in worn.items()}
+        materials = {**documents, **recoloured({**scene.record.materials, **documents}, colours)}
+        if (worn, materials) == (self._looks, self.materials):
+            return
+        if worn != self._looks:
+            self._renderer.resources.dress(worn)
+        self._looks, self.materials = worn, materials
+        if materials:
+            self._tell(materials)
+        if self.answers:
+            answer, shown = self._shown
+            shown.show(answer.lit(materials))
+
+    @cached_property
+    def _shown(self) -> tuple[AnsweredLight, AnswerShown]:
+        answer = AnsweredLight(self._renderer.scene, read_answer(self._store))
+        return answer, AnswerShown(self._renderer, answer)
+
+    def _tell(self, materials: Mapping[str, Material]) -> None:
+        """Note what is estimated, and what is not known of these materials."""
+        scene = self._renderer.scene
+        self._once(ESTIMATED if self.answers else f"light and probes stay as baked: {NO_ANSWER}")
+        if scene.light_fields:
+            self._once(FIELDS_STAY)
+        for name, material in materials.items():
+            given = scene.record.materials[name]
+            if needs_probe(material) and not needs_probe(given):
+                self._once(f"{name} was matte in the bake: what it mirrors now is from the nearest probe")
+            if material.transmits and not given.transmits and scene.irradiance_back is None:
+                self._once(f"{name} let no light through in the bake: its far side stays dark")
+
+    def _once(self, text: str) -> None:
+        if text not in self._noted:
+            self._noted.add(text)
+            self._note(text)

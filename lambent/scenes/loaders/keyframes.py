@@ -1,0 +1,141 @@
+"""Keyframes of a film: states of materials and of the mix of light groups at times, from a file beside a store."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError
+
+from lambent.core.discovery import known
+from lambent.core.errors import UserError, invalid
+from lambent.core.inputs import foreign_bytes
+from lambent.core.light_mix import AS_BAKED, GroupMix, LightMix, MixTrack
+from lambent.materials.document import Material
+from lambent.scenes.loaders.scene_files import SceneFiles
+from lambent.scenes.loaders.scene_toml.looks import looks_told, mixes_told
+from lambent.scenes.loaders.scene_toml.material_files import material_of_file
+from lambent.scenes.loaders.scene_toml.sections import NotNegative, Section
+from lambent.scenes.loaders.scene_toml.text import toml_of
+from lambent.scenes.look_track import LookTrack
+from lambent.scenes.scene import Look, Variant
+from lambent.scenes.variants import variant_named
+
+MOST_KEYS = 1000
+
+
+class _Key(Section):
+    """A moment: all as baked, or as in a variant, or the light as saved with a view; then what is told by name."""
+
+    at: NotNegative
+    as_baked: bool = False
+    variant: str | None = None
+    view: str | None = None
+    materials: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    light: dict[str, str | NotNegative] = Field(default_factory=dict)
+
+
+class _Document(Section):
+    format: Literal["lambent-keyframes"]
+    version: Literal[1]
+    keys: Annotated[tuple[_Key, ...], Field(min_length=1, max_length=MOST_KEYS)]
+
+
+@dataclass(frozen=True)
+class Known:
+    """What keyframes may name: looks of the store's materials, its variants, and mixes saved with views."""
+
+    looks: Mapping[str, Look]
+    variants: tuple[Variant, ...] = ()
+    mixes: Mapping[str, LightMix] | None = None
+
+
+@dataclass(frozen=True)
+class Keyframes:
+    """What changes with time: the mix of light, and materials."""
+
+    light: MixTrack
+    looks: LookTrack
+
+
+@dataclass(frozen=True)
+class _Moment:
+    """A key as it is told: `whole_looks` and `whole_light` say whether what it does not name is as baked."""
+
+    at: float
+    looks: dict[str, Look]
+    light: dict[str, GroupMix]
+    whole_looks: bool
+    whole_light: bool
+
+
+def read_keyframes(path: Path, given: Known) -> Keyframes:
+    """The keyframes of a file.
+
+    Each material and each light group has its own keys: where a key does not name one, it goes on changing from the key
+    before to the next that does. A key with a variant, or with `as_baked`, names all of them; one with a view, all
+    light.
+
+    Raises
+    ------
+    UserError
+        Where the file is damaged, names what is not there, or its times do not grow.
+    """
+    with foreign_bytes("keyframes", path):
+        try:
+            document = _Document.model_validate(toml_of(path))
+        except ValidationError as error:
+            raise invalid(error, path, {*_Key.model_fields, *_Document.model_fields}) from error
+    for first, second in pairwise(document.keys):
+        if second.at <= first.at:
+            raise UserError("times do not grow", file=path, field="keys.at", got=f"{first.at:g}, {second.at:g}")
+    files = SceneFiles(path)
+
+    def read(name: str, field: str) -> Material:
+        return material_of_file(name, field, path, files)
+
+    moments = [_moment(key, number, given, read, path) for number, key in enumerate(document.keys)]
+    return Keyframes(MixTrack(_light_keys(moments)), LookTrack(_look_keys(moments, given.looks)))
+
+
+def _moment(key: _Key, number: int, given: Known, read: Callable[[str, str], Material], path: Path) -> _Moment:
+    where = f"keys.{number}"
+    if sum((key.as_baked, key.variant is not None)) > 1:
+        raise UserError("is as baked, and a variant", file=path, field=where, got=key.variant)
+    looks, light = dict[str, Look](), dict[str, GroupMix]()
+    if key.variant is not None:
+        variant = variant_named(given.variants, key.variant, f"{path.name}: {where}.variant")
+        looks, light = dict(variant.looks), dict(variant.light.groups)
+    if key.view is not None:
+        light = dict((given.mixes or {})[_known_view(key.view, given, path, where)].groups)
+    present = {**given.looks, **looks}
+    looks |= looks_told(key.materials, present, read, path, f"{where}.materials")
+    light |= mixes_told(key.light, path, f"{where}.light")
+    whole = key.as_baked or key.variant is not None
+    return _Moment(key.at, looks, light, whole, whole or key.view is not None)
+
+
+def _known_view(name: str, given: Known, path: Path, where: str) -> str:
+    if not given.mixes:
+        hint = "save one in the window, with its mix"
+        raise UserError("no view was saved with a mix of the light", file=path, field=f"{where}.view", hint=hint)
+    return known("saved view", name, given.mixes, file=path, field=f"{where}.view")
+
+
+def _light_keys(moments: list[_Moment]) -> dict[str, tuple[tuple[float, GroupMix], ...]]:
+    names = dict.fromkeys(name for moment in moments for name in moment.light)
+    return {
+        name: tuple((m.at, m.light.get(name, AS_BAKED)) for m in moments if m.whole_light or name in m.light)
+        for name in names
+    }
+
+
+def _look_keys(moments: list[_Moment], loaded: Mapping[str, Look]) -> dict[str, tuple[tuple[float, Look], ...]]:
+    names = dict.fromkeys(name for moment in moments for name in moment.looks)
+    return {
+        name: tuple((m.at, m.looks.get(name, loaded[name])) for m in moments if m.whole_looks or name in m.looks)
+        for name in names
+    }

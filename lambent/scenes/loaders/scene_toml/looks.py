@@ -1,0 +1,86 @@
+"""Looks of materials and mixes of light as a scene.toml and a file of keyframes tell them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from lambent.core.errors import UserError
+from lambent.core.light_mix import GroupMix, mix_of
+from lambent.materials.document import Material, material_from
+from lambent.materials.recolour import hex_colour
+from lambent.scenes.loaders.scene_toml.assembly import check_material
+from lambent.scenes.scene import Look
+
+USE, FILE, COLOUR = "use", "file", "colour"
+ReadMaterial = Callable[[str, str], Material]  # name of a file as written, and the field that names it
+
+
+def looks_told(
+    tables: Mapping[str, Mapping[str, Any]], looks: Mapping[str, Look], read: ReadMaterial, path: Path, where: str
+) -> dict[str, Look]:
+    """The looks that tables tell, by the names of the materials whose place they take.
+
+    Parameters
+    ----------
+    looks : mapping
+        Of all materials there are.
+    where : str
+        The field of `path` that holds the tables, for errors.
+    """
+    found = {}
+    for name, table in tables.items():
+        field = f"{where}.{name}"
+        check_material(name, {name: look.material for name, look in looks.items()}, path, field)
+        found[name] = _look(table, looks, name, read, path, field)
+    return found
+
+
+def mixes_told(light: Mapping[str, str | float], path: Path, where: str) -> dict[str, GroupMix]:
+    """The mixes of light groups that a table tells; which groups there are is known after the bake."""
+    found = {}
+    for name, value in light.items():
+        try:
+            found[name] = mix_of(str(value), str(value))
+        except UserError as error:
+            expected = "an intensity, off, a temperature as 2700K, #rrggbb, or several with commas"
+            raise UserError(error.message, file=path, field=f"{where}.{name}", got=value, expected=expected) from error
+    return found
+
+
+def _look(
+    table: Mapping[str, Any], looks: Mapping[str, Look], name: str, read: ReadMaterial, path: Path, field: str
+) -> Look:
+    """Another material of the scene, another document, or the same material with other numbers."""
+    for key in (USE, FILE):
+        if key in table and len(table) > 1:
+            raise UserError(f"says more than {key}", file=path, field=field, got=sorted({*table} - {key})[0])
+        if not isinstance(table.get(key, ""), str):
+            raise UserError("is not a name", file=path, field=f"{field}.{key}", got=table[key])
+    if USE in table:
+        check_material(table[USE], {name: look.material for name, look in looks.items()}, path, f"{field}.{USE}")
+        return looks[table[USE]]
+    if FILE in table:
+        return Look(read(table[FILE], f"{field}.{FILE}"))
+    if not table:
+        expected = "use, file, colour, or keys of a material document"
+        raise UserError("says nothing", file=path, field=field, expected=expected)
+    now = looks[name]
+    numbers = dict(table)
+    if COLOUR in numbers:
+        if "kd" in numbers:
+            raise UserError("says its colour twice, by colour and kd", file=path, field=field)
+        numbers["kd"] = hex_colour(str(numbers[COLOUR]))
+        if numbers["kd"] is None:
+            raise UserError(
+                "not a colour", file=path, field=f"{field}.{COLOUR}", got=numbers[COLOUR], expected="#rrggbb"
+            )
+        del numbers[COLOUR]
+    return replace(now, material=material_from(_with_numbers(now.material, numbers), f"{path}: {field}"))
+
+
+def _with_numbers(material: Material, numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """A document with some of its keys replaced: where it was fitted to no longer says what it is."""
+    return {**material.model_dump(mode="json", exclude={"provenance"}), **numbers}

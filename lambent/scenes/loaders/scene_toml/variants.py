@@ -1,0 +1,70 @@
+"""The variants of a scene.toml: those of its geometry files, and its [[variants]], which may add to them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from lambent.core.errors import UserError
+from lambent.core.light_mix import LightMix
+from lambent.scenes.loaders.scene_toml.assembly import check_material, fitting
+from lambent.scenes.loaders.scene_toml.looks import ReadMaterial, looks_told, mixes_told
+from lambent.scenes.loaders.scene_toml.schema import VariantSection
+from lambent.scenes.scene import Scene
+from lambent.scenes.variants import Dressed, looks_as_loaded
+
+
+def variants_told(
+    sections: Sequence[VariantSection],
+    of_geometry: Mapping[str, Sequence[str]],
+    scene: Scene,
+    read: ReadMaterial,
+    path: Path,
+) -> list[Dressed]:
+    """The variants of a scene.toml.
+
+    Parameters
+    ----------
+    of_geometry : mapping
+        Variants of the geometry files: the material of each of the scene's objects.
+    read : callable
+        Reads a material's document.
+
+    Raises
+    ------
+    UserError
+        Where a section names what is not there, or says what cannot be.
+    """
+    for name, times in Counter(section.name for section in sections).items():
+        if times > 1:
+            raise UserError("name is used twice", file=path, field="variants", got=name)
+    described = {section.name: section for section in sections}
+    as_loaded, loaded = [o.material for o in scene.objects], looks_as_loaded(scene.materials, scene.textures)
+    told = []
+    for name in dict.fromkeys([*of_geometry, *described]):
+        worn = list(of_geometry.get(name, as_loaded))
+        section = described.get(name) or VariantSection(name=name)
+        worn = _exchanged(section, worn, scene, path)
+        looks = looks_told(section.materials, loaded, read, path, f"variants.{section.name}.materials")
+        told.append(Dressed(name, [{**loaded, **looks}[material] for material in worn], _mix(section, path)))
+    return told
+
+
+def _exchanged(section: VariantSection, worn: list[str], scene: Scene, path: Path) -> list[str]:
+    """The materials of objects, where the section exchanges some; later patterns win."""
+    names = [o.name for o in scene.objects]
+    for pattern, material in section.objects.items():
+        field = f"variants.{section.name}.objects.{pattern}"
+        check_material(material, scene.materials, path, field)
+        fitting(pattern, names, path, field)
+        worn = [material if fnmatchcase(name, pattern) else was for name, was in zip(names, worn, strict=True)]
+    return worn
+
+
+def _mix(section: VariantSection, path: Path) -> LightMix:
+    mix = LightMix()
+    for name, one in mixes_told(section.light, path, f"variants.{section.name}.light").items():
+        mix = mix.changed(name, one)
+    return mix

@@ -1,0 +1,108 @@
+"""Variants of a scene: other looks of its materials, and other mixes of its light, to choose from without a bake.
+
+A file says how each object looks in a variant; the scene keeps it by material, as light between surfaces is computed
+by material. So objects of one material that some variant shows in different ways get materials of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import count
+from typing import TypeVar
+
+from lambent.core.discovery import known
+from lambent.core.errors import UserError
+from lambent.core.light_mix import LightMix
+from lambent.materials.document import Material
+from lambent.scenes.scene import Look, MaterialTextures, Scene, Variant
+
+FIELD = "--variant"
+Kept = TypeVar("Kept")
+
+
+@dataclass(frozen=True)
+class Dressed:
+    """A variant as a file tells it: the look of each object, in the order of the scene's, and the mix of the light.
+
+    Objects of equal looks share one `Look`.
+    """
+
+    name: str
+    looks: Sequence[Look]
+    light: LightMix = field(default_factory=LightMix)
+
+
+def with_variants(scene: Scene, told: Sequence[Dressed]) -> Scene:
+    """The scene with variants; objects that need it get a material of their own, a copy of theirs under a new name."""
+    names, given, objects = _free_names(scene.materials), dict[tuple[object, ...], str](), []
+    for number, o in enumerate(scene.objects):
+        future = (o.material, *(id(one.looks[number]) for one in told))
+        if future not in given:
+            given[future] = names(o.material) if o.material in given.values() else o.material
+        objects.append(replace(o, material=given[future]))
+    copies = {own: str(future[0]) for future, own in given.items() if own != future[0]}
+    renamed = {own: scene.materials[of].model_copy(update={"name": own}) for own, of in copies.items()}
+    whole = replace(
+        scene, objects=tuple(objects), materials={**scene.materials, **renamed},
+        textures=_copied(scene.textures, copies), measured=_copied(scene.measured, copies),
+    )  # fmt: skip
+    return replace(whole, variants=tuple(Variant(one.name, _changed(whole, one), one.light) for one in told))
+
+
+def _free_names(taken: Collection[str]) -> Callable[[str], str]:
+    """Makes names that nobody has: NAME_2, NAME_3..."""
+    used = set(taken)
+
+    def free(name: str) -> str:
+        found = next(one for number in count(2) if (one := f"{name}_{number}") not in used)
+        used.add(found)
+        return found
+
+    return free
+
+
+def _copied(of_materials: Mapping[str, Kept], copies: Mapping[str, str]) -> dict[str, Kept]:
+    """What materials have, by name, for their copies as well."""
+    return {**of_materials, **{own: of_materials[of] for own, of in copies.items() if of in of_materials}}
+
+
+def _changed(scene: Scene, one: Dressed) -> dict[str, Look]:
+    """The looks of a variant by material, where they are others than the scene's."""
+    found, loaded = {}, looks_as_loaded(scene.materials, scene.textures)
+    for o, look in zip(scene.objects, one.looks, strict=True):
+        now = loaded[o.material]
+        same_document = now.material.model_copy(update={"name": look.material.name}) == look.material
+        if not (same_document and scene.textures.get(now.textures) is scene.textures.get(look.textures)):
+            found[o.material] = look
+    return found
+
+
+def looks_as_loaded(materials: Mapping[str, Material], textured: Collection[str]) -> dict[str, Look]:
+    """How materials look as they are loaded; `textured` are the names of those with textures."""
+    return {name: Look(material, name if name in textured else "") for name, material in materials.items()}
+
+
+def variant_named(variants: Iterable[Variant], name: str, field: str = FIELD) -> Variant:
+    """The variant of this name; a `UserError` that lists all of them where there is none."""
+    found = {variant.name: variant for variant in variants}
+    if not found:
+        hint = "describe them in the scene's [[variants]] and bake it again"
+        raise UserError("the store has no variants", field=field, got=name, hint=hint)
+    return found[known("variant", name, found, field=field)]
+
+
+def textures_worn(textures: Mapping[str, MaterialTextures], looks: Mapping[str, Look]) -> dict[str, MaterialTextures]:
+    """The textures of each material where some have other looks."""
+    changed = {name: textures.get(look.textures) for name, look in looks.items()}
+    return {name: found for name, found in {**textures, **changed}.items() if found is not None}
+
+
+def dressed(scene: Scene, variant: Variant) -> Scene:
+    """The scene with the materials of a variant; its light is as loaded."""
+    return replace(
+        scene,
+        materials={**scene.materials, **variant.materials},
+        textures=textures_worn(scene.textures, variant.looks),
+        measured={name: file for name, file in scene.measured.items() if name not in variant.looks},
+    )

@@ -1,0 +1,176 @@
+"""Variants of a scene in stills: their materials, textures and light."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.core.camera import Camera, CameraPath
+from lambent.core.errors import UserError
+from lambent.core.images import read_encoded, read_image
+from lambent.core.light_mix import GroupMix, LightMix, parse_light
+from lambent.render import Settings, film, sheet, still
+from lambent.render.sheet import laid_out, shape_of, with_the_baked_state
+from lambent.scenes.look_track import LookTrack
+from lambent.scenes.scene import Look, MaterialTextures, Texture, Variant
+from lambent.store.contract import scene_record, write_scene_record
+from lambent.store.store import Store
+from tests.bake.small_scenes import TINY, room_with_step
+from tests.viewer.small_store import MATERIALS, with_light_groups, write_small_store
+
+WITHIN = Camera("in", (1.4, 1.2, -1.4), (-0.8, 0.5, 0.0), fov_y_deg=70)
+SMALL = Settings(48, 32, integrator="rings")
+RED = Look(MATERIALS["plaster"].model_copy(update={"kd": (0.6, 0.0, 0.0)}))
+DIM = LightMix({name: GroupMix(intensity=0.5) for name in ("lamp", "sky", "sun")})
+VARIANTS = (Variant("red", {"plaster": RED}), Variant("dim", light=DIM))
+
+
+def add_variants(folder: Path, variants: tuple[Variant, ...]) -> Path:
+    store = Store.open(folder)
+    write_scene_record(store, scene_record(store).model_copy(update={"variants": variants}))
+    store.close()
+    return folder
+
+
+def image(store: Path, settings: Settings, tmp_path: Path, notes: list[str] | None = None) -> np.ndarray:
+    camera = None if scene_record(Store.open(store)).cameras else WITHIN
+    still(store, tmp_path / "a.exr", camera, settings, note=(notes if notes is not None else []).append)
+    found = read_image(tmp_path / "a.exr")
+    (tmp_path / "a.exr").unlink()
+    return found
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Path:
+    return add_variants(with_light_groups(write_small_store(tmp_path / "s")), VARIANTS)
+
+
+def test_a_store_without_an_answer_shows_the_material_and_says_the_rest(adapter: None, tmp_path: Path) -> None:
+    bare, notes = add_variants(write_small_store(tmp_path / "s"), VARIANTS), list[str]()
+    red = image(bare, replace(SMALL, variant="red"), tmp_path, notes)
+    assert red[-1, 0, 0] > 0 and red[-1, 0, 1] == 0 and any("stay as baked" in note for note in notes)
+    dim = image(bare, replace(SMALL, variant="dim"), tmp_path, notes)
+    assert np.array_equal(dim, image(bare, SMALL, tmp_path))
+    assert any("the mix of the variant is left out: the store has no light group lamp" in note for note in notes)
+    with pytest.raises(UserError, match=r"--variant: unknown variant; found rd; expected red, dim; did you mean 'red'"):
+        image(bare, replace(SMALL, variant="rd"), tmp_path)
+
+
+def test_a_variant_has_its_light_unless_another_is_given(adapter: None, store: Path, tmp_path: Path) -> None:
+    baked = image(store, SMALL, tmp_path)
+    dim = image(store, replace(SMALL, variant="dim"), tmp_path)
+    assert dim == pytest.approx(baked / 2, rel=6e-3, abs=2e-3)
+    given = image(store, replace(SMALL, variant="dim", light=parse_light(["sun=on"])), tmp_path)
+    assert given == pytest.approx(baked, rel=6e-3, abs=2e-3)
+
+
+def test_light_answers_a_variant_as_it_answers_the_same_colour(adapter: None, mi: object, tmp_path: Path) -> None:
+    scene = room_with_step()
+    colour = (0.5, 0.05, 0.05)
+    red = Look(scene.materials["grey"].model_copy(update={"kd": colour}))
+    marble = MaterialTextures(diffuse=Texture(np.full((2, 2, 3), 0.5, np.float16)))
+    whole = replace(scene, variants=(Variant("red", {"grey": red}),), textures={"unworn": marble},
+                    materials={**scene.materials, "unworn": scene.materials["grey"]})  # fmt: skip
+    baked = bake(whole, tmp_path / "s", quality=TINY)
+    baked.close()
+    by_variant = image(tmp_path / "s", replace(SMALL, variant="red"), tmp_path)
+    recoloured = image(tmp_path / "s", replace(SMALL, recolour={"grey": colour}), tmp_path)
+    assert np.array_equal(by_variant, recoloured)
+    plain = image(tmp_path / "s", SMALL, tmp_path)
+    assert by_variant.mean(axis=(0, 1))[1] < 0.7 * plain.mean(axis=(0, 1))[1]
+    add_variants(tmp_path / "s", (Variant("marble", {"grey": Look(scene.materials["grey"], "unworn")}),))
+    textured = image(tmp_path / "s", replace(SMALL, variant="marble", show="diffuse"), tmp_path)
+    assert 0.3 < textured.mean() / image(tmp_path / "s", replace(SMALL, show="diffuse"), tmp_path).mean() < 0.9
+
+
+def test_a_mix_and_other_colours_go_together(adapter: None, mi: object, tmp_path: Path) -> None:
+    bake(room_with_step(), tmp_path / "s", quality=TINY, light_groups="scene").close()
+    red = {"grey": (0.5, 0.05, 0.05)}
+    whole = image(tmp_path / "s", replace(SMALL, recolour=red), tmp_path)
+    half = image(tmp_path / "s", replace(SMALL, recolour=red, light=parse_light(["lamp=0.5"])), tmp_path)
+    assert half == pytest.approx(whole / 2, rel=6e-3, abs=2e-3)
+    assert whole.mean(axis=(0, 1))[1] < 0.7 * image(tmp_path / "s", SMALL, tmp_path).mean(axis=(0, 1))[1]
+
+
+def test_a_sheet_has_every_variant_and_its_name(adapter: None, store: Path, tmp_path: Path) -> None:
+    notes = list[str]()
+    done = sheet(store, tmp_path / "sheet.png", "front", replace(SMALL, exposure_ev=0.0), note=notes.append)
+    page = read_encoded(tmp_path / "sheet.png")
+    assert done.frames == 3 and page.shape[:2] == (done.height, done.width)
+    columns, _ = shape_of(3, 1.5)
+    places = [divmod(number, columns) for number in range(3)]
+    cells = [page[7 + y * 60 : 39 + y * 60, 7 + x * 55 : 55 + x * 55] for y, x in places]
+    for cell, settings in zip(
+        cells, (SMALL, replace(SMALL, variant="red"), replace(SMALL, variant="dim")), strict=True
+    ):
+        still(store, tmp_path / "a.png", "front", replace(settings, exposure_ev=0.0))
+        assert np.abs(cell - read_encoded(tmp_path / "a.png")).max() < 0.02
+    for y, x in places:
+        caption = page[39 + y * 60 : 67 + y * 60, 7 + x * 55 : 55 + x * 55]
+        assert caption.min() < 0.5 < caption.mean(), "letters on paper"
+    assert any("stay as baked" in note for note in notes), "the store has no answer"
+
+
+def test_names_and_shapes_of_sheets() -> None:
+    assert shape_of(1, 1.78) == (1, 1) and shape_of(4, 1.78) == (2, 2) and shape_of(9, 1.78) == (3, 3)
+    assert shape_of(12, 1.0) == (4, 3)
+    pictures = [np.full((40, 60, 3), 128, np.uint8)] * 3
+    page = laid_out(pictures, ["short", "a name that is much too long for its picture", "\x1b[31m"], 2)
+    assert page.shape == (2 * (40 + 28) + 7, 2 * (60 + 7) + 7, 3)
+    assert (page[:, :6] == 255).all() and (page[7 + 68 :, 74:] == 255).all(), "an empty place"
+    assert [one.name for one in with_the_baked_state(VARIANTS)] == ["as baked", "red", "dim"]
+    assert [one.name for one in with_the_baked_state((Variant("plain"), *VARIANTS))] == ["plain", "red", "dim"]
+
+
+def test_a_sheet_that_cannot_be_is_said(adapter: None, store: Path, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"--variants: the sheet is too large; found 3 of 10000x10000"):
+        sheet(store, tmp_path / "a.png", None, Settings(10000, 10000))
+    with pytest.raises(UserError, match=r"--variants: the store has no variants"):
+        sheet(write_small_store(tmp_path / "bare"), tmp_path / "a.png")
+    with pytest.raises(UserError, match=r"png"):
+        sheet(store, tmp_path / "a.exr")
+
+
+def frames(store: Path, folder: Path, text: str, settings: Settings, path: CameraPath | str) -> list[np.ndarray]:
+    """Two frames a second along a path, with keyframes."""
+    folder.mkdir()
+    (folder / "k.toml").write_text(f'format = "lambent-keyframes"\nversion = 1\n{text}')
+    film(store, folder / "f-#.exr", path, settings, fps=2, keyframes=folder / "k.toml")
+    return [read_image(file) for file in sorted(folder.glob("*.exr"))]
+
+
+def test_films_are_linear_in_the_mix_between_keyframes(adapter: None, store: Path, tmp_path: Path) -> None:
+    keys = '[[keys]]\nat = 0\nas_baked = true\n[[keys]]\nat = 2\nvariant = "dim"\n'
+    plain = frames(store, tmp_path / "plain", "[[keys]]\nat = 0\nas_baked = true", SMALL, "tour")
+    shown = frames(store, tmp_path / "shown", keys, SMALL, "tour")
+    shares = [a.mean() / b.mean() for a, b in zip(shown, plain, strict=True)]
+    assert shares == pytest.approx([1, 0.875, 0.75, 0.625, 0.5, 0.5], abs=0.01)
+    with pytest.raises(UserError, match=r"--light: the keyframes say the light"):
+        frames(store, tmp_path / "twice", keys, replace(SMALL, light=parse_light(["sun=off"])), "tour")
+
+
+def test_every_frame_of_changing_paint_is_a_still_of_that_paint(adapter: None, mi: object, tmp_path: Path) -> None:
+    bake(room_with_step(), tmp_path / "s", quality=TINY).close()
+    keys = (
+        "[[keys]]\nat = 0\nmaterials.grey.kd = [0.5, 0.5, 0.5]\n[[keys]]\nat = 1\nmaterials.grey.kd = [0.5, 0.1, 0.1]\n"
+    )
+    still_there = CameraPath("rest", (WITHIN, WITHIN), 1.5)
+    shown = frames(tmp_path / "s", tmp_path / "f", keys, replace(SMALL, samples=4), still_there)
+    for picture, green in zip(shown, (0.5, 0.3, 0.1), strict=True):
+        track = LookTrack({"grey": ((0.0, Look(room_with_step().materials["grey"].model_copy(
+            update={"kd": (0.5, green, green)}))),)})  # fmt: skip
+        expected, *_ = frames_of_track(tmp_path / "s", tmp_path / f"{green}", track, still_there)
+        assert picture == pytest.approx(expected, rel=2e-3, abs=1e-4)
+    assert shown[2].mean(axis=(0, 1))[1] < 0.5 * shown[0].mean(axis=(0, 1))[1]
+
+
+def frames_of_track(store: Path, folder: Path, track: LookTrack, path: CameraPath) -> list[np.ndarray]:
+    """Frames with looks that stay."""
+    folder.mkdir()
+    short = CameraPath(path.name, path.keys, 0.5)
+    film(store, folder / "f-#.exr", short, replace(SMALL, samples=4, looks=track), fps=2)
+    return [read_image(file) for file in sorted(folder.glob("*.exr"))]

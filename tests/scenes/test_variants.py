@@ -1,0 +1,130 @@
+"""Variants of scenes: what files say of them, and the materials and textures that objects then show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.core.light_mix import GroupMix
+from lambent.materials.document import Material
+from lambent.scenes import load_scene
+from lambent.scenes.geometry import patch
+from lambent.scenes.scene import Look, MaterialTextures, Scene, SceneObject, Texture
+from lambent.scenes.variants import Dressed, dressed, textures_worn, variant_named, with_variants
+
+HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
+PAINTED = """
+[materials.white]
+kd = 0.7
+[materials.gold]
+kd = 0.02
+lobes = [{ mx = 0.1, my = 0.1, r0 = [0.9, 0.7, 0.4] }]
+[assign]
+"*" = "white"
+"""
+GREY, GRAIN = Material(name="grey", kd=0.5), Material(name="grain", kd=(0.4, 0.3, 0.2))
+SQUARE = patch((0, 0, 0), (1, 0, 0), (0, 0, -1))
+
+
+def written(folder: Path, text: str) -> Path:
+    file = folder / "scene.toml"
+    file.write_text(HEAD + text)
+    return file
+
+
+def test_a_scene_toml_names_colours_numbers_documents_and_light(tmp_path: Path) -> None:
+    Material(name="copper", kd=(0.3, 0.1, 0.05)).save(tmp_path / "copper.json")
+    scene = load_scene(written(tmp_path, PAINTED + """
+[[variants]]
+name = "blue"
+materials.white.colour = "#0000ff"
+light = { sun = "off", lamp = "0.5,2700K", sky = 2 }
+[[variants]]
+name = "metal"
+materials.white = { use = "gold" }
+[[variants]]
+name = "copper"
+materials.white = { file = "copper.json" }
+[[variants]]
+name = "dark"
+materials.white.kd = 0.1
+"""))  # fmt: skip
+    blue, metal, copper, dark = scene.variants
+    assert [one.name for one in scene.variants] == ["blue", "metal", "copper", "dark"]
+    assert blue.materials["white"].kd == pytest.approx((0, 0, 1)) and [*blue.looks] == ["white"]
+    assert blue.light.factors["sun"] == (0, 0, 0) and blue.light.of("lamp").temperature_k == 2700
+    assert blue.light.of("sky") == GroupMix(intensity=2.0)
+    assert metal.materials["white"].lobes == scene.materials["gold"].lobes
+    assert copper.materials["white"].kd == (0.3, 0.1, 0.05)
+    assert dark.materials["white"].kd == (0.1, 0.1, 0.1) and not dark.light.groups
+    assert tmp_path / "copper.json" in scene.sources
+    assert dressed(scene, dark).materials["white"].kd == (0.1, 0.1, 0.1)
+
+
+def test_objects_of_one_material_that_part_ways_get_materials_of_their_own(tmp_path: Path) -> None:
+    scene = load_scene(written(tmp_path, PAINTED + '[[variants]]\nname = "a"\nobjects.sphere = "gold"\n'))
+    sphere = scene.object("sphere").material
+    others = {o.material for o in scene.objects if o.name != "sphere"}
+    assert sphere not in others and {sphere, *others} == {"white", "white_2"}
+    assert scene.materials["white_2"].model_copy(update={"name": "white"}) == scene.materials["white"]
+    assert [*scene.variants[0].looks] == [sphere]
+
+
+def test_a_material_keeps_its_textures_with_other_numbers_and_takes_those_of_another(tmp_path: Path) -> None:
+    texture = MaterialTextures(diffuse=Texture(np.ones((2, 2, 3), np.float16)))
+    objects = tuple(SceneObject(name, SQUARE, "grain") for name in ("left", "right"))
+    scene = Scene("s", objects, {"grain": GRAIN, "grey": GREY}, textures={"grain": texture})
+    darker, plain = Look(GRAIN.model_copy(update={"kd": (0.1, 0.1, 0.1)}), "grain"), Look(GREY)
+    same = Look(GRAIN, "grain")
+    found = with_variants(scene, [Dressed("dark", (darker, darker)), Dressed("half", (same, plain))])
+    left, right = (o.material for o in found.objects)
+    assert (left, right) == ("grain", "grain_2") and found.textures["grain_2"] is texture
+    dark, half = found.variants
+    assert {*dark.looks} == {left, right} and {*half.looks} == {right}
+    assert textures_worn(found.textures, dark.looks) == {left: texture, right: texture}
+    assert textures_worn(found.textures, half.looks) == {left: texture}
+
+
+def test_variants_that_change_nothing_part_no_materials() -> None:
+    objects = tuple(SceneObject(name, SQUARE, "grey") for name in ("a", "b"))
+    look = Look(GREY)
+    found = with_variants(Scene("s", objects, {"grey": GREY}), [Dressed("as it is", (look, look))])
+    assert found.objects == objects and not found.variants[0].looks
+
+
+WRONG = {
+    '[[variants]]\nname = "a"\nmaterials.wite.kd = 0.1': r"a.materials.wite: unknown material.*did you mean 'white'",
+    '[[variants]]\nname = "a"\nmaterials.white = {}': r"a.materials.white: says nothing; expected use, file, colour",
+    '[[variants]]\nname = "a"\nmaterials.white.colour = "blue"': r"white.colour: not a colour; found blue; .*#rrggbb",
+    '[[variants]]\nname = "a"\nmaterials.white = {colour = "#000000", kd = 1}': r"says its colour twice",
+    '[[variants]]\nname = "a"\nmaterials.white = {use = "gold", kd = 1}': r"says more than use; found kd",
+    '[[variants]]\nname = "a"\nmaterials.white.use = "goold"': r"white.use: unknown material; found goold",
+    '[[variants]]\nname = "a"\nmaterials.white.use = 3': r"white.use: is not a name; found 3",
+    '[[variants]]\nname = "a"\nmaterials.white.file = "../a.json"': r"white.file: .*leaves its folder",
+    '[[variants]]\nname = "a"\nmaterials.white.kd = -1': r"materials.white: kd.*greater than or equal to 0",
+    '[[variants]]\nname = "a"\nobjects."chair*" = "gold"': r"objects.chair\*: fits no object",
+    '[[variants]]\nname = "a"\nobjects.sphere = "goold"': r"objects.sphere: unknown material; found goold",
+    '[[variants]]\nname = "a"\nlight.sun = "blck"': r"a.light.sun: not a light; found blck",
+    '[[variants]]\nname = "a"\nlight.sun = "1@4"': r"a.light.sun: not a light; found 1@4",
+    '[[variants]]\nname = "a"\nlight.sun = 5000': r"a.light.sun: intensity is out of range; found 5000",
+    '[[variants]]\nname = "a"\n[[variants]]\nname = "a"': r"variants: name is used twice; found a",
+    '[[variants]]\nname = ""': r"variants.0.name",
+    '[[variants]]\nname = "a"\nmaterial.white.kd = 1': r"variants.0.material: unknown key",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_what_is_wrong_is_said(tmp_path: Path, text: str) -> None:
+    with pytest.raises(UserError, match=WRONG[text]):
+        load_scene(written(tmp_path, PAINTED + text))
+
+
+def test_an_unknown_variant_is_said_with_those_there_are() -> None:
+    scene = with_variants(Scene("s", (), {"grey": GREY}), [Dressed("oak", ())])
+    with pytest.raises(UserError, match=r"--variant: unknown variant; found oke; expected oak; did you mean 'oak'"):
+        variant_named(scene.variants, "oke")
+    with pytest.raises(UserError, match=r"the store has no variants"):
+        variant_named((), "oak")
