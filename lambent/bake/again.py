@@ -15,6 +15,8 @@ from lambent.bake.quality import Quality
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
+from lambent.scenes.scene import Look
+from lambent.scenes.variants import textures_worn
 from lambent.store.contract import LAST_RUN, TIMINGS
 from lambent.store.source import SOURCE, scene_of
 from lambent.store.store import MANIFEST, Store
@@ -36,6 +38,7 @@ def bake_again(
     materials: Mapping[str, Material],
     progress: Progress = silent,
     *,
+    textures: Mapping[str, str] | None = None,
     quality: Quality | None = None,
 ) -> Store:
     """Bake light map and probes of the store in `folder` into `copy`, with some of its materials replaced.
@@ -45,6 +48,8 @@ def bake_again(
 
     Parameters
     ----------
+    textures : mapping, optional
+        Names of materials whose textures others wear, by the name of these; "" is none.
     quality : Quality, optional
         By default the preset that the store was baked with.
 
@@ -61,7 +66,13 @@ def bake_again(
         raise UserError("the store has no light map that could be baked again", file=folder, field=LIGHT)
     made_with = store.artefact(LIGHT).meta
     scene = scene_of(store)
-    scene = replace(scene, materials={**scene.materials, **materials})
+    worn = {name: Look(scene.materials[name], of) for name, of in (textures or {}).items()}
+    scene = replace(
+        scene,
+        materials={**scene.materials, **materials},
+        textures=textures_worn(scene.textures, worn),
+        measured={name: file for name, file in scene.measured.items() if name not in materials},
+    )
     _prepare(store, copy)
     effort, seed = quality or str(made_with.get("quality")), int(made_with.get("seed", 0))
     with bake(scene, copy, only={"geometry"}, quality=effort, seed=seed, progress=progress) as copied:

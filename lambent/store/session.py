@@ -11,7 +11,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from lambent.core.ceilings import SESSION_BYTES
 from lambent.core.errors import UserError, invalid
@@ -30,20 +30,25 @@ class _Strict(BaseModel):
 
 
 class RoomState(_Strict):
-    """What a room looks like: materials that stand in for the scene's, by name, and the mix of its light groups."""
+    """What a room looks like: materials that stand in for the scene's, by name, and the mix of its light groups.
+
+    `textures` are those that a material wears in the place of its own: the name of their material, "" for none.
+    """
 
     materials: dict[str, Material] = {}
+    textures: dict[str, str] = Field(default={}, exclude_if=lambda one: not one)
     light: LightMix = LightMix()
 
     def unknown(self, materials: Collection[str], groups: Collection[str]) -> list[str]:
         """Names of materials and light groups that a store does not have."""
-        return [name for name in self.materials if name not in materials] + [
-            name for name in self.light.groups if name not in groups
-        ]
+        worn = [*self.materials, *self.textures, *(of for of in self.textures.values() if of)]
+        return [n for n in worn if n not in materials] + [n for n in self.light.groups if n not in groups]
 
     def only(self, materials: Collection[str]) -> RoomState:
         """The same with those of its materials that a store has."""
-        return RoomState(materials={k: v for k, v in self.materials.items() if k in materials}, light=self.light)
+        known = {name: one for name, one in self.materials.items() if name in materials}
+        worn = {name: of for name, of in self.textures.items() if name in materials and of in (*materials, "")}
+        return RoomState(materials=known, textures=worn, light=self.light)
 
 
 class WalkSession(_Strict):

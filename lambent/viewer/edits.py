@@ -78,20 +78,22 @@ class MaterialEdits:
 
     def change(self, name: str, material: Material) -> None:
         """One moment of the stroke that is under way, or the first of a new one."""
-        self._go_on(room=self._room({**self.edited, name: material}, self.light))
+        self._go_on(room=self._room(self.room.model_copy(update={"materials": {**self.edited, name: material}})))
 
     def mix(self, light: LightMix) -> None:
         """The same of the mix of light."""
         if light != self.light:
-            self._go_on(room=RoomState(materials=self.room.materials, light=light))
+            self._go_on(room=self.room.model_copy(update={"light": light}))
 
     def take(self, room: RoomState) -> None:
         """Another state of the whole room, as a stroke of its own; materials that the scene does not have stay out."""
-        self._step(room=self._room(room.only(self.scene).materials, room.light))
+        self._step(room=self._room(room))
 
     def dress(self, materials: Mapping[str, Material]) -> None:
-        """Several materials at once, as a stroke of its own."""
-        self._step(room=self._room({**self.edited, **materials}, self.light))
+        """Several materials at once with their own textures, as a stroke of its own."""
+        textures = {name: of for name, of in self.room.textures.items() if name not in materials}
+        update = {"materials": {**self.edited, **materials}, "textures": textures}
+        self._step(room=self._room(self.room.model_copy(update=update)))
 
     def put_beside(self, other: RoomState | None) -> None:
         """Compare the room with this state from now on, as a stroke of its own."""
@@ -100,7 +102,7 @@ class MaterialEdits:
     def exchange(self) -> None:
         """The present state and the one compared with it change places, as a stroke of its own."""
         if (other := self.other) is not None:
-            self._step(room=self._room(other.only(self.scene).materials, other.light), other=self.room)
+            self._step(room=self._room(other), other=self.room)
 
     def store(self, name: str) -> None:
         """Store the present state under a name, in the place of one that had it, as a stroke of its own."""
@@ -110,8 +112,11 @@ class MaterialEdits:
         """Drop a stored state, as a stroke of its own."""
         self._step(stored={other: room for other, room in self.stored.items() if other != name})
 
-    def _room(self, materials: Mapping[str, Material], light: LightMix) -> RoomState:
-        return RoomState(materials={k: v for k, v in materials.items() if v != self.scene[k]}, light=light)
+    def _room(self, room: RoomState) -> RoomState:
+        """Of a state, what the scene has, and has otherwise."""
+        known = room.only(self.scene)
+        changed = {name: one for name, one in known.materials.items() if one != self.scene[name]}
+        return known.model_copy(update={"materials": changed})
 
     def beside(self, name: str) -> Hashable:
         """What was kept beside a material; None where nothing was."""
@@ -144,8 +149,7 @@ class MaterialEdits:
         self._history.change(replace(self._state_of(session), beside=self._history.now.beside))
 
     def _state_of(self, session: WalkSession) -> _State:
-        room = self._room(session.now.only(self.scene).materials, session.now.light)
-        return _State(room, session.beside, session.states)
+        return _State(self._room(session.now), session.beside, session.states)
 
     def reset(self, name: str) -> None:
         """Back to the scene's material, as a stroke of its own."""

@@ -130,6 +130,12 @@ def test_unknown_names_are_one_line_and_stay_in_the_file(window, tmp_path):
     again.keeper.close()
 
 
+def test_textures_of_variants_are_kept(window, tmp_path):
+    window.edits.take(RoomState(materials={"plaster": RED}, textures={"plaster": "brass", "chrome": "brass"}))
+    assert window.edits.room.textures == {"plaster": "brass"} and "textures" in window.keeper.unsaved
+    assert window.keeper.save() and read_session(tmp_path / FILE).now.textures == {"plaster": "brass"}
+
+
 def edited(said, **changes):
     return {**said, **changes}
 

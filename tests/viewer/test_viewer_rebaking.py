@@ -310,7 +310,7 @@ def test_the_worker_says_what_is_wrong_in_a_line(store, tmp_path):
     """The real process; the quality of this store has no name."""
     command = [sys.executable, "-m", f"{rebaking.__name__}_worker", str(store), str(tmp_path / "copy")]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
-        process.stdin.write(json.dumps({"materials": {}}).encode() + b"\n")
+        process.stdin.write(json.dumps({"materials": {}, "textures": {}}).encode() + b"\n")
         process.stdin.flush()
         said = json.loads(process.stdout.readline())
     assert "unknown quality" in said["error"] and process.returncode == 0
@@ -321,7 +321,7 @@ def test_the_worker_ends_with_the_window(store, tmp_path):
     copy = tmp_path / "copy"
     command = [sys.executable, "-c", ENDLESS, str(store), str(copy)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT) as process:
-        process.stdin.write(json.dumps({"materials": {}}).encode() + b"\n")
+        process.stdin.write(json.dumps({"materials": {}, "textures": {}}).encode() + b"\n")
         process.stdin.flush()
         assert b"begun\n" in iter(process.stderr.readline, b""), "what libraries print goes there"
         process.stdin.close()

@@ -4,11 +4,13 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.light_mix import GroupMix, LightMix
+from lambent.scenes.scene import Look, Variant
 from lambent.store.light_groups import LightGroupRecord
 from lambent.store.session import RoomState
 from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.mode import WalkMode
+from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.modes.walk.states import AS_BAKED
 from tests.viewer.panel_driver import PanelDriver
 
@@ -133,6 +135,46 @@ def test_the_panel_stores_takes_and_compares(panels, state):
     assert not state.states.split
     panels.click("x##evening")
     assert edits.stored == {}
+
+
+def with_variants(scene):
+    """Two variants: one paints, one paints otherwise, takes textures away and dims; brass is never named."""
+    plaster = scene.materials["plaster"]
+    red, blue = (plaster.model_copy(update={"kd": kd}) for kd in ((0.6, 0.1, 0.1), (0.1, 0.1, 0.6)))
+    day = Variant("day", {"plaster": Look(red, "brass")})
+    return scene.model_copy(update={"variants": (day, Variant("night", {"plaster": Look(blue)}, OFF))})
+
+
+def test_a_variant_takes_its_materials_textures_and_light_and_leaves_the_rest(scene, screen):
+    state = WalkState.of(with_variants(scene), "walk", screen)
+    edits, states = state.materials.edits, state.states
+    brass = scene.materials["brass"].model_copy(update={"kd": (0.3, 0.3, 0.3)})
+    edits.change("brass", brass)
+    edits.end_stroke()
+    edits.take(states.variants["day"])
+    assert edits.current("plaster").kd == (0.6, 0.1, 0.1) and edits.room.textures == {"plaster": "brass"}
+    assert edits.current("brass") == brass and states.name_of(edits.room, "?") == "day"
+    edits.take(states.variants["night"])
+    assert edits.current("plaster").kd == (0.1, 0.1, 0.6) and edits.room.textures == {} and edits.light == OFF
+    edits.take(states.variants["day"])
+    assert edits.light == LightMix(), "the lamp is named by a variant, and as baked in this one"
+    edits.undo()
+    edits.undo()
+    assert edits.current("plaster").kd == (0.6, 0.1, 0.1)
+    edits.reset("plaster")
+    assert edits.room == RoomState(materials={"brass": brass}), "its own textures, too"
+
+
+def test_variants_are_offered(monkeypatch, scene, screen, geometry):
+    state = WalkState.of(with_variants(scene), "walk", screen)
+    driver = PanelDriver(monkeypatch, WalkMode(state, WalkInput(state, geometry), Drawing(None)))
+    driver.click("States", 0.3)
+    driver.frame(2)
+    driver.click("take##variant night")
+    assert state.lights.mix == OFF
+    driver.click("beside##variant day")
+    assert state.states.split and state.materials.edits.other.textures == {"plaster": "brass"}
+    driver.close()
 
 
 def test_x_exchanges(state, geometry):

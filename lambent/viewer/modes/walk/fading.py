@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from lambent.core.camera import Camera
 from lambent.core.light_mix import Factors
-from lambent.materials.document import Material
 from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.resources import SceneResources
 from lambent.viewer.modes.walk.lanes import Lane
@@ -28,7 +26,7 @@ class Fade:
 
     def __init__(self, rebaked: Rebaked, lane: Lane, light: Factors, camera: Camera, size: tuple[int, int]) -> None:
         self.lane, self.done, self._light, self._rebaked = lane, False, dict(light), rebaked
-        self._materials: Mapping[str, Material] = lane.room.materials
+        self._room = lane.room
         resources, scene = self._resources, lane.renderer.scene
         self._before = list(resources.light_layers), [item.light for item in resources.objects], resources.answers
         owners = probe_users(scene, resources, range(len(resources.objects)))
@@ -49,7 +47,8 @@ class Fade:
     def serves(self, lane: Lane, light: Factors) -> bool:
         """Whether this is the light of what the lane shows; once it is there, mixes of its light groups are, too."""
         same_mix = light == self._light or (self.done and self._groups is not None)
-        return lane is self.lane and lane.room.materials == self._materials and same_mix
+        worn = lane.room.materials, lane.room.textures
+        return lane is self.lane and worn == (self._room.materials, self._room.textures) and same_mix
 
     def step(self) -> None:
         """Upload what is ready; nothing where the thread is not done with it."""

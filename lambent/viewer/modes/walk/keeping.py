@@ -108,6 +108,7 @@ class SessionKeeper:
         edits, kept = self._edits, self._kept
         names = [name for name in edits.scene if not self._is_saved(name)]
         more = [
+            ("textures", edits.room.textures != kept.now.only(edits.scene).textures),
             ("the mix of light", edits.light != kept.now.light),
             ("stored states", edits.stored != kept.states),
             ("the state to compare with", edits.other != kept.beside),

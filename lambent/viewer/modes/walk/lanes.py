@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from lambent.core.plain import Triple
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
+from lambent.scenes.scene import Look
 from lambent.store.session import RoomState
 from lambent.viewer.modes.walk.answering import Answering, AnsweringLight
 from lambent.viewer.picture import Picture
@@ -45,7 +46,10 @@ class Lane:
         return Lane.of(renderer, screen, answering, shown)
 
     def answer(self, room: RoomState) -> None:
-        """Bring the light of this state a step nearer."""
+        """Wear the textures of this state, and bring its light a step nearer."""
+        if room.textures != self.room.textures:
+            scene = self.renderer.scene.record.materials
+            self.renderer.resources.dress({name: Look(scene[name], of) for name, of in room.textures.items()})
         self.room = room
         if self.answering is not None:
             self.answering.update(room.materials)

@@ -12,9 +12,9 @@ from typing import IO, Any
 
 from lambent.bake.again import copy_beside
 from lambent.core.camera import Camera
-from lambent.core.light_mix import Factors
-from lambent.materials.document import Material
+from lambent.core.light_mix import Factors, LightMix
 from lambent.realtime.baked import BakedScene
+from lambent.store.session import RoomState
 from lambent.viewer.modes.walk.fading import Fade
 from lambent.viewer.modes.walk.lanes import Lane
 from lambent.viewer.modes.walk.rebaked import Rebaking
@@ -36,13 +36,13 @@ class RebakedLight:
         self._store, self._copy, self._screen, self._shown = store, copy_beside(store), screen, shown
         self._scene = scene
         self._mix: Factors = {}  # of the last update
-        self._wanted: Mapping[str, Material] = {}  # materials as they are, if not as baked
+        self._wanted = RoomState()  # materials and textures as they are, under light as baked
         self._changed_s = -1e9
         self._process: WorkerProcess | None = None
         self._baked = False  # the copy has the light of what is wanted
         self._failed = False
         self._reading: Work | None = None
-        self._light: tuple[Mapping[str, Material], Rebaked] | None = None  # the last that was read, and what for
+        self._light: tuple[RoomState, Rebaked] | None = None  # the last that was read, and what for
         self._fade: Fade | None = None
 
     def update(self, lane: Lane, light: Factors, camera: Camera, size: tuple[int, int], *, in_stroke: bool) -> None:
@@ -51,10 +51,10 @@ class RebakedLight:
         mixes, self._mix = light != self._mix, light
         if self._fade is not None and not self._fade.serves(lane, light):
             self._leave(lane)
-        if room.materials != self._wanted:
+        if (wanted := room.model_copy(update={"light": LightMix()})) != self._wanted:
             self._stop()
-            self._wanted, self._changed_s, self._failed = room.materials, now_s, False
-        if not self._shown.on or not self._shown.possible or not self._wanted:
+            self._wanted, self._changed_s, self._failed = wanted, now_s, False
+        if not self._shown.on or not self._shown.possible or self._is_baked:
             self._stop()
         elif self._fade is not None:
             self._go_on(now_s)
@@ -70,8 +70,14 @@ class RebakedLight:
             return FRAME_S
         if self._process is not None or self._reading is not None:
             return LOOK_S
-        waits = self._shown.on and self._shown.possible and self._wanted and not self._failed and self._fade is None
+        wants = self._shown.on and self._shown.possible and not self._is_baked
+        waits = wants and not self._failed and self._fade is None
         return max(0.0, self._changed_s + QUIET_S - self._screen.clock()) if waits else None
+
+    @property
+    def _is_baked(self) -> bool:
+        """Whether the store itself has the light of what is wanted."""
+        return self._wanted == RoomState()
 
     def close(self) -> None:
         """End the process; what it has finished stays in the copy."""
@@ -104,8 +110,8 @@ class RebakedLight:
         self._baked, self._shown.line, self._shown.share = False, "baking anew: starting", 0.0
         words = [str(self._store), str(self._copy)]
         self._process = WorkerProcess(WORKER, words, "the bake of edited materials", self._take, ends=True)
-        materials = {name: material.model_dump(mode="json") for name, material in self._wanted.items()}
-        self._process.ask({"materials": materials})
+        said = self._wanted.model_dump(mode="json")
+        self._process.ask({"materials": said["materials"], "textures": dict(self._wanted.textures)})
 
     def _take(self, said: Mapping[str, Any], _: IO[bytes]) -> None:
         """In the thread of the process: a line of it."""

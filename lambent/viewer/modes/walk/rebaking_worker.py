@@ -2,9 +2,9 @@
 
 python -m lambent.viewer.modes.walk.rebaking_worker STORE COPY
 
-The first line of stdin is a JSON object with "materials", documents by name; the end of stdin ends the process, at any
-moment, and the copy goes on from there the next time. Every line of stdout is a JSON object: "what", "done" and "total"
-of a step; "error", a line for the user; or "baked", when all of it is there.
+The first line of stdin is a JSON object with "materials", documents by name, and "textures", names by name; the end of
+stdin ends the process, at any moment, and the copy goes on from there the next time. Every line of stdout is a JSON
+object: "what", "done" and "total" of a step; "error", a line for the user; or "baked", when all of it is there.
 """
 
 from __future__ import annotations
@@ -19,14 +19,15 @@ from typing import BinaryIO
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 
-NICENESS = 15  # the window comes first, and what is path traced for a comparison
+NICENESS = 10  # the window comes first
 
 
 def main(store: Path, copy: Path, asked: bytes, out: BinaryIO) -> None:
     """Bake, and say how far it is."""
     from lambent.bake.again import bake_again
 
-    materials = {name: Material.model_validate(said) for name, said in json.loads(asked)["materials"].items()}
+    wanted = json.loads(asked)
+    materials = {name: Material.model_validate(said) for name, said in wanted["materials"].items()}
 
     def say(**words: object) -> None:
         out.write(json.dumps(words).encode() + b"\n")
@@ -36,7 +37,7 @@ def main(store: Path, copy: Path, asked: bytes, out: BinaryIO) -> None:
         say(what=what, done=done, total=total)
 
     try:
-        bake_again(store, copy, materials, progress)
+        bake_again(store, copy, materials, progress, textures=wanted["textures"])
     except UserError as error:
         say(error=str(error))
     else:

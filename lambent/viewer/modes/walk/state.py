@@ -174,7 +174,8 @@ class WalkState:
         return cls(
             scene, screen, look, navigation, Selection(whole_objects(scene.objects)),
             Materials(edits, screen), Recordings(views, navigation, screen, lights),
-            Marks({}, scene.reflectors), SessionKeeper(edits, store, screen), States(edits), meter=meter, lights=lights,
+            Marks({}, scene.reflectors), SessionKeeper(edits, store, screen), States(edits, scene),
+            meter=meter, lights=lights,
             store=store, store_name="STORE" if store is None else store.name,
             missing=() if fault is None else (fault,),  # stays in sight: a message is gone before the window is there
         )  # fmt: skip

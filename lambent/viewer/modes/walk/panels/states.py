@@ -5,6 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from lambent.core.errors import UserError
+from lambent.store.session import RoomState
 from lambent.viewer.modes.walk.comparison import Comparison
 from lambent.viewer.modes.walk.states import BAKED, States
 from lambent.viewer.panels.widgets import check, path_field, press
@@ -21,8 +22,17 @@ def draw(states: States, comparison: Comparison, screen: Screen) -> None:
             states.store()
         except UserError as error:
             screen.say(str(error))
-    for name in states.all:
-        _row(states, name)
+    for name, room in states.all.items():
+        _row(states, name, room, name)
+        if name != BAKED:
+            imgui.same_line()
+            if press(f"x##{name}", f"drops the stored state {name}; undo brings it back", small=True):
+                states.edits.forget(name)
+    if variants := states.variants:
+        imgui.separator_text("variants of the scene")
+        for name, room in variants.items():
+            _row(states, name, room, f"variant {name}")
+        imgui.separator()
     split = check("split view", states.split, "shows the room left of a divider, and the other state right of it")
     if split != states.split:
         states.split = split
@@ -33,18 +43,14 @@ def draw(states: States, comparison: Comparison, screen: Screen) -> None:
         states.exchange()
 
 
-def _row(states: States, name: str) -> None:
-    """A state: take it, compare with it, drop it."""
-    edits, room = states.edits, states.all[name]
-    if press(f"take##{name}", f"shows {name} and goes on from it; undo brings back the room as it was", small=True):
+def _row(states: States, name: str, room: RoomState, own: str) -> None:
+    """A state: take it, or compare with it; `own` tells its buttons from others."""
+    edits = states.edits
+    if press(f"take##{own}", f"shows {name} and goes on from it; undo brings back the room as it was", small=True):
         edits.take(room)
     imgui.same_line()
-    if press(f"beside##{name}", f"shows the room and {name} beside each other", small=True):
-        states.compare(name)
-    if name != BAKED:
-        imgui.same_line()
-        if press(f"x##{name}", f"drops the stored state {name}; undo brings it back", small=True):
-            edits.forget(name)
+    if press(f"beside##{own}", f"shows the room and {name} beside each other", small=True):
+        states.show_beside(room)
     imgui.same_line()
     marks = [mark for mark, here in (("now", edits.room == room), ("beside", edits.other == room)) if here]
     imgui.text_unformatted(f"{name}  ({', '.join(marks)})" if marks else name)
