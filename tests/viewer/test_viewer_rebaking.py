@@ -202,7 +202,11 @@ def room(store, screen, monkeypatch, tmp_path):
 
 
 def image(renderer, state, light=()):
-    frame = state.look.frame(state.navigation.camera, SIZE, state.materials.edits.edited)
+    return image_of(renderer, state, state.materials.edits.edited, light)
+
+
+def image_of(renderer, state, materials, light=()):
+    frame = state.look.frame(state.navigation.camera, SIZE, materials)
     waits, renderer.waits = renderer.waits, True
     found = renderer.image(replace(frame, light=dict(light)))
     renderer.waits = waits
@@ -244,6 +248,55 @@ def test_another_edit_ends_it_and_undo_comes_back_without_a_bake(room, store):
     room.until(lambda: state.rebaking.exact)
     assert process is None and room.pictures._rebaked._process is None
     np.testing.assert_allclose(image(room.renderer, state), exact, rtol=1e-3, atol=1e-5)
+
+
+@pytest.mark.parametrize("groups", ["none", "scene"])
+def test_a_state_that_goes_beside_keeps_its_light_and_undo_of_all_is_as_baked(
+    boxes, screen, monkeypatch, tmp_path, groups
+):
+    room = Room(boxes[groups], screen, monkeypatch, tmp_path, BAKES)
+    state, edits = room.state, room.state.materials.edits
+    baked = image(room.renderer, state)
+    room.paint()
+    room.until(lambda: state.rebaking.exact)
+    exact = image(room.renderer, state)
+    state.states.split = True
+    for _ in range(3):
+        room.frame()
+    state.states.exchange()
+    room.frame()
+    room.until(lambda: not (room.pictures._lane.busy or room.pictures._beside.busy))
+    assert not state.rebaking.exact and room.pictures._beside.renderer is room.renderer
+    beside = image_of(room.renderer, state, edits.other.materials)
+    np.testing.assert_allclose(beside, exact, rtol=2e-3, atol=1e-5)
+    np.testing.assert_allclose(image(room.pictures._lane.renderer, state), baked, rtol=2e-3, atol=1e-5)
+    while edits.can_undo:
+        edits.undo()
+    state.states.split = False
+    room.frame()
+    room.until(lambda: not room.pictures._lane.busy)
+    np.testing.assert_allclose(image(room.pictures._lane.renderer, state), baked, rtol=2e-3, atol=1e-5)
+    room.pictures.close()
+
+
+def test_without_answers_an_edit_goes_from_as_baked_to_exact_and_back(room):
+    state, edits = room.state, room.state.materials.edits
+    state.answering.on = False
+    baked = image(room.renderer, state)
+    room.paint()
+    room.until(lambda: state.rebaking.exact)
+    exact = image(room.renderer, state)
+    state.answering.on = True
+    room.frame()
+    assert not state.rebaking.exact, "the estimate first"
+    room.until(lambda: state.rebaking.exact)
+    np.testing.assert_allclose(image(room.renderer, state), exact, rtol=2e-3, atol=1e-5)
+    state.answering.on = False
+    room.frame()
+    edits.undo()
+    room.frame()
+    room.until(lambda: not room.pictures._lane.busy)
+    np.testing.assert_allclose(image(room.renderer, state), baked, rtol=2e-3, atol=1e-5)
 
 
 def test_mixes_of_light_groups_are_exact_too(boxes, screen, monkeypatch, tmp_path):

@@ -26,7 +26,7 @@ class Fade:
 
     def __init__(self, rebaked: Rebaked, lane: Lane, light: Factors, camera: Camera, size: tuple[int, int]) -> None:
         self.lane, self.done, self._light, self._rebaked = lane, False, dict(light), rebaked
-        self._room = lane.room
+        self._room, self._answered = lane.room, lane.shown.on
         resources, scene = self._resources, lane.renderer.scene
         self._before = list(resources.light_layers), [item.light for item in resources.objects], resources.answers
         owners = probe_users(scene, resources, range(len(resources.objects)))
@@ -48,7 +48,8 @@ class Fade:
         """Whether this is the light of what the lane shows; once it is there, mixes of its light groups are, too."""
         same_mix = light == self._light or (self.done and self._groups is not None)
         worn = lane.room.materials, lane.room.textures
-        return lane is self.lane and worn == (self._room.materials, self._room.textures) and same_mix
+        same_lane = lane is self.lane and lane.shown.on == self._answered
+        return same_lane and worn == (self._room.materials, self._room.textures) and same_mix
 
     def step(self) -> None:
         """Upload what is ready; nothing where the thread is not done with it."""
@@ -66,17 +67,27 @@ class Fade:
         if (groups := self._groups) is not None:
             self.lane.renderer.mixer.answer(groups)
 
-    def end(self, *, answers: bool) -> None:
-        """Take it out of the picture again; where `answers`, other light is about to come by itself."""
+    @property
+    def _answers(self) -> bool:
+        """Whether light followed edits of the lane by itself before."""
+        return self.lane.answering is not None and self.lane.shown.possible and self._answered
+
+    def end(self) -> None:
+        """Leave the lane to its own light.
+
+        What is whole stays until that changes: it may be the light of a state that is beside now. Where edits have no
+        answer, the lane shows what it did before.
+        """
         self._thread.shutdown(cancel_futures=True)
-        if answers:
-            return
-        mixer, own = self.lane.renderer.mixer, self.lane.renderer.scene.groups
-        if own is not None:
-            mixer.answer(own)
-            return
-        layers, lights, self._resources.answers = self._before
-        self._resources.show_light_map(layers)
-        for item, light in zip(self._resources.objects, lights, strict=True):
-            item.relight(light, item.emission)
-        self._resources.light_version += 1
+        lane, own = self.lane, self.lane.renderer.scene.groups
+        if self._answers:
+            if not self.done and lane.answering is not None:
+                lane.answering.again()
+        elif own is not None:
+            lane.renderer.mixer.answer(own)
+        else:
+            layers, lights, self._resources.answers = self._before
+            self._resources.show_light_map(layers)
+            for item, light in zip(self._resources.objects, lights, strict=True):
+                item.relight(light, item.emission)
+            self._resources.light_version += 1

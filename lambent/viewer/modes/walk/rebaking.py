@@ -50,7 +50,7 @@ class RebakedLight:
         room, now_s = lane.room, self._screen.clock()
         mixes, self._mix = light != self._mix, light
         if self._fade is not None and not self._fade.serves(lane, light):
-            self._leave(lane)
+            self._leave()
         if (wanted := room.model_copy(update={"light": LightMix()})) != self._wanted:
             self._stop()
             self._wanted, self._changed_s, self._failed = wanted, now_s, False
@@ -86,7 +86,7 @@ class RebakedLight:
             self._reading.wait()
             self._reading = None
         if self._fade is not None:
-            self._fade.end(answers=True)  # nobody will see it
+            self._fade.end()
 
     def _bake(self, now_s: float, in_stroke: bool) -> None:
         """Begin the process, and read the copy when it is done."""
@@ -148,10 +148,10 @@ class RebakedLight:
             self._shown.line = f"exact but for the probes of {', '.join(left)}" if left else "exact: baked anew"
             self._screen.say("the light is exact again: it was baked for these materials")
 
-    def _leave(self, lane: Lane) -> None:
+    def _leave(self) -> None:
         """The light that was baked anew is no longer that of the picture."""
         assert self._fade is not None, "asked for with one alone"
-        self._fade.end(answers=lane is self._fade.lane and lane.shown.possible)
+        self._fade.end()
         self._fade, self._shown.exact, self._shown.line = None, False, ""
 
     def _stop(self) -> None:
