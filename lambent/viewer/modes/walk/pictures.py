@@ -231,7 +231,7 @@ class Pictures(Pair):
             self._traced = TracedPicture(self._renderer.given(), state.screen, state.store, state.sky_turn_deg)
         b = self._traced
         self.shown = (a, b)
-        b.update(wanted)
+        b.update(wanted, self._state.materials.edits.room.textures)
         a.update(wanted, refine=False)
         comparison.fault = b.fault
         comparison.divider.a_label, comparison.divider.b_label = wanted.integrator, b.label

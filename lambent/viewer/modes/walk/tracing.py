@@ -20,18 +20,24 @@ MOST_SAMPLES = 1024  # a pixel: then it rests
 
 @dataclass(frozen=True)
 class Wish:
-    """A view to trace, numbered; without a `camera`, nothing. `materials` stand in for the scene's, by name."""
+    """A view to trace, numbered; without a `camera`, nothing.
+
+    `materials` stand in for the scene's, by name; `textures` are those that materials wear in the place of their own, by
+    the name of their material, "" for none.
+    """
 
     number: int
     camera: Camera | None = None
     size: tuple[int, int] = (1, 1)
     materials: Mapping[str, Material] = field(default_factory=dict)
+    textures: Mapping[str, str] = field(default_factory=dict)
 
     def said(self) -> dict[str, Any]:
         """As a JSON object."""
         worn = {name: material.model_dump(mode="json") for name, material in self.materials.items()}
         camera = None if self.camera is None else asdict(self.camera)
-        return {"number": self.number, "camera": camera, "size": list(self.size), "materials": worn}
+        view = {"number": self.number, "camera": camera, "size": list(self.size)}
+        return {**view, "materials": worn, "textures": dict(self.textures)}
 
     @classmethod
     def of(cls, said: Mapping[str, Any]) -> Wish:
@@ -41,7 +47,8 @@ class Wish:
             places = {name: tuple(camera[name]) for name in ("position", "target", "up")}
             camera = Camera(**{**camera, **places})
         worn = {name: Material.model_validate(one) for name, one in said["materials"].items()}
-        return cls(int(said["number"]), camera, (int(said["size"][0]), int(said["size"][1])), worn)
+        size = int(said["size"][0]), int(said["size"][1])
+        return cls(int(said["number"]), camera, size, worn, dict(said["textures"]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,11 +100,17 @@ class Tracing:
         if self._process is not None:
             _ = self._process.running
 
-    def ask(self, camera: Camera | None, size: tuple[int, int], materials: Mapping[str, Material]) -> None:
+    def ask(
+        self,
+        camera: Camera | None,
+        size: tuple[int, int],
+        materials: Mapping[str, Material],
+        textures: Mapping[str, str],
+    ) -> None:
         """Trace this view from now on; without a camera, none."""
         if self.error or (self._process is None and camera is None):
             return
-        self._wish = Wish(self._wish.number + 1, camera, size, dict(materials))
+        self._wish = Wish(self._wish.number + 1, camera, size, dict(materials), dict(textures))
         if self._process is None:
             self._process = WorkerProcess(WORKER, self._words, "path tracing", self._take, ends=False)
         if not self._process.ask(self._wish.said()):
