@@ -22,8 +22,8 @@ MOST_SAMPLES = 1024  # a pixel: then it rests
 class Wish:
     """A view to trace, numbered; without a `camera`, nothing.
 
-    `materials` stand in for the scene's, by name; `textures` are those that materials wear in the place of their own, by
-    the name of their material, "" for none.
+    `materials` stand in for the scene's, by name; `textures` are those that materials wear in the place of their own,
+    by the name of their material, "" for none.
     """
 
     number: int
