@@ -1,11 +1,14 @@
 """Two states of the room beside each other: each side is the picture of its state, in its light, and both are live."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lambent.core.light_mix import GroupMix, LightMix
 from lambent.realtime.device import open_device
 from lambent.realtime.renderer import Renderer
+from lambent.store.session import RoomState
 from lambent.store.store import Store
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
@@ -126,3 +129,18 @@ def test_a_split_ends_other_comparisons_and_the_room_alone_comes_back(pictures, 
     state.states.split = False
     drawn(pictures, state)
     assert len(pictures.shown) == 1 and pictures.divider is None
+
+
+def test_films_have_the_light_and_the_textures_of_the_room(pictures, state, renderer):
+    """Their renderer has light of its own where there are light groups."""
+    edits = state.materials.edits
+    edits.take(RoomState(materials={"plaster": RED}, textures={"plaster": "brass"}))
+    drawn(pictures, state)
+    dimmed = replace(renderer.scene.groups, _probes={})
+    renderer.mixer.answer(dimmed)
+    state.films.file_name = "tour.mp4"
+    film = pictures._filming(state.scene.paths[0])
+    assert pictures._film_renderer is not renderer and pictures._film_renderer.mixer.groups is dimmed
+    worn = pictures._film_renderer.resources.materials
+    assert worn["plaster"] is pictures._film_renderer.resources._textured["brass"]
+    film.cancel()

@@ -48,8 +48,7 @@ class Lane:
     def answer(self, room: RoomState) -> None:
         """Wear the textures of this state, and bring its light a step nearer."""
         if room.textures != self.room.textures:
-            scene = self.renderer.scene.record.materials
-            self.renderer.resources.dress({name: Look(scene[name], of) for name, of in room.textures.items()})
+            dress(self.renderer, room)
         self.room = room
         if self.answering is not None:
             self.answering.update(room.materials)
@@ -77,3 +76,15 @@ class Lane:
         """Stop computing light."""
         if self.answering is not None:
             self.answering.close()
+
+    def lend_light(self, other: Renderer) -> None:
+        """Let another renderer of the scene, with light of its own, show the state of this lane in any mix."""
+        dress(other, self.room)
+        if (groups := self.renderer.mixer.groups) is not None:
+            other.mixer.answer(groups)
+
+
+def dress(renderer: Renderer, room: RoomState) -> None:
+    """Show the textures that a state wears."""
+    scene = renderer.scene.record.materials
+    renderer.resources.dress({name: Look(scene[name], of) for name, of in room.textures.items()})

@@ -314,6 +314,8 @@ class Pictures(Pair):
             # A film's light may change with its time, and so is not that of the window.
             scene = self._renderer.scene
             self._film_renderer = self._another_renderer() if scene.groups is None else Renderer(self.device, scene)
+        if self._film_renderer.resources is not self._renderer.resources:
+            self._lane.lend_light(self._film_renderer)
         frame = replace(self._frame(SIZES[films.size]), mixed=0)
         track = self._state.recordings.track_of(path)
         light = None if track is None else lambda time_s: self._state.lights.known(track.factors_at(time_s))
