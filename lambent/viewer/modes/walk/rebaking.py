@@ -10,11 +10,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, Any
 
-from lambent.bake.again import copy_beside
+from lambent.bake.again import KINDS, copy_beside
 from lambent.core.camera import Camera
 from lambent.core.light_mix import Factors, LightMix
 from lambent.realtime.baked import BakedScene
+from lambent.store.contract import TIMINGS
 from lambent.store.session import RoomState
+from lambent.store.store import Store
 from lambent.viewer.modes.walk.fading import Fade
 from lambent.viewer.modes.walk.lanes import Lane
 from lambent.viewer.modes.walk.rebaked import Rebaking
@@ -38,6 +40,7 @@ class RebakedLight:
         self._mix: Factors = {}  # of the last update
         self._wanted = RoomState()  # materials and textures as they are, under light as baked
         self._changed_s = -1e9
+        self._began_s = self._expected_s = 0.0  # of the bake under way
         self._process: WorkerProcess | None = None
         self._baked = False  # the copy has the light of what is wanted
         self._failed = False
@@ -108,6 +111,7 @@ class RebakedLight:
 
     def _begin(self) -> None:
         self._baked, self._shown.line, self._shown.share = False, "baking anew: starting", 0.0
+        self._began_s, self._expected_s = self._screen.clock(), first_bake_s(self._store)
         words = [str(self._store), str(self._copy)]
         self._process = WorkerProcess(WORKER, words, "the bake of edited materials", self._take, ends=True)
         said = self._wanted.model_dump(mode="json")
@@ -119,7 +123,10 @@ class RebakedLight:
             self._baked = True
             return
         share = float(said["done"]) / max(float(said["total"]), 1e-9)
-        self._shown.share, self._shown.line = share, f"baking anew: {said['what']} {100 * share:.0f} %"
+        self._shown.share = share
+        passed = minutes(self._screen.clock() - self._began_s)
+        of = f" of about {minutes(self._expected_s)}" if self._expected_s else ""
+        self._shown.line = f"baking anew {passed}{of}: {said['what']} {100 * share:.0f} %"
 
     def _read(self) -> None:
         """Read the copy in a thread."""
@@ -158,3 +165,14 @@ class RebakedLight:
         if self._process is not None:
             self._process.close()
             self._process, self._shown.share, self._shown.line = None, None, ""
+
+
+def first_bake_s(store: Path) -> float:
+    """Seconds that the store's own bake took for the same arrays; 0 where it does not say."""
+    timings = Store.open(store).documents.get(TIMINGS, {})
+    return float(sum(timings.get(kind, 0.0) for kind in KINDS))
+
+
+def minutes(seconds: float) -> str:
+    """As 1:05."""
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02}"
