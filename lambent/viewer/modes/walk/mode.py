@@ -118,8 +118,8 @@ class WalkMode(Mode):
             lines.append(f"recording {self.screen.clock() - recorder.began_s:.0f} s   (R stops)")
         overlay.draw(self.screen, lines, refining=filming is None)  # which has the adapter to itself
 
-        if state.materials.editor is None and not imgui.is_any_item_active():
-            state.materials.edits.end_stroke()  # the editor knows itself when a drag of its plots ends
+        if not imgui.is_any_item_active():
+            state.materials.edits.end_stroke()
 
     def advance(self, dt_s: float) -> None:
         self.input.walk(dt_s)
