@@ -40,7 +40,7 @@ class RebakedLight:
         self._mix: Factors = {}  # of the last update
         self._wanted = RoomState()  # materials and textures as they are, under light as baked
         self._changed_s = -1e9
-        self._began_s = self._expected_s = 0.0  # of the bake under way
+        self._began_s = self._first_s = 0.0  # of the bake under way
         self._process: WorkerProcess | None = None
         self._baked = False  # the copy has the light of what is wanted
         self._failed = False
@@ -111,7 +111,7 @@ class RebakedLight:
 
     def _begin(self) -> None:
         self._baked, self._shown.line, self._shown.share = False, "baking anew: starting", 0.0
-        self._began_s, self._expected_s = self._screen.clock(), first_bake_s(self._store)
+        self._began_s, self._first_s = self._screen.clock(), first_bake_s(self._store)
         words = [str(self._store), str(self._copy)]
         self._process = WorkerProcess(WORKER, words, "the bake of edited materials", self._take, ends=True)
         said = self._wanted.model_dump(mode="json")
@@ -125,8 +125,8 @@ class RebakedLight:
         share = float(said["done"]) / max(float(said["total"]), 1e-9)
         self._shown.share = share
         passed = minutes(self._screen.clock() - self._began_s)
-        of = f" of about {minutes(self._expected_s)}" if self._expected_s else ""
-        self._shown.line = f"baking anew {passed}{of}: {said['what']} {100 * share:.0f} %"
+        first = f" ({minutes(self._first_s)} the first time)" if self._first_s else ""
+        self._shown.line = f"baking anew {passed}{first}: {said['what']} {100 * share:.0f} %"
 
     def _read(self) -> None:
         """Read the copy in a thread."""
