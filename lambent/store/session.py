@@ -7,6 +7,7 @@ saved yet, so that it survives the end of the process. Saved cameras and paths a
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Literal
@@ -19,10 +20,38 @@ from lambent.core.files import write_text
 from lambent.core.inputs import parse_json, read_bytes
 from lambent.core.light_mix import LightMix
 from lambent.materials.document import Material
+from lambent.store.lock import lock
 
+LOCK_FILE = ".session.lock"  # stays in the folder; that it exists means nothing
 FILE, UNSAVED_FILE = "session.json", "session-unsaved.json"
 FORMAT: Literal["lambent-walk-session"] = "lambent-walk-session"
 VERSION: Literal[1] = 1
+
+
+class SessionLock:
+    """The right to keep the session of a store, until `release` or the end of the process.
+
+    Raises
+    ------
+    UserError
+        Where the folder cannot be written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        try:
+            handle = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
+        except OSError as error:
+            raise UserError(f"cannot be written ({error.strerror})", file=folder) from error
+        self.held = lock(handle, wait=False)  # False: another window has it
+        self._handle: int | None = handle
+        if not self.held:
+            self.release()
+
+    def release(self) -> None:
+        """Let another window have it."""
+        handle, self._handle, self.held = self._handle, None, False
+        if handle is not None:
+            os.close(handle)
 
 
 class _Strict(BaseModel):

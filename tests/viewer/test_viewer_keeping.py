@@ -187,9 +187,9 @@ def test_a_folder_that_cannot_be_written_is_one_line(tmp_path, monkeypatch):
     def refused(*_, **__):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("lambent.viewer.modes.walk.keeping.os.open", refused)
+    monkeypatch.setattr("lambent.store.session.os.open", refused)
     opened = Window(tmp_path)
-    assert opened.lines == (f"the session cannot be saved: {tmp_path} cannot be written (Permission denied)",)
+    assert opened.lines == (f"the session cannot be saved: {tmp_path}: cannot be written (Permission denied)",)
     opened.paint(RED)
     opened.rest()
     assert opened.keeper.unsaved == ("plaster",) and not opened.keeper.keeps

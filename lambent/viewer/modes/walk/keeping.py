@@ -5,18 +5,15 @@ The first window on a store keeps its session; another one shows it, and saves m
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from lambent.core.errors import UserError
-from lambent.store.lock import lock
-from lambent.store.session import FILE, UNSAVED_FILE, WalkSession, read_session, write_session
+from lambent.store.session import FILE, UNSAVED_FILE, SessionLock, WalkSession, read_session, write_session
 from lambent.viewer.edits import MaterialEdits, unused
 from lambent.viewer.screen import Screen
 from lambent.viewer.work import Work, pending
 
-LOCK_FILE = ".session.lock"  # stays in the folder; that it exists means nothing
 QUIET_S = 1.5  # without a change, before what is unsaved is written
 BACK = "unsaved changes of the last window are back: save them, or undo"
 ELSEWHERE = "another window keeps the session of this store: changes made here are saved as documents alone"
@@ -38,7 +35,7 @@ class SessionKeeper:
         self._kept = WalkSession()  # as it is saved
         self._foreign: dict[str, object] = {}  # materials of the present state that the store does not have
         self._set_aside = False  # the file that is there cannot be read, and is kept under another name
-        self._lock: int | None = None
+        self._lock: SessionLock | None = None
         self._seen = edits.session
         self._due_s: float | None = None
         self._is_written = False  # the file of what is unsaved is there
@@ -73,13 +70,10 @@ class SessionKeeper:
     def _take_lock(self, folder: Path) -> str:
         """Make this window the one that keeps the session; why that cannot be, in a line."""
         try:
-            self._lock = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
-        except OSError as error:
-            return f"the session cannot be saved: {folder} cannot be written ({error.strerror})"
-        if lock(self._lock, wait=False):
-            return ""
-        self._release()
-        return ELSEWHERE
+            self._lock = SessionLock(folder)
+        except UserError as error:
+            return f"the session cannot be saved: {error}"
+        return "" if self._lock.held else ELSEWHERE
 
     def _take_unsaved(self, file: Path) -> list[str]:
         try:
@@ -199,9 +193,8 @@ class SessionKeeper:
             self._is_written = False
 
     def _release(self) -> None:
-        handle, self._lock = self._lock, None
-        if handle is not None:
-            os.close(handle)
+        if self._lock is not None:
+            self._lock.release()
 
     def _failed(self, error: UserError) -> None:
         self._screen.say(f"unsaved changes could not be kept: {error}")
