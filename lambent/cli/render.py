@@ -204,7 +204,7 @@ def command(
         return
     if surfaces is not None:
         raise UserError("says what an edited view shows", field="--surfaces", hint="name a session with --edit")
-    if variants and variant:
+    if variants and (variant or replace):
         raise UserError("says one variant and all of them", field="--variant", hint="leave out one of both")
     if variants and path is not None:
         raise UserError("a sheet is of one view", field="--path", hint="name it with --camera")

@@ -82,6 +82,11 @@ class LightMixer:
         self._answers += 1  # last: the thread reads it first, so that it never takes old light for new
 
     @property
+    def groups(self) -> GroupArrays | None:
+        """The light by group that is mixed; None where it was baked as one."""
+        return self._scene.groups if self._answer is None else self._answer.groups
+
+    @property
     def factors(self) -> Floats | None:
         """(n, 3) of the mix that is wanted; None while all light is as it was baked."""
         return self._wanted

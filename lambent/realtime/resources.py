@@ -88,6 +88,7 @@ class SceneResources:
         self.vertices = layouts.buffer("VERTEX", np.nan_to_num(vertices).astype(np.float32))
         self.indices = layouts.buffer("INDEX", scene.faces.astype(np.uint32))
         layers = light_layers(scene.irradiance, scene.irradiance_back, scene.dominant_direction)
+        self.light_layers = list(layers)  # as they are shown
         self._light_texture = upload(device, [layers], "rgba16float")
         self.light_view = self._light_texture.create_view(dimension="2d-array")
         self.light_version = 0  # grows with every answer of light to edited materials, and with other textures
@@ -134,9 +135,13 @@ class SceneResources:
         self.light_version += 1
 
     def show_light_map(self, sides: Sequence[NDArray[np.float16] | None]) -> None:
-        """Show other light maps (H, W, 4) on the front and the back; None of a side that stays."""
+        """Show other light maps (H, W, 4) on the front and the back; None of a side that stays.
+
+        A third map is the dominant direction.
+        """
         for layer, texels in enumerate(sides):
             if texels is not None:
+                self.light_layers[layer] = texels
                 height, width = texels.shape[:2]
                 self._layouts.device.queue.write_texture(
                     {"texture": self._light_texture, "origin": (0, 0, layer)}, np.ascontiguousarray(texels),

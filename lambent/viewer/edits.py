@@ -1,4 +1,4 @@
-"""Materials that were changed in the window: undo and redo; names of files; rescue when the window is lost."""
+"""What was changed in the window, materials and light: undo and redo; names of files; rescue when it is lost."""
 
 from __future__ import annotations
 
@@ -8,30 +8,34 @@ from pathlib import Path
 from typing import Any
 
 from lambent.core.errors import UserError
+from lambent.core.light_mix import LightMix
 from lambent.core.plain import plain_name
 from lambent.editing.history import History
 from lambent.materials.document import Material
+from lambent.store.session import RoomState, WalkSession
 
 
 @dataclass(frozen=True)
 class _State:
-    """Edited materials, and what goes with materials besides their numbers, both by name."""
+    """The room now, the one compared with it, stored ones, and what goes with materials besides numbers, by name."""
 
-    materials: Mapping[str, Material] = field(default_factory=dict)
+    room: RoomState = field(default_factory=RoomState)
+    other: RoomState | None = None
+    stored: Mapping[str, RoomState] = field(default_factory=dict)
     beside: Mapping[str, Hashable] = field(default_factory=dict)
 
 
 class MaterialEdits:
-    """Materials that differ from the scene's, with undo and redo.
+    """Materials that differ from the scene's, and the mix of its light, with undo and redo of both.
 
-    A stroke is what one drag of a slider does: any number of `change`, then one `end_stroke`. It is undone as a whole.
+    A stroke is what one drag of a slider does: any number of changes, then one `end_stroke`. It is undone as a whole.
 
     Attributes
     ----------
     scene
         The materials of the scene, by name.
     saved
-        Materials as they were saved last.
+        Materials as they were saved last, as documents.
     """
 
     def __init__(self, scene: Mapping[str, Material]) -> None:
@@ -42,15 +46,77 @@ class MaterialEdits:
     @property
     def edited(self) -> Mapping[str, Material]:
         """The materials that differ from the scene's."""
-        return self._history.now.materials
+        return self.room.materials
+
+    @property
+    def light(self) -> LightMix:
+        """The mix of light groups."""
+        return self.room.light
+
+    @property
+    def room(self) -> RoomState:
+        """All that was edited."""
+        return self._history.now.room
+
+    @property
+    def other(self) -> RoomState | None:
+        """The state of the room that the present one is compared with; None where there is none."""
+        return self._history.now.other
+
+    @property
+    def stored(self) -> Mapping[str, RoomState]:
+        """States of the room that were stored, by name."""
+        return self._history.now.stored
+
+    @property
+    def session(self) -> WalkSession:
+        """All of it, as it is saved."""
+        return WalkSession(now=self.room, beside=self.other, states=dict(self.stored))
 
     def current(self, name: str) -> Material:
         return self.edited.get(name, self.scene[name])
 
     def change(self, name: str, material: Material) -> None:
         """One moment of the stroke that is under way, or the first of a new one."""
-        others = {other: edited for other, edited in self.edited.items() if other != name}
-        self._go_on(materials=others if material == self.scene[name] else {**others, name: material})
+        self._go_on(room=self._room(self.room.model_copy(update={"materials": {**self.edited, name: material}})))
+
+    def mix(self, light: LightMix) -> None:
+        """The same of the mix of light."""
+        if light != self.light:
+            self._go_on(room=self.room.model_copy(update={"light": light}))
+
+    def take(self, room: RoomState) -> None:
+        """Another state of the whole room, as a stroke of its own; materials that the scene does not have stay out."""
+        self._step(room=self._room(room))
+
+    def dress(self, materials: Mapping[str, Material]) -> None:
+        """Several materials at once with their own textures, as a stroke of its own."""
+        textures = {name: of for name, of in self.room.textures.items() if name not in materials}
+        update = {"materials": {**self.edited, **materials}, "textures": textures}
+        self._step(room=self._room(self.room.model_copy(update=update)))
+
+    def put_beside(self, other: RoomState | None) -> None:
+        """Compare the room with this state from now on, as a stroke of its own."""
+        self._step(other=other)
+
+    def exchange(self) -> None:
+        """The present state and the one compared with it change places, as a stroke of its own."""
+        if (other := self.other) is not None:
+            self._step(room=self._room(other), other=self.room)
+
+    def store(self, name: str) -> None:
+        """Store the present state under a name, in the place of one that had it, as a stroke of its own."""
+        self._step(stored={**self.stored, name: self.room})
+
+    def forget(self, name: str) -> None:
+        """Drop a stored state, as a stroke of its own."""
+        self._step(stored={other: room for other, room in self.stored.items() if other != name})
+
+    def _room(self, room: RoomState) -> RoomState:
+        """Of a state, what the scene has, and has otherwise."""
+        known = room.only(self.scene)
+        changed = {name: one for name, one in known.materials.items() if one != self.scene[name]}
+        return known.model_copy(update={"materials": changed})
 
     def beside(self, name: str) -> Hashable:
         """What was kept beside a material; None where nothing was."""
@@ -60,6 +126,11 @@ class MaterialEdits:
         """Keep something beside a material, such as what a fit leaves alone: undo brings back what was there before."""
         self._go_on(beside={**self._history.now.beside, name: value})
 
+    def _step(self, **changes: Any) -> None:
+        self.end_stroke()
+        self._go_on(**changes)
+        self.end_stroke()
+
     def _go_on(self, **changes: Any) -> None:
         if not self.in_stroke:
             self._history.begin_stroke()
@@ -68,11 +139,21 @@ class MaterialEdits:
     def end_stroke(self) -> None:
         self._history.end_stroke()
 
+    def begin_from(self, session: WalkSession) -> None:
+        """Begin a new history with a session that was saved: what was done before it cannot be undone."""
+        self._history = History(self._state_of(session))
+
+    def go_to(self, session: WalkSession) -> None:
+        """Take all of a session, as a stroke of its own."""
+        self.end_stroke()
+        self._history.change(replace(self._state_of(session), beside=self._history.now.beside))
+
+    def _state_of(self, session: WalkSession) -> _State:
+        return _State(self._room(session.now), session.beside, session.states)
+
     def reset(self, name: str) -> None:
         """Back to the scene's material, as a stroke of its own."""
-        self.end_stroke()
-        self.change(name, self.scene[name])
-        self.end_stroke()
+        self.dress({name: self.scene[name]})
 
     @property
     def in_stroke(self) -> bool:
@@ -82,7 +163,7 @@ class MaterialEdits:
     def previous(self, name: str) -> Material | None:
         """The material before the last stroke, or before the one under way; None where there was none."""
         before = self._history.previous
-        return None if before is None else before.materials.get(name, self.scene[name])
+        return None if before is None else before.room.materials.get(name, self.scene[name])
 
     @property
     def can_undo(self) -> bool:

@@ -119,13 +119,18 @@ class Window:
         wanted |= drawing.images
         if beside is not None:
             wanted |= beside.images
-        for name in [name for name in self._textures if self._made_of[name] is not wanted.get(name)]:
-            self._imgui.backend.unregister_texture(self._textures.pop(name))
-            del self._made_of[name]
-        for name, source in wanted.items():
-            if name not in self._textures:
+        known = {id(source): self._textures[name] for name, source in self._made_of.items()}
+        shown = {id(source) for source in wanted.values()}
+        # By their source: Dear ImGui forgets a view after the frame, also one that got another name in it.
+        for number, texture in known.items():
+            if number not in shown:
+                self._imgui.backend.unregister_texture(texture)
+        for source in wanted.values():
+            if id(source) not in known:
                 view = self._uploaded(source) if isinstance(source, np.ndarray) else source
-                self._textures[name], self._made_of[name] = self._imgui.backend.register_texture(view), source
+                known[id(source)] = self._imgui.backend.register_texture(view)
+        self._textures = {name: known[id(source)] for name, source in wanted.items()}
+        self._made_of = wanted
 
     def _uploaded(self, image: Image) -> Any:
         """View of a texture that holds an RGBA picture (H, W, 4)."""

@@ -30,6 +30,7 @@ from lambent.materials.measured.registry import load
 from lambent.materials.models.published import read_fits
 from lambent.scenes import load_scene
 from lambent.scenes.loaders.gltf.container import read as read_gltf
+from lambent.store.session import read_session
 from lambent.store.views import read_views
 from lambent.viewer.editor.files import kind_of
 from tests.reliability.scene_seeds import gltf_parts, obj
@@ -40,6 +41,7 @@ OPENERS: dict[str, Callable[[Path], Any]] = {
     "measured": load, "material.json": load_material, "a.fit": read_fits, "a.hdr": read_image, "a.png": read_encoded,
     "scene.toml": load_scene, "scene.gltf": load_scene, "scene.glb": load_scene, "scene.obj": load_scene,
     "scene.ply": load_scene, "scene.xml": load_scene, "views.json": lambda path: read_views(path.parent),
+    "session.json": read_session,
     "edited": kind_of, "hashed": sha256_of, "head": lambda path: read_head(path, 64),
 }  # fmt: skip
 SIZES = {
@@ -47,6 +49,7 @@ SIZES = {
     "a.png": ceilings.PICTURE_BYTES, "scene.toml": ceilings.SCENE_TOML_BYTES, "scene.gltf": ceilings.GLTF_BYTES,
     "scene.glb": ceilings.GLTF_BYTES, "scene.obj": ceilings.OBJ_BYTES, "scene.ply": ceilings.PLY_BYTES,
     "scene.xml": ceilings.MITSUBA_BYTES, "views.json": ceilings.VIEWS_BYTES,
+    "session.json": ceilings.SESSION_BYTES,
 }  # fmt: skip
 
 
@@ -142,7 +145,6 @@ OWN_FILES = {
     "materials/shader_layout.py: files('lambent.materials').joinpath('lobes.wgsl').read_text": "the package's shader",
     "realtime/incident/__init__.py: Path(look_up.__file__).with_suffix('.wgsl').read_text": "the package's shader",
     "realtime/shader_source.py: path.read_text": "the package's shader",
-    "viewer/modes/edit/baking.py: words.read_text": "what its own worker wrote",
     "viewer/modes/walk/comparison.py: np.load": "what its own worker wrote",
     "viewer/modes/walk/comparison.py: words.read_text": "what its own worker wrote",
 }

@@ -67,7 +67,7 @@ def test_closing_ends_the_process(begun):
     bake = begun("time.sleep(600)")
     while not bake.arrived:
         time.sleep(0.01)
-    process = bake._process
+    process = bake._process._process
     began = time.monotonic()
     bake.close()
     assert process.poll() is not None and time.monotonic() - began < 5

@@ -9,6 +9,7 @@ from lambent.store.light_groups import LightGroupRecord
 from lambent.store.views import read_views
 from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.walk.input import WalkInput
+from lambent.viewer.modes.walk.light_keys import key_times, mix_at, with_key, without_key
 from lambent.viewer.modes.walk.lights import RecordedLight
 from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.views import SavedViews
@@ -118,3 +119,45 @@ def test_a_track_of_light_that_never_changed_is_one_key_or_none():
     for step in range(5):
         recorded.take(HALF, step)
     assert recorded.track(2.0) == MixTrack({"lamp": ((0.0, GroupMix(intensity=0.5)),)})
+
+
+def test_keys_of_light_are_set_moved_and_removed():
+    names = ("lamp", "sky")
+    track = with_key(None, 0.0, LightMix(), names)
+    assert track.factors_at(0.0) == {} and key_times(track) == (0.0,), "as baked is a key, too"
+    track = with_key(track, 2.0, OFF, names)
+    assert track.factors_at(1.0) == {"lamp": pytest.approx((0.5,) * 3)}
+    assert track.factors_at(5.0) == {"lamp": (0, 0, 0)}
+    sky = LightMix({"sky": GroupMix(on=False)})
+    assert key_times(with_key(track, 2.02, sky, names)) == (0.0, 2.0), "so near, it takes the other one's place"
+    assert mix_at(track, 2.0) == OFF and mix_at(track, 0.0) == LightMix()
+    older = MixTrack({"lamp": ((1.0, GroupMix(intensity=0.5)),)})
+    assert with_key(older, 3.0, sky, names).factors_at(1.0) == {"lamp": pytest.approx((0.5,) * 3)}
+    assert without_key(track, 0.0) == MixTrack({"lamp": ((2.0, GroupMix(on=False)),), "sky": ((2.0, GroupMix()),)})
+    assert without_key(without_key(track, 0.0), 2.0) is None and key_times(None) == ()
+
+
+def test_the_panel_sets_keys_along_a_path(panels, state, tmp_path):
+    saving(state, tmp_path)
+    state.recordings.views = SavedViews(state.scene, tmp_path)
+    path = state.scene.paths[0]
+    for time_s, mix in ((0.0, LightMix()), (3.0, OFF)):
+        state.navigation.scrub(path, time_s)
+        state.recordings.keying = True
+        state.lights.mix = mix
+        panels.frame(2)
+        assert state.recordings.light == mix.factors, "the mix is shown while keys are set"
+        panels.click(f"key at {time_s:.1f} s###set key")
+    track = read_views(tmp_path).tracks["tour"]
+    assert track.factors_at(3.0)["lamp"] == (0, 0, 0) and track.factors_at(0.0) == {}
+    panels.click("set keys", 0.05)
+    assert not state.recordings.keying and state.recordings.light == {"lamp": (0, 0, 0)}
+    state.lights.mix = HALF
+    panels.frame(2)
+    panels.click("3.0 s##key")
+    assert state.lights.mix == OFF and state.recordings.keying
+    panels.click("x##key 3.0")
+    panels.frame(2)
+    panels.click("x##key 0.0")
+    panels.frame(2)
+    assert "tour" not in read_views(tmp_path).tracks

@@ -22,6 +22,7 @@ from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.picking import Geometry
 from lambent.viewer.screen import Rect
 from tests.realtime.lit_ball import CAMERA, ball_scene, light_field
+from tests.viewer.drawn_frames import drawn
 from tests.viewer.panel_driver import PanelDriver
 
 SIZE = (160, 160)
@@ -106,29 +107,22 @@ def test_picking_takes_the_point_under_the_mouse_and_none_behind_what_is_clicked
     assert view.chosen is None and not view.pick(CAMERA, at, SIZE, np.inf)
 
 
-def drawn(pictures, state):
-    pictures.update(Rect(0, 0, *SIZE), 1.0)
-    while pictures.under_way:
-        pictures.work()
-    state.screen.clock.now_s += 1
-
-
 def test_the_window_has_discs_and_a_map_of_the_selected_object(renderer, screen, field):
     state = WalkState.of(renderer.scene.record, "walk", screen)
     state.fields.fields = renderer.scene.light_fields
     state.navigation.camera = CAMERA
     state.fields.points_on = state.fields.map_on = True
     pictures = Pictures(renderer, state)
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert "points" not in pictures.images and "map" not in pictures.images, "nothing is selected"
     state.selection.choose("ball")
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     discs, square = pictures.images["points"], pictures.images["map"]
     assert square.shape == (30, 30, 4)
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert pictures.images["points"] is discs and pictures.images["map"] is square, "made once"
     state.fields.point, state.fields.shows = 5, "distance"
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert pictures.images["points"] is not discs and not np.array_equal(pictures.images["map"], square)
 
 
@@ -140,7 +134,7 @@ def test_a_light_field_is_compared_with_the_single_probe(renderer, screen):
     comparison.mode, comparison.integrator, comparison.look_up = "side by side", "rings", "plain"
     pictures = Pictures(renderer, state)
     for _ in range(3):
-        drawn(pictures, state)
+        drawn(pictures, state, SIZE)
     a, b = (picture.read() for picture in pictures.shown)
     frame = replace(pictures._frame(SIZE), integrator="rings", lookups={})
     np.testing.assert_allclose(b, renderer.image(replace(frame, lookup="plain")), rtol=0.02, atol=0.02)
@@ -198,6 +192,6 @@ def test_the_choice_of_points_is_not_refined(renderer, screen):
         state.look.lookup = look_up
         pictures = Pictures(renderer, state)
         for _ in range(4):
-            drawn(pictures, state)
+            drawn(pictures, state, SIZE)
         counts[look_up] = pictures.shown[0].samples
     assert counts["light_field-choice"] == 0 < counts["light_field"]

@@ -9,6 +9,7 @@ import pytest
 
 from lambent.core.camera import Camera
 from lambent.materials.document import load_material
+from lambent.store.session import UNSAVED_FILE, read_session
 from lambent.store.views import Views
 from lambent.viewer.lost import kept
 from lambent.viewer.mode import Drawing
@@ -101,9 +102,9 @@ def test_a_window_that_is_lost_keeps_its_material(adapter, tmp_path, how):
         session.kill()
         screen.close()
     assert code == (1 if how == "display" else -signal.SIGTERM), session.log()
-    rescued = load_material(tmp_path / "brass-rescued-001.json")
+    rescued = read_session(tmp_path / "store" / UNSAVED_FILE).now.materials["brass"]
     assert rescued.model_dump(mode="json")["lobes"] == seen["edited"]["brass"]["lobes"]
-    assert "brass-rescued-001.json" in session.log()
+    assert UNSAVED_FILE in session.log()
 
 
 def test_a_walk_that_can_be_kept_nowhere_is_said(mode, state, capsys, monkeypatch):

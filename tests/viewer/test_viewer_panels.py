@@ -347,13 +347,13 @@ def test_controls_of_a_narrow_column_can_be_used(monkeypatch, state, geometry, s
 
 
 def test_a_panel_that_is_opened_comes_into_sight(monkeypatch, state, geometry):
-    driver = PanelDriver(monkeypatch, walk_mode(state, geometry), (800, 600))
+    driver = PanelDriver(monkeypatch, walk_mode(state, geometry), (800, 700))
     driver.frame(2)
     for panel, last in (("Film", "make film##film file"), ("Drawing", "frame")):
         before = driver.rects[panel][1]
         driver.click(panel, 0.3)
         driver.frame(3)
-        assert 560 < driver.rects[last][3] <= 600 and driver.rects[panel][1] < before, "scrolled as far as it has to"
+        assert 660 < driver.rects[last][3] <= 700 and driver.rects[panel][1] < before, "scrolled as far as it has to"
         driver.click(panel, 0.3)
         driver.frame(3)
     driver.close()

@@ -17,9 +17,11 @@ from lambent.store.store import Store
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.screen import Rect
+from tests.viewer.drawn_frames import drawn
 from tests.viewer.small_store import FRONT, SIDE, write_small_store
 
-PLACE = Rect(0, 0, 96, 64)
+SIZE = (96, 64)
+PLACE = Rect(0, 0, *SIZE)
 
 
 @pytest.fixture(scope="module")
@@ -31,14 +33,6 @@ def renderer(adapter, tmp_path_factory):
 def state(renderer, screen):
     screen.pace.adaptive = False
     return WalkState.of(renderer.scene.record, "walk", screen)
-
-
-def drawn(pictures, state, steps=1, dt_s=1.0):
-    for _ in range(steps):
-        pictures.update(PLACE, 1.0)
-        while pictures.under_way:
-            pictures.work()
-        state.screen.clock.now_s += dt_s
 
 
 def test_false_colour_of_the_shader_is_that_of_numpy(renderer):
@@ -68,16 +62,16 @@ def test_noise_has_a_range_of_its_own(renderer, state):
     noisy = replace(renderer.scene, noise=np.full((4, 4), 0.125, np.float32))
     pictures = Pictures(Renderer(renderer.device, noisy), state)
     state.look.show, state.meter.wanted = "noise", True
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     before = state.look.scale
     assert state.meter.reading.log_mean == pytest.approx(12.5, rel=1e-3), "black is left out"
     state.look.noise_scale, state.meter.fit_wanted, state.meter.expose_wanted = Range(1, 2), True, True
     exposure_ev = state.look.exposure_ev
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert state.look.noise_scale == state.meter.reading.ranges[0] and state.look.scale == before
     assert state.look.exposure_ev == exposure_ev, "noise sets no exposure"
     state.look.show, state.look.view_transform = "full", "false-colour"
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert state.look.scale == state.meter.reading.ranges[0] != before, "that of light is fitted when it is first shown"
 
 
@@ -89,28 +83,28 @@ def test_near_things_are_cut_away(renderer):
 
 def test_the_meter_sets_the_exposure(renderer, state):
     pictures = Pictures(renderer, state)
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert state.meter.reading is None, "nobody looks at it"
     state.meter.expose_wanted = True
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert state.look.exposure_ev == pytest.approx(state.meter.reading.exposure_ev)
     state.look.view_transform = "false-colour"
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert state.look.scale == state.meter.reading.ranges[0] and not state.meter.fit_wanted
 
 
 def test_long_frames_at_rest_wait_while_somebody_works(renderer, state):
     pictures = Pictures(renderer, state)
-    drawn(pictures, state, 3)
+    drawn(pictures, state, SIZE, 3)
     version, pictures._a._part_s = pictures._a.version, 0.45
     state.screen.pace.touched_s = state.screen.clock.now_s
-    drawn(pictures, state, 2, dt_s=0.2)
+    drawn(pictures, state, SIZE, 2, dt_s=0.2)
     assert pictures._a.version == version
     assert pictures.wait_s() == pytest.approx(0.05)
     state.navigation.camera = SIDE
     pictures.update(PLACE, 1.0)
     assert pictures._a.version == version + 1, "motion is drawn at once"
-    drawn(pictures, state, 2)
+    drawn(pictures, state, SIZE, 2)
     assert pictures._a.version > version + 1
 
 
@@ -118,7 +112,7 @@ def test_long_frames_at_rest_wait_while_somebody_works(renderer, state):
 def at_rest(renderer, state):
     """Pictures of a slow adapter, with a frame at rest begun and a part of it drawn."""
     pictures = Pictures(renderer, state)
-    drawn(pictures, state, 2)
+    drawn(pictures, state, SIZE, 2)
     pictures._a._whole_s = 1.0
     state.screen.clock.now_s += 1
     pictures.update(PLACE, 1.0)
@@ -150,7 +144,7 @@ def test_a_picture_is_saved_in_the_midst_of_a_frame(at_rest, state):
     state.navigation.camera = replace(state.navigation.camera, name="another name is no other picture")
     at_rest.save()
     assert "saved" in state.screen.messages[-1].text
-    drawn(at_rest, state)
+    drawn(at_rest, state, SIZE)
     assert not at_rest.under_way
 
 
@@ -158,36 +152,36 @@ def test_what_is_under_the_cursor(renderer, state):
     pictures = Pictures(renderer, state)
     state.meter.readout_on = True
     state.look.show, state.meter.cursor = "light-map", (0.1, 0.95)
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert state.meter.under_cursor == pytest.approx((2, 2, 2), rel=1e-3)
     state.meter.cursor = (0.5, 0.01)
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert state.meter.under_cursor == (0, 0, 0)
     state.meter.cursor = None
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert state.meter.under_cursor is None
 
 
 def test_side_by_side_with_the_reference(renderer, state):
     pictures = Pictures(renderer, state)
     state.comparison.mode = "side by side"
-    drawn(pictures, state, 24)
+    drawn(pictures, state, SIZE, 24)
     figures = state.comparison.figures
     assert len(pictures.views) == 2 and figures.of >= 8
     assert 20 < figures.psnr_db < 80
     assert state.comparison.divider.a_label == "lamps" and "qmc" in state.comparison.divider.b_label
     state.navigation.camera = SIDE
-    drawn(pictures, state, dt_s=0.01)
+    drawn(pictures, state, SIZE, dt_s=0.01)
     assert state.comparison.figures is None, "figures of another place are not shown"
     state.comparison.mode = "off"
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert len(pictures.views) == 1
 
 
 def test_an_integrator_agrees_with_itself(renderer, state):
     pictures = Pictures(renderer, state)
     state.comparison.mode, state.comparison.integrator = "error map", "lamps"
-    drawn(pictures, state, 4)
+    drawn(pictures, state, SIZE, 4)
     assert state.comparison.figures.psnr_db == np.inf and state.comparison.figures.difference_percent == 0
     assert (pictures.images["picture A"][..., :3] == 0).all()
     pictures.save()
@@ -198,7 +192,7 @@ def test_an_integrator_agrees_with_itself(renderer, state):
 def film(pictures, state, name):
     state.films.file_name, state.films.size = name, "640 x 360"
     state.films.wanted = CameraPath(name="short", keys=(FRONT, SIDE), seconds=0.1)
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
 
 
 def test_films_and_rows_of_pictures(renderer, state, tmp_path):
@@ -208,7 +202,7 @@ def test_films_and_rows_of_pictures(renderer, state, tmp_path):
         for _ in range(100):
             if state.films.under_way is None:
                 break
-            drawn(pictures, state)
+            drawn(pictures, state, SIZE)
         assert "3 frames" in state.screen.messages[-1].text
     names = ["a.mp4", "b-01.png", "b-02.png", "b-03.png", "c-0001.exr", "c-0002.exr", "c-0003.exr"]
     assert sorted(p.name for p in tmp_path.iterdir()) == names
@@ -221,7 +215,7 @@ def test_a_film_can_be_cancelled_and_leaves_nothing(renderer, state, tmp_path):
     assert not state.films.under_way.over and list(tmp_path.iterdir())
     state.screen.pace.answering = True
     done = state.films.under_way.done
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert state.films.under_way.done == done, "events come first"
     state.films.under_way.cancel()
     state.films.under_way = None
@@ -238,7 +232,7 @@ def test_a_film_that_cannot_be_is_said(renderer, state, tmp_path):
     (tmp_path / "b-0001.png").mkdir()
     (tmp_path / "b-0003.png").mkdir()
     for _ in range(5):
-        drawn(pictures, state)
+        drawn(pictures, state, SIZE)
     assert state.films.under_way is None and "is a folder" in state.screen.messages[-1].text
 
 
@@ -249,7 +243,7 @@ def test_a_folder_that_takes_no_files_is_said(renderer, state, monkeypatch):
         raise PermissionError(errno.EACCES, "Permission denied")
 
     pictures = Pictures(renderer, state)
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     monkeypatch.setattr("tempfile.TemporaryFile", refused)
     monkeypatch.setattr("os.open", refused)
     pictures.save()

@@ -161,19 +161,19 @@ def test_a_path_plays_to_its_end_and_again(state, scene):
 
 
 def test_unsaved_materials_are_known_and_rescued(state, tmp_path):
-    assert state.materials.unsaved == ()
+    assert state.unsaved_materials == ()
     state.materials.edits.change("brass", rougher(state.scene.materials["brass"], 0.2))
     state.materials.edits.end_stroke()
-    assert state.materials.unsaved == ("brass",)
+    assert state.unsaved_materials == ("brass",)
     state.materials.save("brass")
-    assert state.materials.unsaved == ()
+    assert state.unsaved_materials == ()
     state.materials.edits.change("brass", rougher(state.scene.materials["brass"], 0.4))
-    assert state.materials.unsaved == ("brass",)
-    (path,) = state.materials.rescue()
+    assert state.unsaved_materials == ("brass",)
+    (path,) = state.materials.rescue(state.unsaved_materials)
     assert path == tmp_path / "brass-rescued-001.json" and load_material(path).lobes[0].mx == 0.4
     state.materials.edits.undo()
     state.materials.edits.reset("brass")
-    assert state.materials.unsaved == ()
+    assert state.unsaved_materials == ()
 
 
 def test_a_material_that_was_changed_by_hand_says_so(state, tmp_path):

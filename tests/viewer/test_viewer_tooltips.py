@@ -9,6 +9,7 @@ from lambent.bake.interreflection.proposal import Proposal, Row
 from lambent.core.camera import Camera
 from lambent.materials.document import KINDS
 from lambent.store.contract import ReflectorPart, ReflectorRecord
+from lambent.store.light_groups import LightGroupRecord
 from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.edit.mode import EditMode
 from lambent.viewer.modes.edit.state import DIRECT
@@ -94,6 +95,12 @@ def test_the_walk_mode(walk):
     state.look.near_m, state.look.n, state.look.view_transform = 0.1, 3, "false-colour"
     state.comparison.mode, state.comparison.figures = "error map", Figures(33.3, 1.2, 64)
     check(walk, seen)
+    state.materials.edits.store("evening")
+    state.lights.groups = (LightGroupRecord(name="lamp", members=("bulb",), share=1.0),)
+    state.navigation.scrub(state.scene.paths[0], 1.0)
+    state.recordings.set_key()
+    state.answering.possible, state.rebaking.line = True, "baking anew"
+    check(walk, seen)
     state.recordings.save_view()
     check(walk, seen)
     state.recordings.views.renaming = ("camera", state.navigation.camera.name)
@@ -113,6 +120,7 @@ def test_the_walk_mode(walk):
     state.materials.edits.change("brass", state.scene.materials["plaster"])
     check(walk, seen)
     wanted = {"cancel the film", "mx", "rename##new camera name", "smooth", "save##closing", "planes", "delete##path"}
+    wanted |= {"save session", "light answers", "bake edits", "take##as baked", "x##evening", "set keys", "1.0 s##key"}
     assert wanted <= set(seen) and len(seen) > 80
 
 

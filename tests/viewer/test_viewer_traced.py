@@ -16,9 +16,9 @@ from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.modes.walk.tracing import Wish
 from lambent.viewer.modes.walk.tracing_worker import Wishes
-from lambent.viewer.screen import Rect
 from lambent.viewer.work import POLL_S
 from tests.bake.small_scenes import TINY
+from tests.viewer.drawn_frames import drawn
 from tests.viewer.small_store import FRONT, MATERIALS, SIDE
 
 SIZE = (48, 32)
@@ -51,18 +51,11 @@ def pictures(renderer, state):
     made.close()
 
 
-def drawn(pictures, state):
-    pictures.update(Rect(0, 0, *SIZE), 1.0)
-    while pictures.under_way:
-        pictures.work()
-    state.screen.clock.now_s += 1
-
-
 def traced_until(pictures, state, samples):
     """The picture B once it has that many samples."""
     began_s = time.monotonic()
     while time.monotonic() - began_s < LONGEST_S:
-        drawn(pictures, state)
+        drawn(pictures, state, SIZE)
         assert not state.comparison.fault
         b = pictures.shown[1]
         if b.samples >= samples:
@@ -90,7 +83,7 @@ def z_of(b, reference):
 
 def test_b_is_the_path_traced_scene_and_follows_the_camera(pictures, state, store):
     """Against the reference by z; at rest only, and A stands in until there is something."""
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     a, b = pictures.shown
     views = pictures.views
     assert views[0] is a.view and views[1] is not a.view and views[1].texture is a.view.texture and "at rest" in b.label
@@ -102,13 +95,13 @@ def test_b_is_the_path_traced_scene_and_follows_the_camera(pictures, state, stor
     )
     camera = state.navigation.camera
     state.navigation.camera = replace(camera, fov_y_deg=0.6 * camera.fov_y_deg)
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert pictures.views[1].texture is a.view.texture and not b.readable, "the last view is not this one"
     b = traced_until(pictures, state, 16)
     assert np.abs(z_of(b, reference(store, state.navigation.camera, 64))).max() < 4
     assert np.abs(z_of(b, first)).max() > 8, "the first view is another one"
     for _ in range(4):
-        drawn(pictures, state)
+        drawn(pictures, state, SIZE)
     assert state.comparison.figures is not None and state.comparison.figures.of >= 4
 
 
@@ -116,17 +109,17 @@ def test_edited_materials_are_traced_and_exposure_needs_no_new_paths(pictures, s
     """A black material in place of all takes the light that they scatter."""
     b = traced_until(pictures, state, 4)
     before = b.read().mean()
-    process = b._tracing._process
+    process = b._tracing._process._process
     state.look.exposure_ev += 1
     count = b.samples
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert b.samples >= count
     for name, material in state.scene.materials.items():
         state.materials.edits.change(name, material.model_copy(update={"kd": (0.0, 0.0, 0.0), "lobes": ()}))
     after = traced_until(pictures, state, 4).read().mean()
     assert after < 0.7 * before, (after, before)
     state.comparison.mode = "off"
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert not b._tracing.busy, "nobody looks"
     assert process.poll() is None
     pictures.close()
@@ -135,11 +128,11 @@ def test_edited_materials_are_traced_and_exposure_needs_no_new_paths(pictures, s
 
 def test_what_cannot_be_traced_is_said(pictures, state, tmp_path):
     state.look.show = "specular"
-    drawn(pictures, state)
+    drawn(pictures, state, SIZE)
     assert "all light" in state.comparison.fault
     state.look.show, state.store = "full", None
     other = Pictures(pictures._renderer, state)
-    drawn(other, state)
+    drawn(other, state, SIZE)
     assert "no store" in state.comparison.fault and len(other.shown) == 1
 
 
@@ -149,7 +142,7 @@ def test_a_store_without_a_scene_is_a_line(renderer, state, tmp_path):
     state.store = write_small_store(tmp_path / "small.store")
     pictures, began_s = Pictures(renderer, state), time.monotonic()
     while not state.comparison.fault and time.monotonic() - began_s < LONGEST_S:
-        drawn(pictures, state)
+        drawn(pictures, state, SIZE)
         time.sleep(POLL_S)
     assert "does not say where its scene is" in state.comparison.fault and "\n" not in state.comparison.fault
     pictures.close()

@@ -48,7 +48,9 @@ def is_beyond(corners: list[Any], middles: list[Any], part: tuple[Any, Any]) -> 
     at, between = [w[0] for w in corners], [w[0] for w in middles]
     bends = [dr.abs(m - (x + y) / 2) for m, x, y in zip(between, at, (*at[1:], at[0]), strict=True)]
     margin = 2 * _most(bends) + 2
-    return (_most([*at, *between]) + margin < mi.Float(part[0])) | (_least([*at, *between]) - margin > mi.Float(part[1]))
+    return (_most([*at, *between]) + margin < mi.Float(part[0])) | (
+        _least([*at, *between]) - margin > mi.Float(part[1])
+    )
 
 
 def is_broad(corners: list[Any]) -> Any:

@@ -86,7 +86,7 @@ def rgb(label: str, value: Triple, high: float, meaning: str) -> Triple:
             value = triple(srgb_decode(np.array(colour)) * scale)
         imgui.end_popup()
     imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
-    imgui.text_unformatted(label)
+    imgui.text_unformatted(label.split("##")[0])
     explain(meaning)
     imgui.pop_id()
     return value

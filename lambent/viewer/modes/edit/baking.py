@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -15,18 +13,15 @@ from typing import Any, cast
 
 from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection.proposal import Proposal, time_said
-from lambent.core.errors import UserError
-from lambent.core.progress import Progress
 from lambent.editing.document import SessionDocument
 from lambent.editing.interreflection.noise import PASS
 from lambent.editing.session import Session
-from lambent.viewer.work import Work
+from lambent.viewer.worker_process import WorkerProcess
 
 LIGHTS = (400, 4000)
 WORKER, BOUNCES = "lambent.viewer.modes.edit.worker", "--bounces"
 ONE_CURVE, TWO_CURVES = 0.6, 12.0  # time that transport takes where a whole view shows it; visibility takes 1
 LEAST_DONE = 0.02  # before it, nobody can say how long it takes
-LAST_CHARACTERS = 300  # of what a worker wrote before it died
 _NUMBER = re.compile(r"(\d+) lights$")
 
 
@@ -132,16 +127,21 @@ class Baking:
         self._curves = {(name, t.name): len(t.factors) for name, t in terms}
         self._stage = Stage({}, clock())
         self.weigh({name: 1 / len(self.document.materials) for name in self.document.materials})
-        copy = Session(session.document, session.folder)
-        self._process: subprocess.Popen[str] | None = None
-        self._work: Work | None = Work(lambda progress: self._run(copy, progress), lambda _: None, self._failed)
+        self._job = tempfile.TemporaryDirectory()  # as long as the process
+        job = Path(self._job.name) / "job.edits.json"
+        Session(session.document, session.folder).save(job)
+        self._process: WorkerProcess | None = WorkerProcess(
+            WORKER, [str(job), str(store), *self._words], "the bake", lambda said, _: self.take(said), ends=True
+        )
 
     @property
     def running(self) -> bool:
         """Whether it goes on; takes its end."""
-        if self._work is not None and self._work.poll():
-            self._work = None
-        return self._work is not None
+        if self._process is None or self._process.running:
+            return self._process is not None
+        self.error, self._process = self._process.error, None
+        self._job.cleanup()
+        return False
 
     @property
     def line(self) -> str:
@@ -162,45 +162,13 @@ class Baking:
 
     def close(self) -> None:
         """End the process; what it has finished stays in the store."""
-        if self._work is not None:
-            self._work.cancel()
-            if self._process is not None:
-                self._process.kill()
-            self._work.wait()
-            self._work = None
+        if self._process is not None:
+            self._process.close()
+            self._process = None
+            self._job.cleanup()
 
-    def _failed(self, error: UserError) -> None:
-        self.error = str(error)
-
-    def _run(self, session: Session, progress: Progress) -> None:
-        with tempfile.TemporaryDirectory() as folder:
-            job, words = Path(folder) / "job.edits.json", Path(folder) / "words.txt"
-            session.save(job)
-            command = [sys.executable, "-m", WORKER, str(job), str(self.store), *self._words]
-            with words.open("w") as log:
-                self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
-                try:
-                    self._listen(self._process, progress)
-                finally:
-                    self._process.kill()
-                    self._process.wait()
-            if self._process.returncode != 0:
-                progress(1, 1, "")  # raises where it was cancelled
-                last = words.read_text(errors="replace").strip()[-LAST_CHARACTERS:].splitlines()
-                raise UserError(f"the bake ended with {self._process.returncode} ({last[-1] if last else 'no word'})")
-
-    def _listen(self, process: subprocess.Popen[str], progress: Progress) -> None:
-        assert process.stdout is not None
-        progress(0, 1, "")
-        for line in process.stdout:
-            progress(0, 1, "")
-            self.take(json.loads(line))
-        process.wait()
-
-    def take(self, said: dict[str, object]) -> None:
+    def take(self, said: Mapping[str, object]) -> None:
         """Take a line of the worker."""
-        if "error" in said:
-            raise UserError(str(said["error"]))
         if "proposal" in said:
             self.proposal = Proposal.of(cast(Mapping[str, Any], said["proposal"]))
             return

@@ -61,15 +61,22 @@ class AnsweringLight:
     def __init__(self, store: Store, renderer: Renderer, shown: Answering) -> None:
         self._store, self._renderer, self._shown = store, renderer, shown
         self._answer: AnsweredLight | None = None  # made in the thread, with the first edit
-        self._of: Mapping[str, Material] = {}
+        self._of: Mapping[str, Material] | None = {}  # None: of something else, so that it is computed anew
         self._work: Work | None = None
         self._probes_of: Lit | None = None  # whose probes are to come
         self._probing: Lit | None = None  # whose probes are being made
         self._as_baked: dict[str, ProbeLight] | None = None  # by object with a probe, before the first edit
+        self._first = [item.light for item in renderer.resources.objects]  # as baked
         self._users: dict[str, list[int]] = {}  # numbers of the objects that show each
         shown.possible = has_answer(store)
         if shown.possible:
             shown.said = "light of other surfaces: as baked"
+
+    def another(self, renderer: Renderer, shown: Answering) -> AnsweringLight:
+        """The same for another renderer of the scene; what was read of the store is shared."""
+        made = AnsweringLight(self._store, renderer, shown)
+        made._answer = self._answer
+        return made
 
     @property
     def busy(self) -> bool:
@@ -94,6 +101,10 @@ class AnsweringLight:
         elif self._probes_of is not None:
             light, self._probes_of = self._probes_of, None
             self._begin_probes(light)
+
+    def again(self) -> None:
+        """Compute the light anew at the next `update`, because something else was shown in its place."""
+        self._of = None
 
     def close(self) -> None:
         """Stop computing."""
@@ -125,10 +136,10 @@ class AnsweringLight:
         answer, resources = self._answer, self._renderer.resources
         assert answer is not None, "maps come before probes"
         if self._as_baked is None:
-            self._as_baked = {name: resources.light_of(name) for name in answer.probes}
-            shown = [item.light for item in resources.objects]
+            owners = {item.record.name: light for item, light in zip(resources.objects, self._first, strict=True)}
+            self._as_baked = {name: owners[name] for name in answer.probes}
             self._users = {
-                name: [k for k, one in enumerate(shown) if one is light] for name, light in self._as_baked.items()
+                name: [k for k, one in enumerate(self._first) if one is light] for name, light in self._as_baked.items()
             }
         baked = self._as_baked
 

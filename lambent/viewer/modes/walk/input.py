@@ -32,8 +32,9 @@ SHORTCUTS = (
     ("1 ... 9", "jump to a camera of the scene, or a saved view"),
     ("V", "save the view"),
     ("R", "record the way, or stop"),
-    ("Ctrl+Z, Ctrl+Y", "undo, redo a material edit"),
-    ("Ctrl+S", "save the selected material"),
+    ("X", "exchange the room and the state beside it, or as it was baked"),
+    ("Ctrl+Z / Ctrl+Shift+Z, Ctrl+Y", "undo / redo a change of a material or the light"),
+    ("Ctrl+S", "save the session with the store"),
     ("Ctrl+Q", "close the window"),
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show the panels"),
@@ -84,14 +85,14 @@ class WalkInput(Input):
 
     def pressed(self, x: float) -> None:
         """Take the divider: Dear ImGui would only after a frame with the mouse over it, and frames can be slow."""
-        place, divider = self.screen.picture, self._state.comparison.divider
-        beside = self._state.comparison.mode == "side by side"
-        self._on_divider = beside and abs(x - place.x - divider.share * place.width) <= CLICK_PX
+        place, divider = self.screen.picture, self._state.divider
+        self._on_divider = divider is not None and abs(x - place.x - divider.share * place.width) <= CLICK_PX
 
     def dragged(self, dx: float, dy: float) -> None:
-        if self._on_divider:
+        divider = self._state.divider
+        if self._on_divider and divider is not None:
             place = self.screen.picture
-            self._state.comparison.divider.move((self._at[0] - place.x) / place.width)
+            divider.move((self._at[0] - place.x) / place.width)
         elif self.navigation.movement == "walk":
             self.navigation.move(cameras.look(self.navigation.camera, dx, dy))
         else:
@@ -169,14 +170,16 @@ class WalkInput(Input):
             state.selection.choose(None)
         elif key == "v":
             state.recordings.save_view()
+        elif key == "x":
+            state.states.exchange()
         elif key == "r":
             state.recordings.record()
         elif key in "123456789" and int(key) <= len(state.recordings.cameras):
             navigation.jump(state.recordings.cameras[int(key) - 1])
 
     def saved(self) -> None:
-        materials, name = self._state.materials, self._state.selection.material
-        if materials.editor is not None:
-            materials.editor.save()
-        elif name is not None:
-            materials.save(name)
+        editor = self._state.materials.editor
+        if editor is not None:
+            editor.save()
+        else:
+            self._state.session.save()

@@ -10,20 +10,30 @@ from lambent.core.light_mix import LightMix, MixTrack
 from lambent.core.plain import Triple
 from lambent.store.light_groups import LightGroupRecord
 from lambent.store.views import Views
+from lambent.viewer.edits import MaterialEdits
 from lambent.viewer.navigation import Navigation
 
 
 @dataclass
 class Lights:
-    """`groups` are the store's, none where it was baked without; `mix` is what the panel shows.
+    """`groups` are the store's, none where it was baked without; the mix is one of the `edits`, with their undo.
 
     `fields`: whether an object has a light field, which does not follow the mix.
     """
 
     groups: tuple[LightGroupRecord, ...] = ()
-    mix: LightMix = field(default_factory=LightMix)
+    edits: MaterialEdits = field(default_factory=lambda: MaterialEdits({}))
     fields: bool = False
     at_view: str = ""  # the saved view whose mix was taken last
+
+    @property
+    def mix(self) -> LightMix:
+        """What the panel shows."""
+        return self.edits.light
+
+    @mix.setter
+    def mix(self, mix: LightMix) -> None:
+        self.edits.mix(mix)
 
     def visit(self, navigation: Navigation, saved: Views) -> None:
         """Take the mix of a saved view where the camera has come to stand at one."""
@@ -32,7 +42,9 @@ class Lights:
             self.at_view = ""
         elif camera.name != self.at_view:
             self.at_view = camera.name
+            self.edits.end_stroke()
             self.mix = saved.lights.get(camera.name, self.mix)
+            self.edits.end_stroke()
 
     def known(self, factors: Mapping[str, Triple]) -> dict[str, Triple]:
         """Those of groups that the store has: a mix may be saved with a store that was baked otherwise since."""

@@ -6,6 +6,8 @@ import sys
 from functools import partial
 from pathlib import Path
 
+from imgui_bundle import imgui
+
 from lambent.core.map_cache import LEAST_RECENT
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
@@ -14,13 +16,26 @@ from lambent.realtime.replaced import with_replacements
 from lambent.realtime.resources import device_needs
 from lambent.realtime.turned_sky import under_turned_sky
 from lambent.scenes.replacement import parse_replacements
+from lambent.store.source import SOURCE
 from lambent.store.store import Store
 from lambent.viewer.lost import rescued
 from lambent.viewer.mode import Beside, Drawing, Mode, Panel, Textures
 from lambent.viewer.modes.walk.answering import AnsweringLight
 from lambent.viewer.modes.walk.comparison import error_scale
 from lambent.viewer.modes.walk.input import SHORTCUTS, WalkInput
-from lambent.viewer.modes.walk.panels import compare, film, light_field, lights, marks, material, metering, scene, view
+from lambent.viewer.modes.walk.panels import (
+    compare,
+    film,
+    light_field,
+    lights,
+    marks,
+    material,
+    metering,
+    room,
+    scene,
+    states,
+    view,
+)
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.navigation import Movement
@@ -28,7 +43,7 @@ from lambent.viewer.panels import overlay, statistics
 from lambent.viewer.panels.plots import beside
 from lambent.viewer.panels.widgets import rows
 from lambent.viewer.picking import Geometry
-from lambent.viewer.screen import Screen
+from lambent.viewer.screen import Screen, least
 from lambent.viewer.work import POLL_S
 
 
@@ -49,7 +64,10 @@ def open_store(
     state.lights.groups = baked.groups.records if baked.groups is not None else ()
     state.lights.fields = bool(baked.light_fields)
     state.sky_turn_deg, state.replaced = sky_turn_deg, replaced
-    state.missing = (*baked.missing, *state.missing)
+    from_scene = isinstance(store.documents.get(SOURCE), str) and not replaced
+    state.rebaking.possible = from_scene and sky_turn_deg % 360 == 0  # a turned sky has left the light map
+    of_session = state.session.open([group.name for group in state.lights.groups])
+    state.missing = (*baked.missing, *state.missing, *of_session)
     state.notes, state.knows_noise = light_map_notes(store), baked.noise is not None
     geometry = Geometry(baked.positions, baked.faces, state.selection.objects)
     renderer = Renderer(open_device(device_needs(baked)), baked)
@@ -77,6 +95,7 @@ class WalkMode(Mode):
     def __init__(self, state: WalkState, input: WalkInput, drawing: Drawing) -> None:
         super().__init__(state.scene.name, state.screen, input, drawing, panels(state))
         self.state = state
+        self.head = partial(room.draw, state)
 
     @property
     def beside(self) -> Beside | None:
@@ -102,6 +121,9 @@ class WalkMode(Mode):
             lines.append(f"recording {self.screen.clock() - recorder.began_s:.0f} s   (R stops)")
         overlay.draw(self.screen, lines, refining=filming is None)  # which has the adapter to itself
 
+        if not imgui.is_any_item_active():
+            state.materials.edits.end_stroke()
+
     def advance(self, dt_s: float) -> None:
         self.input.walk(dt_s)
         self.state.navigation.play(dt_s)
@@ -109,10 +131,12 @@ class WalkMode(Mode):
         self.state.recordings.follow()
         if self.state.materials.editor is not None:
             self.state.materials.editor.tick()
+        self.state.session.tick()
 
     def wait_s(self) -> float | None:
         editor = self.state.materials.editor
-        return POLL_S if self.state.recordings.recorder.on or (editor is not None and editor.busy) else None
+        busy = self.state.recordings.recorder.on or (editor is not None and editor.busy)
+        return least(POLL_S if busy else None, self.state.session.wait_s())
 
     def drop(self, path: str) -> None:
         if self.state.materials.editor is not None:
@@ -121,26 +145,32 @@ class WalkMode(Mode):
     @property
     def unsaved(self) -> tuple[str, ...]:
         walk = ("the recorded walk",) if self.state.recordings.unsaved else ()
-        return (*self.state.materials.unsaved, *walk)
+        return (*self.state.session.unsaved, *walk)
 
     def save(self) -> None:
-        for name in self.state.materials.unsaved:
-            self.state.materials.save(name)
+        if not self.state.session.keeps or not self.state.session.save():
+            for name in self.state.unsaved_materials:
+                self.state.materials.save(name)
         self.state.recordings.keep()
 
     def discard(self) -> None:
+        self.state.session.discard()
         self.state.recordings.drop()
 
     def rescue(self) -> None:
-        rescued("an unsaved material", self.state.materials.rescue)
+        if self.state.session.keeps:
+            rescued("the unsaved session", self.state.session.rescue)
+        else:
+            rescued("an unsaved material", lambda: self.state.materials.rescue(self.state.unsaved_materials))
         rescued("the recorded walk", self.state.recordings.rescue)
         self.drawing.close()  # a film under way leaves nothing behind
 
     def close(self) -> None:
         self.state.materials.close_editor()
         rescued("the recorded walk", self.state.recordings.rescue)
-        if self.state.materials.unsaved:
-            names = ", ".join(self.state.materials.unsaved)
+        names = ", ".join(self.state.session.unsaved)
+        self.state.session.close()
+        if names:
             sys.stderr.write(f"lambent: note: {names} changed and not saved\n")
 
 
@@ -150,9 +180,14 @@ def panels(state: WalkState) -> tuple[Panel, ...]:
     return (
         Panel(
             "Material",
-            partial(material.draw, state.selection, state.materials, state.answering),
+            partial(material.draw, state.selection, state.materials),
             "the objects, and every number of the selected one's material",
             opened=True,
+        ),
+        Panel(
+            "States",
+            partial(states.draw, state.states, state.comparison, state.screen),
+            "the room as it is now, as it was stored, and both beside each other",
         ),
         Panel("View", partial(view.draw, state), "what the picture shows, and how bright", opened=True),
         Panel(

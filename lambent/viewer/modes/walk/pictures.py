@@ -20,18 +20,18 @@ from lambent.viewer.modes.walk.answering import AnsweringLight
 from lambent.viewer.modes.walk.comparison import AS_A, REFERENCE
 from lambent.viewer.modes.walk.filming import QUALITIES, SIZES, Filming, film_file
 from lambent.viewer.modes.walk.glare import GlareDrawing
+from lambent.viewer.modes.walk.lanes import Lane
 from lambent.viewer.modes.walk.light_fields import FieldDrawing, shows_choice
 from lambent.viewer.modes.walk.metering import read
 from lambent.viewer.modes.walk.outlining import Outlining
+from lambent.viewer.modes.walk.rebaking import RebakedLight
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.modes.walk.traced import TracedPicture
 from lambent.viewer.picture import Pair, Picture, size_px
 from lambent.viewer.screen import Rect, least
 from lambent.viewer.work import POLL_S
 
-MIX_S = 0.01  # between two looks at a mix of light that is being made
 METER_S = 0.2  # between two readings of the meter while something moves
-ANSWER_S = 0.01  # between two looks at light that is being computed
 SHARED = 0.5  # of the frame time that each of two pictures may take
 
 
@@ -40,9 +40,12 @@ class Pictures(Pair):
 
     def __init__(self, renderer: Renderer, state: WalkState, answering: AnsweringLight | None = None) -> None:
         super().__init__(renderer.device)
-        self._renderer, self._state, self._answering = renderer, state, answering
-        self._a = Picture(renderer, state.screen)
-        renderer.waits = False  # for maps: the picture is drawn again when they are there
+        self._state = state
+        self._lane = Lane.of(renderer, state.screen, answering, state.answering)
+        self._beside: Lane | None = None  # of the state that the room is compared with
+        self._rebaked = (
+            None if state.store is None else RebakedLight(state.store, renderer.scene, state.screen, state.rebaking)
+        )
         self._b: Picture | None = None
         self._traced: TracedPicture | None = None
         self._stands_for: Any = None
@@ -54,6 +57,14 @@ class Pictures(Pair):
         self._read_version, self._read_s = -1, -1e9
         self._glare = GlareDrawing(state.meter.glare)
         self._glare_renderer: Renderer | None = None
+
+    @property
+    def _renderer(self) -> Renderer:
+        return self._lane.renderer
+
+    @property
+    def _a(self) -> Picture:
+        return self._lane.picture
 
     @property
     def images(self) -> Mapping[str, Any]:
@@ -71,20 +82,26 @@ class Pictures(Pair):
 
     @property
     def divider(self) -> Divider | None:
-        beside = len(self.shown) == 2 and self._state.comparison.mode == "side by side"
-        return self._state.comparison.divider if beside else None
+        return self._state.divider if len(self.shown) == 2 else None
 
     def update(self, place: Rect, pixel_ratio: float) -> None:
         """Draw what is due, and read the picture for the meter where it is looked at."""
         state = self._state
         self._film()
-        if self._answering is not None:
-            self._answering.update(state.materials.edits.edited)
-        wanted = self._frame(size_px(place, pixel_ratio))
+        self._follow_exchange()
+        self._lane.answer(state.materials.edits.room)
+        size = size_px(place, pixel_ratio)
+        if self._rebaked is not None and state.films.under_way is None:
+            in_stroke = state.materials.edits.in_stroke
+            self._rebaked.update(self._lane, state.recordings.light, state.navigation.camera, size, in_stroke=in_stroke)
+        wanted = self._frame(size)
         self._outlining.update(wanted, state.selection.record)
-        if self._traced is not None and not (state.comparison.is_traced and state.films.under_way is None):
+        traces = state.comparison.is_traced and state.films.under_way is None and not state.states.split
+        if self._traced is not None and not traces:
             self._traced.rest()
-        if state.comparison.is_traced and state.films.under_way is None:
+        if state.states.split and state.films.under_way is None:
+            self._compare_states(wanted)
+        elif state.comparison.is_traced and state.films.under_way is None:
             self._compare_traced(wanted)
         elif state.comparison.on and state.films.under_way is None:
             self._compare(wanted)
@@ -109,17 +126,21 @@ class Pictures(Pair):
     def _frame(self, size: tuple[int, int]) -> FrameState:
         state = self._state
         frame = state.look.frame(state.navigation.camera, size, state.materials.edits.edited)
-        light = state.recordings.light
-        return replace(frame, maps=self._renderer.light_version, light=light, mixed=self._renderer.mixer.version)
+        return self._lane.frame(frame, state.recordings.light)
 
     def wait_s(self) -> float | None:
         if self._state.films.under_way is not None or self._glare.busy:
             return 0.0
-        loading = MIX_S if self._renderer.mixer.busy else POLL_S if self._renderer.streaming.busy else None
-        answers = ANSWER_S if self._answering is not None and self._answering.busy else None
-        return least(
-            super().wait_s(), loading, answers, 0.1 if len(self.shown) == 2 and self._state.comparison.busy else None
-        )
+        loading = POLL_S if self._renderer.streaming.busy else None
+        beside = self._beside.wait_s() if self._beside is not None and self._state.states.split else None
+        compares = POLL_S if len(self.shown) == 2 and self._state.comparison.busy else None
+        rebakes = None if self._rebaked is None else self._rebaked.wait_s()
+        return least(super().wait_s(), loading, self._lane.wait_s(), beside, compares, rebakes)
+
+    def work(self) -> bool:
+        """Go on with the frame under way that has come less far."""
+        busy = [picture for picture in self.shown if picture.under_way]
+        return bool(busy) and min(busy, key=lambda picture: picture.samples).work()
 
     def save(self) -> None:
         """Write the picture A, and the error map where one is shown."""
@@ -136,8 +157,11 @@ class Pictures(Pair):
 
     def close(self) -> None:
         """Cancel FLIP, path tracing, the film under way, and light that is being computed."""
-        if self._answering is not None:
-            self._answering.close()
+        if self._rebaked is not None:
+            self._rebaked.close()
+        for lane in (self._lane, self._beside):
+            if lane is not None:
+                lane.close()
         self._state.comparison.forget()
         if self._traced is not None:
             self._traced.close()
@@ -145,6 +169,31 @@ class Pictures(Pair):
             self._state.films.under_way.cancel()
 
     # comparing
+
+    def _follow_exchange(self) -> None:
+        """Where the room and the state beside it have changed places, so do their lanes."""
+        edits, lane, beside = self._state.materials.edits, self._lane, self._beside
+        if beside is None or edits.room == edits.other:
+            return
+        if beside.room == edits.room and lane.room == edits.other:
+            self._lane, self._beside, self._state.answering = beside, lane, beside.shown
+            self._b = self._film_renderer = self._glare_renderer = None  # which share the light of the lane before
+
+    def _compare_states(self, wanted: FrameState) -> None:
+        """The room left of the divider, the other state right of it; each has half of a frame's time."""
+        state, edits = self._state, self._state.materials.edits
+        state.comparison.forget()
+        state.comparison.figures = None
+        if self._beside is None:
+            self._beside = self._lane.another(state.screen)
+        other, beside = edits.other, self._beside
+        assert other is not None, "there is no split without"
+        beside.shown.on = state.answering.on
+        beside.answer(other.only(state.scene.materials))
+        self.shown = (self._a, beside.picture)
+        beside.picture.update(beside.frame(wanted, state.lights.known(other.light.factors)), share=SHARED)
+        self._a.update(wanted, share=SHARED)  # last: its statistics are the window's
+        state.states.label()
 
     def _compare(self, wanted: FrameState) -> None:
         comparison = self._state.comparison
@@ -184,7 +233,7 @@ class Pictures(Pair):
             )
         b = self._traced
         self.shown = (a, b)
-        b.update(wanted)
+        b.update(wanted, self._state.materials.edits.room.textures)
         a.update(wanted, refine=False)
         comparison.fault = b.fault
         comparison.divider.a_label, comparison.divider.b_label = wanted.integrator, b.label
@@ -267,6 +316,8 @@ class Pictures(Pair):
             # A film's light may change with its time, and so is not that of the window.
             scene = self._renderer.scene
             self._film_renderer = self._another_renderer() if scene.groups is None else Renderer(self.device, scene)
+        if self._film_renderer.resources is not self._renderer.resources:
+            self._lane.lend_light(self._film_renderer)
         frame = replace(self._frame(SIZES[films.size]), mixed=0)
         track = self._state.recordings.track_of(path)
         light = None if track is None else lambda time_s: self._state.lights.known(track.factors_at(time_s))

@@ -12,6 +12,7 @@ from lambent.core.light_mix import MixTrack
 from lambent.core.plain import Triple, triple
 from lambent.viewer.cameras import LONGEST_STEP_S
 from lambent.viewer.edits import rescue_file
+from lambent.viewer.modes.walk.light_keys import mix_at, with_key, without_key
 from lambent.viewer.modes.walk.lights import Lights, RecordedLight
 from lambent.viewer.modes.walk.views import Kind, SavedViews, write_alone
 from lambent.viewer.navigation import Navigation, PathPlay
@@ -130,6 +131,7 @@ class Recordings:
     lights: Lights = field(default_factory=Lights)
     recorder: Recorder = field(default_factory=Recorder)
     view_name: str = ""  # typed for the next saved view
+    keying: bool = False  # keys of light are being set: a path that rests shows the mix, not its own light
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
@@ -146,13 +148,42 @@ class Recordings:
     def light(self) -> dict[str, Triple]:
         """Factors of the light groups that the picture shows: of the walk that is followed, else of the mix."""
         play = self.navigation.path
-        track = None if play is None else self.track_of(play.path)
+        keying = self.keying and play is not None and not play.playing
+        track = None if play is None or keying else self.track_of(play.path)
         found = self.lights.mix.factors if track is None or play is None else track.factors_at(play.time_s)
         return self.lights.known(found)
 
     def track_of(self, path: CameraPath) -> MixTrack | None:
         """The light over time of a saved path, or of the one just recorded."""
         return self.recorder.track if path == self.recorder.draft else self.views.saved.tracks.get(path.name)
+
+    def set_key(self) -> None:
+        """Keep the mix as it is now as the light of the path at this moment."""
+        play = self.navigation.path
+        if play is None:
+            return
+        groups = [group.name for group in self.lights.groups]
+        track = with_key(self.track_of(play.path), play.time_s, self.lights.mix, groups)
+        if self.views.set_track(play.path.name, track):
+            self.screen.say(f"the light of {play.path.name} at {play.time_s:.1f} s is the present mix")
+
+    def drop_key(self, time_s: float) -> None:
+        """Remove a key of the path's light."""
+        play = self.navigation.path
+        track = None if play is None else self.track_of(play.path)
+        if play is not None and track is not None:
+            self.views.set_track(play.path.name, without_key(track, time_s))
+
+    def go_to_key(self, time_s: float) -> None:
+        """Stand at a key of the path's light, with its mix at hand, as a step of undo."""
+        play = self.navigation.path
+        track = None if play is None else self.track_of(play.path)
+        if play is not None and track is not None:
+            self.navigation.scrub(play.path, time_s)
+            self.keying = True
+            self.lights.edits.end_stroke()
+            self.lights.mix = mix_at(track, time_s)
+            self.lights.edits.end_stroke()
 
     def save_view(self) -> None:
         """Save where the camera stands, under the typed name or the next free one."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,14 +15,18 @@ from lambent.viewer.editor.editor import Editor
 from lambent.viewer.editor.files import document_file, with_account
 from lambent.viewer.edits import MaterialEdits, rescue
 from lambent.viewer.look import Look
+from lambent.viewer.mode import Divider
 from lambent.viewer.modes.walk.answering import Answering
 from lambent.viewer.modes.walk.comparison import Comparison
 from lambent.viewer.modes.walk.filming import Films
+from lambent.viewer.modes.walk.keeping import SessionKeeper
 from lambent.viewer.modes.walk.light_fields import FieldView
 from lambent.viewer.modes.walk.lights import Lights
 from lambent.viewer.modes.walk.markers import Marks
 from lambent.viewer.modes.walk.metering import Meter
+from lambent.viewer.modes.walk.rebaked import Rebaking
 from lambent.viewer.modes.walk.recording import Recordings
+from lambent.viewer.modes.walk.states import States
 from lambent.viewer.modes.walk.views import SavedViews
 from lambent.viewer.navigation import Movement, Navigation
 from lambent.viewer.screen import Screen
@@ -95,15 +99,9 @@ class Materials:
             self.edits.saved[name] = material
             self.screen.say(f"saved {file_name}")
 
-    @property
-    def unsaved(self) -> tuple[str, ...]:
-        """Materials that are neither the scene's nor as they were saved."""
-        saved, scene = self.edits.saved, self.edits.scene
-        return tuple(name for name, now in self.edits.edited.items() if now != saved.get(name, scene[name]))
-
-    def rescue(self) -> Iterator[Path]:
-        """Write unsaved materials to files of new names."""
-        return rescue(self.edits, self.unsaved, self.screen.folder)
+    def rescue(self, names: Iterable[str]) -> Iterator[Path]:
+        """Write materials to files of new names."""
+        return rescue(self.edits, names, self.screen.folder)
 
     def open_editor(self, name: str) -> None:
         """Open the editor on a material, with the measurement whose path was typed, if any."""
@@ -132,9 +130,12 @@ class WalkState:
     materials: Materials
     recordings: Recordings
     marks: Marks
+    session: SessionKeeper
+    states: States
     comparison: Comparison = field(default_factory=Comparison)
     meter: Meter = field(default_factory=Meter)
     answering: Answering = field(default_factory=Answering)
+    rebaking: Rebaking = field(default_factory=Rebaking)
     films: Films = field(default_factory=Films)
     fields: FieldView = field(default_factory=FieldView)
     lights: Lights = field(default_factory=Lights)
@@ -152,16 +153,30 @@ class WalkState:
         name = self.selection.name
         return frozenset(o.name for o in self.scene.objects if name is not None and name in (o.name, o.part_of))
 
+    @property
+    def divider(self) -> Divider | None:
+        """The line that can be dragged between two pictures, where two are shown."""
+        if self.states.split:
+            return self.states.divider
+        return self.comparison.divider if self.comparison.mode == "side by side" else None
+
+    @property
+    def unsaved_materials(self) -> tuple[str, ...]:
+        """Materials that neither the session nor a document has as they are now."""
+        return tuple(name for name in self.session.unsaved if name in self.scene.materials)
+
     @classmethod
     def of(cls, scene: SceneRecord, movement: Movement, screen: Screen, store: Path | None = None) -> WalkState:
         """State at the scene's first camera and exposure, with the views saved in the folder of the `store`."""
         look, meter = Look(scene.exposure_ev or 0.0), Meter(expose_wanted=scene.exposure_ev is None)
         navigation, views = Navigation.of(scene, movement), SavedViews(scene, store, screen.say)
-        fault, lights = views.load(), Lights()
+        fault, edits = views.load(), MaterialEdits(scene.materials)
+        lights = Lights(edits=edits)
         return cls(
             scene, screen, look, navigation, Selection(whole_objects(scene.objects)),
-            Materials(MaterialEdits(scene.materials), screen), Recordings(views, navigation, screen, lights),
-            Marks({}, scene.reflectors), meter=meter, lights=lights,
+            Materials(edits, screen), Recordings(views, navigation, screen, lights),
+            Marks({}, scene.reflectors), SessionKeeper(edits, store, screen), States(edits, scene),
+            meter=meter, lights=lights,
             store=store, store_name="STORE" if store is None else store.name,
             missing=() if fault is None else (fault,),  # stays in sight: a message is gone before the window is there
         )  # fmt: skip

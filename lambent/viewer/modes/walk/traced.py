@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,8 @@ class TracedPicture:
         self, given: Given, screen: Screen, store: Path, sky_turn_deg: float, replaced: tuple[str, ...]
     ) -> None:  # fmt: skip
         self._given, self._screen, self._tracing = given, screen, Tracing(store, sky_turn_deg, replaced)
-        self._of: FrameState | None = None  # what is asked for, by what paths depend on
+        self._of: tuple[FrameState, Mapping[str, str]] | None = None  # what is asked for, by what paths depend on
+        self._is_mixed = False  # the picture A has another mix of light than the scene
         self._asked = False
         self._changed_s = 0.0
         self._taken: Traced | None = None
@@ -60,7 +62,7 @@ class TracedPicture:
     @property
     def fault(self) -> str:
         """Why there is no picture, in a line; empty where there is one, or will be."""
-        if self._of is not None and self._of.show != ALL_LIGHT:
+        if self._of is not None and self._of[0].show != ALL_LIGHT:
             return "The path tracer shows all light: set *show* to full."
         return self._tracing.error
 
@@ -71,19 +73,23 @@ class TracedPicture:
             return "not path traced"
         if self._taken is None:
             return f"path tracing: {self._tracing.what}" if self._asked else "path tracing: at rest"
-        return f"path traced, {f'{self.samples} samples' if self.samples else 'coarse'}"
+        mix = ", light as baked" if self._is_mixed else ""
+        return f"path traced, {f'{self.samples} samples' if self.samples else 'coarse'}{mix}"
 
-    def update(self, wanted: FrameState) -> None:
-        """Ask for a view once it rests, and show what is there of it."""
+    def update(self, wanted: FrameState, textures: Mapping[str, str]) -> None:
+        """Ask for a view once it rests, and show what is there of it.
+
+        `textures` are those that materials wear in the place of their own. A mix of light groups is not traced.
+        """
         self._tracing.tick()
-        of = _traced_of(wanted)
+        of, self._is_mixed = (_traced_of(wanted), dict(textures)), bool(wanted.light)
         now_s = self._screen.clock()
         if of != self._of:
             self._of, self._changed_s, self._asked, self._taken = of, now_s, False, None
-            self._tracing.ask(None, of.size, {})
-        if not self._asked and of.show == ALL_LIGHT and now_s - self._changed_s >= REST_S:
+            self._tracing.ask(None, wanted.size, {}, {})
+        if not self._asked and wanted.show == ALL_LIGHT and now_s - self._changed_s >= REST_S:
             self._asked = True
-            self._tracing.ask(of.camera, of.size, of.materials)
+            self._tracing.ask(wanted.camera, wanted.size, wanted.materials, textures)
         last = self._tracing.last if self._asked else None
         if last is not None and last is not self._taken:
             self._given.take(last.radiance)
@@ -121,7 +127,7 @@ class TracedPicture:
         """Trace nothing until the next `update`."""
         if self._of is not None:
             self._of, self._asked, self._taken = None, False, None
-            self._tracing.ask(None, (1, 1), {})
+            self._tracing.ask(None, (1, 1), {}, {})
 
     def close(self) -> None:
         """End the process."""
@@ -129,7 +135,7 @@ class TracedPicture:
 
     @property
     def _is_whole(self) -> bool:
-        return self._taken is not None and self._of is not None and self.size == self._of.size
+        return self._taken is not None and self._of is not None and self.size == self._of[0].size
 
 
 def size_of(traced: Traced) -> tuple[int, int]:

@@ -27,8 +27,9 @@ from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.scenes.replacement import parse_replacements, with_replacements
-from lambent.scenes.scene import Scene
+from lambent.scenes.scene import Look, Scene
 from lambent.scenes.turned_sky import under_turned_sky
+from lambent.scenes.variants import textures_worn
 from lambent.store.source import SOURCE, scene_of
 from lambent.store.store import Store
 from lambent.viewer.modes.walk.tracing import MOST_SAMPLES, Wish
@@ -70,7 +71,7 @@ class Views:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._worn: Mapping[str, Material] | None = None
+        self._worn: tuple[Mapping[str, Material], Mapping[str, str]] | None = None
         self._built: Any = None
 
     def traced(self, camera: Camera, size: tuple[int, int], samples: int, seed: int) -> Floats:
@@ -79,14 +80,17 @@ class Views:
 
         return traced(self._built, camera, *size, samples, seed)[0]
 
-    def wear(self, materials: Mapping[str, Material]) -> bool:
-        """Take these materials in place of the scene's; whether the scene has to be built for it."""
-        if self._built is not None and materials == self._worn:
+    def wear(self, materials: Mapping[str, Material], textures: Mapping[str, str]) -> bool:
+        """Take these materials and textures in place of the scene's; whether the scene has to be built for it."""
+        if self._built is not None and (materials, textures) == self._worn:
             return False
         from lambent.bake.reference.path_traced import built
 
-        self._worn = materials
-        self._built = built(replace(self._scene, materials={**self._scene.materials, **materials}))[1]
+        self._worn = materials, textures
+        scene = self._scene
+        looks = {name: Look(scene.materials[name], of) for name, of in textures.items()}
+        worn = textures_worn(scene.textures, looks)
+        self._built = built(replace(scene, materials={**scene.materials, **materials}, textures=worn))[1]
         return True
 
 
@@ -111,7 +115,7 @@ def main(folder: Path, sky_turn_deg: float, replaced: Sequence[str], wishes: Wis
 def trace(views: Views, wish: Wish, camera: Camera, wishes: Wishes, out: BinaryIO) -> None:
     """Write pictures of a wish, each of more samples, while it stands."""
     say(out, what="building the scene")
-    views.wear(wish.materials)
+    views.wear(wish.materials, wish.textures)
     coarse = max(1, wish.size[0] // COARSE), max(1, wish.size[1] // COARSE)
     if wishes.stands(wish):
         send(out, wish, views.traced(camera, coarse, COARSE_SAMPLES, 0), COARSE_SAMPLES)

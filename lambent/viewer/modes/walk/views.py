@@ -84,6 +84,15 @@ class SavedViews:
 
         return self._change(change)
 
+    def set_track(self, path: str, track: MixTrack | None) -> bool:
+        """Save the light along a path, of the scene or saved, or none; whether that was possible."""
+
+        def change(views: Views) -> Views:
+            others = {name: one for name, one in views.tracks.items() if name != path}
+            return _lit(views, "path", others if track is None else {**others, path: track})
+
+        return self._change(change)
+
     def _names(self, kind: Kind, views: Views) -> set[str]:
         return {item.name for item in (*_of(self.scene, kind), *_of(views, kind))}
 

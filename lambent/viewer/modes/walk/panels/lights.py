@@ -9,8 +9,10 @@ from imgui_bundle import imgui
 from lambent.core.light_mix import AS_BAKED, LEAST_K, MOST_K, WHITE, GroupMix, LightMix
 from lambent.realtime.group_arrays import BAKE_GROUPS, FIELDS_STAY, NO_GROUPS
 from lambent.store.light_groups import LightGroupRecord
+from lambent.viewer.modes.walk.light_keys import key_times
 from lambent.viewer.modes.walk.lights import Lights
 from lambent.viewer.modes.walk.recording import Recordings
+from lambent.viewer.navigation import PathPlay
 from lambent.viewer.panels.widgets import check, press, rgb, slider, wrapped
 
 BRIGHTEST = 4.0  # of the slider: times as baked
@@ -23,7 +25,7 @@ def draw(lights: Lights, recordings: Recordings) -> None:
         wrapped([f"{NO_GROUPS}: {BAKE_GROUPS}"])
         return
     play = recordings.navigation.path
-    if play is not None and recordings.track_of(play.path) is not None:
+    if play is not None and recordings.track_of(play.path) is not None and not recordings.keying:
         wrapped(["the light follows the walk that is shown; move to take it over"])
     for group in lights.groups:
         mix = lights.mix.of(group.name)
@@ -32,8 +34,31 @@ def draw(lights: Lights, recordings: Recordings) -> None:
     if press("reset all light", "shows all light as it was baked", -1):
         lights.mix = LightMix()
     imgui.end_disabled()
+    if play is not None:
+        _keys(recordings, play)
     if lights.fields:
         wrapped([FIELDS_STAY])
+
+
+def _keys(recordings: Recordings, play: PathPlay) -> None:
+    """Keys of the mix along the path that is shown: films of it have the same light."""
+    imgui.separator_text(f"light along {play.path.name}")
+    if play.path == recordings.recorder.draft:
+        imgui.text_wrapped("Save the recorded walk, then set keys.")
+        return
+    meaning = "while the walk rests the picture shows the mix above, to be set as a key, not the light of the walk"
+    recordings.keying = check("set keys", recordings.keying, meaning)
+    imgui.same_line()
+    imgui.begin_disabled(not recordings.keying)
+    if press(f"key at {play.time_s:.1f} s###set key", "the mix above is the light of the walk at this moment"):
+        recordings.set_key()
+    imgui.end_disabled()
+    for time_s in key_times(recordings.track_of(play.path)):
+        if press(f"{time_s:.1f} s##key", "stands there, with the mix of this key above", small=True):
+            recordings.go_to_key(time_s)
+        imgui.same_line()
+        if press(f"x##key {time_s}", "removes this key of light; the view stays", small=True):
+            recordings.drop_key(time_s)
 
 
 def _row(group: LightGroupRecord, mix: GroupMix) -> GroupMix:

@@ -6,15 +6,14 @@ from functools import partial
 
 from imgui_bundle import imgui
 
-from lambent.viewer.modes.walk.answering import Answering
 from lambent.viewer.modes.walk.state import Materials, Selection
 from lambent.viewer.panels import editing, parameters
-from lambent.viewer.panels.widgets import buttons, check, explain, listed, path_field, press
+from lambent.viewer.panels.widgets import buttons, explain, listed, path_field, press
 
 LISTED = 5
 
 
-def draw(selection: Selection, materials: Materials, answering: Answering) -> None:
+def draw(selection: Selection, materials: Materials) -> None:
     _objects(selection)
     name, editor = selection.material, materials.editor
     if name is None:
@@ -32,27 +31,12 @@ def draw(selection: Selection, materials: Materials, answering: Answering) -> No
     edited, materials.linked_roughness = parameters.edited(material, materials.linked_roughness)
     if edited != material:
         edits.change(name, edited)
-    elif not imgui.is_any_item_active():
-        edits.end_stroke()
     imgui.separator()
     buttons([
-        ("undo", edits.can_undo, edits.undo, "takes back the last step (Ctrl+Z)"),
-        ("redo", edits.can_redo, edits.redo, "does the step again (Ctrl+Shift+Z)"),
         ("reset", name in edits.edited, partial(edits.reset, name), "returns to the material that the store has"),
     ])  # fmt: skip
-    _light(answering)
     _save(materials, name)
     _compare(materials, name)
-
-
-def _light(answering: Answering) -> None:
-    """Whether the light of other surfaces follows an edit, and how exactly."""
-    if answering.possible:
-        meaning = "other surfaces get the light of edited colours, estimated at once; a new bake is exact"
-        answering.on = check("light answers", answering.on, meaning)
-    imgui.push_style_color(imgui.Col_.text, imgui.get_style_color_vec4(imgui.Col_.text_disabled))
-    imgui.text_wrapped(answering.note)
-    imgui.pop_style_color()
 
 
 def _objects(selection: Selection) -> None:

@@ -1,0 +1,102 @@
+"""A store's light baked again for other materials, into a copy beside it: same geometry, same effort, same seed.
+
+The copy has the geometry, the light map and the probes. Texel for texel and probe for probe it can stand in for the
+store's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from lambent.bake.bake import bake
+from lambent.bake.quality import Quality
+from lambent.core.errors import UserError
+from lambent.core.progress import Progress, silent
+from lambent.materials.document import Material
+from lambent.scenes.scene import Look
+from lambent.scenes.variants import textures_worn
+from lambent.store.contract import LAST_RUN, TIMINGS
+from lambent.store.source import SOURCE, scene_of
+from lambent.store.store import MANIFEST, Store
+
+COPY_OF = "copy_of"  # document: name of the store whose light the copy has for other materials
+KINDS = ("light_map", "probe")
+LIGHT = "light_map/irradiance"
+
+
+def copy_beside(folder: Path) -> Path:
+    """Where the copy of a store is: ROOM.rebake.store beside ROOM.store."""
+    folder = folder.resolve()
+    return folder.with_name(f"{folder.name.removesuffix('.store')}.rebake.store")
+
+
+def bake_again(
+    folder: Path,
+    copy: Path,
+    materials: Mapping[str, Material],
+    progress: Progress = silent,
+    *,
+    textures: Mapping[str, str] | None = None,
+    quality: Quality | None = None,
+) -> Store:
+    """Bake light map and probes of the store in `folder` into `copy`, with some of its materials replaced.
+
+    A copy that is there is brought up to date; one that an interrupted bake left is gone on with. The store itself is
+    only read.
+
+    Parameters
+    ----------
+    textures : mapping, optional
+        Names of materials whose textures others wear, by the name of these; "" is none.
+    quality : Quality, optional
+        By default the preset that the store was baked with.
+
+    Raises
+    ------
+    UserError
+        Where the store does not say where its scene is, or was baked with settings of its own; where `copy` is
+        something else; where other materials need other geometry.
+    """
+    store = Store.open(folder)
+    if not isinstance(store.documents.get(SOURCE), str):
+        raise UserError("the store does not say where its scene is", file=folder, hint="bake the scene from its file")
+    if LIGHT not in store:
+        raise UserError("the store has no light map that could be baked again", file=folder, field=LIGHT)
+    made_with = store.artefact(LIGHT).meta
+    scene = scene_of(store)
+    worn = {name: Look(scene.materials[name], of) for name, of in (textures or {}).items()}
+    scene = replace(
+        scene,
+        materials={**scene.materials, **materials},
+        textures=textures_worn(scene.textures, worn),
+        measured={name: file for name, file in scene.measured.items() if name not in materials},
+    )
+    _prepare(store, copy)
+    effort, seed = quality or str(made_with.get("quality")), int(made_with.get("seed", 0))
+    with bake(scene, copy, only={"geometry"}, quality=effort, seed=seed, progress=progress) as copied:
+        if not _same_geometry(store, copied):
+            hint = "`lambent bake` of the scene with these materials shows it"
+            raise UserError("these materials need probes or parts that the store does not have", file=folder, hint=hint)
+    return bake(scene, copy, only=set(KINDS), quality=effort, seed=seed, progress=progress)
+
+
+def _prepare(store: Store, folder: Path) -> None:
+    """Make the copy with the geometry and the notes of the store, where it is not there yet."""
+    if (folder / MANIFEST).exists() and Store.open(folder).documents.get(COPY_OF) != store.folder.name:
+        raise UserError("is another store", file=folder, hint="move it: the light of edited materials is baked there")
+    with Store.create(folder, store.inputs) as copy:
+        for name, document in store.documents.items():
+            if name not in (TIMINGS, LAST_RUN):
+                copy.set_document(name, document)
+        copy.set_document(COPY_OF, store.folder.name)
+        for artefact in store.artefacts("geometry"):
+            if artefact.name not in copy or copy.artefact(artefact.name).key != artefact.key:
+                copy.put(artefact.name, "geometry", store.read(artefact.name), key=artefact.key, meta=artefact.meta)
+
+
+def _same_geometry(store: Store, copy: Store) -> bool:
+    """Whether all geometry is that of the store."""
+    keys = {artefact.name: artefact.key for artefact in store.artefacts("geometry")}
+    return keys == {artefact.name: artefact.key for artefact in copy.artefacts("geometry")}

@@ -1,0 +1,130 @@
+"""The session of a store: what people have changed while they look at it, `session.json` in its folder.
+
+No bake touches the file. `session-unsaved.json` beside it has the same form: the window keeps there what nobody has
+saved yet, so that it survives the end of the process. Saved cameras and paths are not in it: see `store.views`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from lambent.core.ceilings import SESSION_BYTES
+from lambent.core.errors import UserError, invalid
+from lambent.core.files import write_text
+from lambent.core.inputs import parse_json, read_bytes
+from lambent.core.light_mix import LightMix
+from lambent.materials.document import Material
+from lambent.store.lock import lock
+
+LOCK_FILE = ".session.lock"  # stays in the folder; that it exists means nothing
+FILE, UNSAVED_FILE = "session.json", "session-unsaved.json"
+FORMAT: Literal["lambent-walk-session"] = "lambent-walk-session"
+VERSION: Literal[1] = 1
+
+
+class SessionLock:
+    """The right to keep the session of a store, until `release` or the end of the process.
+
+    Raises
+    ------
+    UserError
+        Where the folder cannot be written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        try:
+            handle = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
+        except OSError as error:
+            raise UserError(f"cannot be written ({error.strerror})", file=folder) from error
+        self.held = lock(handle, wait=False)  # False: another window has it
+        self._handle: int | None = handle
+        if not self.held:
+            self.release()
+
+    def release(self) -> None:
+        """Let another window have it."""
+        handle, self._handle, self.held = self._handle, None, False
+        if handle is not None:
+            os.close(handle)
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class RoomState(_Strict):
+    """What a room looks like: materials that stand in for the scene's, by name, and the mix of its light groups.
+
+    `textures` are those that a material wears in the place of its own: the name of their material, "" for none.
+    """
+
+    materials: dict[str, Material] = {}
+    textures: dict[str, str] = Field(default={}, exclude_if=lambda one: not one)
+    light: LightMix = LightMix()
+
+    def unknown(self, materials: Collection[str], groups: Collection[str]) -> list[str]:
+        """Names of materials and light groups that a store does not have."""
+        worn = [*self.materials, *self.textures, *(of for of in self.textures.values() if of)]
+        return [n for n in worn if n not in materials] + [n for n in self.light.groups if n not in groups]
+
+    def only(self, materials: Collection[str]) -> RoomState:
+        """The same with those of its materials that a store has."""
+        known = {name: one for name, one in self.materials.items() if name in materials}
+        worn = {name: of for name, of in self.textures.items() if name in materials and of in (*materials, "")}
+        return RoomState(materials=known, textures=worn, light=self.light)
+
+
+class WalkSession(_Strict):
+    """What a session file holds: the present state, the one that is compared with it, and stored states by name."""
+
+    format: Literal["lambent-walk-session"] = FORMAT
+    version: Literal[1] = VERSION
+    now: RoomState = RoomState()
+    beside: RoomState | None = None
+    states: dict[str, RoomState] = {}
+
+    def unknown(self, materials: Collection[str], groups: Collection[str]) -> list[str]:
+        """Names of materials and light groups that a store does not have, sorted."""
+        parts = [self.now, *([] if self.beside is None else [self.beside]), *self.states.values()]
+        return sorted({name for part in parts for name in part.unknown(materials, groups)})
+
+
+def read_session(file: Path) -> WalkSession | None:
+    """The session in a file; None where there is none.
+
+    Raises
+    ------
+    UserError
+        Where the file is damaged or of another version.
+    """
+    if not file.exists():
+        return None
+    return session_from(parse_json(read_bytes(file, SESSION_BYTES), file), file)
+
+
+def session_from(said: Any, file: Path) -> WalkSession:
+    """The session of a parsed document; errors name `file`."""
+    if not isinstance(said, dict) or said.get("format") != FORMAT:
+        raise UserError("is not a session of a store", file=file, field="format", expected=FORMAT)
+    if said.get("version") != VERSION:
+        hint = "open it with the version of Lambent that wrote it"
+        raise UserError(
+            "unknown version", file=file, field="version", got=said.get("version"), expected=VERSION, hint=hint
+        )
+    try:
+        return WalkSession.model_validate(said)
+    except ValidationError as error:
+        raise invalid(error, file) from error
+    except UserError as error:  # a mix that no light can have
+        raise UserError(error.message, file=file, field=error.field, got=error.got, expected=error.expected) from error
+
+
+def write_session(file: Path, session: WalkSession) -> None:
+    """Write a session, atomically; `UserError` where that cannot be."""
+    write_text(file, json.dumps(session.model_dump(mode="json"), indent=1) + "\n")

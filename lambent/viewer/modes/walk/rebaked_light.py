@@ -1,0 +1,201 @@
+"""Light that was baked anew, brought into the picture region by region: what each step of it uploads.
+
+A region is the texels and the probe of an object. Texels go over in a few frames each, those of what is in view and
+near first, then the probes in the same order. Arrays are made in a thread; nothing here waits for the GPU.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.surfaces.coverage import pieces_of
+from lambent.core.arrays import Floats, Indices
+from lambent.core.camera import Camera, image_plane
+from lambent.core.light_mix import Factors
+from lambent.realtime.baked import BakedScene, Probe, read_baked
+from lambent.realtime.cube_mips import finite
+from lambent.realtime.group_arrays import groups_in
+from lambent.realtime.group_light import GroupLight
+from lambent.realtime.probe_light import ProbeLight
+from lambent.realtime.resources import ObjectResources, SceneResources, light_layers
+from lambent.realtime.sun_disc import without_sun
+from lambent.store.contract import ObjectRecord, SceneRecord
+from lambent.store.store import Store
+
+FADE_STEPS = 8  # frames in which one region goes over
+STAGGER = 2  # frames from the begin of one region to that of the next
+MOST_BATCHES = 16  # of regions that go over together
+PROBE_STEPS = 3
+REACH = 0.5  # texels around a square from which look-ups touch it
+Layers = list[NDArray[np.float16]]
+Step = Callable[[SceneResources], None]  # what one frame uploads
+
+
+@dataclass(frozen=True, eq=False)
+class Rebaked:
+    """The scene that is shown, in the light of the copy.
+
+    Attributes
+    ----------
+    scene : BakedScene
+        With light map, probes and light by group of the copy, in the units of the scene that is shown.
+    texel_object : (H, W) int64
+        Number of the object that each texel of the light map belongs to; the count of objects where there is none.
+    """
+
+    scene: BakedScene
+    texel_object: Indices
+
+    @classmethod
+    def read(cls, copy: Path, shown: BakedScene) -> Rebaked:
+        """The light of the copy in a folder."""
+        store = Store.open(copy)
+        found = read_baked(store)
+        scale = np.float32(found.unit / shown.unit)
+        front, back = (None if side is None else side * scale for side in (found.irradiance, found.irradiance_back))
+        lit = replace(
+            shown, irradiance=front, irradiance_back=back, dominant_direction=found.dominant_direction,
+            probes={name: replace(one, radiance=one.radiance * scale) for name, one in found.probes.items()},
+            groups=groups_in(store, shown.unit),
+        )  # fmt: skip
+        return cls(lit, texel_objects(shown))
+
+    def layers(self, light: Factors) -> Layers:
+        """Layers (H, W, 4) as `resources.light_layers` has them, in a mix of light groups."""
+        scene, groups = self.scene, self.scene.groups
+        sides = [scene.irradiance, scene.irradiance_back]
+        if groups is not None:
+            mixed = GroupLight(scene, groups).light_map(groups.factors(light))
+            sides = [None if side is None else side[..., :3] for side in mixed]
+        return list(light_layers(sides[0], sides[1], scene.dominant_direction))
+
+    def probe(self, name: str, light: Factors) -> Probe | None:
+        """The probe of an object without the sun's disc, in a mix of light groups; None where the copy has none."""
+        scene, groups = self.scene, self.scene.groups
+        found = scene.probes.get(name)
+        if found is None:
+            return None
+        by_group = None if groups is None else GroupLight(scene, groups).probe(name, groups.factors(light))
+        return by_group or without_sun(found, scene.sun, scene.unit)
+
+
+def texel_objects(scene: BakedScene) -> Indices:
+    """(H, W) number of the object on each texel of the light map; the count of objects where there is none."""
+    assert scene.irradiance is not None, "there is a light map"
+    height, width = scene.irradiance.shape[:2]
+    geometry: dict[str, Any] = {"positions": scene.positions, "faces": scene.faces, "uv2": scene.uv2}
+    pieces = pieces_of(geometry, width, height, reach=REACH)
+    owner = np.zeros(len(scene.faces), np.int64)
+    for number, record in enumerate(scene.record.objects):
+        owner[record.first_face : record.first_face + record.face_count] = number
+    found = np.full(height * width, len(scene.record.objects), np.int64)
+    order = np.argsort(pieces.area, kind="stable")  # the largest piece of a texel is written last
+    found[pieces.cell[order]] = owner[pieces.face[order]]
+    return found.reshape(height, width)
+
+
+def in_view_order(record: SceneRecord, camera: Camera, size: tuple[int, int]) -> list[int]:
+    """Numbers of the objects: those in view first, the nearest first among them and among the others."""
+    across, up, forward = image_plane(camera, *size)
+
+    def place(o: ObjectRecord) -> tuple[bool, float]:
+        low, high = np.array(o.bounds)
+        nearest = np.clip(camera.position, low, high) - np.array(camera.position)
+        corners = np.array([[(low, high)[(k >> axis) & 1][axis] for axis in range(3)] for k in range(8)])
+        rays = np.concatenate([corners, [(low + high) / 2]]) - np.array(camera.position)
+        return not _meets(rays, across, up, forward), float(np.linalg.norm(nearest))
+
+    return sorted(range(len(record.objects)), key=lambda number: place(record.objects[number]))
+
+
+def _meets(rays: Floats, across: Floats, up: Floats, forward: Floats) -> bool:
+    """Whether a box whose corners are seen along these rays (n, 3) may be in the picture."""
+    depth = rays @ forward / (forward @ forward)
+    x, y = rays @ across / (across @ across), rays @ up / (up @ up)
+    beyond = [depth <= 0, x > depth, x < -depth, y > depth, y < -depth]
+    return not any(side.all() for side in beyond)
+
+
+def texel_steps(before: Layers, after: Layers, batch: Indices) -> Iterator[Layers]:
+    """Light maps frame by frame, texels (H, W) of one batch after the other going over from one to the other.
+
+    The last is `after`, to the bit.
+    """
+    last = STAGGER * int(batch.max()) + FADE_STEPS
+    for frame in range(1, last):
+        share = np.clip((frame - STAGGER * batch) / FADE_STEPS, 0, 1).astype(np.float32)[..., None]
+        share = share * share * (3 - 2 * share)  # begins and ends gently
+        yield [_between(a, b, share) for a, b in zip(before, after, strict=True)]
+    yield after
+
+
+def _between(a: NDArray[np.float16], b: NDArray[np.float16], share: Floats) -> NDArray[np.float16]:
+    wide = a.astype(np.float32)
+    return np.asarray(wide + (b - wide) * share, np.float16)
+
+
+def batches_of(texel_object: Indices, order: Sequence[int]) -> Indices:
+    """(H, W) number of the batch in which each texel goes over; texels of no object go last."""
+    count = len(order)
+    rank = np.full(count + 1, min(count, MOST_BATCHES) - 1 if count else 0)
+    for place, number in enumerate(order):
+        rank[number] = place * min(count, MOST_BATCHES) // count
+    return np.asarray(rank[texel_object])
+
+
+def steps(
+    rebaked: Rebaked,
+    shown: BakedScene,
+    resources: SceneResources,
+    light: Factors,
+    camera: Camera,
+    size: tuple[int, int],
+) -> Iterator[Step]:
+    """All uploads, in order, a frame each. Iterate in a thread: each takes a while to make."""
+    order = in_view_order(shown.record, camera, size)
+    after = rebaked.layers(light)
+    before = list(resources.light_layers[: len(after)])
+    for layers in texel_steps(before, after, batches_of(rebaked.texel_object, order)):
+        yield _uploads_map(layers)
+    for owner, users in probe_users(shown, resources, order).items():
+        found = rebaked.probe(owner, light)
+        if found is None:
+            continue
+        old, new = users[0].light, finite(found.radiance)[0]
+        was = finite(old.probe.radiance)[0]
+        for step in range(1, PROBE_STEPS + 1):
+            between = new if step == PROBE_STEPS else was + (new - was) * np.float32(step / PROBE_STEPS)
+            yield _relights(users, old.relit(between, found.irradiance))
+
+
+def _uploads_map(layers: Layers) -> Step:
+    return lambda resources: resources.show_light_map(layers)
+
+
+def _relights(users: Sequence[ObjectResources], light: ProbeLight) -> Step:
+    def upload(_: SceneResources) -> None:
+        for item in users:
+            item.relight(light, item.emission)
+
+    return upload
+
+
+def probe_users(
+    shown: BakedScene, resources: SceneResources, order: Sequence[int]
+) -> Mapping[str, list[ObjectResources]]:
+    """By owner of a probe, the objects that show it, in the order of the first of these."""
+    names = {id(probe.radiance): name for name, probe in shown.probes.items()}
+    found: dict[str, list[ObjectResources]] = {}
+    for number in order:
+        item = resources.objects[number]
+        probe = shown.probe_of(item.record)
+        owner = None if probe is None else names.get(id(probe.radiance))
+        if owner is not None:
+            found.setdefault(owner, []).append(item)
+    return found

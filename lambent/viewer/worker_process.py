@@ -1,0 +1,93 @@
+"""A process beside the window that answers in lines: each line of its stdout is a JSON object.
+
+A thread reads them. The process may be asked in lines of JSON on its stdin, which ends with the window: a worker that
+reads it to the end cannot outlive the window, however that ended.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from typing import IO, Any
+
+from lambent.core.errors import UserError
+from lambent.core.progress import Progress
+from lambent.viewer.work import Work, pending
+
+LAST_CHARACTERS = 300  # of what the process wrote before it died
+Take = Callable[[Mapping[str, Any], IO[bytes]], None]
+
+
+class WorkerProcess:
+    """A running worker, `python -m MODULE WORDS...`.
+
+    Parameters
+    ----------
+    name : str
+        What it does, for the line that says why it ended.
+    take : callable
+        Called in the thread with each line and the stream that it came from; a line may be followed by bytes. Lines
+        with "error" are not passed on: they end the process, and are its `error`.
+    ends : bool
+        Whether it ends by itself when it is done; else its end is an error.
+    """
+
+    def __init__(self, module: str, words: Sequence[str], name: str, take: Take, *, ends: bool) -> None:
+        self.error = ""  # why it ended, in a line; empty while it has not, or where it is done
+        self._name, self._take, self._ends = name, take, ends
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
+        command = [sys.executable, "-m", module, *words]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log)
+        self._work: Work | None = Work(self._listen, lambda _: None, self._failed)
+
+    @property
+    def running(self) -> bool:
+        """Whether it goes on; takes its end."""
+        self._work = pending(self._work)
+        return self._work is not None
+
+    def ask(self, said: Mapping[str, Any]) -> bool:
+        """Send it a line; False where it has ended."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(json.dumps(said).encode() + b"\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            return False  # `_listen` tells why
+        return True
+
+    def close(self) -> None:
+        """End it at once, and return when it has ended."""
+        if self._work is not None:
+            self._work.cancel()
+            self._process.kill()
+            self._work.wait()
+            self._work = None
+
+    def _failed(self, error: UserError) -> None:
+        self.error = str(error)
+
+    def _listen(self, progress: Progress) -> None:
+        """Take what the process writes, until it ends."""
+        process = self._process
+        assert process.stdout is not None
+        try:
+            for line in iter(process.stdout.readline, b""):
+                progress(0, 1, "")
+                said = json.loads(line)
+                if "error" in said:
+                    raise UserError(str(said["error"]))
+                self._take(said, process.stdout)
+            code = process.wait()
+        finally:
+            process.kill()
+            process.wait()
+        progress(1, 1, "")  # raises where it was cancelled
+        if code == 0 and self._ends:
+            return
+        self._log.seek(0)
+        words = self._log.read().decode(errors="replace").strip()[-LAST_CHARACTERS:].splitlines()
+        raise UserError(f"{self._name} ended with {code} ({words[-1] if words else 'no word'})")

@@ -1,0 +1,393 @@
+"""Light baked anew beside the window: into a copy of the store, and region by region into the picture."""
+
+import json
+import re
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lambent.bake.again import COPY_OF, bake_again, copy_beside
+from lambent.bake.bake import bake
+from lambent.core.camera import Camera
+from lambent.core.errors import UserError
+from lambent.core.light_mix import GroupMix, LightMix
+from lambent.realtime.device import open_device
+from lambent.realtime.renderer import Renderer
+from lambent.scenes import load_scene
+from lambent.store.store import Store
+from lambent.viewer.modes.walk import rebaking
+from lambent.viewer.modes.walk.answering import AnsweringLight
+from lambent.viewer.modes.walk.pictures import Pictures
+from lambent.viewer.modes.walk.rebaked_light import (
+    FADE_STEPS,
+    Rebaked,
+    batches_of,
+    in_view_order,
+    texel_objects,
+    texel_steps,
+)
+from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.screen import Rect
+from tests.bake.small_scenes import TINY
+from tests.viewer.window_session import ROOT
+
+SIZE = (64, 48)
+PLACE = Rect(0, 0, *SIZE)
+LONGEST_S = 60.0
+WORKER = """
+import json, sys, time
+from pathlib import Path
+asked = json.loads(sys.stdin.readline())
+def say(**words):
+    print(json.dumps(words), flush=True)
+say(what="light map", done=1, total=4)
+{then}
+"""
+BAKES = """
+from lambent.bake.again import bake_again
+from lambent.materials.document import Material
+from tests.bake.small_scenes import TINY
+materials = {name: Material.model_validate(one) for name, one in asked["materials"].items()}
+bake_again(Path(sys.argv[1]), Path(sys.argv[2]), materials, quality=TINY)
+say(baked=True)
+"""
+ENDLESS = """
+import runpy, sys, time
+import lambent.bake.again
+def endless(*_, **__):
+    print("begun", flush=True)
+    time.sleep(60)
+lambent.bake.again.bake_again = endless
+runpy.run_module("lambent.viewer.modes.walk.rebaking_worker", run_name="__main__", alter_sys=False)
+"""
+
+
+def baked_box(folder, groups):
+    store = bake(load_scene("builtin:box"), folder / "box.store", quality=TINY, light_groups=groups)
+    store.close()
+    return folder / "box.store"
+
+
+@pytest.fixture(scope="module")
+def boxes(mi, adapter, tmp_path_factory):
+    """The built-in box with and without light groups."""
+    return {groups: baked_box(tmp_path_factory.mktemp(groups), groups) for groups in ("none", "scene")}
+
+
+@pytest.fixture(scope="module")
+def store(boxes):
+    return boxes["none"]
+
+
+def painted(scene):
+    """The walls' material dark, another one red."""
+    first, second = sorted(scene.materials)[:2]
+    dark = scene.materials[first].model_copy(update={"kd": (0.1, 0.1, 0.1)})
+    return {first: dark, second: scene.materials[second].model_copy(update={"kd": (0.6, 0.1, 0.05)})}
+
+
+def test_the_copy_is_the_bake_of_the_edited_scene(store, tmp_path):
+    """To the bit, since seeds and effort are the same; the store itself stays as it was."""
+    scene, before = load_scene("builtin:box"), {a.name: a.key for a in Store.open(store).artefacts()}
+    copy = bake_again(store, tmp_path / "copy", painted(scene), quality=TINY)
+    worn = replace(scene, materials={**scene.materials, **painted(scene)})
+    direct = bake(worn, tmp_path / "direct", quality=TINY, only={"light_map", "probe"})
+    names = [a.name for a in copy.artefacts() if a.kind in ("light_map", "probe")]
+    assert "light_map/irradiance" in names
+    for name in names:
+        np.testing.assert_array_equal(copy.read(name), direct.read(name), err_msg=name)
+    assert {a.name: a.key for a in Store.open(store).artefacts()} == before
+    assert copy.documents[COPY_OF] == "box.store"
+
+
+def test_a_folder_of_somebody_else_is_left_alone(store, tmp_path):
+    other = Store.create(tmp_path / "other", {})
+    other.close()
+    with pytest.raises(UserError, match="is another store"):
+        bake_again(store, tmp_path / "other", {}, quality=TINY)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "letter.txt").write_text("dear")
+    with pytest.raises(UserError, match="not empty"):
+        bake_again(store, tmp_path / "full", {}, quality=TINY)
+    assert (tmp_path / "full" / "letter.txt").read_text() == "dear"
+
+
+def test_settings_of_its_own_are_one_line(store, tmp_path):
+    with pytest.raises(UserError, match="unknown quality"):
+        bake_again(store, tmp_path / "copy", {})
+    assert copy_beside(tmp_path / "room.store").name == "room.rebake.store"
+
+
+def test_texels_go_over_by_their_batches_and_end_exactly():
+    rng = np.random.default_rng(1)
+    before, after = ([rng.random((4, 6, 4)).astype(np.float16)] for _ in range(2))
+    batch = np.repeat([[0, 0, 1, 1, 2, 2]], 4, axis=0)
+    frames = [layers[0].astype(np.float32) for layers in texel_steps(before, after, batch)]
+    np.testing.assert_array_equal(frames[-1], after[0].astype(np.float32))
+    first, last = before[0].astype(np.float32), after[0].astype(np.float32)
+    changes = np.abs(np.diff([first, *frames], axis=0)) / np.maximum(np.abs(last - first), 1e-3)
+    assert changes.max() < 0.25, "no frame jumps"
+    np.testing.assert_array_equal(frames[1][:, 2:], first[:, 2:])
+    np.testing.assert_array_equal(frames[FADE_STEPS - 1][:, :2], last[:, :2])
+
+
+def test_objects_in_view_come_first_and_near_ones_before_far_ones(store):
+    scene = Renderer(open_device(), Store.open(store)).scene
+    record = scene.record
+    camera = Camera(name="in", position=(0.0, 1.0, 0.0), target=(0.0, 1.0, -1.0), fov_y_deg=40)
+    places = {"behind": 1.0, "far": -3.0, "near": -1.0}
+    first = record.objects[0]
+    objects = tuple(
+        first.model_copy(update={"name": name, "bounds": ((-0.1, 0.9, z), (0.1, 1.1, z + 0.1))})
+        for name, z in places.items()
+    )
+    order = in_view_order(record.model_copy(update={"objects": objects}), camera, (64, 48))
+    assert [objects[number].name for number in order] == ["near", "far", "behind"]
+
+
+def test_every_lit_texel_belongs_to_an_object(store):
+    scene = Renderer(open_device(), Store.open(store)).scene
+    owner = texel_objects(scene)
+    count = len(scene.record.objects)
+    assert owner.shape == scene.irradiance.shape[:2] and set(np.unique(owner)) >= set(range(count))
+    batch = batches_of(owner, list(range(count)))
+    assert batch.max() == min(count, 16) - 1 and (batch[owner == 0] == 0).all()
+
+
+class Room:
+    """The walk's pictures on a store whose worker is a script."""
+
+    def __init__(self, folder, screen, monkeypatch, tmp_path, then):
+        screen.pace.adaptive = screen.pace.refine = False
+        screen.clock = time.monotonic
+        (tmp_path / "baking_worker.py").write_text(WORKER.format(then=then))
+        monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{ROOT}")
+        monkeypatch.setattr(rebaking, "WORKER", "baking_worker")
+        monkeypatch.setattr(rebaking, "QUIET_S", 0.1)
+        opened = Store.open(folder)
+        self.renderer = Renderer(open_device(), opened)
+        self.state = WalkState.of(self.renderer.scene.record, "walk", screen, folder)
+        groups = self.renderer.scene.groups
+        self.state.lights.groups = () if groups is None else groups.records
+        self.state.look.exposure_ev, self.state.meter.expose_wanted = 0.0, False
+        self.pictures = Pictures(self.renderer, self.state, AnsweringLight(opened, self.renderer, self.state.answering))
+        self.lines, self.seen = [], []
+
+    def frame(self):
+        self.pictures.update(PLACE, 1.0)
+        while self.pictures.under_way:
+            self.pictures.work()
+        self.lines.append(self.state.rebaking.line)
+
+    def until(self, condition):
+        end = time.monotonic() + LONGEST_S
+        while not condition():
+            assert time.monotonic() < end, self.lines[-3:]
+            self.frame()
+            self.seen.append(self.renderer.resources.light_layers[0][..., :3].astype(np.float32))
+            time.sleep(0.002)
+
+    def paint(self):
+        self.state.materials.edits.dress(painted(self.state.scene))
+
+
+@pytest.fixture
+def room(store, screen, monkeypatch, tmp_path):
+    made = Room(store, screen, monkeypatch, tmp_path, BAKES)
+    yield made
+    made.pictures.close()
+
+
+def image(renderer, state, light=()):
+    return image_of(renderer, state, state.materials.edits.edited, light)
+
+
+def image_of(renderer, state, materials, light=()):
+    frame = state.look.frame(state.navigation.camera, SIZE, materials)
+    waits, renderer.waits = renderer.waits, True
+    found = renderer.image(replace(frame, light=dict(light)))
+    renderer.waits = waits
+    return found
+
+
+def test_an_edit_is_estimated_then_baked_then_exact(room, store):
+    state = room.state
+    room.paint()
+    room.until(lambda: state.rebaking.exact)
+    truth = Renderer(open_device(), Store.open(copy_beside(store)))
+    np.testing.assert_allclose(image(room.renderer, state), image(truth, state), rtol=2e-3, atol=1e-4)
+    assert any(
+        re.fullmatch(r"baking anew \d:\d\d \(\d:\d\d the first time\): light map 25 %", line) for line in room.lines
+    )
+    assert state.rebaking.line == "exact: baked anew" and "exact again" in state.screen.messages[-1].text
+    estimated = next(n for n, line in enumerate(room.lines) if line.startswith("the light that was baked"))
+    whole = np.abs(room.seen[-1] - room.seen[estimated - 1])
+    frames = np.array([np.abs(b - a) for a, b in zip(room.seen[estimated - 1 :], room.seen[estimated:], strict=False)])
+    assert whole.max() > 0.01, "the estimate was one"
+    assert (frames.max(axis=0) <= 0.25 * whole + 2e-3 * room.seen[-1] + 1e-6).all(), "no texel jumps"
+    version = room.renderer.light_version
+    for _ in range(3):
+        room.frame()
+    assert room.renderer.light_version == version and room.pictures.wait_s() is None, "then nothing goes on"
+
+
+def test_another_edit_ends_it_and_undo_comes_back_without_a_bake(room, store):
+    state, edits = room.state, room.state.materials.edits
+    baked = image(room.renderer, state)
+    room.paint()
+    room.until(lambda: state.rebaking.exact)
+    exact = image(room.renderer, state)
+    edits.undo()
+    room.frame()
+    assert not state.rebaking.exact and state.rebaking.line == ""
+    room.until(lambda: not room.pictures._lane.busy)
+    np.testing.assert_allclose(image(room.renderer, state), baked, rtol=1e-3, atol=1e-5)
+    edits.redo()
+    process = room.pictures._rebaked._process
+    room.until(lambda: state.rebaking.exact)
+    assert process is None and room.pictures._rebaked._process is None
+    np.testing.assert_allclose(image(room.renderer, state), exact, rtol=1e-3, atol=1e-5)
+
+
+@pytest.mark.parametrize("groups", ["none", "scene"])
+def test_a_state_that_goes_beside_keeps_its_light_and_undo_of_all_is_as_baked(
+    boxes, screen, monkeypatch, tmp_path, groups
+):
+    room = Room(boxes[groups], screen, monkeypatch, tmp_path, BAKES)
+    state, edits = room.state, room.state.materials.edits
+    baked = image(room.renderer, state)
+    room.paint()
+    room.until(lambda: state.rebaking.exact)
+    exact = image(room.renderer, state)
+    state.states.split = True
+    for _ in range(3):
+        room.frame()
+    state.states.exchange()
+    room.frame()
+    room.until(lambda: not (room.pictures._lane.busy or room.pictures._beside.busy))
+    assert not state.rebaking.exact and room.pictures._beside.renderer is room.renderer
+    beside = image_of(room.renderer, state, edits.other.materials)
+    np.testing.assert_allclose(beside, exact, rtol=2e-3, atol=1e-5)
+    np.testing.assert_allclose(image(room.pictures._lane.renderer, state), baked, rtol=2e-3, atol=1e-5)
+    while edits.can_undo:
+        edits.undo()
+    state.states.split = False
+    room.frame()
+    room.until(lambda: not room.pictures._lane.busy)
+    np.testing.assert_allclose(image(room.pictures._lane.renderer, state), baked, rtol=2e-3, atol=1e-5)
+    room.pictures.close()
+
+
+def test_without_answers_an_edit_goes_from_as_baked_to_exact_and_back(room):
+    state, edits = room.state, room.state.materials.edits
+    state.answering.on = False
+    baked = image(room.renderer, state)
+    room.paint()
+    room.until(lambda: state.rebaking.exact)
+    exact = image(room.renderer, state)
+    state.answering.on = True
+    room.frame()
+    assert not state.rebaking.exact, "the estimate first"
+    room.until(lambda: state.rebaking.exact)
+    np.testing.assert_allclose(image(room.renderer, state), exact, rtol=2e-3, atol=1e-5)
+    state.answering.on = False
+    room.frame()
+    edits.undo()
+    room.frame()
+    room.until(lambda: not room.pictures._lane.busy)
+    np.testing.assert_allclose(image(room.renderer, state), baked, rtol=2e-3, atol=1e-5)
+
+
+def test_mixes_of_light_groups_are_exact_too(boxes, screen, monkeypatch, tmp_path):
+    room = Room(boxes["scene"], screen, monkeypatch, tmp_path, BAKES)
+    state = room.state
+    name = state.lights.groups[0].name
+    room.paint()
+    room.until(lambda: state.rebaking.exact)
+    state.lights.mix = LightMix({name: GroupMix(intensity=0.25)})
+    state.materials.edits.end_stroke()
+    room.frame()
+    assert state.rebaking.exact
+    room.until(lambda: not room.pictures._lane.busy)
+    truth = Renderer(open_device(), Store.open(copy_beside(boxes["scene"])))
+    light = state.recordings.light
+    np.testing.assert_allclose(
+        image(room.renderer, state, light.items()), image(truth, state, light.items()), rtol=4e-3, atol=1e-4
+    )
+    state.materials.edits.take(state.materials.edits.room.model_copy(update={"materials": {}}))
+    room.until(lambda: not state.rebaking.exact and not room.pictures._lane.busy)
+    plain = Renderer(open_device(), Store.open(boxes["scene"]))
+    np.testing.assert_allclose(
+        image(room.renderer, state, light.items()), image(plain, state, light.items()), rtol=4e-3, atol=1e-4
+    )
+    room.pictures.close()
+
+
+def test_an_edit_meanwhile_and_closing_end_the_process(store, screen, monkeypatch, tmp_path):
+    room = Room(store, screen, monkeypatch, tmp_path, "time.sleep(600)")
+    room.paint()
+    room.until(lambda: "25 %" in room.state.rebaking.line)
+    first = room.pictures._rebaked._process._process
+    room.state.materials.edits.undo()
+    room.frame()
+    assert first.poll() is not None and room.state.rebaking.line == ""
+    room.state.materials.edits.redo()
+    room.until(lambda: "25 %" in room.state.rebaking.line)
+    second = room.pictures._rebaked._process._process
+    began_s = time.monotonic()
+    room.pictures.close()
+    assert second.poll() is not None and time.monotonic() - began_s < 5
+
+
+@pytest.mark.parametrize(
+    ("then", "line"),
+    [
+        ("say(error='room.toml: no such file')", "not baked anew: room.toml: no such file"),
+        ("raise RuntimeError('no memory')", "ended with 1 (RuntimeError: no memory)"),
+        ("sys.exit(0)", "not baked anew: the bake ended early"),
+    ],
+)
+def test_faults_are_one_line_and_the_estimate_stays(store, screen, monkeypatch, tmp_path, then, line):
+    room = Room(store, screen, monkeypatch, tmp_path, then)
+    room.paint()
+    room.until(lambda: "not baked anew" in room.state.rebaking.line)
+    assert line in room.state.rebaking.line and not room.state.rebaking.exact
+    for _ in range(3):
+        room.frame()
+    assert room.pictures._rebaked._process is None, "it is not tried again until something changes"
+    room.pictures.close()
+
+
+def test_the_worker_says_what_is_wrong_in_a_line(store, tmp_path):
+    """The real process; the quality of this store has no name."""
+    command = [sys.executable, "-m", f"{rebaking.__name__}_worker", str(store), str(tmp_path / "copy")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        process.stdin.write(json.dumps({"materials": {}, "textures": {}}).encode() + b"\n")
+        process.stdin.flush()
+        said = json.loads(process.stdout.readline())
+    assert "unknown quality" in said["error"] and process.returncode == 0
+
+
+def test_the_worker_ends_with_the_window(store, tmp_path):
+    """The end of stdin is that of a window that was killed; this bake would take minutes."""
+    copy = tmp_path / "copy"
+    command = [sys.executable, "-c", ENDLESS, str(store), str(copy)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT) as process:
+        process.stdin.write(json.dumps({"materials": {}, "textures": {}}).encode() + b"\n")
+        process.stdin.flush()
+        assert b"begun\n" in iter(process.stderr.readline, b""), "what libraries print goes there"
+        process.stdin.close()
+        assert process.wait(10) == 0
+
+
+def test_reading_takes_the_units_of_the_scene_that_is_shown(store, tmp_path):
+    scene = Renderer(open_device(), Store.open(store)).scene
+    bake_again(store, tmp_path / "copy", {}, quality=TINY)
+    again = Rebaked.read(tmp_path / "copy", scene)
+    np.testing.assert_array_equal(again.layers({})[0][..., :3], scene.irradiance.astype(np.float16))
+    for name, probe in scene.probes.items():
+        np.testing.assert_allclose(again.probe(name, {}).radiance, probe.radiance, rtol=1e-3)

@@ -1,0 +1,187 @@
+"""States of the room: stored, taken, exchanged, with the undo of materials and light; the panel that does it."""
+
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.core.light_mix import GroupMix, LightMix
+from lambent.scenes.scene import Look, Variant
+from lambent.store.light_groups import LightGroupRecord
+from lambent.store.session import RoomState
+from lambent.viewer.mode import Drawing
+from lambent.viewer.modes.walk.input import WalkInput
+from lambent.viewer.modes.walk.mode import WalkMode
+from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.modes.walk.states import AS_BAKED
+from tests.viewer.panel_driver import PanelDriver
+
+OFF = LightMix({"lamp": GroupMix(on=False)})
+
+
+def painted(state, kd=0.2):
+    return state.scene.materials["plaster"].model_copy(update={"kd": (kd, kd, kd)})
+
+
+def paint(state, kd=0.2):
+    state.materials.edits.change("plaster", painted(state, kd))
+    state.materials.edits.end_stroke()
+
+
+def dim(state, mix=OFF):
+    state.lights.mix = mix
+    state.materials.edits.end_stroke()
+
+
+def test_light_and_materials_have_one_history(state):
+    edits = state.materials.edits
+    paint(state)
+    dim(state)
+    state.selection.choose("table")
+    state.selection.choose(None)
+    edits.undo()
+    assert state.lights.mix == LightMix() and edits.current("plaster") == painted(state)
+    edits.undo()
+    assert edits.room == AS_BAKED and not edits.can_undo
+    edits.redo()
+    edits.redo()
+    assert state.lights.mix == OFF and edits.current("plaster") == painted(state)
+
+
+def test_a_drag_of_a_light_is_one_step(state):
+    for intensity in (0.9, 0.7, 0.4):
+        state.lights.mix = LightMix({"lamp": GroupMix(intensity=intensity)})
+    state.materials.edits.end_stroke()
+    state.materials.edits.undo()
+    assert state.lights.mix == LightMix() and not state.materials.edits.can_undo
+
+
+def test_a_stored_state_comes_back_and_can_be_undone(state):
+    states, edits = state.states, state.materials.edits
+    paint(state)
+    dim(state)
+    states.typed_name = " evening "
+    assert states.store() == "evening"
+    assert states.store() == "state 1", "the next free name"
+    edits.take(AS_BAKED)
+    assert edits.room == AS_BAKED
+    edits.take(states.all["evening"])
+    assert (edits.light, edits.current("plaster")) == (OFF, painted(state))
+    edits.forget("evening")
+    assert "evening" not in states.all
+    edits.undo()
+    assert states.all["evening"].light == OFF
+    states.typed_name = "as baked"
+    with pytest.raises(UserError, match="taken"):
+        states.store()
+
+
+def test_exchange_goes_to_and_fro(state):
+    states, edits = state.states, state.materials.edits
+    paint(state)
+    states.exchange()
+    assert edits.room == AS_BAKED and edits.other.materials == {"plaster": painted(state)}
+    dim(state)
+    states.exchange()
+    assert edits.current("plaster") == painted(state) and edits.other == RoomState(light=OFF), "both can be edited"
+    for _ in range(3):
+        edits.undo()
+    assert edits.current("plaster") == painted(state) and edits.light == LightMix()
+
+
+def test_undo_of_what_is_beside_ends_the_split(state):
+    paint(state)
+    state.states.split = True
+    assert state.states.split and state.divider is state.states.divider
+    state.states.label()
+    assert (state.states.divider.a_label, state.states.divider.b_label) == ("as it is now", "as baked")
+    state.materials.edits.undo()
+    assert not state.states.split and state.divider is None
+
+
+@pytest.fixture
+def panels(monkeypatch, state, geometry):
+    state.lights.groups = (LightGroupRecord(name="lamp", members=("bulb",), share=1.0),)
+    driver = PanelDriver(monkeypatch, WalkMode(state, WalkInput(state, geometry), Drawing(None)))
+    for header in ("Material", "View", "Scene"):
+        driver.click(header, 0.3)
+    for header in ("States", "Light"):
+        driver.click(header, 0.3)
+    driver.frame(2)
+    yield driver
+    driver.close()
+
+
+def test_the_panel_stores_takes_and_compares(panels, state):
+    edits = state.materials.edits
+    panels.drag("##times lamp", 0.25, 0.1)
+    panels.frame()
+    dimmed = edits.light
+    assert dimmed.of("lamp").intensity < 0.8
+    panels.click("undo")
+    assert edits.light == LightMix()
+    panels.click("redo")
+    assert edits.light == dimmed
+    panels.click("##state name", 0.5)
+    panels.type("evening")
+    panels.click("store##state name")
+    panels.frame(2)
+    assert edits.stored == {"evening": RoomState(light=dimmed)}
+    panels.click("take##as baked")
+    assert edits.room == AS_BAKED
+    panels.click("beside##evening")
+    assert state.states.split and edits.other.light == dimmed
+    panels.click("exchange")
+    assert edits.light == dimmed and edits.other == AS_BAKED
+    panels.click("split view", 0.05)
+    assert not state.states.split
+    panels.click("x##evening")
+    assert edits.stored == {}
+
+
+def with_variants(scene):
+    """Two variants: one paints, one paints otherwise, takes textures away and dims; brass is never named."""
+    plaster = scene.materials["plaster"]
+    red, blue = (plaster.model_copy(update={"kd": kd}) for kd in ((0.6, 0.1, 0.1), (0.1, 0.1, 0.6)))
+    day = Variant("day", {"plaster": Look(red, "brass")})
+    return scene.model_copy(update={"variants": (day, Variant("night", {"plaster": Look(blue)}, OFF))})
+
+
+def test_a_variant_takes_its_materials_textures_and_light_and_leaves_the_rest(scene, screen):
+    state = WalkState.of(with_variants(scene), "walk", screen)
+    edits, states = state.materials.edits, state.states
+    brass = scene.materials["brass"].model_copy(update={"kd": (0.3, 0.3, 0.3)})
+    edits.change("brass", brass)
+    edits.end_stroke()
+    edits.take(states.variants["day"])
+    assert edits.current("plaster").kd == (0.6, 0.1, 0.1) and edits.room.textures == {"plaster": "brass"}
+    assert edits.current("brass") == brass and states.name_of(edits.room, "?") == "day"
+    edits.take(states.variants["night"])
+    assert edits.current("plaster").kd == (0.1, 0.1, 0.6) and edits.room.textures == {} and edits.light == OFF
+    edits.take(states.variants["day"])
+    assert edits.light == LightMix(), "the lamp is named by a variant, and as baked in this one"
+    edits.undo()
+    edits.undo()
+    assert edits.current("plaster").kd == (0.6, 0.1, 0.1)
+    edits.reset("plaster")
+    assert edits.room == RoomState(materials={"brass": brass}), "its own textures, too"
+
+
+def test_variants_are_offered(monkeypatch, scene, screen, geometry):
+    state = WalkState.of(with_variants(scene), "walk", screen)
+    driver = PanelDriver(monkeypatch, WalkMode(state, WalkInput(state, geometry), Drawing(None)))
+    driver.click("States", 0.3)
+    driver.frame(2)
+    driver.click("take##variant night")
+    assert state.lights.mix == OFF
+    driver.click("beside##variant day")
+    assert state.states.split and state.materials.edits.other.textures == {"plaster": "brass"}
+    driver.close()
+
+
+def test_x_exchanges(state, geometry):
+    paint(state)
+    walk = WalkInput(state, geometry)
+    press = {"event_type": "key_down", "key": "x", "modifiers": ()}
+    walk.handle(press, ui_has_mouse=False, ui_has_keys=False)
+    assert state.materials.edits.room == AS_BAKED
+    walk.handle(press, ui_has_mouse=False, ui_has_keys=False)
+    assert state.materials.edits.current("plaster") == painted(state)
