@@ -81,6 +81,7 @@ class BakedScene:
     policy: str = LEAST_RECENT  # of their caches
     sun: SunRecord | None = None  # whose direct light the light maps leave out
     groups: GroupArrays | None = None  # the light by group; None where it was baked as one
+    replaced: bool = False  # whether a mesh stands in the place of an object: light maps are not the store's then
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
         """The object's own probe or the one it shares, else the nearest one, else the environment, else None.

@@ -81,6 +81,7 @@ def _replaced(scene: BakedScene, one: Replacement) -> BakedScene:
         dominant_direction=room.joined(scene.dominant_direction),
         light_fields={name: room.moved_field(f) for name, f in scene.light_fields.items()} | {record.name: own},
         groups=None,
+        replaced=True,
     )
 
 

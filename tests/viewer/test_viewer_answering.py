@@ -108,3 +108,12 @@ def test_a_store_with_light_groups_answers_in_its_mix(tmp_path: Path) -> None:
     settled(light, {})
     assert np.array_equal(renderer.image(mix), before) and "as baked" in shown.note
     light.close()
+
+
+def test_light_stays_as_baked_where_an_object_is_replaced(tmp_path: Path) -> None:
+    store = bake(room_with_step(), tmp_path / "s", quality=TINY)
+    renderer, shown = Renderer(open_device(), replace(read_baked(store), replaced=True)), Answering()
+    light = AnsweringLight(store, renderer, shown)
+    version = renderer.light_version
+    settled(light, RED)
+    assert not shown.possible and "replaced" in shown.note and renderer.light_version == version

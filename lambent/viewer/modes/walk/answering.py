@@ -68,9 +68,11 @@ class AnsweringLight:
         self._as_baked: dict[str, ProbeLight] | None = None  # by object with a probe, before the first edit
         self._first = [item.light for item in renderer.resources.objects]  # as baked
         self._users: dict[str, list[int]] = {}  # numbers of the objects that show each
-        shown.possible = has_answer(store)
+        shown.possible = has_answer(store) and not renderer.scene.replaced
         if shown.possible:
             shown.said = "light of other surfaces: as baked"
+        elif renderer.scene.replaced:
+            shown.said = "the light of other surfaces stays as baked: an object is replaced"
 
     def another(self, renderer: Renderer, shown: Answering) -> AnsweringLight:
         """The same for another renderer of the scene; what was read of the store is shared."""
