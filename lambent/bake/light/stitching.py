@@ -82,7 +82,7 @@ def stitched(irradiance: Floats, cuts: Cuts, labels: Indices, area_m2: Floats) -
     moving = np.zeros(own.shape, bool)
     moving[texel[unlike][of_sliver & counts]] = True
     moving[texel[unlike][~of_sliver & counts]] = False
-    return _close(met, texel[keep], share[keep], np.full(own.shape, FILLED), moving)
+    return _close(met, texel[keep], share[keep], own, moving)
 
 
 def _close(irradiance: Floats, texel: NDArray[Any], share: Floats, own: Floats, moving: Flags) -> Floats:
@@ -117,7 +117,20 @@ def _close(irradiance: Floats, texel: NDArray[Any], share: Floats, own: Floats, 
     for channel in range(3):
         start = values[free, channel]
         found[touched[free], channel], _ = cg(system, aim[:, channel], x0=start, rtol=RESIDUE, maxiter=STEPS, M=first)
-    return np.asarray(np.maximum(found, 0).reshape(irradiance.shape), irradiance.dtype)
+    found[touched] = found[touched].clip(*_ranges(values, number, share))
+    return np.asarray(found.reshape(irradiance.shape), irradiance.dtype)
+
+
+def _ranges(values: Floats, number: NDArray[Any], share: Floats) -> tuple[Floats, Floats]:
+    """Least and greatest `values` (m, 3) that each texel meets in its look-ups: beyond them the fit would swing.
+
+    `number` and `share` (n, 8) are the texels of the look-ups on both sides, and what they count.
+    """
+    low, high, counts = values.copy(), values.copy(), share != 0
+    met, row = values[number], np.nonzero(counts)[0]
+    np.minimum.at(low, number[counts], np.where(counts[..., None], met, np.inf).min(axis=1)[row])
+    np.maximum.at(high, number[counts], np.where(counts[..., None], met, -np.inf).max(axis=1)[row])
+    return low, high
 
 
 def _footprint(uv: Floats, width: int, height: int) -> tuple[NDArray[Any], Floats]:
