@@ -56,8 +56,6 @@ class LightField:
     own_diffuse : whether the maps show the object itself without its lobes.
     volume : whether points fill a box that the object stands in, and maps are without it, so that another may stand
         there. `normals` point away from the middle of the box.
-    cover : (P, E, E) uint8, or None: bit 2 i + j is set where the quarter (row i, column j) of a texel shows a surface;
-        others show the sky, whatever the texel's distance is. A texel with a surface has its light and its distance.
     glass : what refracts the light that the object transmits, or None; maps are then without the object.
     blocks : (P, B, B, 4) uint32, or None: where a store has the radiance so, as `core.light_field_blocks` makes it.
     """
@@ -74,7 +72,6 @@ class LightField:
     own_diffuse: bool = False
     volume: bool = False
     glass: Glass | None = None
-    cover: NDArray[np.uint8] | None = None
 
     @property
     def without_object(self) -> bool:

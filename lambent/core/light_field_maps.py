@@ -42,19 +42,10 @@ def radiance_along(field: LightField, point: Indices, w: Floats) -> Floats:
 
 
 def nearness_along(field: LightField, point: Indices, w: Floats) -> Floats:
-    """(...) inverse distance, 1/m, of what points see in the texels nearest to directions; 0 for the sky.
-
-    Of texels that show both, quarters tell them apart.
-    """
+    """(...) inverse distance, 1/m, of what points see in the texels nearest to directions; 0 for the sky."""
     n = field.inverse_distance.shape[1]
-    place = to_square(w) * n
-    at = np.minimum(place.astype(np.int64), n - 1)
-    found = np.asarray(field.inverse_distance[point, at[..., 1], at[..., 0]], np.float64)
-    if field.cover is None:
-        return found
-    half = place - at >= 0.5
-    bit = field.cover[point, at[..., 1], at[..., 0]] >> (2 * half[..., 1] + half[..., 0]).astype(np.uint8)
-    return np.where(bit & 1, found, 0.0)
+    at = np.minimum((to_square(w) * n).astype(np.int64), n - 1)
+    return np.asarray(field.inverse_distance[point, at[..., 1], at[..., 0]], np.float64)
 
 
 def _on_map(row: Indices, column: Indices, n: int) -> tuple[Indices, Indices]:

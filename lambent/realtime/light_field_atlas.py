@@ -69,16 +69,6 @@ def coding(device: Any, tiles: Tiles) -> Coding:
     return Coding("rgb9e5ufloat", 1, 4, lambda texels: packed_rgb(texels)[..., None])
 
 
-def with_quarters(inverse: NDArray[np.float16], cover: NDArray[np.uint8]) -> NDArray[np.float16]:
-    """Inverse distances with the quarters of texels that show a surface: three lowest bits, and the sign.
-
-    What is left of the distance is right to .4 %.
-    """
-    rounded = np.minimum(inverse.view(np.uint16) + np.uint16(4), np.uint16(0x7BFF)) & np.uint16(0x7FF8)
-    bits = (cover & 7).astype(np.uint16) | (cover.astype(np.uint16) >> 3 & 1) << 15
-    return np.asarray((rounded | bits).view(np.float16))
-
-
 @dataclass(frozen=True)
 class Packed:
     """Maps as they are written to an atlas: tiles of every level of radiance, and of inverse distance."""
@@ -144,10 +134,7 @@ class Atlas:
             for level, tiles in zip(range(self.levels), self.tiles.chain(light), strict=False)
         )
         inverse = np.asarray(field.inverse_distance[part])
-        inverse = np.where(np.isfinite(inverse) & (inverse > 0), inverse, np.float16(0))
-        if field.cover is not None:
-            inverse = with_quarters(inverse, field.cover[part])
-        inverse = inverse[..., None]
+        inverse = np.where(np.isfinite(inverse) & (inverse > 0), inverse, np.float16(0))[..., None]
         within = np.pad(inverse, ((0, 0), *[(1, self.tiles.tile - self.tiles.side - 1)] * 2, (0, 0)))
         return Packed(levels, within)
 

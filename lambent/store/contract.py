@@ -34,7 +34,6 @@
                                            without the disc of meta["sun"] of light_map/irradiance
     light_field/OBJECT/blocks              in its place, (P, B, B, 4) uint32, blocks of BC6H: core.light_field_blocks
     light_field/OBJECT/inverse_distance    (P, E, E) float16, 1/m, 0 where nothing is hit
-    light_field/OBJECT/cover               (P, E, E) uint8, quarters with a surface, may be absent; see there
     light_field/OBJECT/sample_map          (h, w, 4) uint16; written last. meta["corner"] and meta["grid"] place it on
                                            the light map's uv2, meta["offset_m"] is how far off the surface points are.
                                            meta["volume"]: points fill the box of OBJECT, maps are without it

@@ -25,7 +25,7 @@ from lambent.core.geometry import triangle_areas
 from lambent.core.progress import Progress, part_of
 from lambent.scenes.scene import LightFieldWish
 from lambent.store.contract import LIGHT_FIELD_CHOICE, light_field_name, needs_probe
-from lambent.store.light_fields import COVER, EXITS
+from lambent.store.light_fields import EXITS
 from lambent.store.store import Array
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Settings:
     @property
     def parts(self) -> tuple[str, ...]:
         """The arrays of a light field, in the order in which they are written."""
-        return "points", "normals", "blocks" if self.blocks else "radiance", "inverse_distance", COVER, "sample_map"
+        return "points", "normals", "blocks" if self.blocks else "radiance", "inverse_distance", "sample_map"
 
 
 SETTINGS = {
@@ -217,7 +217,7 @@ def _chooser(context: BakeContext, traced: Traced) -> Chooser:
 
 
 def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced, progress: Progress) -> None:
-    from lambent.bake.light_fields.acquisition import covered_distances, radiance_maps
+    from lambent.bake.light_fields.acquisition import inverse_distances, radiance_maps
     from lambent.core.light_field_blocks import blocks_of, blocks_shape
 
     start, how = time.perf_counter(), settings_of(context, wish)
@@ -229,24 +229,20 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
     def radiance(region: tuple[slice, ...], seed: int) -> Array:
         some = region[0]
         surface = None if wish.without_object else normals[some]  # what is beneath points is seen as well
-        light = radiance_maps(seen, points[some], how.texels, how.strata, seed, how.onward, surface, covers=True)
+        light = radiance_maps(seen, points[some], how.texels, how.strata, seed, how.onward, surface)
         maps = halves(light, traced.unit)
         return blocks_of(maps) if how.blocks else maps
 
     def inverse_distance(region: tuple[slice, ...], seed: int) -> Array:
-        return covered_distances(seen.scene, points[region[0]], how.texels)[0]
-
-    def cover(region: tuple[slice, ...], seed: int) -> Array:
-        return covered_distances(seen.scene, points[region[0]], how.texels)[1]
+        return inverse_distances(seen.scene, points[region[0]], how.texels)
 
     at_once = max(1, min(PATHS_OF_A_CHUNK // (how.texels * how.strata) ** 2, len(points)))
     of_light = blocks_shape(how.texels) if how.blocks else (how.texels, how.texels, 3)
-    light, distance, quarters = (light_field_name(name, how.parts[i]) for i in (2, 3, 4))
+    light, distance = (light_field_name(name, how.parts[i]) for i in (2, 3))
     kind = "uint32" if how.blocks else "float16"
     for at, shape, dtype, tile, begin, end in (
         (light, (len(points), *of_light), kind, radiance, 0.0, 0.9),
-        (distance, (len(points), how.texels, how.texels), "float16", inverse_distance, 0.9, 0.95),
-        (quarters, (len(points), how.texels, how.texels), "uint8", cover, 0.95, 1.0),
+        (distance, (len(points), how.texels, how.texels), "float16", inverse_distance, 0.9, 1.0),
     ):
         key, note = context.keys(KIND)[at], context.provenance(**({"unit": traced.unit} if at == light else {}))
         chunks = (at_once, *shape[1:])  # an interrupted bake continues with the next points

@@ -59,7 +59,6 @@ class LightFieldLookUp:
             "METHOD": self.METHOD, "POWER": self.POWER, "MARCHES": rule.candidates, "STEPS": rule.steps,
             "SECANTS": rule.secants, "FIRST": rule.first, "LAST": rule.last, "TOLERANCE": rule.tolerance,
             "ALIKE": rule.alike, "HAS_SKY": probe.sky is not None, "SURFACE": self.SURFACE,
-            "QUARTERS": light_field is not None and light_field.cover is not None,
             **glass,
         }  # fmt: skip
 

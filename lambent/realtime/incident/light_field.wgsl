@@ -24,7 +24,6 @@ override ALIKE: f32 = 0.15;
 override SURFACE: bool = false; // points show the surface itself, too
 override HAS_SKY: bool = true; // or the maps answer for it
 
-override QUARTERS: bool = false; // texels say which of their quarters show a surface
 override GLASS: bool = false; // what is transmitted is refracted; the lower half of the sample map then has the exits
 
 const NEAREST = 0u;
@@ -111,18 +110,10 @@ fn light_of(point: u32, w: vec3f, half_log2_omega: f32) -> vec3f {
     return light;
 }
 
-// 1/m, of the quarter of a texel that a direction from a point lies in; 0 for the sky. The quarters that show a surface are
-// the lowest bits of the half float, and its sign: light_field_atlas.py.
+// 1/m, of the texel that a direction from a point lies in; 0 for the sky.
 fn inverse_distance(tile: vec3u, w: vec3f) -> f32 {
-    let at = map_place(w) * f32(field.side);
-    let texel = min(vec2u(at), vec2u(field.side - 1u));
-    let found = textureLoad(inverse_atlas, tile.xy + 1u + texel, tile.z, 0).r;
-    if (!QUARTERS) { return found; }
-    let bits = pack2x16float(vec2f(found, 0.0));
-    let beyond = select(vec2u(0u), vec2u(1u), at - vec2f(texel) >= vec2f(0.5));
-    let quarter = 2u * beyond.y + beyond.x;
-    let shows = ((bits >> select(quarter, 15u, quarter == 3u)) & 1u) == 1u;
-    return select(0.0, unpack2x16float(bits & 0x7ff8u).x, shows);
+    let texel = min(vec2u(map_place(w) * f32(field.side)), vec2u(field.side - 1u));
+    return textureLoad(inverse_atlas, tile.xy + 1u + texel, tile.z, 0).r;
 }
 
 fn light_of_sky(w: vec3f, half_log2_omega: f32) -> vec3f {
