@@ -260,6 +260,7 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
         "gather_rays": (32, ANSWER),
         "block": (2, ANSWER),
         "direct_samples": (16, ANSWER),
+        "lobe_samples": (16, NOTHING),  # where light is sorted alone
         "importance_rays": (8, ANSWER),
     },
 }

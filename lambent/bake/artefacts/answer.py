@@ -42,8 +42,8 @@ TILES = 16  # of transfer and of rays
 class Settings:
     """Patches, rays from each, and what light is gathered with.
 
-    Texels get `direct_samples` of direct light. One texel of each block of `block` x `block` texels gathers by
-    `gather_rays`.
+    Texels get `direct_samples` of direct light; where light is sorted, the light map has it, but for what lobes have
+    sent on, which takes `lobe_samples`. One texel of each block of `block` x `block` texels gathers by `gather_rays`.
     """
 
     patches: int = 1000
@@ -51,13 +51,14 @@ class Settings:
     gather_rays: int = 256
     block: int = 4
     direct_samples: int = 32
+    lobe_samples: int = 8
     importance_rays: int = 16
 
 
 SETTINGS = {
     QualityName.preview: Settings(),
-    QualityName.normal: Settings(patch_rays=8192, block=8, direct_samples=64),
-    QualityName.final: Settings(patch_rays=16384, gather_rays=512, block=12, direct_samples=256),
+    QualityName.normal: Settings(patch_rays=8192, block=8, direct_samples=64, lobe_samples=16),
+    QualityName.final: Settings(patch_rays=16384, gather_rays=512, block=12, direct_samples=256, lobe_samples=64),
 }
 
 
@@ -65,7 +66,8 @@ def keys(context: BakeContext) -> dict[str, str]:
     how: Settings = context.settings(KIND)
     light = context.keys("light_map")[IRRADIANCE[0]]
     count = 2 if any(context.two_sided) else 1
-    effort = [how.patches, how.patch_rays, how.gather_rays, how.block, how.direct_samples, how.importance_rays]
+    samples = how.lobe_samples if sorts_light(context.methods) else how.direct_samples
+    effort = [how.patches, how.patch_rays, how.gather_rays, how.block, samples, how.importance_rays]
     key = key_of(KIND, REVISION, light, effort, context.seed)
     by_group = map(_by_group, TRACED[:count]) if sorts_light(context.methods) else ()
     found = dict.fromkeys((*TRACED[:count], *by_group, *MAPS[:count]), key)
@@ -145,9 +147,10 @@ def _sampled_direct(context: BakeContext, side: int) -> Indices:
     size = traced.texels.height, traced.texels.width
     whole = context.samples(KIND, TRACED[side], (2, *size, 4), (2, tile, tile, 4))
     writer: Writer | BothWriters = whole
-    half, depth = max(1, how.direct_samples // 2), context.settings("light_map").max_depth
+    grouped, depth = sorts_light(context.methods), context.settings("light_map").max_depth
+    half = max(1, (how.lobe_samples if grouped else how.direct_samples) // 2)
     sampling = Sampling((2 * half, 2 * half), 0.0, depth, half, unseen=traced.unseen(diffuse=False))
-    if sorts_light(context.methods):
+    if grouped:
         parts = 2 * len(traced.sorted_lights.groups)  # all of it, and what comes straight from emitters
         beside = context.samples(KIND, _by_group(TRACED[side]), (1, *size, 3 * parts), (1, tile, tile, 3 * parts))
         writer = BothWriters(whole, beside)

@@ -7,6 +7,7 @@ nearby texels of the same chart: with 25 of them the deviation is some 14 %.
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,15 +39,22 @@ def noise_map(halves: Floats, known: Flags, labels: Indices) -> NDArray[np.float
 
 def chart_means(values: Floats, known: Flags, labels: Indices) -> Floats:
     """Means of values (H, W, C) over the known texels of the same chart within REACH."""
-    rim = ((REACH, REACH), (REACH, REACH))
-    there, chart = np.pad(known, rim), np.pad(labels, rim, constant_values=-1)
-    padded, count = np.pad(values, (*rim, (0, 0))), np.zeros(known.shape, np.float32)
-    total = np.zeros_like(values)
-    height, width = known.shape
-    for row in range(2 * REACH + 1):
-        for column in range(2 * REACH + 1):
-            window = slice(row, row + height), slice(column, column + width)
-            same = there[window] & (chart[window] == labels)
-            total += padded[window] * same[..., None]
-            count += same
-    return np.asarray(total / np.maximum(count, 1)[..., None])
+    return np.asarray(_chart_means(np.ascontiguousarray(values), known, np.ascontiguousarray(labels)))
+
+
+@numba.njit(parallel=True, cache=True)
+def _chart_means(values, known, labels):  # type: ignore[no-untyped-def]
+    height, width, channels = values.shape
+    means = np.zeros_like(values)
+    for row in numba.prange(height):
+        for column in range(width):
+            count = np.float32(0)
+            for y in range(max(row - REACH, 0), min(row + REACH + 1, height)):
+                for x in range(max(column - REACH, 0), min(column + REACH + 1, width)):
+                    if known[y, x] and labels[y, x] == labels[row, column]:
+                        count += 1
+                        for channel in range(channels):
+                            means[row, column, channel] += values[y, x, channel]
+            for channel in range(channels):
+                means[row, column, channel] /= max(count, np.float32(1))
+    return means
