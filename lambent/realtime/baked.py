@@ -181,6 +181,7 @@ def read_baked(store: Store, light_field_mb: float | None = None, policy: str = 
         policy=policy,
         sun=_in_units(contract.sun_beside(store), unit),
         groups=groups_in(store, unit),
+        replaced=False,
     )
 
 

@@ -78,7 +78,7 @@ def test_every_group_answers_as_a_bake_of_the_other_colour(store: Store, scene: 
         lit = expected[group].mean(axis=-1) > 0.05 * expected[group].mean()
         assert ours[group][lit].mean(axis=0) == pytest.approx(expected[group][lit].mean(axis=0), rel=0.1)
         off, stale = (np.sqrt(((one[group] - expected[group])[lit] ** 2).mean()) for one in (ours, before))
-        assert off < 0.4 * stale
+        assert off < 0.25 * stale
 
 
 def test_pictures_are_linear_in_the_mix_and_as_baked_without_an_edit(store: Store, scene: BakedScene) -> None:

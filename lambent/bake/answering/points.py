@@ -16,6 +16,7 @@ SPREAD = 0.7  # of a block's size: distance at which a point counts by 1/e
 NORMAL_M = 0.5  # metres that a unit of the normal counts for in the search
 BENT = 4  # power of the cosine between normals
 LEAST = 1e-6
+POINTS_OF_PATCH = 4  # at least: fewer would know less of where light is than patches do
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +46,19 @@ def gather_points(spots: Spots, width: int, block: int) -> GatherPoints:
     return GatherPoints(np.concatenate(sides), np.concatenate(texels))
 
 
-def bounded_points(spots: Spots, width: int, block: int) -> tuple[GatherPoints, int]:
-    """`gather_points` of the smallest blocks, from `block` on, that have no more than rays can name; and their size."""
-    while len((found := gather_points(spots, width, block)).texel) > MOST_POINTS:
+def bounded_points(spots: Spots, width: int, block: int, patches: int) -> tuple[GatherPoints, int]:
+    """`gather_points` of blocks of such a size, or another, and that size.
+
+    Blocks are smaller in small maps, where there would be fewer than POINTS_OF_PATCH points for each of so many
+    patches, and larger where rays could not name all points.
+    """
+    found = gather_points(spots, width, block)
+    while len(found.texel) < POINTS_OF_PATCH * patches and block > 1:
+        block //= 2
+        found = gather_points(spots, width, block)
+    while len(found.texel) > MOST_POINTS:
         block += max(1, block // 4)
+        found = gather_points(spots, width, block)
     return found, block
 
 

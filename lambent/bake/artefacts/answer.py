@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 KIND = "answer"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 4
+REVISION = 5
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
@@ -105,28 +105,30 @@ def _direct(context: BakeContext, side: int) -> Floats:
     What lobes alone have sent on counts as direct.
     """
     from lambent.bake.answering.direct import cleaned_direct
-    from lambent.bake.light.sampling import sampled_halves
+    from lambent.bake.light.sampling import closed, sampled_halves
 
     if MAPS[side] not in context.stale(KIND):
         return np.asarray(context.store.read(MAPS[side]))
     labels = _sampled_direct(context, side)
     halves, known = sampled_halves(context.store.read(TRACED[side]))
-    if not sorts_light(context.methods):
-        lit = finished_maps(context)[side]
-        assert lit is not None, "two-sided scenes have both maps"
-        direct = cleaned_direct(halves, known, lit, labels)[None]
+    lit = (finished_groups if sorts_light(context.methods) else finished_maps)(context)[side]
+    assert lit is not None, "two-sided scenes have both maps"
+    if sorts_light(context.methods):
+        clean = _direct_by_group(context, side, lit, known, labels)
     else:
-        direct = _direct_by_group(context, side, known, labels)
+        lit = lit[None]
+        clean = cleaned_direct(halves, known, lit[0], labels)[None]
+    if known.any():  # where seams of the light map have been moved, its direct part has, too
+        clean = closed(clean, known, context.traced.texels, labels, context.traced.cuts)
+    direct = np.minimum(clean, np.asarray(lit, np.float16))
     context.put(KIND, MAPS[side], direct, context.provenance())
     return direct
 
 
-def _direct_by_group(context: BakeContext, side: int, known: Flags, labels: Indices) -> NDArray[np.float16]:
+def _direct_by_group(context: BakeContext, side: int, lit: Floats, known: Flags, labels: Indices) -> Floats:
     """The same where light is sorted: the light map's own direct light, denoised, and what lobes alone have sent on."""
     from lambent.bake.answering.direct import cleaned_direct
 
-    lit = finished_groups(context)[side]
-    assert lit is not None, "two-sided scenes have both maps"
     parts = context.store.read(_by_group(TRACED[side]))[0].reshape(*known.shape, -1, 3)
     whole, straight = np.split(np.moveaxis(parts, 2, 0), 2)
     by_lobes = np.clip(whole - straight, 0, lit.astype(np.float32))
@@ -134,7 +136,7 @@ def _direct_by_group(context: BakeContext, side: int, known: Flags, labels: Indi
         [cleaned_direct(np.stack([one, one]), known, light, labels) for one, light in zip(by_lobes, lit, strict=True)]
     )
     straight_map = context.store.read(group_name(SIDES[side], direct=True)).astype(np.float32)
-    return np.asarray(np.minimum(straight_map + sent, lit), np.float16)
+    return np.asarray(straight_map + sent)
 
 
 def _sampled_direct(context: BakeContext, side: int) -> Indices:
@@ -212,7 +214,7 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     how: Settings = context.settings(KIND)
     width, count = context.traced.texels.width, clusters.count
     sides = [context.traced.in_view(sign)[0] for sign in SIGNS[: 2 if any(context.two_sided) else 1]]
-    points, block = bounded_points(spots, width, how.block)
+    points, block = bounded_points(spots, width, how.block, clusters.count)
     codes, near = neighbours(spots, points, block)
     closest = points_near(spots, codes, near)
     between = Between(ends, spots, sides, clusters, closest, points, spots.exitance(context.scene))
