@@ -3,7 +3,8 @@
 Rows are scene x edit. Errors are those at texels that viewers see, drawn at random, all channels alike, in percent:
 `rms` and `mean_error` over the mean of the truth, `relative_rms` and `p95_contacts` texel by texel (over at least
 LEAST of that mean). The truth has the direct sun, which texels show beside the light map and no edit changes. The light
-that is answered from is path traced, too, with the same random numbers, so that errors are those of the answer alone:
+that is answered from is path traced, too, with the same random numbers, so that errors are those of the answer alone;
+of it, as much is direct as of the light map, which may lie a texel beside it at edges of light.
 `shown_rms` has those of the light map besides, of which `baked_rms` is there before any edit. Where light is sorted by
 group, `shown_rms` is of the sum of the groups' own answers. `rms` and `relative_rms` are roots of mean products of the
 errors in two independent halves of the paths, which noise (`noise`, of one whole) does not enter. `naive` is the light
@@ -149,7 +150,8 @@ class Truth:
         self._before = self._traced({})
         answer = stored.answer
         self._reference = answer.reference()
-        self._direct = answer.direct[:, self.at].sum(axis=0)
+        direct, light = (of[:, self.at].sum(axis=0) for of in (answer.direct, answer.baked))
+        self._share = np.divide(direct, light, out=np.ones_like(light), where=light > 0)
 
     def _traced(self, edited: dict[str, Material]) -> Floats:
         """Halves (2, n, 3) of path traced irradiance."""
@@ -185,12 +187,11 @@ class Truth:
         answer = self._stored.answer
         computed = upsampled(answer.indirect(albedos), answer.near)
         after, before = self._traced(edited), self._before
-        direct = np.minimum(self._direct, before.mean(axis=0))
         by_group = [light[:, self.at] for light in (answer.direct, answer.baked, computed, self._reference)]
         map_before, map_after = by_group[1].sum(axis=0), answered(*by_group).sum(axis=0)
         gathered_light = [light.sum(axis=0)[None] for light in by_group[2:]]
         ours = (
-            answered(direct[None], half[None], *gathered_light)[0] - true
+            answered((self._share * half)[None], half[None], *gathered_light)[0] - true
             for half, true in zip(before, after, strict=True)
         )
         naive = [half - true for half, true in zip(before, after, strict=True)]
