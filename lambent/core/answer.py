@@ -211,6 +211,12 @@ class Neighbours:
     def __getitem__(self, some: NDArray[np.integer]) -> Neighbours:
         return Neighbours(self.points[some], self.shares[some])
 
+    @property
+    def closest(self) -> NDArray[np.int64]:
+        """(T,) the point that counts most for each texel."""
+        most = self.shares.argmax(axis=1)[:, None]
+        return np.take_along_axis(self.points, most, axis=1)[:, 0].astype(np.int64)
+
 
 def upsampled(light: Floats, near: Neighbours) -> NDArray[np.float32]:
     """Means (G, T, 3) over the points near each texel of light (G, K, 3)."""

@@ -5,6 +5,7 @@ Light that is sorted by group goes through the renderer's mixer, which mixes it 
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +24,11 @@ def answered(baked: ProbeLight, answer: AnsweredLight, name: str, light: Lit) ->
     return baked.relit(radiance, answer.probe_irradiance(name, change))
 
 
+def users_of(lights: Sequence[ProbeLight], owners: Mapping[str, ProbeLight]) -> dict[str, list[int]]:
+    """Numbers of the objects that show each owner's probe; `lights` by object, `owners` by name."""
+    return {name: [k for k, one in enumerate(lights) if one is light] for name, light in owners.items()}
+
+
 class AnswerShown:
     """The light of a renderer's scene for edited materials; nobody else changes the renderer's light meanwhile."""
 
@@ -30,10 +36,7 @@ class AnswerShown:
         self._renderer, self._answer = renderer, answer
         self._shown = answer.as_baked
         self._baked_probes = {name: renderer.resources.light_of(name) for name in answer.probes}
-        lights = [item.light for item in renderer.resources.objects]
-        self._users = {
-            name: [k for k, one in enumerate(lights) if one is light] for name, light in self._baked_probes.items()
-        }
+        self._users = users_of([item.light for item in renderer.resources.objects], self._baked_probes)
 
     def show(self, light: Lit) -> None:
         """Show this light from the next frame on."""

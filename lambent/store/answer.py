@@ -177,9 +177,7 @@ def read_answer(store: Store) -> StoredAnswer:
 
 def _on_other_sides(row: NDArray[np.int64], near: Neighbours) -> NDArray[np.int64]:
     """(K,) the point that counts most for the other side of a point's texel, `row` (K,); its own where that is -1."""
-    most = near.shares.argmax(axis=1)[:, None]
-    found = np.take_along_axis(near.points, most, axis=1)[:, 0].astype(np.int64)
-    return np.asarray(np.where(row >= 0, found[row], np.arange(len(row))))
+    return np.asarray(np.where(row >= 0, near.closest[row], np.arange(len(row))))
 
 
 def _at_texels(store: Store, names: list[str], texels: NDArray[np.uint32]) -> NDArray[np.float32]:

@@ -14,9 +14,11 @@ from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.modes.walk.states import AS_BAKED
 from lambent.viewer.screen import Rect
+from tests.viewer.drawn_frames import drawn
 from tests.viewer.small_store import MATERIALS, SIDE, with_light_groups, write_small_store
 
-PLACE = Rect(0, 0, 96, 64)
+SIZE = 96, 64
+PLACE = Rect(0, 0, *SIZE)
 LONGEST = 400  # frames until all light is there
 OFF = LightMix({"lamp": GroupMix(on=False), "sky": GroupMix(intensity=2.0)})
 RED = MATERIALS["plaster"].model_copy(update={"kd": (0.6, 0.1, 0.1)})
@@ -48,12 +50,10 @@ def pictures(renderer, state):
     made.close()
 
 
-def drawn(pictures, state):
+def rested(pictures, state):
     """Frames until nothing more is to come."""
     for _ in range(LONGEST):
-        pictures.update(PLACE, 1.0)
-        while pictures.under_way:
-            pictures.work()
+        drawn(pictures, state, SIZE, dt_s=0.0)
         if pictures.wait_s() is None:
             return
         state.screen.clock.now_s += 0.3
@@ -67,7 +67,7 @@ def alone(store, state, room):
     other.look.exposure_ev, other.meter.expose_wanted = 0.0, False
     other.materials.edits.take(room)
     pictures = Pictures(Renderer(open_device(), Store.open(store)), other)
-    drawn(pictures, other)
+    rested(pictures, other)
     return pictures._a.read()
 
 
@@ -79,7 +79,7 @@ def test_each_side_is_its_state_and_both_follow_the_camera(pictures, state, stor
     state.states.split = True
     for camera in (state.navigation.camera, SIDE):
         state.navigation.camera = camera
-        drawn(pictures, state)
+        rested(pictures, state)
         a, b = (picture.read() for picture in pictures.shown)
         assert pictures.divider is state.states.divider
         np.testing.assert_array_equal(a, alone(store, state, edits.room))
@@ -92,7 +92,7 @@ def test_an_exchange_takes_one_frame_and_computes_nothing(pictures, state):
     edits.change("plaster", RED)
     edits.mix(OFF)
     state.states.split = True
-    drawn(pictures, state)
+    rested(pictures, state)
     a, b = (picture.read() for picture in pictures.shown)
     versions = {lane.renderer.mixer.version for lane in (pictures._lane, pictures._beside)}
     for first, second in ((b, a), (a, b)):
@@ -125,9 +125,9 @@ def test_both_sides_refine_by_turns(pictures, state):
 def test_a_split_ends_other_comparisons_and_the_room_alone_comes_back(pictures, state):
     state.materials.edits.change("plaster", RED)
     state.states.split = True
-    drawn(pictures, state)
+    rested(pictures, state)
     state.states.split = False
-    drawn(pictures, state)
+    rested(pictures, state)
     assert len(pictures.shown) == 1 and pictures.divider is None
 
 
@@ -135,7 +135,7 @@ def test_films_have_the_light_and_the_textures_of_the_room(pictures, state, rend
     """Their renderer has light of its own where there are light groups."""
     edits = state.materials.edits
     edits.take(RoomState(materials={"plaster": RED}, textures={"plaster": "brass"}))
-    drawn(pictures, state)
+    rested(pictures, state)
     dimmed = replace(renderer.scene.groups, _probes={})
     renderer.mixer.answer(dimmed)
     state.films.file_name = "tour.mp4"

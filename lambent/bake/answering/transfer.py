@@ -28,25 +28,24 @@ class Between:
     ) -> None:  # fmt: skip
         size = sides[0].texels.width * sides[0].texels.height
         self._ends, self._spots, self._sides, self._clusters, self._points = ends, spots, sides, clusters, points
-        means = [patch_means(spots, clusters, of_group[..., None])[:, 0] for of_group in exitance]
-        self._patches = [senders_of(spots, clusters.of, *pair, size) for pair in zip(means, exitance, strict=True)]
-        own = exitance[:, points.side, points.texel]
-        self._near = [senders_of(spots, near, *pair, size) for pair in zip(own, exitance, strict=True)]
+        means = patch_means(spots, clusters, np.moveaxis(exitance, 0, -1)).T
+        self._patches = senders_of(spots, clusters.of, means, exitance, size)
+        self._near = senders_of(spots, near, exitance[:, points.side, points.texel], exitance, size)
 
     def transfer_rows(self, first: int, last: int, rays: int, seed: int) -> NDArray[np.float32]:
         """Rows [first, last) of F (., G, P): means over `rays` from each patch, spread over its texels by area."""
         count = self._clusters.count
-        rows = np.zeros((last - first, len(self._patches), count), np.float32)
+        rows = np.zeros((last - first, len(self._patches.relative), count), np.float32)
         for side in range(2):
             texel, patch = self._drawn(side, first, last, rays, seed)
             if not len(texel):
                 continue
             ends = self._ends.from_texels(self._sides[side], texel, RAYS_OF_TEXEL, seed_of(seed, "transfer", side))
             drawn = np.bincount(patch - first, minlength=len(rows)) * RAYS_OF_TEXEL
-            for group, senders in enumerate(self._patches):
-                met, weight = senders.met(*ends)
-                known = met >= 0
-                place = ((patch - first)[:, None] * count + met)[known]
+            met, weights = self._patches.met(*ends)
+            known = met >= 0
+            place = ((patch - first)[:, None] * count + met)[known]
+            for group, weight in enumerate(weights):
                 sums = np.bincount(place, weight[known], len(rows) * count).reshape(-1, count)
                 rows[:, group] += (sums / np.maximum(drawn, 1)[:, None]).astype(np.float32)
         return rows
@@ -69,13 +68,12 @@ class Between:
     def gathered_rays(self, part: slice, count: int, seed: int) -> NDArray[np.uint8]:
         """`packed_rays` (n, count, 2 + G) from some of the points."""
         side, texel = self._points.side[part], self._points.texel[part]
-        found = np.zeros((len(texel), count, 2 + len(self._near)), np.uint8)
+        found = np.zeros((len(texel), count, 2 + len(self._near.relative)), np.uint8)
         for one in range(2):
             mine = np.flatnonzero(side == one)
             if len(mine):
                 ends = self._ends.from_texels(self._sides[one], texel[mine], count, seed_of(seed, "gather", one))
-                met = [senders.met(*ends) for senders in self._near]
-                found[mine] = packed_rays(met[0][0], np.stack([weight for _, weight in met]))
+                found[mine] = packed_rays(*self._near.met(*ends))
         return found
 
 

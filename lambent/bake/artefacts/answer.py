@@ -111,18 +111,23 @@ def _direct(context: BakeContext, side: int) -> Floats:
         return np.asarray(context.store.read(MAPS[side]))
     labels = _sampled_direct(context, side)
     halves, known = sampled_halves(context.store.read(TRACED[side]))
-    lit = (finished_groups if sorts_light(context.methods) else finished_maps)(context)[side]
-    assert lit is not None, "two-sided scenes have both maps"
+    lit = _lit(context)[side]
     if sorts_light(context.methods):
         clean = _direct_by_group(context, side, lit, known, labels)
     else:
-        lit = lit[None]
         clean = cleaned_direct(halves, known, lit[0], labels)[None]
     if known.any():  # where seams of the light map have been moved, its direct part has, too
         clean = closed(clean, known, context.traced.texels, labels, context.traced.cuts)
     direct = np.minimum(clean, np.asarray(lit, np.float16))
     context.put(KIND, MAPS[side], direct, context.provenance())
     return direct
+
+
+def _lit(context: BakeContext) -> list[Floats]:
+    """All light (G, H, W, 3) by group, of each side that the light map has."""
+    if sorts_light(context.methods):
+        return [light for light in finished_groups(context) if light is not None]
+    return [light[None] for light in finished_maps(context) if light is not None]
 
 
 def _direct_by_group(context: BakeContext, side: int, lit: Floats, known: Flags, labels: Indices) -> Floats:
@@ -171,11 +176,8 @@ def _sampled_direct(context: BakeContext, side: int) -> Indices:
 def _spots(context: BakeContext, directs: list[Floats]) -> Spots:
     from lambent.bake.answering.spots import spots_of
 
-    by_group = sorts_light(context.methods)
-    maps = [one for one in (finished_groups if by_group else finished_maps)(context) if one is not None]
-    maps = maps if by_group else [one[None] for one in maps]
-    of_sun = context.traced.sorted_lights.sun if by_group else 0
-    return spots_of(context.traced, maps, directs, of_sun)
+    of_sun = context.traced.sorted_lights.sun if sorts_light(context.methods) else 0
+    return spots_of(context.traced, _lit(context), directs, of_sun)
 
 
 def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress
 from lambent.materials.document import Material
-from lambent.realtime.answer_shown import answered
+from lambent.realtime.answer_shown import answered, users_of
 from lambent.realtime.answering import AnsweredLight, Lit
 from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.probe_light import ProbeLight
@@ -140,9 +140,7 @@ class AnsweringLight:
         if self._as_baked is None:
             owners = {item.record.name: light for item, light in zip(resources.objects, self._first, strict=True)}
             self._as_baked = {name: owners[name] for name in answer.probes}
-            self._users = {
-                name: [k for k, one in enumerate(self._first) if one is light] for name, light in self._as_baked.items()
-            }
+            self._users = users_of(self._first, self._as_baked)
         baked = self._as_baked
 
         def run(progress: Progress) -> dict[str, ProbeLight]:
