@@ -8,10 +8,13 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import wgpu
+from wgpu.backends.wgpu_native import extras
 
 from lambent.core.errors import UserError
 
@@ -47,6 +50,7 @@ WEBGPU_LIMITS: Mapping[str, int] = {
     "max-compute-workgroup-size-z": 64,
     "max-compute-workgroups-per-dimension": 65535,
 }
+BACKENDS = ("Vulkan", "Metal", "DX12")
 BLOCKS = "texture-compression-bc"
 OPTIONAL_FEATURES = ("timestamp-query", BLOCKS)
 
@@ -75,7 +79,7 @@ def adapter_info(device_or_adapter: Any) -> AdapterInfo:
 
 
 def choose_adapter() -> Any:
-    """The fastest adapter: a real GPU before a software one, Vulkan, Metal or DX12 before OpenGL.
+    """The fastest adapter of Vulkan, Metal or DX12: a real GPU before a software one.
 
     Raises
     ------
@@ -83,11 +87,19 @@ def choose_adapter() -> Any:
         Where this machine has no adapter at all; names the package that mends it.
     """
     _have_runtime_folder()
+    _leave_out_opengl()
     adapters = [a for a in wgpu.gpu.enumerate_adapters_sync() if a.info.get("backend_type") != "OpenGL"]
     if not adapters:
         raise UserError("no graphics adapter found", expected="Vulkan, Metal or Direct3D 12", hint=MEND)
     order = ["DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU"]
     return min(adapters, key=lambda a: order.index(a.info["adapter_type"]) if a.info["adapter_type"] in order else 3)
+
+
+@cache
+def _leave_out_opengl() -> None:
+    """Keep wgpu from starting EGL to list OpenGL adapters, which can abort the process on a loaded machine."""
+    with suppress(RuntimeError):  # wgpu has started already, with the backends of the program around us
+        extras.set_instance_extras(backends=BACKENDS)
 
 
 def _have_runtime_folder() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
@@ -52,6 +54,14 @@ def test_a_real_gpu_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
     found[:] = []
     with pytest.raises(UserError, match="apt-get install mesa-vulkan-drivers libvulkan1"):
         choose_adapter()
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+def test_opengl_is_not_started() -> None:
+    """Listing its adapters starts EGL, which aborts the process at times."""
+    code = "from lambent.realtime.device import open_device; open_device(); print(open('/proc/self/maps').read())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "vulkan" in done.stdout and "libEGL" not in done.stdout
 
 
 def test_limits_beyond_the_adapter_are_refused(device) -> None:
