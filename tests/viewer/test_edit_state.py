@@ -57,6 +57,22 @@ def ready(quick, opened):
     return state, bakes
 
 
+def test_exposure_is_metered_unless_it_was_chosen_before_the_light_came(quick, screen, tmp_path):
+    found = []
+    for name, chosen in (("metered", 0.0), ("chosen", -1.0)):
+        (tmp_path / name).mkdir()
+        state, bakes = new_state(screen, tmp_path / name)
+        state.look.exposure_ev = chosen
+        until(state, lambda bakes=bakes: bakes.begun)
+        bakes.begun[0].arrive(LIGHTS[1])
+        until(state, lambda state=state: state.loading.lights == LIGHTS[1])
+        for _ in range(3):
+            settled(state)
+        found.append(state.look.exposure_ev)
+        state.close()
+    assert found[1] == -1.0 and found[0] not in (0.0, -1.0)
+
+
 def exact(state, session=None, lights=LIGHTS[-1]):
     """The picture (48, 3) of a session, drawn at once from what the store has."""
     session = session or state.session

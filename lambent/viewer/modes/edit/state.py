@@ -186,7 +186,8 @@ class EditState:
             compared.fit(frame)
             if not self._metered:
                 self._metered = True
-                look.exposure_ev = metered(frame.radiance) or 0.0
+                if look.exposure_ev == 0.0:  # not yet chosen by hand
+                    look.exposure_ev = metered(frame.radiance) or 0.0
         wish = Wish(
             self._now, compared.materials, compared.chosen == DIRECT, compared.scale if self.is_difference else None,
             look.view_transform, look.exposure_ev, look.scale, surfaces,
