@@ -7,11 +7,12 @@ map holds stays as it was baked: the diffuse light of the sky, and all that surf
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Flags, Floats
 from lambent.core.cubemap import face_directions, sample
 from lambent.core.directions import normalize
 from lambent.core.light_field_lookup import Sky
@@ -19,8 +20,10 @@ from lambent.core.light_field_shading import turned, under_sky
 from lambent.core.plain import triple
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import mip_chain
+from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.sun_disc import sky_without
 from lambent.scenes.geometry import turn
+from lambent.scenes.light_groups import SKY, SUN
 from lambent.store.contract import FAR
 
 
@@ -41,7 +44,45 @@ def under_turned_sky(scene: BakedScene, degrees: float) -> BakedScene:
             name: under_sky(field, turned(_of(clear, field.inverse_distance.shape[1]), rotation))
             for name, field in scene.light_fields.items()
         },
+        groups=scene.groups
+        and TurnedGroups(
+            scene.groups.records,
+            scene.groups.store,
+            scene.groups.unit,
+            base=scene.groups,
+            baked=scene.probes,
+            whole=whole,
+            clear=clear,
+            rotation=rotation,
+        ),
     )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TurnedGroups(GroupArrays):
+    """Light by group of a scene under a turned sky.
+
+    `whole` and `clear` are the levels of the sky with the sun's disc and without: the disc is of the sun's group.
+    """
+
+    base: GroupArrays
+    baked: Mapping[str, Probe]
+    whole: list[Floats]
+    clear: list[Floats]
+    rotation: Floats
+
+    def probe(self, name: str) -> Floats | None:
+        """Radiance of the probe of an object by group, as that of `base`."""
+        by_group, sky, sun = self.base.probe(name), self.number(SKY), self.number(SUN)
+        if by_group is None or sky is None or (probe := self.baked[name]).distance is None:
+            return by_group
+        n, seen = by_group.shape[2], _sees_sky(probe.distance, by_group.shape[2])
+        whole, clear = (_turned_sky(levels, self.rotation, n)[seen] for levels in (self.whole, self.clear))
+        by_group[:, seen] = 0
+        by_group[sky][seen] = whole if sun is None else clear
+        if sun is not None:
+            by_group[sun][seen] = whole - clear
+        return by_group
 
 
 def _levels(cube: Floats) -> list[Floats]:
@@ -63,9 +104,16 @@ def _probe_under(probe: Probe, levels: list[Floats], rotation: Floats) -> Probe:
     """A probe whose distances say where it sees the sky; others stay."""
     if probe.distance is None:
         return probe
-    n, m = probe.radiance.shape[1], probe.distance.shape[1]
-    at = np.minimum((np.arange(n) + 0.5) * m / n, m - 1).astype(int)
-    open_sky = probe.distance[:, at[:, None], at] >= 0.999 * FAR
-    sky = turned(_of(levels, int(np.sqrt(6.0) * n)), rotation)
-    radiance = np.where(open_sky[..., None], _seen(sky, n), probe.radiance)
+    n = probe.radiance.shape[1]
+    radiance = np.where(_sees_sky(probe.distance, n)[..., None], _turned_sky(levels, rotation, n), probe.radiance)
     return replace(probe, radiance=np.asarray(radiance, probe.radiance.dtype))
+
+
+def _sees_sky(distance: Floats, n: int) -> Flags:
+    """(6, n, n) texels of a probe that hit nothing, of distances (6, m, m)."""
+    at = np.minimum((np.arange(n) + 0.5) * distance.shape[1] / n, distance.shape[1] - 1).astype(int)
+    return np.asarray(distance[:, at[:, None], at] >= 0.999 * FAR)
+
+
+def _turned_sky(levels: list[Floats], rotation: Floats, n: int) -> Floats:
+    return _seen(turned(_of(levels, int(np.sqrt(6.0) * n)), rotation), n)

@@ -102,8 +102,11 @@ def _parts_of(name: str, record: SceneRecord) -> list[ObjectRecord]:
 
 
 def _fits(parts: list[ObjectRecord], bounds: tuple[object, object], faces: int, cuts: set[str]) -> bool:
-    """Whether the parts have so many faces, or more where the bake has cut them, and these bounds."""
-    baked, was_cut = sum(part.face_count for part in parts), any(part.name in cuts for part in parts)
+    """Whether the parts have so many faces, or more where the bake has cut them, and these bounds.
+
+    Faces are cut where the object was divided, or where the light's edges run (`cuts`).
+    """
+    baked, was_cut = sum(part.face_count for part in parts), len(parts) > 1 or any(part.name in cuts for part in parts)
     if not parts or baked < faces or (baked > faces and not was_cut):
         return False
     lows, highs = zip(*(part.bounds for part in parts), strict=True)

@@ -24,9 +24,11 @@ from lambent.scenes.geometry import turn
 from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, ImageEnvironment, Scene, SunSky
 from lambent.scenes.turned_sky import under_turned_sky as scene_under_turned_sky
 from lambent.store.contract import FAR, SunRecord
+from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, plane
 from tests.realtime.lit_plate import CAMERA, mirrored, plate_field, plate_scene
 from tests.realtime.lit_wall import cube_of, smooth_light
+from tests.viewer.small_store import with_light_groups, write_small_store
 
 SIZE, DEGREES = 128, 70.0
 QUALITY = TINY.changed("tiny, clear sky", environment={"texels": 64})
@@ -73,6 +75,26 @@ def test_probes_that_know_distances_turn_and_the_sun_turns_too() -> None:
     np.testing.assert_allclose(under.probes["a"].radiance[2], expected[2], atol=0.05)
     assert (under.probes["a"].radiance[[0, 1, 3, 4, 5]] == 7.0).all()
     assert under.probes["b"] is blind and under_turned_sky(scene, 360.0) is scene
+
+
+def test_probes_of_light_groups_turn_as_the_probe_of_all_light_does(tmp_path: Path) -> None:
+    """Under the turned sky the sky's group has the sky and the sun's group its disc; walls keep their light."""
+    store = Store.open(with_light_groups(write_small_store(tmp_path / "s")))
+    scene = read_baked(store)
+    assert scene.groups is not None and scene.sun is not None
+    name, probe = next(iter(scene.probes.items()))
+    distance = np.full((6, 8, 8), 2.0, np.float32)
+    distance[2] = FAR
+    scene = replace(scene, probes={name: replace(probe, distance=distance)}, environment=cube_of(smooth_light, 32))
+    before, under = scene.groups.probe(name), under_turned_sky(scene, 90.0)
+    assert under.groups is not None and before is not None
+    by_group = under.groups.probe(name)
+    assert by_group is not None
+    sky, sun = (under.groups.number(member) for member in ("sky", "sun"))
+    np.testing.assert_array_equal(by_group[:, [0, 1, 3, 4, 5]], before[:, [0, 1, 3, 4, 5]])
+    np.testing.assert_allclose(by_group.sum(axis=0)[2], under.probes[name].radiance[2], rtol=2e-3, atol=2e-3)
+    assert by_group[sky][2].mean() > 0.1 and by_group[sun][2].min() >= -1e-5
+    assert not np.delete(by_group, [sky, sun], axis=0)[:, 2].any()
 
 
 def test_a_scene_turns_as_its_bake_does(mi: Any, tmp_path: Path) -> None:
