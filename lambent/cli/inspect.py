@@ -144,8 +144,9 @@ def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:
 
 def inspect_store(file: str) -> Facts:
     """A store: its arrays, complete or not, and whether every chunk on disk is sound."""
-    from lambent.store.contract import SCENE, scene_record
+    from lambent.store.contract import SCENE
     from lambent.store.light_groups import light_groups
+    from lambent.store.states import variants_of
     from lambent.store.store import Store
 
     store = Store.open(Path(file))
@@ -154,7 +155,7 @@ def inspect_store(file: str) -> Facts:
         "arrays": {a.name: f"{'x'.join(map(str, a.shape))} {a.dtype}, {_health(store, a)}" for a in store.artefacts()},
         "documents": sorted(store.documents),
         "light_groups": {g.name: f"{g.share:.1%} of the light: {', '.join(g.members)}" for g in light_groups(store)},
-        "variants": _variants(scene_record(store).variants if SCENE in store.documents else ()),
+        "variants": _variants(variants_of(store) if SCENE in store.documents else ()),
         "reflectors": _reflectors(store),
         "inputs": store.inputs,
     }

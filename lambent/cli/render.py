@@ -133,7 +133,11 @@ def command(
         ),
     ] = None,
     variant: Annotated[
-        str, typer.Option(help="Variant of the scene: its materials and its mix of the light, which answers.")
+        str,
+        typer.Option(
+            help="Variant of the scene, or a state that was stored in the window (saved: as the window was left): its "
+            "materials and its mix of the light, which answers."
+        ),
     ] = "",
     variants: Annotated[
         bool,

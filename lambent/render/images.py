@@ -82,8 +82,8 @@ class Settings:
     recolour : mapping
         Linear RGB by material: its diffuse colour in the images, and the light answers (`realtime.answering`).
     variant : str
-        Name of one of the scene's variants: its materials, under those of `recolour`, and its mix of the light, where
-        `light` has none. The light answers it.
+        Name of one of the store's variants (`store.states`): its materials, under those of `recolour`, and its mix of
+        the light, where `light` has none. The light answers it.
     looks : LookTrack, optional
         Looks of materials over the time of a film, over those of the variant; the light answers them.
     replacements : tuple of Replacement

@@ -27,6 +27,7 @@ from lambent.scenes.loaders.keyframes import Known, read_keyframes
 from lambent.scenes.variants import looks_as_loaded, variant_named
 from lambent.store.contract import SceneRecord, scene_record
 from lambent.store.light_groups import light_groups
+from lambent.store.states import variants_of
 from lambent.store.store import Store
 from lambent.store.views import read_views, with_views
 
@@ -95,7 +96,7 @@ def still(
     check_writable(file, WRITABLE)
     opened, record = opened_with_views(store)
     view = view_of(record, camera)
-    says_mix = settings.light is not None or _mix_of_variant(settings, record).groups
+    says_mix = settings.light is not None or _mix_of_variant(settings, opened).groups
     if camera is not None and not says_mix and (mix := read_views(opened.folder).lights.get(view.name)):
         settings = _lit(settings, opened, MixTrack.of(mix), "saved with the view", note)
     drawn = images(opened, settings, scene=scene, note=note)
@@ -172,7 +173,7 @@ def film(
     chosen = path if isinstance(path, CameraPath) else _named("path", record.paths, path)
     if keyframes is not None:
         settings = _with_keyframes(settings, opened, record, keyframes)
-    says_mix = settings.light is not None or _mix_of_variant(settings, record).groups
+    says_mix = settings.light is not None or _mix_of_variant(settings, opened).groups
     if not says_mix and (track := read_views(opened.folder).tracks.get(chosen.name)):
         settings = _lit(settings, opened, track, "saved with the walk", note)
     if file.suffix.lower() == FILM:
@@ -212,7 +213,7 @@ def images(
 ) -> Images:
     """Renderer of a store's images as arrays; `moving` for those of a film, the other parameters as of `still`."""
     settings = exposed(settings, store)
-    mix = _mix_of_variant(settings, scene_record(store))
+    mix = _mix_of_variant(settings, store)
     if settings.light is None and mix.groups and settings.integrator != PATH_TRACER:
         settings = _lit(settings, store, MixTrack.of(mix), "of the variant", note)
     if settings.projection is not Projection.perspective:
@@ -229,7 +230,7 @@ def images(
 def _with_keyframes(settings: Settings, store: Store, record: SceneRecord, file: Path) -> Settings:
     """Settings with what a file says of materials and light over time."""
     looks = looks_as_loaded(record.materials, record.textures)
-    found = read_keyframes(file, Known(looks, record.variants, read_views(store.folder).lights))
+    found = read_keyframes(file, Known(looks, variants_of(store), read_views(store.folder).lights))
     if not found.light.groups:
         return replace(settings, looks=found.looks)
     if settings.light is not None:
@@ -237,9 +238,9 @@ def _with_keyframes(settings: Settings, store: Store, record: SceneRecord, file:
     return replace(settings, looks=found.looks, light=found.light)
 
 
-def _mix_of_variant(settings: Settings, record: SceneRecord) -> LightMix:
+def _mix_of_variant(settings: Settings, store: Store) -> LightMix:
     """The mix of the light that the settings' variant has."""
-    return variant_named(record.variants, settings.variant).light if settings.variant else LightMix()
+    return variant_named(variants_of(store), settings.variant).light if settings.variant else LightMix()
 
 
 def _lit(settings: Settings, store: Store, light: MixTrack, whose: str, note: Note) -> Settings:

@@ -18,8 +18,8 @@ from lambent.scenes.replacement import with_replacements
 from lambent.scenes.scene import Scene, Variant
 from lambent.scenes.turned_sky import under_turned_sky
 from lambent.scenes.variants import dressed, variant_named
-from lambent.store.contract import scene_record
 from lambent.store.source import changed_inputs, scene_of
+from lambent.store.states import variants_of
 from lambent.store.store import Store
 
 SPP = 64
@@ -40,8 +40,7 @@ class PathTraced(Images):
             raise UserError("the path tracer traces reflectors", field="--planar", got=got, expected="auto")
         baked = scene_of(store, scene)
         self._baked, self._note = with_replacements(baked, settings.replacements), note
-        variants = scene_record(store).variants
-        self.wear(variant_named(variants, settings.variant) if settings.variant else Variant("as baked"))
+        self.wear(variant_named(variants_of(store), settings.variant) if settings.variant else Variant("as baked"))
         for name in changed_inputs(store, baked):
             note(f"{name} has changed since the store was baked")
         engine()

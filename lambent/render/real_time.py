@@ -33,6 +33,7 @@ from lambent.scenes.scene import Look, Variant
 from lambent.scenes.variants import variant_named
 from lambent.store.answer import read_answer
 from lambent.store.contract import SIDES, noise_name
+from lambent.store.states import variants_of
 from lambent.store.store import Store
 
 METERED_PX = 256  # the longer side of what sets an exposure
@@ -80,7 +81,7 @@ class RealTime(Images):
         self._check_light(self._light, note)
         self._looks: Mapping[str, Look] = {}
         if settings.variant:
-            self._looks = variant_named(baked.record.variants, settings.variant).looks
+            self._looks = variant_named(variants_of(store), settings.variant).looks
         self._lookups = self._of_probes() if moving and (self._light.groups or settings.looks) else {}
 
     def _of_probes(self) -> dict[str, str]:

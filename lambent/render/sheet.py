@@ -23,6 +23,7 @@ from lambent.scenes.scene import Variant
 from lambent.scenes.variants import variant_named
 from lambent.store.answer import has_answer
 from lambent.store.light_groups import light_groups
+from lambent.store.states import variants_of
 from lambent.store.store import Store
 from lambent.store.views import read_views
 
@@ -57,14 +58,15 @@ def sheet(
     Raises
     ------
     UserError
-        Where the scene has no variants, the sheet would be too large, or as `output.still` raises it.
+        Where the store has no variants, the sheet would be too large, or as `output.still` raises it.
     """
     began, file = time.perf_counter(), Path(file)
     check_writable(file, (".png",))
     opened, record = opened_with_views(store)
-    if not record.variants:
+    found = variants_of(opened, saved=False)
+    if not found:
         variant_named((), "all of them", "--variants")
-    variants = with_the_baked_state(record.variants)
+    variants = with_the_baked_state(found)
     columns, rows = shape_of(len(variants), settings.width / settings.height)
     pixels = columns * rows * settings.width * settings.height
     if pixels > MOST_PIXELS:

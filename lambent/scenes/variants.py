@@ -95,7 +95,7 @@ def variant_named(variants: Iterable[Variant], name: str, field: str = FIELD) ->
     """The variant of this name; a `UserError` that lists all of them where there is none."""
     found = {variant.name: variant for variant in variants}
     if not found:
-        hint = "describe them in the scene's [[variants]] and bake it again"
+        hint = "describe them in the scene's [[variants]] and bake it again, or store states in the window"
         raise UserError("the store has no variants", field=field, got=name, hint=hint)
     return found[known("variant", name, found, field=field)]
 

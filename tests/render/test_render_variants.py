@@ -18,6 +18,8 @@ from lambent.render.sheet import laid_out, shape_of, with_the_baked_state
 from lambent.scenes.look_track import LookTrack
 from lambent.scenes.scene import Look, MaterialTextures, Texture, Variant
 from lambent.store.contract import scene_record, write_scene_record
+from lambent.store.session import FILE, RoomState, WalkSession, write_session
+from lambent.store.states import variants_of
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, room_with_step
 from tests.viewer.small_store import MATERIALS, with_light_groups, write_small_store
@@ -67,6 +69,27 @@ def test_a_variant_has_its_light_unless_another_is_given(adapter: None, store: P
     assert dim == pytest.approx(baked / 2, rel=6e-3, abs=2e-3)
     given = image(store, replace(SMALL, variant="dim", light=parse_light(["sun=on"])), tmp_path)
     assert given == pytest.approx(baked, rel=6e-3, abs=2e-3)
+
+
+def test_states_of_the_session_are_variants(adapter: None, store: Path, tmp_path: Path) -> None:
+    """By name; the last one saved is `saved`. A state stands before the scene's variant of its name."""
+    red, grey = RED.material, MATERIALS["plaster"].model_copy(update={"kd": (0.2, 0.2, 0.2)})
+    gone = RoomState(materials={"no more": grey, "plaster": grey}, textures={"plaster": "no more"})
+    states = {"crimson": RoomState(materials={"plaster": red}), "red": gone, "night": RoomState(light=DIM)}
+    session = WalkSession(now=RoomState(materials={"plaster": red}, light=DIM), states=states)
+    as_red = image(store, replace(SMALL, variant="red"), tmp_path)
+    as_dim = image(store, replace(SMALL, variant="dim"), tmp_path)
+    write_session(store / FILE, session)
+    np.testing.assert_array_equal(image(store, replace(SMALL, variant="crimson"), tmp_path), as_red)
+    np.testing.assert_array_equal(image(store, replace(SMALL, variant="night"), tmp_path), as_dim)
+    both = image(store, replace(SMALL, variant="saved"), tmp_path)
+    assert both == pytest.approx(as_red / 2, rel=2e-2, abs=2e-3)
+    shadowed = image(store, replace(SMALL, variant="red"), tmp_path)
+    assert abs(shadowed - as_red).max() > 0.01, "the state, not the variant"
+    assert [one.name for one in variants_of(Store.open(store), saved=False)] == ["red", "dim", "crimson", "night"]
+    (store / FILE).write_text("{")
+    with pytest.raises(UserError, match=r"session\.json"):
+        image(store, replace(SMALL, variant="dim"), tmp_path)
 
 
 def test_light_answers_a_variant_as_it_answers_the_same_colour(adapter: None, mi: object, tmp_path: Path) -> None:

@@ -1,0 +1,39 @@
+"""The variants of a store: those of its scene, and states of the room that were stored in the window."""
+
+from __future__ import annotations
+
+from lambent.scenes.scene import Look, Variant
+from lambent.store.contract import SceneRecord, scene_record
+from lambent.store.session import FILE, RoomState, read_session
+from lambent.store.store import Store
+
+SAVED = "saved"  # the room as it was last saved
+
+
+def variants_of(store: Store, *, saved: bool = True) -> tuple[Variant, ...]:
+    """The variants of the scene, and after them the states of the store's session; of one name, the state.
+
+    `saved` adds the room as the session left it, where that is another than the baked one. What the store does not have
+    any more is left out of a state.
+
+    Raises
+    ------
+    UserError
+        Where the session is damaged.
+    """
+    record, session = scene_record(store), read_session(store.folder / FILE)
+    found = {variant.name: variant for variant in record.variants}
+    if session is not None:
+        left = {SAVED: session.now} if saved and session.now != RoomState() else {}
+        found |= {name: _variant(name, room, record) for name, room in {**left, **session.states}.items()}
+    return tuple(found.values())
+
+
+def _variant(name: str, room: RoomState, record: SceneRecord) -> Variant:
+    known = room.only(record.materials)
+    own = {one: one if one in record.textures else "" for one in record.materials}
+    changed = dict.fromkeys([*known.materials, *known.textures])
+    looks = {
+        one: Look(known.materials.get(one, record.materials[one]), known.textures.get(one, own[one])) for one in changed
+    }
+    return Variant(name, looks, known.light)
