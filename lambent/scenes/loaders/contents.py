@@ -7,10 +7,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from lambent.core.camera import Camera, overview
+from lambent.core.camera import Camera
 from lambent.core.plain import Triple
 from lambent.materials.document import Material
-from lambent.scenes.scene import Environment, Light, MaterialTextures, Scene, SceneObject, SunSky, bounds_of
+from lambent.scenes.first_view import first_views
+from lambent.scenes.scene import Environment, Light, MaterialTextures, Scene, SceneObject, SunSky
 from lambent.scenes.variants import Dressed, looks_as_loaded, with_variants
 
 DAYLIGHT = SunSky(sun_direction=(0.4558, 0.7597, 0.4637))
@@ -48,7 +49,7 @@ class Contents:
             materials=self.materials,
             environment=self.environment if own_light else DAYLIGHT,
             lights=self.lights,
-            cameras=self.cameras or (overview(*bounds_of(self.objects)),),
+            cameras=self.cameras or first_views(self.objects),
             sources=self.sources,
             warnings=(*self.warnings, *notes, *lights_that_stay(self.objects, sets)),
             textures=self.textures,

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from lambent.core.camera import overview
 from lambent.core.errors import UserError, invalid
 from lambent.core.geometry import triangle_areas
 from lambent.core.plain import Triple
 from lambent.materials.document import Material, material_from
+from lambent.scenes.first_view import first_views
 from lambent.scenes.geometry import transformed
 from lambent.scenes.ies import read_ies
 from lambent.scenes.light_groups import SKY, SUN, names_of_lights
@@ -46,7 +46,6 @@ from lambent.scenes.scene import (
     ReflectorRule,
     Scene,
     SceneObject,
-    bounds_of,
 )
 from lambent.scenes.variants import with_variants
 
@@ -94,7 +93,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         materials=materials,
         environment=environment,
         lights=lights,
-        cameras=cameras or (overview(*bounds_of(objects)),),
+        cameras=cameras or first_views(objects),
         paths=tuple(section.path() for section in document.paths),
         exposure_ev=document.exposure,
         sources=tuple(files.sources),

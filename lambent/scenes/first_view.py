@@ -1,0 +1,145 @@
+"""Cameras of a scene that has none: within its room, where it is one, and from outside at all that stands in it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from lambent.core.arrays import Flags, Floats
+from lambent.core.camera import Camera, overview
+from lambent.core.plain import triple
+from lambent.scenes.scene import EYE_HEIGHT_M, SceneObject, bounds_of
+
+GROUND, FLAT = 4.0, 0.05  # a ground is so many times as large as all others together, and not higher than its share
+PLACES, MOST_TRIED = 11, 25  # on each side of the floor, and of those with a floor and a ceiling
+ROOM_HEIGHT_M, ELBOW_ROOM_M = (1.9, 30.0), 0.5
+MOST_TRIANGLES = 4000  # the largest, that walls are made of
+AROUND = 24  # rays at each of these heights: the walls, what stands on the floor, and the ceiling
+LEVEL, FLOORWARDS, UPWARDS = 0.0, math.radians(-30), math.radians(60)
+WALLED, ROOFED, UNEVEN = 0.45, 0.8, 0.25  # least shares of rays that hit; how far ceilings may be off their median
+INWARDS, FURNITURE = 0.7, 3  # least share of rays that hit fronts; least objects that stand free
+LONG_M, OBJECT_M = 5.0, 0.5  # views that are longer are no better; an object in sight is worth so much length
+MARGIN = 0.03  # of the room, between walls and what stands free
+FOV_Y_DEG, SIDES, PITCH = 60.0, 3, 0.08  # rays to each side that are in view; radians down
+
+
+def first_views(objects: Sequence[SceneObject]) -> tuple[Camera, ...]:
+    """`inside`, where the objects enclose a place to stand, then `overview`. Scenes are in metres, +y is up."""
+    found, whole = inside(objects), overview(*content_bounds(objects))
+    return (whole,) if found is None else (found, whole)
+
+
+def content_bounds(objects: Sequence[SceneObject]) -> tuple[Floats, Floats]:
+    """Corners (3,), (3,) of the box around the objects, without flat grounds and skies that dwarf all others."""
+    by_size = sorted(objects, key=_size)
+    while len(by_size) > 1 and _surrounds(by_size[-1], *bounds_of(by_size[:-1])):
+        by_size.pop()
+    low, high = bounds_of(by_size)
+    return np.asarray(low, float), np.asarray(high, float)
+
+
+def _size(o: SceneObject) -> float:
+    return float(np.linalg.norm(np.subtract(*o.mesh.bounds)))
+
+
+def _surrounds(o: SceneObject, low: Floats, high: Floats) -> bool:
+    near, far = o.mesh.bounds
+    flat, around = (far - near)[1] <= FLAT * _size(o), (near < low).all() and (far > high).all()
+    return bool((flat or around) and _size(o) > GROUND * np.linalg.norm(high - low))
+
+
+def inside(objects: Sequence[SceneObject]) -> Camera | None:
+    """A camera at eye height, towards most of what stands there; None without a floor, walls and a ceiling.
+
+    What surrounds a place is a room where its surfaces face it, or where furniture stands free in it: closed solids and
+    empty shells of buildings are neither.
+    """
+    low, high = content_bounds(objects)
+    if not ROOM_HEIGHT_M[0] <= high[1] - low[1] or min((high - low)[[0, 2]]) < 4 * ELBOW_ROOM_M:
+        return None
+    walls = _Walls(objects)
+    x, z = ((grid.ravel() + 0.5) / PLACES for grid in np.mgrid[:PLACES, :PLACES])
+    eyes = low + np.stack([x, np.zeros_like(x), z], axis=1) * (high - low) + [0.0, EYE_HEIGHT_M, 0.0]
+    up, down = (walls.hit(eyes, np.broadcast_to([0.0, y, 0.0], eyes.shape))[0] for y in (1.0, -1.0))
+    stands = (down < 1.5 * EYE_HEIGHT_M) & (down > 0.3 * EYE_HEIGHT_M)
+    height = up + down
+    indoors = np.flatnonzero(stands & (height >= ROOM_HEIGHT_M[0]) & (height <= ROOM_HEIGHT_M[1]))
+    eyes[indoors, 1] += EYE_HEIGHT_M - down[indoors]
+    ways, best = np.concatenate([_around(tilt) for tilt in (LEVEL, FLOORWARDS, UPWARDS)]), None
+    for eye in eyes[indoors[:: -(-len(indoors) // MOST_TRIED) or 1]]:
+        distance, inwards, hits = walls.hit(np.broadcast_to(eye, ways.shape), ways)
+        level, above = distance[:AROUND], distance[-AROUND:] * math.sin(UPWARDS)
+        ceiling = np.median(np.minimum(above, ROOM_HEIGHT_M[1]))
+        roofed = np.abs(above - ceiling) < UNEVEN * ceiling
+        if np.isfinite(level).mean() < WALLED or level.min() < ELBOW_ROOM_M or roofed.mean() < ROOFED:
+            continue
+        if inwards.mean() < INWARDS * np.isfinite(distance).mean() and _free(objects, hits, low, high) < FURNITURE:
+            continue
+        worth = _worth(np.minimum(level, LONG_M), hits[: 2 * AROUND].reshape(2, AROUND))
+        if best is None or worth.max() > best[0]:
+            best = worth.max(), eye, ways[worth.argmax()] - [0.0, PITCH, 0.0]
+    if best is None:
+        return None
+    _, eye, forward = best
+    return Camera("inside", triple(eye), triple(eye + forward), fov_y_deg=FOV_Y_DEG)
+
+
+def _worth(length_m: Floats, hits: Floats) -> Floats:
+    """(AROUND,) what there is to see each way, of views (AROUND,) and the objects (rows, AROUND) that rays hit."""
+    turns = range(-SIDES, SIDES + 1)
+    ahead = np.mean([np.roll(length_m, turn) for turn in turns], axis=0)
+    objects = np.concatenate([np.roll(hits, turn, axis=1) for turn in turns])
+    return np.asarray(ahead + [OBJECT_M * len(set(column)) for column in objects.T])
+
+
+def _around(tilt_rad: float) -> Floats:
+    """(AROUND, 3) directions so far above the horizon."""
+    angle, across = np.arange(AROUND) * 2 * math.pi / AROUND, math.cos(tilt_rad)
+    return np.stack([across * np.cos(angle), np.full(AROUND, math.sin(tilt_rad)), across * np.sin(angle)], axis=1)
+
+
+class _Walls:
+    """The largest triangles of objects, for few rays."""
+
+    def __init__(self, objects: Sequence[SceneObject]) -> None:
+        corners = np.concatenate([o.mesh.corners for o in objects])
+        of_object = np.repeat(np.arange(len(objects)), [len(o.mesh.faces) for o in objects])
+        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        largest = np.argsort(area)[-MOST_TRIANGLES:]
+        largest = largest[area[largest] > 0]
+        self._object, self._a = of_object[largest], corners[largest, 0]
+        self._u, self._v = (corners[largest, k] - self._a for k in (1, 2))
+        self._n = np.cross(self._u, self._v)
+
+    def hit(self, origins: Floats, directions: Floats) -> tuple[Floats, Flags, Floats]:
+        """Distance (R,) of each ray's first triangle, inf of none, whether it is a front, and its object, -1 of none.
+
+        Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997.
+        """
+        found = np.full(len(origins), np.inf), np.zeros(len(origins), bool), np.full(len(origins), -1)
+        for ray, (origin, w) in enumerate(zip(origins, directions, strict=True)):
+            facing = self._n @ w
+            with np.errstate(divide="ignore", invalid="ignore"):
+                to_a = self._a - origin
+                across = np.cross(w, to_a)
+                t = np.einsum("tc,tc->t", self._n, to_a) / facing
+                u, v = (k * np.einsum("tc,tc->t", e, across) / facing for k, e in ((-1, self._v), (1, self._u)))
+                inside = (t > 1e-6) & (u >= 0) & (v >= 0) & (u + v <= 1)
+            if inside.any():
+                first = np.flatnonzero(inside)[t[inside].argmin()]
+                for values, value in zip(found, (t[first], facing[first] < 0, self._object[first]), strict=True):
+                    values[ray] = value
+        return found
+
+
+def _free(objects: Sequence[SceneObject], hits: Floats, low: Floats, high: Floats) -> int:
+    """How many of the objects of these numbers stand away from the walls."""
+    gap = MARGIN * (high - low)[[0, 2]]
+
+    def stands_free(o: SceneObject) -> bool:
+        near, far = (np.asarray(corner, float)[[0, 2]] for corner in o.mesh.bounds)
+        return bool((near > low[[0, 2]] + gap).all() and (far < high[[0, 2]] - gap).all())
+
+    return sum(stands_free(objects[number]) for number in set(hits[hits >= 0]))
