@@ -154,14 +154,20 @@ fn light_of_sky(w: vec3f, half_log2_omega: f32) -> vec3f {
     return textureSampleLevel(sky_cube, linear_sampler, w, level).rgb;
 }
 
-// How many times brighter the light is now that comes from the distance 1/u along r: as the probe sees it there.
+const BLUR_TEXELS = 4.0; // over which linear look-ups in a map spread a texel, about
+
+// How many times brighter the light is now that comes from the distance 1/u along r: as the probe sees it there. It is
+// averaged as far as the map spreads light: beside a lamp that is off now, the map has some of the lamp's light.
 fn change_along(s: Surface, r: vec3f, u: f32, half_log2_omega: f32) -> vec3f {
     if (!RELIT) { return vec3f(1.0); }
     let q = r + u * s.x;
     let major = max_norm(q);
     let stretch = length(q) / (major * major * major);
-    let level = max(half_log2_omega + 0.5 * log2(max(stretch, 1e-20)) + object.centre.w, 0.0);
-    return textureSampleLevel(radiance_cube, linear_sampler, q, level).rgb;
+    let spread = 0.5 * log2(4.0 * LAMBENT_PI * BLUR_TEXELS) - log2(f32(field.side));
+    let finest = 0.5 * log2(max(stretch, 1e-20)) + object.centre.w;
+    let here = textureSampleLevel(radiance_cube, linear_sampler, q, max(half_log2_omega + finest, 0.0)).rgb;
+    let around = textureSampleLevel(radiance_cube, linear_sampler, q, max(max(half_log2_omega, spread) + finest, 0.0)).rgb;
+    return min(here, around);
 }
 
 // Cosine between an axis and the direction from x to a point; -2 where there is none.
