@@ -154,7 +154,7 @@ fn light_of_sky(w: vec3f, half_log2_omega: f32) -> vec3f {
     return textureSampleLevel(sky_cube, linear_sampler, w, level).rgb;
 }
 
-const BLUR_TEXELS = 4.0; // over which linear look-ups in a map spread a texel, about
+const BLUR_TEXELS = 9.0; // as far as linear look-ups in a map, and what a march misses a surface by, spread light, about
 
 // How many times brighter the light is now that comes from the distance 1/u along r: as the probe sees it there. It is
 // averaged as far as the map spreads light: beside a lamp that is off now, the map has some of the lamp's light.
