@@ -138,13 +138,14 @@ class LightFieldView:
         found = sample_map(context.geometry, np.arange(*first[number : number + 2]), size, at, spacing_m)
         radiance = np.zeros((len(at), texels, texels, 3), np.float16)
         nearness = np.zeros((len(at), texels, texels), np.float16)
+        cover = np.zeros((len(at), texels, texels), np.uint8)
         field = LightField(
             at, placed.normals.astype(np.float32), radiance, nearness, found.entries, found.corner, found.grid,
-            placed.offset_m,
+            placed.offset_m, cover=cover,
         )  # fmt: skip
         near = self.place(field)
         used = np.unique(near.points[near.known])
-        radiance[used], nearness[used] = self._tracer.maps(at[used], texels, strata, SEED)
+        radiance[used], nearness[used], cover[used] = self._tracer.maps(at[used], texels, strata, SEED)
         return field
 
     def single(self, texels: int, strata: int) -> LightField:

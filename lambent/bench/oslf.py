@@ -20,7 +20,7 @@ from lambent.bake.quality import Quality
 from lambent.bench.light_field_view import Compared, LightFieldView
 from lambent.core import light_field_lookup as look
 from lambent.core.arrays import Floats
-from lambent.core.light_field import NO_POINT, LightField
+from lambent.core.light_field import NO_POINT, LightField, Sky
 from lambent.core.light_field_lookup import March, Place
 from lambent.core.light_field_maps import radiance_along
 from lambent.core.map_cache import POLICIES, fewest_misses, misses
@@ -97,7 +97,7 @@ def methods(field: LightField, single: LightField, place: Place, view: LightFiel
     w, k = view.shown.w, len(place.x)
     middle = Place(place.x, place.n, np.stack([np.zeros(k, np.int64), *[np.full(k, NO_POINT)] * 3], axis=-1))
     far = March(1, first=0.02, last=4.0)
-    blend = partial(look.blended, field, place, w)
+    blend = partial(look.blended, field, place, w, sky=view.sky)
     yield Method("single map", 1, partial(radiance_along, single, middle.named(1)[:, 0], w))
     yield Method("single map, marched", PER_POINT, partial(_marched, single, middle, w, far))
     yield Method("nearest", 1, partial(blend, "nearest"))
@@ -107,22 +107,26 @@ def methods(field: LightField, single: LightField, place: Place, view: LightFiel
         yield Method(f"B_r {power}", 4, partial(blend, "reflection", power))
     for power in POWERS:
         yield Method(f"B_n {power}", 4, partial(blend, "normal", power))
-    yield Method("fixed point", 28, lambda: look.fixed_point(field, place, w).radiance)
+    yield Method("fixed point", 28, lambda: look.fixed_point(field, place, w, edges=view.sky).radiance)
     for name, rule in (("march 1", ONE), ("march 4", FOUR)):
         count = rule.candidates * PER_POINT
-        yield Method(name, count, partial(_marched, field, place, w, rule))
+        yield Method(name, count, partial(_marched, field, place, w, rule, None, view.sky))
         yield Method(f"{name}, sky", count, partial(_marched, field, place, w, rule, view.sky))
-    yield Method("true hit", 4, partial(true_hit, field, place, w, view.distance_m))
+    yield Method("true hit", 4, partial(true_hit, field, place, w, view.distance_m, view.sky))
 
 
-def _marched(field: LightField, place: Place, w: Floats, rule: March, sky: look.Sky | None = None) -> Floats:
-    return look.marched(field, place, w, rule, sky).radiance
+def _marched(
+    field: LightField, place: Place, w: Floats, rule: March, sky: Sky | None = None, edges: Sky | None = None
+) -> Floats:
+    return look.marched(field, place, w, rule, sky, edges).radiance
 
 
-def true_hit(field: LightField, place: Place, w: Floats, distance_m: Floats) -> Floats:
+def true_hit(field: LightField, place: Place, w: Floats, distance_m: Floats, sky: Sky | None = None) -> Floats:
     """Radiance (k, 3) of the maps towards what the traced rays meet: the error that their texels leave."""
-    far = np.where(np.isfinite(distance_m), distance_m, 1e6)[:, None, None]
-    seen = radiance_along(field, place.named(), place.offsets(field) + far * w[:, None])
+    is_open = ~np.isfinite(distance_m)
+    q = place.offsets(field) + np.where(is_open, 1e6, distance_m)[:, None, None] * w[:, None]
+    seen = radiance_along(field, place.named(), q)
+    seen[is_open] = radiance_along(field, place.named()[is_open], q[is_open], sky)
     return np.asarray(np.einsum("kj,kjc->kc", look.basis_weights(field, place, w, "normal"), seen))
 
 

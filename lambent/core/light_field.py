@@ -5,15 +5,21 @@ Spec: thesis R, "Offset surface light fields", chapter 3. What a store holds of 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
+
+Sky = Callable[[Floats], Floats]  # radiance (n, 3) of directions (n, 3) in which nothing is hit
 NO_POINT = 0xFFFF  # in a sample map: no further point
 NO_EXIT = -1.0  # in place of a distance: no face is behind
 CANDIDATES = 4  # points that a texel of the sample map names at most
 MOST_POINTS = NO_POINT  # indices are 16 bits wide
+# By the bits of `LightField.cover`, the share of a texel that is sky while it has the light of a surface.
+SKY_SHARE = np.array([0.0, *[1 - bits.bit_count() / 4 for bits in range(1, 16)]])
 LEAST_TEXELS, MOST_TEXELS = 8, 1024  # along a side of a map
 
 
@@ -56,6 +62,8 @@ class LightField:
     own_diffuse : whether the maps show the object itself without its lobes.
     volume : whether points fill a box that the object stands in, and maps are without it, so that another may stand
         there. `normals` point away from the middle of the box.
+    cover : (P, E, E) uint8, or None: bit 2 i + j is set where the quarter (row i, column j) of a texel shows a surface;
+        others show the sky, whatever the texel's distance is. A texel with a surface has its light and its distance.
     glass : what refracts the light that the object transmits, or None; maps are then without the object.
     blocks : (P, B, B, 4) uint32, or None: where a store has the radiance so, as `core.light_field_blocks` makes it.
     """
@@ -72,6 +80,7 @@ class LightField:
     own_diffuse: bool = False
     volume: bool = False
     glass: Glass | None = None
+    cover: NDArray[np.uint8] | None = None
 
     @property
     def without_object(self) -> bool:

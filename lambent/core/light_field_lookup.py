@@ -10,7 +10,6 @@ x goes behind what the point sees, and read there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -18,11 +17,10 @@ import numpy as np
 
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import normalize
-from lambent.core.light_field import NO_POINT, LightField
+from lambent.core.light_field import NO_POINT, LightField, Sky
 from lambent.core.light_field_maps import nearest_points, nearness_along, radiance_along
 
 Basis = Literal["nearest", "angle", "average", "reflection", "normal"]
-Sky = Callable[[Floats], Floats]  # radiance (n, 3) of directions (n, 3) in which nothing is hit
 POWER = 4  # N of B_n and B_r
 CONES_DEG = (65.0, 75.0)  # about the normal, of points that show the surface: the first that holds one
 SURFACE_TOLERANCE = 0.15  # of the distance at which a point sees the surface
@@ -107,13 +105,15 @@ def basis_weights(field: LightField, place: Place, w: Floats, basis: Basis, powe
     return np.asarray(weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-30))
 
 
-def blended(field: LightField, place: Place, w: Floats, basis: Basis = "normal", power: int = POWER) -> Floats:
-    """(k, 3) radiance sum_j B_j L(p_j, w) (4.7)."""
-    seen = radiance_along(field, place.named(), np.broadcast_to(w[:, None], (*place.points.shape, 3)))
+def blended(
+    field: LightField, place: Place, w: Floats, basis: Basis = "normal", power: int = POWER, sky: Sky | None = None
+) -> Floats:
+    """(k, 3) radiance sum_j B_j L(p_j, w) (4.7); a `sky` has its share of texels that show surfaces as well."""
+    seen = radiance_along(field, place.named(), np.broadcast_to(w[:, None], (*place.points.shape, 3)), sky)
     return np.asarray(np.einsum("kj,kjc->kc", basis_weights(field, place, w, basis, power), seen))
 
 
-def fixed_point(field: LightField, place: Place, w: Floats, rounds: int = 4) -> Marched:
+def fixed_point(field: LightField, place: Place, w: Floats, rounds: int = 4, edges: Sky | None = None) -> Marched:
     """As `marched`, by the iteration t = d(x + t w) instead of a search: cheaper, and blind to what stands before."""
     offset, point, known = place.offsets(field), place.named(), place.known
     direction = np.broadcast_to(w[:, None], offset.shape)
@@ -128,19 +128,22 @@ def fixed_point(field: LightField, place: Place, w: Floats, rounds: int = 4) -> 
     nearness = nearness_along(field, point, q)
     met = known & (np.abs(np.linalg.norm(q, axis=-1) * nearness - 1) < rule.tolerance) & (t > 0)
     open_sky = known & (nearness_along(field, point, direction) == 0) & ~met
-    return _answered(field, place, w, rule, q, np.where(met, t, np.inf), open_sky, None)
+    return _answered(field, place, w, rule, q, np.where(met, t, np.inf), open_sky, None, edges)
 
 
-def marched(field: LightField, place: Place, w: Floats, rule: March | None = None, sky: Sky | None = None) -> Marched:
+def marched(
+    field: LightField, place: Place, w: Floats, rule: March | None = None, sky: Sky | None = None,
+    edges: Sky | None = None,
+) -> Marched:  # fmt: skip
     """Radiance of the surface that rays from x along w (k, 3) meet first, as the points near x see it.
 
     A surface that a point verifies is there, so the nearest of all points counts, and those that agree are blended.
     Where none verifies one, the ray ends in the sky if a point sees it there; else the answer is B_n of the maps.
-    A `sky` answers for the sky; without one, the maps do.
+    A `sky` answers for the sky; without one, the maps do, with the share of `edges` in texels that show both.
     """
     rule = rule or March()
     q, t, open_sky = _searched(field, place, w, rule)
-    return _answered(field, place, w, rule, q, t, open_sky, sky)
+    return _answered(field, place, w, rule, q, t, open_sky, sky, edges or sky)
 
 
 def _searched(field: LightField, place: Place, w: Floats, rule: March) -> tuple[Floats, Floats, Flags]:
@@ -188,8 +191,9 @@ def _searched(field: LightField, place: Place, w: Floats, rule: March) -> tuple[
 
 
 def _answered(
-    field: LightField, place: Place, w: Floats, rule: March, q: Floats, t: Floats, open_sky: Flags, sky: Sky | None
-) -> Marched:
+    field: LightField, place: Place, w: Floats, rule: March, q: Floats, t: Floats, open_sky: Flags, sky: Sky | None,
+    edges: Sky | None,
+) -> Marched:  # fmt: skip
     """The answer of all points from what each has found."""
     count = t.shape[1]
     known = place.known[:, :count]
@@ -200,7 +204,7 @@ def _answered(
     weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-30)
     seen = np.einsum("kj,kjc->kc", weight, radiance_along(field, place.named(count), q))
     in_sky = np.asarray(~met & (open_sky & known).any(axis=1))
-    radiance = np.where(met[:, None], seen, blended(field, place, w))
+    radiance = np.where(met[:, None], seen, blended(field, place, w, sky=edges))
     if sky is not None and in_sky.any():
         radiance[in_sky] = sky(w[in_sky])
     return Marched(radiance, met, in_sky, first)

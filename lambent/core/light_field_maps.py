@@ -7,10 +7,11 @@ directions (..., 3) need not be unit.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats, Indices
-from lambent.core.light_field import LightField
-from lambent.core.octahedral import to_square
+from lambent.core.light_field import SKY_SHARE, LightField, Sky
+from lambent.core.octahedral import texel_directions, to_square
 
 
 def nearest_points(field: LightField, uv2: Floats) -> Indices:
@@ -26,26 +27,56 @@ def nearest_points(field: LightField, uv2: Floats) -> Indices:
     return np.asarray(found, np.int64)
 
 
-def radiance_along(field: LightField, point: Indices, w: Floats) -> Floats:
-    """(..., 3) radiance that points see along directions: bilinear between the four nearest texels."""
+def radiance_along(field: LightField, point: Indices, w: Floats, sky: Sky | None = None) -> Floats:
+    """(..., 3) radiance that points see along directions: bilinear between the four nearest texels.
+
+    Texels that show surfaces and the sky have the light of the surfaces; with a `sky`, its share is mixed in.
+    """
     n = field.radiance.shape[1]
     at = to_square(w) * n - 0.5
     low = np.floor(at)
     share = at - low
     column, row = low[..., 0].astype(np.int64), low[..., 1].astype(np.int64)
-    total = np.zeros(w.shape)
+    total, open_sky = np.zeros(w.shape), np.zeros(w.shape[:-1])
+    mixes = sky is not None and field.cover is not None
     for i in (0, 1):
         for j in (0, 1):
             weight = np.abs(1 - j - share[..., 0]) * np.abs(1 - i - share[..., 1])
-            total += weight[..., None] * field.radiance[point, *_on_map(row + i, column + j, n)]
+            texel = (point, *_on_map(row + i, column + j, n))
+            if mixes and field.cover is not None:
+                part = SKY_SHARE[field.cover[texel]] * weight
+                open_sky, weight = open_sky + part, weight - part
+            total += weight[..., None] * field.radiance[texel]
+    if sky is not None and (edge := open_sky > 0).any():
+        total[edge] += open_sky[edge][:, None] * sky(w[edge])
     return total
 
 
+def whole_texels(radiance: Floats, cover: NDArray[np.uint8], sky: Sky) -> Floats:
+    """Maps (P, E, E, 3) of all that texels show: the sky has its share of those with the light of a surface."""
+    n = cover.shape[1]
+    behind = sky(texel_directions(n).reshape(-1, 3)).reshape(n, n, 3)
+    found, share = np.array(radiance, np.float32), SKY_SHARE[cover]
+    point, row, column = np.nonzero(share)
+    part = share[point, row, column, None].astype(np.float32)
+    found[point, row, column] += part * (behind[row, column] - found[point, row, column])
+    return found
+
+
 def nearness_along(field: LightField, point: Indices, w: Floats) -> Floats:
-    """(...) inverse distance, 1/m, of what points see in the texels nearest to directions; 0 for the sky."""
+    """(...) inverse distance, 1/m, of what points see in the texels nearest to directions; 0 for the sky.
+
+    Of texels that show both, quarters tell them apart.
+    """
     n = field.inverse_distance.shape[1]
-    at = np.minimum((to_square(w) * n).astype(np.int64), n - 1)
-    return np.asarray(field.inverse_distance[point, at[..., 1], at[..., 0]], np.float64)
+    place = to_square(w) * n
+    at = np.minimum(place.astype(np.int64), n - 1)
+    found = np.asarray(field.inverse_distance[point, at[..., 1], at[..., 0]], np.float64)
+    if field.cover is None:
+        return found
+    half = place - at >= 0.5
+    bit = field.cover[point, at[..., 1], at[..., 0]] >> (2 * half[..., 1] + half[..., 0]).astype(np.uint8)
+    return np.where(bit & 1, found, 0.0)
 
 
 def _on_map(row: Indices, column: Indices, n: int) -> tuple[Indices, Indices]:

@@ -12,8 +12,8 @@ from functools import partial
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.light_field import LightField
-from lambent.core.light_field_lookup import POWER, Basis, Place, Sky, basis_weights
+from lambent.core.light_field import LightField, Sky
+from lambent.core.light_field_lookup import POWER, Basis, Place, basis_weights
 from lambent.core.light_field_maps import radiance_along
 from lambent.core.octahedral import texel_directions
 

@@ -2,9 +2,9 @@
 
 Thesis R, "Thin Lens Refractions", looks light up along the refracted direction. Here both faces refract: the second is
 taken for the plane that lies behind the first one along its normal (`light_field.Glass`). So a pane displaces light and
-keeps its direction, a lens turns it, and a thick body is approximate. Light that the second face mirrors within is
-followed into that direction, and no further. Directions are unit, of rays that go on from the viewer. The shader is
-realtime/shaders/thin_glass.wgsl.
+keeps its direction, a lens turns it, and a thick body is approximate. What faces mirror instead of passing comes from
+where the surface itself mirrors, as if all were parallel: so clear glass in even light is not darker than what is
+behind it. Directions are unit, of rays that go on from the viewer. The shader is realtime/shaders/thin_glass.wgsl.
 """
 
 from __future__ import annotations
@@ -28,6 +28,22 @@ def eta_of(r0: float) -> float:
 def normal_transmittance(lobe: Any) -> Floats:
     """(3,) share of light that an interface with this lobe of transmission passes at normal incidence."""
     return np.asarray(np.asarray(lobe.k, float) * (1 - np.asarray(lobe.r0, float)))
+
+
+def mirrored_back(cosine: Floats, share: Floats, eta: float, tint: tuple[float, float, float]) -> Floats:
+    """Share (k,) of the light within the glass that its second face and those beyond mirror, and so do not pass.
+
+    Parameters
+    ----------
+    cosine, share : (k,) as from `through_glass`.
+    tint : what an interface lets pass at normal incidence: 1 - r0 (Fresnel), and less where glass is coloured.
+    """
+    passes = 1 - ((eta - 1) / (eta + 1)) ** 2
+    colourless = np.log(passes) / min(
+        float(np.log(max(float(np.mean(np.asarray(tint))), 1e-6))), -1e-6
+    )  # of each face's share
+    under_fresnel = 1 - (1 - np.minimum(cosine, 1)) ** 5
+    return np.asarray(1 - passes * under_fresnel * np.maximum(share, 1e-6) ** min(colourless, 1.0))
 
 
 def refracted(w: Floats, n: Floats, ratio: float) -> tuple[Floats, Floats]:

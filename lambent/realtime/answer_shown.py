@@ -48,7 +48,6 @@ class AnswerShown:
             self._renderer.mixer.answer(groups)
             return
         resources = self._renderer.resources
-        resources.answers = not light.is_baked
         resources.show_light_map(list(self._layers if light.is_baked else light_layers(*self._answer.maps(light))))
         for name, baked in self._baked_probes.items():
             made = baked if light.is_baked else answered(baked, self._answer, name, light)

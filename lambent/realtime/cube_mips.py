@@ -21,6 +21,7 @@ from lambent.core.cubemap import directions_at, sample, texel_solid_angles
 BLUR = (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)  # along rows and columns: variance 1 texel^2
 # Variance of a look-up in texel^2 per axis: box 1/12, and linear interpolation 1/6, to which the blur adds 1.
 SMOOTH_AREA = 5.0
+FAINT = 1e-4  # of the mean light of a cube map: what is darker says nothing of how light changes
 
 
 def halved(cube: Floats) -> Floats:
@@ -48,6 +49,16 @@ def mip_chain(cube: Floats) -> list[Floats]:
     while levels[-1].shape[1] > 1:
         levels.append(halved(levels[-1]))
     return levels
+
+
+def light_change(now: Floats, before: Floats) -> list[Floats]:
+    """Levels of a cube map of how many times brighter a probe's light `now` is than `before`, (6, N, N, 3) each.
+
+    A light field in other light is its maps times this, read towards what its rays meet. Where the probe saw next to
+    nothing, light stays as it was.
+    """
+    faint = FAINT * float(np.mean(before)) + 1e-30
+    return [(a + faint) / (b + faint) for a, b in zip(mip_chain(now), mip_chain(before), strict=True)]
 
 
 def smooth_chain(cube: Floats) -> list[Floats]:

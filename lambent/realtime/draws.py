@@ -67,6 +67,10 @@ class Draw:
         return {"LAYERS": 1 + self.item.light.lamps.mixes(self.material, bool(self.textures & WIDENING))}
 
     @property
+    def _change(self) -> dict[str, float]:
+        return {"RELIT": 1} if self.item.light.is_relit and brings_light(self.look_up) else {}
+
+    @property
     def _part(self) -> dict[str, float]:
         return {"PART": 1 + self.is_beyond} if self.item.record.borders else {}
 
@@ -88,6 +92,7 @@ class Draw:
             "LOBES": self.lobes,
             "TEXTURES": self.textures,
             **self.look_up.constants(self.item.light.probe),
+            **self._change,
             **self.integrator.constants,
             **self._layers,
             **self._part,
@@ -104,13 +109,8 @@ def lamp_use(how: Integrator, light: ProbeLight, look_up: LookUp, material: Mate
     return "lamps" if how.lamps and light.lamps.serve(material, widened) else ""
 
 
-def draws_of(
-    state: FrameState, resources: SceneResources, reflecting: Collection[str] = (), *, stale_fields: bool = False
-) -> list[Draw]:
-    """What a frame draws; objects whose names are in `reflecting` have pixels on planar reflectors.
-
-    With `stale_fields` objects whose look-up is automatic are drawn from their probes, not from their light fields.
-    """
+def draws_of(state: FrameState, resources: SceneResources, reflecting: Collection[str] = ()) -> list[Draw]:
+    """What a frame draws; objects whose names are in `reflecting` have pixels on planar reflectors."""
     wanted = INTEGRATORS["diffuse" if SHOW[state.show][3] else state.integrator]
     found = {}
     for name, buffers in resources.materials.items():
@@ -125,7 +125,7 @@ def draws_of(
         material, how, bits = found[item.record.material]
         buffers, light = resources.materials[item.record.material], item.light
         wish = state.lookups.get(item.record.name, state.lookup)
-        look_up = light.look_up(wish, stale_fields=stale_fields) if how.specular else light.cheapest
+        look_up = light.look_up(wish) if how.specular else light.cheapest
         table = lamp_use(how, light, look_up, material, bits)
         alone = table == "lamps" and light.lamps.all_out(material, bool(bits & WIDENING))
         rough = buffers.textures.rough

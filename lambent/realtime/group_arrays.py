@@ -17,7 +17,7 @@ from lambent.store.store import Store
 
 NO_GROUPS = "the store holds no light by group"
 BAKE_GROUPS = "`lambent bake` of the same scene with --light-groups scene adds it"
-FIELDS_STAY = "light fields stay as baked: in other light their objects show their probes, unless a look-up is chosen"
+FIELDS_FOLLOW = "light fields are as baked, times the change of light that their objects' probes see"
 
 
 @dataclass(frozen=True, eq=False)

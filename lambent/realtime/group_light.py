@@ -72,6 +72,10 @@ class GroupLight:
         pairs = ((self._of(member, factors), self._of(member, before)) for member in (SKY, SUN))
         return any(not np.array_equal(now, then) for now, then in pairs)
 
+    def sky_change(self, factors: Floats) -> Triple:
+        """How many times brighter the environment without the sun's disc is than as baked."""
+        return triple(self._of(SKY, factors))
+
     def sun(self, factors: Floats) -> Triple | None:
         """W/m^2 of the sun, in units of the scene."""
         return None if self.scene.sun is None else triple(np.array(self.scene.sun.irradiance) * self._of(SUN, factors))

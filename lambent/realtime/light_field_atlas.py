@@ -11,8 +11,9 @@ import wgpu
 from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
-from lambent.core.light_field import LightField
-from lambent.core.light_field_tiles import Tiles
+from lambent.core.light_field import LightField, Sky
+from lambent.core.light_field_maps import whole_texels
+from lambent.core.light_field_tiles import Tiles, tiled
 from lambent.core.shared_exponent import packed_rgb
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.device import BLOCKS, WEBGPU_LIMITS, adapter_info
@@ -69,6 +70,16 @@ def coding(device: Any, tiles: Tiles) -> Coding:
     return Coding("rgb9e5ufloat", 1, 4, lambda texels: packed_rgb(texels)[..., None])
 
 
+def with_quarters(inverse: NDArray[np.float16], cover: NDArray[np.uint8]) -> NDArray[np.float16]:
+    """Inverse distances with the quarters of texels that show a surface: three lowest bits, and the sign.
+
+    What is left of the distance is right to .4 %.
+    """
+    rounded = np.minimum(inverse.view(np.uint16) + np.uint16(4), np.uint16(0x7BFF)) & np.uint16(0x7FF8)
+    bits = (cover & 7).astype(np.uint16) | (cover.astype(np.uint16) >> 3 & 1) << 15
+    return np.asarray((rounded | bits).view(np.float16))
+
+
 @dataclass(frozen=True)
 class Packed:
     """Maps as they are written to an atlas: tiles of every level of radiance, and of inverse distance."""
@@ -86,9 +97,10 @@ class Atlas:
     Each map has a place, by number. With `most_bytes` there are places for as many maps as fit into them.
     """
 
-    def __init__(self, device: Any, field: LightField, most_bytes: float | None = None) -> None:
+    def __init__(self, device: Any, field: LightField, most_bytes: float | None = None, sky: Sky | None = None) -> None:
+        """`sky` is in coarser levels of texels that show a surface and the sky."""
         self.tiles = Tiles.of(field.radiance.shape[1])
-        self._how, self._field = coding(device, self.tiles), field
+        self._how, self._field, self._sky = coding(device, self.tiles), field, sky
         self.levels = sum((self.tiles.tile >> k) % self._how.block == 0 for k in range(self.tiles.levels))
         self.places = len(field.points)
         if most_bytes is not None:
@@ -129,14 +141,16 @@ class Atlas:
         ready = field.blocks if how.block > 1 else None
         if ready is not None and how.block * ready.shape[1] != self.tiles.tile:
             ready = None  # a tile that can be halved more often
-        levels = tuple(
-            ready[part] if ready is not None and level == 0 else how.pack(tiles)
-            for level, tiles in zip(range(self.levels), self.tiles.chain(light), strict=False)
-        )
+        finest = ready[part] if ready is not None else how.pack(tiled(light, self.tiles.tile))
+        if self._sky is not None and field.cover is not None:
+            light = whole_texels(light, field.cover[part], self._sky)
+        coarser = zip(range(self.levels), self.tiles.chain(light), strict=False)
+        levels = (finest, *(how.pack(tiles) for level, tiles in coarser if level))
         inverse = np.asarray(field.inverse_distance[part])
-        inverse = np.where(np.isfinite(inverse) & (inverse > 0), inverse, np.float16(0))[..., None]
-        within = np.pad(inverse, ((0, 0), *[(1, self.tiles.tile - self.tiles.side - 1)] * 2, (0, 0)))
-        return Packed(levels, within)
+        inverse = np.where(np.isfinite(inverse) & (inverse > 0), inverse, np.float16(0))
+        if field.cover is not None:
+            inverse = with_quarters(inverse, field.cover[part])
+        return Packed(levels, tiled(inverse[..., None], self.tiles.tile))
 
     def fill(self) -> None:
         """Write the first maps into all places, row by row."""

@@ -91,12 +91,6 @@ class LightMixer:
         """(n, 3) of the mix that is wanted; None while all light is as it was baked."""
         return self._wanted
 
-    @property
-    def changes(self) -> bool:
-        """Whether the light that is wanted is another one than was baked."""
-        answers = self._answer is not None and self._answer.groups is not self._scene.groups
-        return answers or (self._wanted is not None and bool((self._wanted != 1).any()))
-
     @cached_property
     def _thread(self) -> ThreadPoolExecutor:
         return ThreadPoolExecutor(1, "light")
@@ -161,11 +155,14 @@ class LightMixer:
 
     def _probe(self, number: int, factors: Floats) -> ProbeLight | None:
         light, owner = self._resources.objects[self._users[number][0]].light, self._owners[number]
+        if self.groups is self._scene.groups and (factors == 1).all():
+            return light.as_baked
+        sky_change = self._light.sky_change(factors)
         if owner is None:
             sky = self._light.sky(factors)[1]
-            return None if sky is None else light.relit(finite(sky)[0], ())
+            return None if sky is None else light.relit(finite(sky)[0], (), sky_change)
         probe = self._surfaces.probe(owner, factors)
-        return None if probe is None else light.relit(probe.radiance, probe.irradiance)
+        return None if probe is None else light.relit(probe.radiance, probe.irradiance, sky_change)
 
     def _show(self, part: int, factors: Floats, made: Any) -> None:
         """Upload a part."""

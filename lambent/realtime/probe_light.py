@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
+from lambent.core.plain import Triple
 from lambent.materials.document import Material
 from lambent.realtime.aim import aim_table, aimed_share, widest_lobe
 from lambent.realtime.baked import DARK, Probe
-from lambent.realtime.cube_mips import SMOOTH_AREA, finite, mip_chain, smooth_chain
-from lambent.realtime.incident import AUTO, LookUp, brings_light, look_up_of
+from lambent.realtime.cube_mips import SMOOTH_AREA, finite, light_change, mip_chain, smooth_chain
+from lambent.realtime.incident import LookUp, look_up_of
 from lambent.realtime.integrators import Cube
 from lambent.realtime.lamps import ProbeLamps
 from lambent.realtime.layouts import Layouts
@@ -55,6 +56,8 @@ class ProbeLight:
         self.table = cache(self._new_table)  # of lamps: what it is for, and the look-up that finds them
         self.streams: list[ResidentMaps] = []  # of the light field, where not all of its maps are on the GPU
         self._resources: dict[str, tuple[Any, ...]] = {}  # of look-ups, by their files
+        self.as_baked = self  # of which this is other light
+        self.sky_change = (1.0, 1.0, 1.0)  # how many times brighter the sky is than it was baked
 
     def resources(self, look_up: LookUp) -> tuple[Any, ...]:
         """What the look-ups of one file read."""
@@ -85,10 +88,26 @@ class ProbeLight:
         chain = smooth_chain if cube == "smooth" else mip_chain
         return [with_alpha(level) for level in chain(finite(self.probe.radiance)[0])]
 
-    def relit(self, radiance: Floats, irradiance: tuple[float, ...]) -> ProbeLight:
+    @property
+    def is_relit(self) -> bool:
+        """Whether its light is another one than its light field was taken in."""
+        return self.as_baked is not self
+
+    def change_view(self) -> Any:
+        """View of a cube map that says how many times brighter light is than as baked, in each direction."""
+        return upload(self._layouts.device, self._change, "rgba16float").create_view(dimension="cube")
+
+    @cached_property
+    def _change(self) -> list[NDArray[np.float16]]:
+        now, before = (finite(light.probe.radiance)[0] for light in (self, self.as_baked))
+        return [with_alpha(level) for level in light_change(now, before)]
+
+    def relit(
+        self, radiance: Floats, irradiance: tuple[float, ...], sky_change: Triple = (1.0, 1.0, 1.0)
+    ) -> ProbeLight:
         """The same probe with other light, its cube maps and lamps made ready as far as this one's were used.
 
-        Touches no GPU, so that another thread may call it.
+        `sky_change` is that of the sky. Touches no GPU, so that another thread may call it.
         """
         probe = replace(self.probe, radiance=radiance, irradiance=irradiance)
         other = ProbeLight(self._layouts, probe, self._sampler, self._look_ups)
@@ -98,6 +117,9 @@ class ProbeLight:
                 other._levels[cube] = other._chain(cube)
         if "lamps" in self.__dict__:
             _ = other.lamps
+        other.as_baked, other.sky_change = self.as_baked, sky_change
+        if self.probe.light_field is not None:
+            _ = other._change
         return other
 
     @cached_property
@@ -118,12 +140,6 @@ class ProbeLight:
         """The look-up of draws that have no lobes."""
         return next(one for one in self._look_ups.values() if one.serves(self.probe))
 
-    def look_up(self, wanted: str, *, stale_fields: bool = False) -> LookUp:
-        """The look-up of that name, if it serves the probe, else the preferred one.
-
-        With `stale_fields` one of the probe's own light is preferred: light fields show other light than there is.
-        """
-        among = self._look_ups
-        if stale_fields and wanted == AUTO:
-            among = {name: one for name, one in among.items() if not brings_light(one)}
-        return look_up_of(self.probe, wanted, among)
+    def look_up(self, wanted: str) -> LookUp:
+        """The look-up of that name, if it serves the probe, else the preferred one."""
+        return look_up_of(self.probe, wanted, self._look_ups)

@@ -182,11 +182,6 @@ class Renderer:
         """W/(sr m^2), or what else the state shows, of texels of the texture of radiance that `draw` left."""
         return np.asarray(texels, np.float32) * np.float32(self._unit(state))
 
-    @property
-    def _is_relit(self) -> bool:
-        """Whether the light is another one than was baked."""
-        return self.resources.answers or self.mixer.changes
-
     def _unit(self, state: FrameState) -> float:
         return 1.0 if state.show == LIGHT_MAP_NOISE else self.scene.unit
 
@@ -265,7 +260,7 @@ class Renderer:
         self.resources.reflector_lamps.follow()
         views = self._planar_views(state, data)
         reflecting = {part.object for view in views for part in view.reflector.parts}
-        draws = draws_of(state, self.resources, reflecting, stale_fields=self._is_relit)
+        draws = draws_of(state, self.resources, reflecting)
         self.streaming.follow(draws, data, self._clusters, waits=self.waits)
         passing = target_view is not None and state.accumulate is None  # seen once, so half floats do
         halves = passing or self.resources.mixes_parts  # single precision cannot be blended everywhere

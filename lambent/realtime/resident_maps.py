@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
-from lambent.core.light_field import NO_POINT, LightField
+from lambent.core.light_field import NO_POINT, LightField, Sky
 from lambent.core.map_cache import LEAST_RECENT, POLICIES
 from lambent.realtime.light_field_atlas import Atlas, Packed
 from lambent.realtime.uploads import upload
@@ -42,9 +42,10 @@ class ResidentMaps:
     """
 
     def __init__(
-        self, device: Any, field: LightField, most_bytes: float | None = None, policy: str = LEAST_RECENT
-    ) -> None:
-        self.atlas, self._device, self._field = Atlas(device, field, most_bytes), device, field
+        self, device: Any, field: LightField, most_bytes: float | None = None, policy: str = LEAST_RECENT,
+        sky: Sky | None = None,
+    ) -> None:  # fmt: skip
+        self.atlas, self._device, self._field = Atlas(device, field, most_bytes, sky), device, field
         count, room = len(field.points), self.atlas.places
         self.whole, self.reads = room == count, Reads()
         self._cache = POLICIES[policy](room)

@@ -15,7 +15,7 @@ from lambent.realtime.baked import DARK, BakedScene, Probe
 from lambent.realtime.clusters import Ranges, merged
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.device import WEBGPU_LIMITS
-from lambent.realtime.incident import LookUp, look_ups
+from lambent.realtime.incident import LookUp, brings_light, look_ups
 from lambent.realtime.integrators import Cube
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.material_buffers import MaterialBuffers
@@ -60,18 +60,22 @@ class ObjectResources:
     def _new_group(self, cube: Cube, look_up: LookUp, table: str = "", dark: bool = False) -> Any:
         """Group 2 with that cube map, what the look-up reads, and a table of the probe's lamps: aim, lamps or none.
 
+        For look-ups with light of their own, in other light than as baked, the cube map has the change.
         `dark`: without the object's own emission.
         """
-        probe = self.light.probe
+        probe, view = self.light.probe, self.light.view(cube)
+        if shows_change := brings_light(look_up) and self.light.is_relit:
+            view = self.light.change_view()
         data = np.zeros(1, OBJECT_DTYPE)
-        data["centre"][0] = (*probe.centre, self.light.half_log2_texels(cube))
+        data["centre"][0] = (*probe.centre, self.light.half_log2_texels("box" if shows_change else cube))
+        data["sky_change"][0, :3] = self.light.sky_change
         data["emission"][0, :3] = 0 if dark else np.array(self.emission) / self._unit
         data["irradiance"].reshape(-1)[: len(probe.irradiance)] = np.array(probe.irradiance) / self._unit
         data["borders"][0] = [*self.record.borders, *[WITHIN] * (MOST_BORDERS - len(self.record.borders))]
         uniform = self._layouts.buffer("UNIFORM", data)
         lamps = self.light.table(table, look_up) if table else self._layouts.empty
         layout = self._layouts.object(look_up.BINDINGS, kind_of(cube))
-        return self._layouts.group(layout, uniform, self.light.view(cube), lamps, *self.light.resources(look_up))
+        return self._layouts.group(layout, uniform, view, lamps, *self.light.resources(look_up))
 
 
 class SceneResources:
@@ -92,7 +96,6 @@ class SceneResources:
         self._light_texture = upload(device, [layers], "rgba16float")
         self.light_view = self._light_texture.create_view(dimension="2d-array")
         self.light_version = 0  # grows with every answer of light to edited materials, and with other textures
-        self.answers = False  # whether light maps and probes answer edited materials
         sky = scene.far_light or DARK
         self.sky_group = self.sky_group_of(with_alpha(finite(sky.radiance)[0]))
         cleaned = without_sun(sky, scene.sun)

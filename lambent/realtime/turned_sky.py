@@ -15,7 +15,7 @@ import numpy as np
 from lambent.core.arrays import Flags, Floats
 from lambent.core.cubemap import face_directions, sample
 from lambent.core.directions import normalize
-from lambent.core.light_field_lookup import Sky
+from lambent.core.light_field import Sky
 from lambent.core.light_field_shading import turned, under_sky
 from lambent.core.plain import triple
 from lambent.realtime.baked import BakedScene, Probe

@@ -19,7 +19,7 @@ from lambent.core.progress import Progress, silent
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.frame_state import FrameState, quantity_of
-from lambent.realtime.group_arrays import BAKE_GROUPS, FIELDS_STAY, NO_GROUPS
+from lambent.realtime.group_arrays import BAKE_GROUPS, FIELDS_FOLLOW, NO_GROUPS
 from lambent.realtime.incident import AUTO, look_ups
 from lambent.realtime.incident.light_field import check_serves
 from lambent.realtime.integrators import integrator
@@ -82,13 +82,6 @@ class RealTime(Images):
         self._looks: Mapping[str, Look] = {}
         if settings.variant:
             self._looks = variant_named(variants_of(store), settings.variant).looks
-        self._lookups = self._of_probes() if moving and (self._light.groups or settings.looks) else {}
-
-    def _of_probes(self) -> dict[str, str]:
-        """Look-ups of objects with light fields in films whose light changes: what shows them is one for all frames."""
-        shown = (o for o in self._renderer.resources.objects if o.record.name in self._renderer.scene.light_fields)
-        wanted = self.settings.lookup
-        return {o.record.name: o.light.look_up(wanted, stale_fields=True).NAME for o in shown}
 
     def _check_light(self, light: MixTrack, note: Callable[[str], None]) -> None:
         """`UserError` where the store lacks the groups of a mix; a note of what does not follow it."""
@@ -99,7 +92,7 @@ class RealTime(Images):
             raise UserError(NO_GROUPS, field="--light", hint=BAKE_GROUPS)
         scene.groups.factors(dict.fromkeys(light.groups, WHITE))
         if scene.light_fields:
-            note(FIELDS_STAY)
+            note(FIELDS_FOLLOW)
 
     def wear(self, variant: Variant) -> None:
         self._light, self._looks = self.settings.light or MixTrack.of(variant.light), variant.looks
@@ -110,10 +103,7 @@ class RealTime(Images):
         looks = {**self._looks, **(track.looks_at(self.time_s) if track else {})}
         self._wearing.wear(looks, self.settings.recolour)
         light = self._light.factors_at(self.time_s)
-        return self._frame(
-            camera, light=light, materials=self._wearing.materials, lookups=self._lookups,
-            maps=self._renderer.light_version,
-        )  # fmt: skip
+        return self._frame(camera, light=light, materials=self._wearing.materials, maps=self._renderer.light_version)
 
     @property
     def light_fields(self) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from lambent.materials.document import Material
 from lambent.materials.recolour import recoloured
 from lambent.realtime.answer_shown import AnswerShown
 from lambent.realtime.answering import AnsweredLight
-from lambent.realtime.group_arrays import FIELDS_STAY
+from lambent.realtime.group_arrays import FIELDS_FOLLOW
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.scene import Look
 from lambent.scenes.variants import looks_as_loaded
@@ -68,7 +68,7 @@ class Wearing:
         scene = self._renderer.scene
         self._once(ESTIMATED if self.answers else f"light and probes stay as baked: {NO_ANSWER}")
         if scene.light_fields:
-            self._once(FIELDS_STAY)
+            self._once(FIELDS_FOLLOW)
         shared, has_probe = scene.shared_probes, {o.material for o in scene.record.objects if o.name in scene.probes}
         has_probe |= {o.material for o in scene.record.objects if shared.get(o.name) in scene.probes}
         for name, material in materials.items():

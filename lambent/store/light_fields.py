@@ -15,6 +15,7 @@ from lambent.store.store import Store
 PARTS = ("points", "normals", "radiance", "inverse_distance", "sample_map")
 BLOCKS = "blocks"  # in place of radiance
 EXITS = "exits"  # of glass
+COVER = "cover"  # of texels' quarters; stores of earlier versions have none
 
 
 def has_light_field(store: Store, object_name: str) -> bool:
@@ -56,8 +57,19 @@ def read_light_field(store: Store, object_name: str) -> LightField:
         points, normals, radiance, inverse_distance, sample_map,
         (int(corner[0]), int(corner[1])), (int(grid[0]), int(grid[1])), offset_m, blocks,
         store.artefact(name).meta.get("levels") == 1, store.artefact(name).meta.get("volume") is True,
-        _glass(store, object_name, sample_map.shape),
+        _glass(store, object_name, sample_map.shape), _cover(store, object_name, inverse_distance.shape),
     )  # fmt: skip
+
+
+def _cover(store: Store, object_name: str, shape: tuple[int, ...]) -> NDArray[np.uint8] | None:
+    """Which quarters of texels show surfaces, where the store knows."""
+    name = light_field_name(object_name, COVER)
+    if name not in store:
+        return None
+    cover = store.read(name)
+    if cover.shape != shape or cover.dtype != np.uint8:
+        raise UserError("broken store", file=store.folder, field=name, got=str(cover.shape), expected=str(shape))
+    return cover
 
 
 def _glass(store: Store, object_name: str, shape: tuple[int, ...]) -> Glass | None:

@@ -141,7 +141,7 @@ def test_an_interrupted_bake_ends_with_the_same_bits(tmp_path: Path, monkeypatch
 
 def test_only_what_is_asked_is_baked_and_what_is_no_longer_asked_goes(tmp_path: Path) -> None:
     scene = coloured_room()
-    names = {light_field_name("ball", part) for part in PARTS}
+    names = {light_field_name("ball", part) for part in (*PARTS, "cover")}
     store = bake(with_field(scene, points=5, texels=8, offset_m=0.25), tmp_path / "s", quality=SMALL)
     assert read(store, "radiance").shape == (5, 8, 8, 3)
     assert store.artefact(light_field_name("ball", "points")).meta["offset_m"] == 0.25
@@ -203,6 +203,28 @@ def test_texels_hold_the_light_of_what_their_middle_meets(mi: Any) -> None:
     met = inverse_distances(built, point, n)[0] > 0
     assert 0.05 < met.mean() < 0.3
     np.testing.assert_allclose(light, np.where(met[..., None], 0.0, 1.0) * np.ones(3), atol=1e-6)
+
+
+def test_quarters_of_texels_tell_where_a_square_ends(mi: Any) -> None:
+    """Every quarter whose middle is before the square, by hand; texels with any of these show it, and its distance."""
+    from lambent.bake.light_fields.acquisition import Around, covered_distances, radiance_maps
+    from lambent.bake.tracing.scene_builder import SceneBuilder
+
+    square = SceneObject("square", patch((-1.03, -1, 1.07), (2, 0, 0), (0, 0, -2)), "black")
+    scene = Scene("s", (square,), {"black": BLACK}, environment=ConstantEnvironment((1.0, 1.0, 1.0)))
+    built, point, n = SceneBuilder(scene).build(), np.zeros((1, 3)), 31
+    inverse, cover = covered_distances(built, point, n)
+    w = texel_directions(2 * n)
+    x, z = (-w[..., axis] / np.minimum(w[..., 1], -1e-9) for axis in (0, 2))
+    before = (w[..., 1] < 0) & (x > -1.03) & (x < 0.97) & (z > -0.93) & (z < 1.07)
+    bits = before.reshape(n, 2, n, 2).transpose(0, 2, 1, 3).reshape(n, n, 4)
+    np.testing.assert_array_equal(cover[0], (bits * [1, 2, 4, 8]).sum(axis=-1))
+    mixed = bits.any(axis=-1) & ~bits.all(axis=-1)
+    assert mixed.sum() > 20 and (inverse[0][bits.any(axis=-1)] > 0).all()
+    light = radiance_maps(Around(built, None, 2), point, n, 2, 0, covers=True)[0, ..., 0]
+    assert (light[bits.all(axis=-1)] == 0).all()
+    np.testing.assert_allclose(light[inverse[0] == 0], 1, atol=1e-6)
+    assert (light[mixed] == 0).mean() > 0.9, "where no part of two by two meets it, its sky"
 
 
 def test_the_disc_of_the_sun_is_left_out(mi: Any) -> None:

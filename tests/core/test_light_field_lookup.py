@@ -185,3 +185,25 @@ def test_a_place_on_a_point_is_finite(field: LightField) -> None:
     place = Place(field.points.astype(float), n, np.tile(np.arange(144)[:, None], (1, 4)))
     for light in (marched(field, place, n).radiance, blended(field, place, n, "angle"), surface(field, place)[0]):
         assert np.isfinite(light).all()
+
+
+def test_quarters_of_texels_sharpen_the_edge_of_a_roof() -> None:
+    """So the error over all directions falls."""
+    field = ball_field(144, 96, open_roof=True)
+    light, fine = seen(field.points.astype(float)[:, None, None], texel_directions(192), open_roof=True)
+    quarters = np.isfinite(fine).reshape(144, 96, 2, 96, 2).transpose(0, 1, 3, 2, 4).reshape(144, 96, 96, 4)
+    near = np.where(np.isfinite(fine), 1 / fine, 0).reshape(144, 96, 2, 96, 2).sum(axis=(2, 4))
+    mean = near / np.maximum(quarters.sum(axis=-1), 1)
+    inverse = np.where(field.inverse_distance > 0, field.inverse_distance, mean).astype(np.float16)
+    of_walls = (light * np.isfinite(fine)[..., None]).reshape(144, 96, 2, 96, 2, 3).sum(axis=(2, 4))
+    of_walls /= np.maximum(quarters.sum(axis=-1), 1)[..., None]
+    mixed = (field.inverse_distance == 0) & (inverse > 0)
+    radiance = np.where(mixed[..., None], of_walls, field.radiance)
+    cover = (quarters * [1, 2, 4, 8]).sum(axis=-1).astype(np.uint8)
+    place, w = places(field, 6000)
+    found = [
+        errors(marched(one, place, w, sky=sky_light).radiance, place, w, open_roof=True)
+        for one in (field, replace(field, radiance=radiance, inverse_distance=inverse, cover=cover))
+    ]
+    plain, covered = (float(np.sqrt(np.mean(e**2))) for e in found)
+    assert covered < 0.95 * plain, (covered, plain)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lambent.core.directions import normalize
-from lambent.core.thin_glass import eta_of, refracted, through_glass
+from lambent.core.thin_glass import eta_of, mirrored_back, refracted, through_glass
 
 ETA, DEPTH = 1.5, 0.02
 
@@ -81,3 +81,17 @@ def test_a_thin_lens_brings_parallel_light_to_its_focus(most_deg: float) -> None
 
 def test_the_index_follows_the_reflectance() -> None:
     assert eta_of(0.04) == pytest.approx(1.5) and eta_of(0.0) == 1.0 and np.isfinite(eta_of(1.0))
+
+
+def test_clear_glass_in_even_light_is_as_bright_as_what_is_behind_it() -> None:
+    """However many faces there are; each that is coloured takes its part."""
+    cosine = np.cos(np.radians([0, 40, 60]))
+    fresnel = 0.04 + 0.96 * (1 - cosine) ** 5
+    for faces in (0, 2, 6):
+        share = np.full(3, 0.96**faces)
+        back = mirrored_back(cosine, share, 1.5, (0.96, 0.96, 0.96))
+        np.testing.assert_allclose(back, 1 - (1 - fresnel) * share, rtol=1e-9)
+        assert ((1 - fresnel) * share + 0.96 * back > 0.96).all()
+    np.testing.assert_allclose(
+        mirrored_back(cosine, np.full(3, 0.48**2), 1.5, (0.48,) * 3), 1 - (1 - fresnel) * 0.96**2
+    )

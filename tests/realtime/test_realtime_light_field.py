@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from lambent.core.errors import UserError
 from lambent.core.images import read_image
 from lambent.core.light_field import LightField
 from lambent.core.light_field_tiles import Tiles
-from lambent.core.octahedral import texel_solid_angles
+from lambent.core.octahedral import texel_directions, texel_solid_angles
 from lambent.realtime import light_field_atlas
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import BLOCKS
@@ -22,7 +23,8 @@ from lambent.realtime.light_field_atlas import MOST_TEXELS, Grid, coding
 from lambent.realtime.renderer import Renderer
 from lambent.render import Settings, still
 from lambent.store.light_fields import read_light_field
-from tests.realtime.lit_ball import CAMERA, ball_scene, light_field, mirrored, put_ball
+from tests.realtime.lit_ball import CAMERA, HALF, ball_scene, light_field, mirrored, put_ball, seen
+from tests.realtime.lit_wall import cube_of
 
 SIZE = 96
 STATE = FrameState(CAMERA, SIZE, SIZE, n=1, antialias=False, show="specular")
@@ -55,17 +57,54 @@ def test_methods_rank_as_they_should(renderer: Renderer) -> None:
     np.testing.assert_array_equal(renderer.image(STATE), renderer.image(replace(STATE, lookup="light_field")))
 
 
-def test_in_other_light_than_was_baked_a_probe_stands_in_unless_the_field_is_asked_for(renderer: Renderer) -> None:
-    by_probe = renderer.resources.light_of("ball").look_up("auto", stale_fields=True).NAME
-    as_baked, by_field = renderer.image(STATE), replace(STATE, lookup="light_field")
-    renderer.resources.answers = True
-    try:
-        np.testing.assert_array_equal(renderer.image(STATE), renderer.image(replace(STATE, lookup=by_probe)))
-        np.testing.assert_array_equal(renderer.image(by_field), as_baked)
-    finally:
-        renderer.resources.answers = False
-    np.testing.assert_array_equal(renderer.image(STATE), as_baked)
-    assert not by_probe.startswith("light_field")
+def brighter(p: np.ndarray) -> np.ndarray:
+    """How many times brighter (..., 3) the wall at p is in other light: red fades in one corner, blue grows."""
+    return np.asarray(1 + np.array([-0.8, 0.3, 1.5]) * np.exp(-2 * np.sum((p - HALF) ** 2, axis=-1))[..., None])
+
+
+def walls_from(centre: tuple[float, float, float], w: np.ndarray, lit: bool = False) -> np.ndarray:
+    """Radiance (..., 3) of the walls along w from a place, in the other light where they are `lit` by it."""
+    light, t = seen(np.array(centre), w, ball=False)
+    return light * brighter(np.array(centre) + t[..., None] * w) if lit else light
+
+
+def test_light_follows_what_the_probe_sees_of_its_change(device: Any, renderer: Renderer, field: LightField) -> None:
+    """As light fields that are taken again in the other light, and unlike the maps as they are."""
+    as_baked = renderer.image(STATE)
+    for centre in ((0.0, 0.0, 0.0), (0.1, -0.2, 0.15)):
+        w, at = texel_directions(field.radiance.shape[1]), field.points[:, None, None].astype(float)
+        light, distance = seen(at, w)
+        is_wall = seen(at, w, ball=False)[1] == distance
+        change = np.where(is_wall[..., None], brighter(at + distance[..., None] * w), 1)
+        taken_again = replace(field, radiance=(light * change).astype(np.float16))
+        truth = Renderer(device, ball_scene(field=taken_again)).image(STATE)
+
+        scene = ball_scene(field=field)
+        probe = replace(scene.probes["ball"], centre=centre, radiance=cube_of(partial(walls_from, centre), 128))
+        moved = Renderer(device, replace(scene, probes={"ball": probe}))
+        item = moved.resources.objects[0]
+        baked = item.light
+        item.relight(baked.relit(cube_of(partial(walls_from, centre, lit=True), 128), ()), item.emission)
+        off, stale = (np.sqrt(np.mean((image - truth) ** 2)) for image in (moved.image(STATE), as_baked))
+        assert off < 0.12 * stale, (off, stale)
+        item.relight(baked.relit(probe.radiance, ()), item.emission)
+        np.testing.assert_allclose(moved.image(STATE), as_baked, rtol=1e-6)
+        for look_up in ("light_field-bn", "light_field-nearest"):
+            item.relight(baked.relit(3 * probe.radiance, ()), item.emission)
+            three = moved.image(replace(STATE, lookup=look_up))
+            item.relight(baked, item.emission)
+            np.testing.assert_allclose(three, 3 * moved.image(replace(STATE, lookup=look_up)), rtol=5e-3, atol=1e-3)
+
+
+def test_the_sky_follows_by_itself(device: Any, field: LightField) -> None:
+    """Where the march ends in the sky: four times as bright, whatever the probe sees there."""
+    open_field = replace(field, inverse_distance=0 * field.inverse_distance)
+    scene = replace(ball_scene(field=open_field), environment=np.full((6, 4, 4, 3), 0.25, np.float32))
+    bright = Renderer(device, scene)
+    np.testing.assert_allclose(bright.image(STATE)[SIZE // 2, SIZE // 2], 0.25, rtol=0.02)
+    item = bright.resources.objects[0]
+    item.relight(item.light.relit(scene.probes["ball"].radiance, (), (4.0, 2.0, 1.0)), item.emission)
+    np.testing.assert_allclose(bright.image(STATE)[SIZE // 2, SIZE // 2], (1.0, 0.5, 0.25), rtol=0.02)
 
 
 def test_the_light_field_of_a_store_is_rendered(tmp_path: Path, renderer: Renderer, field: LightField) -> None:

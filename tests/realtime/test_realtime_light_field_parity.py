@@ -54,6 +54,20 @@ def test_shader_and_numpy_agree(renderer: Renderer, field: LightField, one: Any)
     assert np.quantile(error, 0.5) < 3e-3 and np.quantile(error, 0.98) < 0.03, np.quantile(error, [0.5, 0.9, 0.98, 1])
 
 
+def test_shader_and_numpy_agree_on_quarters_of_texels(device: Any, field: LightField) -> None:
+    """Any quarters at all; but for rays that pass a surface within the .4 % that the bits take of its distance."""
+    cover = np.random.default_rng(3).integers(0, 16, field.inverse_distance.shape).astype(np.uint8)
+    covered = replace(field, cover=np.where(field.inverse_distance > 0, cover | (cover > 7) * 15, 0).astype(np.uint8))
+    place, w, inside = mirrored(covered, SIZE)
+    sky = cube_of(smooth_light)
+    march = numpy_twin.marched(covered, place, w, sky=lambda w: sample(sky, w))
+    whole = numpy_twin.marched(field, place, w, sky=lambda w: sample(sky, w))
+    assert (march.sky & ~whole.sky)[inside].mean() > 0.02, "quarters matter"
+    got = Renderer(device, plate_scene(covered)).image(replace(STATE, lookup="light_field")).reshape(-1, 3)
+    error = np.abs(got - march.radiance)[inside].max(axis=1)
+    assert np.quantile(error, 0.5) < 0.01 and np.quantile(error, 0.9) < 0.05, np.quantile(error, [0.5, 0.9, 0.98, 1])
+
+
 def test_places_without_points_take_those_of_the_nearest_that_have_some(device: Any) -> None:
     """Here the rows below; a field without any leaves its object to the probe."""
     field = plate_field(dropped=10)

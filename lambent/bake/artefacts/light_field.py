@@ -25,7 +25,7 @@ from lambent.core.geometry import triangle_areas
 from lambent.core.progress import Progress, part_of
 from lambent.scenes.scene import LightFieldWish
 from lambent.store.contract import LIGHT_FIELD_CHOICE, light_field_name, needs_probe
-from lambent.store.light_fields import EXITS
+from lambent.store.light_fields import COVER, EXITS
 from lambent.store.store import Array
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 KIND = "light_field"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 5
+REVISION = 6
 MATTE = "%s: light_field: its material reflects nothing but diffuse light, it gets none"
 PATHS_OF_A_CHUNK = 1 << 21
 MIRROR_DEPTH = 6  # glossy surfaces in a row on paths of level 1, of objects without light fields
@@ -143,7 +143,10 @@ def wished(context: BakeContext) -> dict[str, LightFieldWish]:
 
 def parts_of(how: Settings, wish: LightFieldWish) -> tuple[str, ...]:
     """The arrays of an object's light field, in the order in which they are written."""
-    return (*how.parts[:-1], EXITS, how.parts[-1]) if wish.refracts else how.parts
+    more = (EXITS,) if wish.refracts else ()
+    if not wish.volume:  # whose maps give irradiance, too, and have what texels show altogether
+        more = (COVER, *more)
+    return (*how.parts[:-1], *more, how.parts[-1])
 
 
 def settings_of(context: BakeContext, wish: LightFieldWish) -> Settings:
@@ -217,7 +220,7 @@ def _chooser(context: BakeContext, traced: Traced) -> Chooser:
 
 
 def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced, progress: Progress) -> None:
-    from lambent.bake.light_fields.acquisition import inverse_distances, radiance_maps
+    from lambent.bake.light_fields.acquisition import covered_distances, inverse_distances, radiance_maps
     from lambent.core.light_field_blocks import blocks_of, blocks_shape
 
     start, how = time.perf_counter(), settings_of(context, wish)
@@ -229,21 +232,31 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
     def radiance(region: tuple[slice, ...], seed: int) -> Array:
         some = region[0]
         surface = None if wish.without_object else normals[some]  # what is beneath points is seen as well
-        light = radiance_maps(seen, points[some], how.texels, how.strata, seed, how.onward, surface)
+        light = radiance_maps(
+            seen, points[some], how.texels, how.strata, seed, how.onward, surface, covers=not wish.volume
+        )
         maps = halves(light, traced.unit)
         return blocks_of(maps) if how.blocks else maps
 
     def inverse_distance(region: tuple[slice, ...], seed: int) -> Array:
-        return inverse_distances(seen.scene, points[region[0]], how.texels)
+        some = points[region[0]]
+        if wish.volume:
+            return inverse_distances(seen.scene, some, how.texels)
+        return covered_distances(seen.scene, some, how.texels)[0]
+
+    def cover(region: tuple[slice, ...], seed: int) -> Array:
+        return covered_distances(seen.scene, points[region[0]], how.texels)[1]
 
     at_once = max(1, min(PATHS_OF_A_CHUNK // (how.texels * how.strata) ** 2, len(points)))
     of_light = blocks_shape(how.texels) if how.blocks else (how.texels, how.texels, 3)
-    light, distance = (light_field_name(name, how.parts[i]) for i in (2, 3))
+    light, distance, quarters = (light_field_name(name, part) for part in (*how.parts[2:4], COVER))
     kind = "uint32" if how.blocks else "float16"
-    for at, shape, dtype, tile, begin, end in (
+    arrays = (
         (light, (len(points), *of_light), kind, radiance, 0.0, 0.9),
-        (distance, (len(points), how.texels, how.texels), "float16", inverse_distance, 0.9, 1.0),
-    ):
+        (distance, (len(points), how.texels, how.texels), "float16", inverse_distance, 0.9, 0.95),
+        (quarters, (len(points), how.texels, how.texels), "uint8", cover, 0.95, 1.0),
+    )
+    for at, shape, dtype, tile, begin, end in arrays[: 2 if wish.volume else 3]:
         key, note = context.keys(KIND)[at], context.provenance(**({"unit": traced.unit} if at == light else {}))
         chunks = (at_once, *shape[1:])  # an interrupted bake continues with the next points
         writer = context.store.begin(at, KIND, shape, chunks, dtype, key=key, meta=note)

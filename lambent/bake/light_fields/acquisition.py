@@ -57,8 +57,9 @@ class _First:
 
 
 def radiance_maps(
-    around: Around, points: Floats, texels: int, strata: int, seed: int, onward: int = 1, normals: Floats | None = None
-) -> NDArray[np.float32]:
+    around: Around, points: Floats, texels: int, strata: int, seed: int, onward: int = 1, normals: Floats | None = None,
+    covers: bool = False,
+) -> NDArray[np.float32]:  # fmt: skip
     """Maps (P, texels, texels, 3) of the radiance that arrives at points (P, 3).
 
     Where the ray through a texel's middle meets no glossy surface, and its neighbours show nearly the same, its light
@@ -66,7 +67,7 @@ def radiance_maps(
     each glossy surface that these meet first. Beneath points whose surface has `normals` (P, 3), where next to no
     reflection looks, glossy surfaces are met through the middle alone. A path that is not finite counts as black. A
     texel holds the light of surfaces or of the sky, as its middle does: as `inverse_distances` has it, and look-ups
-    tell them apart.
+    tell them apart. With `covers`, it has that of surfaces where any of its quarters meets one: as `covered_distances`.
     """
     found = np.empty((len(points), texels, texels, 3), np.float32)
     for mine in slices(len(points), max(1, PATHS_AT_ONCE // texels**2)):
@@ -75,9 +76,14 @@ def radiance_maps(
         first = _first(around, _rays(some, every, texels, mi.Point2f(0.5)))
         dr.eval(first.light, first.mirrors, first.met)
         light, solid, mirrors = array_of(first.light), np.array(first.met), np.array(first.mirrors)
+        if covers:
+            mixed = ~solid & (_quarters(around.scene, some, texels) > 0).any(axis=(3, 4)).ravel()
+            light[mixed] = _parted(around, some, texels, np.flatnonzero(mixed), mixed[mixed], 2, onward, ~seed)
         parted = unlike(light.reshape(shape), solid.reshape(shape[:3])).ravel() & (strata > 1)
         beneath = np.zeros(len(light), bool) if normals is None else _beneath(normals[mine], texels).ravel()
         single = mirrors & beneath
+        if covers:
+            parted, mirrors = parted & ~mixed, mirrors & ~mixed  # they are traced
         for which, parts in ((single, 1), ((mirrors | parted) & ~single, strata)):
             index = np.flatnonzero(which)
             light[index] = _parted(around, some, texels, index, solid[index], parts, onward, seed + mine.start)
@@ -166,6 +172,22 @@ def inverse_distances(scene: Any, points: Floats, texels: int) -> NDArray[np.flo
         inverse = dr.select(si.is_valid(), dr.rcp(dr.maximum(dr.norm(si.p - ray.o), 1 / HALF_MAX)), 0.0)
         found[mine] = np.array(inverse).astype(np.float16)
     return found.reshape(len(points), texels, texels)
+
+
+def covered_distances(scene: Any, points: Floats, texels: int) -> tuple[NDArray[np.float16], NDArray[np.uint8]]:
+    """As `inverse_distances`, of quarters where a texel's middle shows the sky; and `cover` of a light field."""
+    quarters = _quarters(scene, points, texels).astype(float)
+    solid = quarters > 0
+    mean = quarters.sum(axis=(3, 4)) / np.maximum(solid.sum(axis=(3, 4)), 1)
+    middle = inverse_distances(scene, points, texels)
+    bits = solid.reshape(*solid.shape[:3], 4) << np.arange(4)
+    return np.where(middle > 0, middle, mean).astype(np.float16), bits.sum(axis=3).astype(np.uint8)
+
+
+def _quarters(scene: Any, points: Floats, texels: int) -> NDArray[np.float16]:
+    """(P, texels, texels, 2, 2) inverse distances through the middles of texels' quarters."""
+    fine = inverse_distances(scene, points, 2 * texels)
+    return fine.reshape(len(points), texels, 2, texels, 2).transpose(0, 1, 3, 2, 4)
 
 
 def _rays(points: Floats, place: Any, texels: int, within: Any) -> Any:

@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.light_fields.acquisition import Around, inverse_distances, radiance_maps
+from lambent.bake.light_fields.acquisition import Around, covered_distances, inverse_distances, radiance_maps
 from lambent.bake.light_fields.surroundings import Maps, around
 from lambent.bake.tiles import slices
 from lambent.bake.tracing import path_tracer, rays
@@ -22,7 +22,7 @@ from lambent.bake.tracing.scene_builder import light_map_uv
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats, Indices
 from lambent.core.camera import Camera, rays_through
-from lambent.core.colour import HALF_MAX
+from lambent.core.colour import HALF_MAX, halves
 from lambent.core.directions import reflect
 
 PATHS_AT_ONCE = 1 << 21
@@ -83,8 +83,8 @@ class MirrorTracer:
         """Length (k,) of the mirrored rays, infinite where they meet nothing."""
         return rays.distances(self._scene, rays.leaving(self._scene, shown.x, shown.flat, shown.w))
 
-    def maps(self, points: Floats, texels: int, strata: int, seed: int = 0) -> tuple[Halves, Halves]:
-        """Radiance (P, E, E, 3) and inverse distance (P, E, E) from points (P, 3), as in light fields."""
+    def maps(self, points: Floats, texels: int, strata: int, seed: int = 0) -> tuple[Halves, Halves, NDArray[np.uint8]]:
+        """Radiance (P, E, E, 3), inverse distance and cover (P, E, E) from points (P, 3), as in light fields."""
         return _maps(self._around, points, texels, strata, seed)
 
     def map_from_middle(self, texels: int, strata: int, seed: int = 0) -> tuple[Floats, Halves, Halves]:
@@ -92,7 +92,8 @@ class MirrorTracer:
         middle = np.mean(self._mesh.bounds, axis=0, keepdims=True).astype(float)
         scene = self._builder.build(leave_out=(self._name,))
         without = Around(scene, self._cache, DEPTH, self._around.sun)
-        return middle, *_maps(without, middle, texels, strata, seed)
+        light = radiance_maps(without, middle, texels, strata, seed)
+        return middle, halves(light, 1.0), inverse_distances(without.scene, middle, texels)
 
     def _seen(self, eye: Floats, w: Floats) -> Shown:
         """Of rays (r, 3) from the eye, those that meet the object."""
@@ -118,9 +119,11 @@ class MirrorTracer:
         return array_of(value).astype(float)
 
 
-def _maps(seen: Around, points: Floats, texels: int, strata: int, seed: int) -> tuple[Halves, Halves]:
+def _maps(
+    seen: Around, points: Floats, texels: int, strata: int, seed: int
+) -> tuple[Halves, Halves, NDArray[np.uint8]]:
     radiance = np.empty((len(points), texels, texels, 3), np.float16)
     for mine in slices(len(points), max(1, PATHS_AT_ONCE // (texels * strata) ** 2)):
-        maps = radiance_maps(seen, points[mine], texels, strata, seed + mine.start)
+        maps = radiance_maps(seen, points[mine], texels, strata, seed + mine.start, covers=True)
         radiance[mine] = np.minimum(maps, HALF_MAX)
-    return radiance, inverse_distances(seen.scene, points, texels)
+    return radiance, *covered_distances(seen.scene, points, texels)

@@ -12,6 +12,7 @@ import numpy as np
 import wgpu
 
 from lambent.core.arrays import Floats
+from lambent.core.cubemap import sample
 from lambent.core.errors import UserError
 from lambent.core.light_field import NO_POINT
 from lambent.core.light_field_lookup import POWER, March
@@ -52,24 +53,26 @@ class LightFieldLookUp:
     def constants(self, probe: Probe) -> dict[str, float]:
         light_field = probe.light_field
         glass = {"GLASS": light_field is not None and light_field.glass is not None}
+        quarters = light_field is not None and light_field.cover is not None
         if self.METHOD < MARCHED:
-            return {"METHOD": self.METHOD, "POWER": self.POWER, **glass}
+            return {"METHOD": self.METHOD, "POWER": self.POWER, "QUARTERS": quarters, **glass}
         rule = self.RULE
         return {
             "METHOD": self.METHOD, "POWER": self.POWER, "MARCHES": rule.candidates, "STEPS": rule.steps,
             "SECANTS": rule.secants, "FIRST": rule.first, "LAST": rule.last, "TOLERANCE": rule.tolerance,
             "ALIKE": rule.alike, "HAS_SKY": probe.sky is not None, "SURFACE": self.SURFACE,
+            "QUARTERS": quarters,
             **glass,
         }  # fmt: skip
 
     def resources(self, device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
         light_field = probe.light_field
         assert light_field is not None, "this look-up does not serve the probe"
-        maps = ResidentMaps(device, light_field, probe.most_bytes, probe.policy)
+        sky = np.zeros((6, 1, 1, 3), np.float32) if probe.sky is None else finite(probe.sky)[0]
+        maps = ResidentMaps(device, light_field, probe.most_bytes, probe.policy, lambda w: sample(sky, w))
         if not maps.whole:
             streams.append(maps)
         atlas = maps.atlas
-        sky = np.zeros((6, 1, 1, 3), np.float32) if probe.sky is None else finite(probe.sky)[0]
         record = np.zeros((), LIGHT_FIELD_DTYPE)
         record["side"], record["tile"], record["levels"] = atlas.tiles.side, atlas.tiles.tile, atlas.levels
         record["columns"], record["rows"] = atlas.grid.columns, atlas.grid.rows

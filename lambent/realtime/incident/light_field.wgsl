@@ -24,6 +24,8 @@ override ALIKE: f32 = 0.15;
 override SURFACE: bool = false; // points show the surface itself, too
 override HAS_SKY: bool = true; // or the maps answer for it
 
+override QUARTERS: bool = false; // texels say which of their quarters show a surface
+override RELIT: bool = false; // the cube map says how many times brighter light is than in the maps
 override GLASS: bool = false; // what is transmitted is refracted; the lower half of the sample map then has the exits
 
 const NEAREST = 0u;
@@ -105,20 +107,67 @@ fn light_of(point: u32, w: vec3f, half_log2_omega: f32) -> vec3f {
     let place = map_place(w);
     let finer = u32(level);
     var light = light_on_level(tile, place, finer);
+    if (QUARTERS && METHOD < MARCHED && finer == 0u) { light += edge_sky(tile, place, w); }
     let share = level - f32(finer);
     if (share > 0.0) { light = mix(light, light_on_level(tile, place, finer + 1u), share); }
     return light;
 }
 
-// 1/m, of the texel that a direction from a point lies in; 0 for the sky.
+// What is added to the light of the finest level, which is that of surfaces in texels that show the sky as well, so that it
+// has the light of both. Coarser levels are of both, and a march that meets a surface wants its light alone.
+fn edge_sky(tile: vec3u, place: vec2f, w: vec3f) -> vec3f {
+    let at = place * f32(field.side) - 0.5;
+    let low = floor(at);
+    var found = vec3f(0.0);
+    for (var k = 0u; k < 4u; k++) {
+        let beside = vec2f(f32(k & 1u), f32(k >> 1u));
+        let weights = abs(1.0 - beside - (at - low));
+        let texel = tile.xy + vec2u(vec2i(low + beside) + 1);
+        let quarters = countOneBits(cover_bits(textureLoad(inverse_atlas, texel, tile.z, 0).r) & 0x8007u);
+        if (quarters == 0u || quarters == 4u) { continue; }
+        let share = weights.x * weights.y * (1.0 - 0.25 * f32(quarters));
+        found += share * (light_of_sky(w, SHARP) - textureLoad(atlas, texel, tile.z, 0).rgb);
+    }
+    return found;
+}
+
+// The quarters of a texel that show a surface are the lowest bits of its inverse distance, and its sign: light_field_atlas.py.
+fn cover_bits(inverse: f32) -> u32 {
+    return pack2x16float(vec2f(inverse, 0.0));
+}
+
+// 1/m, of the quarter of a texel that a direction from a point lies in; 0 for the sky.
 fn inverse_distance(tile: vec3u, w: vec3f) -> f32 {
-    let texel = min(vec2u(map_place(w) * f32(field.side)), vec2u(field.side - 1u));
-    return textureLoad(inverse_atlas, tile.xy + 1u + texel, tile.z, 0).r;
+    let at = map_place(w) * f32(field.side);
+    let texel = min(vec2u(at), vec2u(field.side - 1u));
+    let found = textureLoad(inverse_atlas, tile.xy + 1u + texel, tile.z, 0).r;
+    if (!QUARTERS) { return found; }
+    let bits = cover_bits(found);
+    let beyond = select(vec2u(0u), vec2u(1u), at - vec2f(texel) >= vec2f(0.5));
+    let quarter = 2u * beyond.y + beyond.x;
+    let shows = ((bits >> select(quarter, 15u, quarter == 3u)) & 1u) == 1u;
+    return select(0.0, unpack2x16float(bits & 0x7ff8u).x, shows);
 }
 
 fn light_of_sky(w: vec3f, half_log2_omega: f32) -> vec3f {
     let level = max(half_log2_omega - 1.5 * log2(max_norm(w)) + field.sky_texels, 0.0);
     return textureSampleLevel(sky_cube, linear_sampler, w, level).rgb;
+}
+
+const BLUR_TEXELS = 9.0; // as far as linear look-ups in a map, and what a march misses a surface by, spread light, about
+
+// How many times brighter the light is now that comes from the distance 1/u along r: as the probe sees it there. It is
+// averaged as far as the map spreads light: beside a lamp that is off now, the map has some of the lamp's light.
+fn change_along(s: Surface, r: vec3f, u: f32, half_log2_omega: f32) -> vec3f {
+    if (!RELIT) { return vec3f(1.0); }
+    let q = r + u * s.x;
+    let major = max_norm(q);
+    let stretch = length(q) / (major * major * major);
+    let spread = 0.5 * log2(4.0 * LAMBENT_PI * BLUR_TEXELS) - log2(f32(field.side));
+    let finest = 0.5 * log2(max(stretch, 1e-20)) + object.centre.w;
+    let here = textureSampleLevel(radiance_cube, linear_sampler, q, max(half_log2_omega + finest, 0.0)).rgb;
+    let around = textureSampleLevel(radiance_cube, linear_sampler, q, max(max(half_log2_omega, spread) + finest, 0.0)).rgb;
+    return min(here, around);
 }
 
 // Cosine between an axis and the direction from x to a point; -2 where there is none.
@@ -191,7 +240,8 @@ fn weighted(s: Surface, r: vec3f, u: vec4f, weights: vec4f, half_log2_omega: f32
 
 // Without parallax: the light of the points in the ray's own direction.
 fn blended(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
-    return weighted(s, r, vec4f(0.0), weights_of(METHOD, s, r), half_log2_omega);
+    let light = weighted(s, r, vec4f(0.0), weights_of(METHOD, s, r), half_log2_omega);
+    return light * change_along(s, r, 0.0, half_log2_omega);
 }
 
 const SHARP = -20.0; // half the log2 of a solid angle that is smaller than any texel
@@ -259,9 +309,12 @@ fn is_sky(s: Surface, found: vec4f, half_log2_omega: f32) -> bool {
 // ends in the sky if a point sees it there, or the answer is B_n.
 fn marched_light(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
     let found = found_by_points(s, r);
-    if (HAS_SKY && is_sky(s, found, half_log2_omega)) { return light_of_sky(r, half_log2_omega); }
-    let met = select(0.0, 1.0, largest_of(found) > 0.0);
-    return weighted(s, r, max(found, vec4f(0.0)) * met, weights_of_found(s, found), half_log2_omega);
+    if (HAS_SKY && is_sky(s, found, half_log2_omega)) {
+        return light_of_sky(r, half_log2_omega) * object.sky_change.rgb;
+    }
+    let nearest = max(largest_of(found), 0.0);
+    let light = weighted(s, r, max(found, vec4f(0.0)), weights_of_found(s, found), half_log2_omega);
+    return light * change_along(s, r, nearest, half_log2_omega);
 }
 
 // Weights of the points that agree on the nearest surface; of all, where none has met one.
@@ -301,7 +354,7 @@ fn rank_of(point: u32, x: vec3f, n: vec3f) -> f32 {
 
 // Light of the surface as the nearest point shows it that lies in the narrowest cone and sees it (3.11).
 fn own_light(s: Surface, of_light_map: vec3f) -> vec3f {
-    if (!SURFACE) { return of_light_map; }
+    if (!SURFACE || RELIT) { return of_light_map; } // which follows other light
     let x = s.x + object.centre.xyz;
     let p = s.points;
     let ranks = vec4f(rank_of(p.x, x, s.n), rank_of(p.y, x, s.n), rank_of(p.z, x, s.n), rank_of(p.w, x, s.n));
@@ -312,14 +365,17 @@ fn own_light(s: Surface, of_light_map: vec3f) -> vec3f {
     return light_of(point, select(-s.n, q, dot(q, q) > 0.0), SHARP);
 }
 
-// Light that comes through the glass: s is moved to where rays leave it.
+// Light that comes through the glass, from where rays leave it, and what its further faces mirror.
 fn light_through_glass(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
     let found = through_glass(r, s.n, s.exit, field.eta);
     var beyond = s;
     beyond.x += found.offset;
-    let passed = select(vec3f(1.0), found.share * field.tint * lambent_under_fresnel(found.cosine)
-        * pow(max(found.cosine, LAMBENT_COS_MIN), field.power), s.exit.w >= 0.0);
-    return passed * light_along(beyond, found.w, half_log2_omega);
+    let straight = light_along(beyond, found.w, half_log2_omega);
+    if (s.exit.w < 0.0) { return straight; }
+    let passed = found.share * field.tint * lambent_under_fresnel(found.cosine)
+        * pow(max(found.cosine, LAMBENT_COS_MIN), field.power);
+    let mirrored = mirrored_back(found.cosine, found.share, field.eta, field.tint) * field.tint;
+    return passed * straight + mirrored * light_along(s, reflect(r, s.n), half_log2_omega);
 }
 
 fn incident_along(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
@@ -352,7 +408,8 @@ fn point_weights(s: Surface, mirror: vec3f) -> vec4f {
 }
 
 fn ray_of_point(s: Surface, point: u32, w: vec3f) -> vec3f {
-    return light_of(s.points[point], to_world(s, w), SHARP);
+    let r = to_world(s, w);
+    return light_of(s.points[point], r, SHARP) * change_along(s, r, 0.0, SHARP);
 }
 
 fn incident_look_up(x: vec3f, w: vec3f) -> LookUp {

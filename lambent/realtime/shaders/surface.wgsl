@@ -23,6 +23,7 @@ struct Object {
     emission: vec4f,
     irradiance: array<vec4f, 3>, // luminance that the probe alone would give, see probe_irradiance; 0 where it is not asked
     borders: array<vec4f, 2>, // of a part, see ObjectRecord of store/contract.py
+    sky_change: vec4f, // how many times brighter the sky is than as baked
 }
 
 @group(1) @binding(1) var<storage, read> lobes: array<PlacedLobe>;

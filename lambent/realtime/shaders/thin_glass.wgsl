@@ -9,6 +9,14 @@ struct Through {
     share: f32,    // of light that faces beyond let pass
 }
 
+// Share of light that the second face and those beyond mirror, and so do not pass.
+fn mirrored_back(cosine: f32, share: f32, eta: f32, tint: vec3f) -> f32 {
+    let r = (eta - 1.0) / (eta + 1.0);
+    let mean = max(dot(tint, vec3f(1.0 / 3.0)), 1e-6);
+    let colourless = min(log(1.0 - r * r) / min(log(mean), -1e-6), 1.0);
+    return 1.0 - (1.0 - r * r) * lambent_under_fresnel(cosine) * pow(max(share, 1e-6), colourless);
+}
+
 // The ray w against a face of normal n; mirrored where all is reflected.
 fn refracted_at(w: vec3f, n: vec3f, ratio: f32) -> vec3f {
     let cosine = -dot(w, n);

@@ -129,7 +129,6 @@ class AnsweringLight:
         if maps.groups is not None:  # the mixer makes light maps and probes of them
             self._renderer.mixer.answer(maps.groups)
         elif maps.layers is not None:
-            self._renderer.resources.answers = not maps.light.is_baked
             self._renderer.resources.show_light_map(list(maps.layers))
             self._probes_of = maps.light
         self._renderer.resources.light_version += 1

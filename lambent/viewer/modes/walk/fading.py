@@ -28,7 +28,7 @@ class Fade:
         self.lane, self.done, self._light, self._rebaked = lane, False, dict(light), rebaked
         self._room, self._answered = lane.room, lane.shown.on
         resources, scene = self._resources, lane.renderer.scene
-        self._before = list(resources.light_layers), [item.light for item in resources.objects], resources.answers
+        self._before = list(resources.light_layers), [item.light for item in resources.objects]
         owners = probe_users(scene, resources, range(len(resources.objects)))
         self.left = tuple(name for name in owners if name not in rebaked.scene.probes)
         self._steps = steps(rebaked, scene, resources, light, camera, size)
@@ -58,7 +58,6 @@ class Fade:
         upload = self._next.result()
         if upload is not None:
             upload(self._resources)
-            self._resources.answers = True  # light fields have the light of the first bake
             self._resources.light_version += 1
             self._next = self._thread.submit(next, self._steps, None)
             return
@@ -86,7 +85,7 @@ class Fade:
         elif own is not None:
             lane.renderer.mixer.answer(own)
         else:
-            layers, lights, self._resources.answers = self._before
+            layers, lights = self._before
             self._resources.show_light_map(layers)
             for item, light in zip(self._resources.objects, lights, strict=True):
                 item.relight(light, item.emission)

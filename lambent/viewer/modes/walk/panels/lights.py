@@ -7,7 +7,7 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from lambent.core.light_mix import AS_BAKED, LEAST_K, MOST_K, WHITE, GroupMix, LightMix
-from lambent.realtime.group_arrays import BAKE_GROUPS, FIELDS_STAY, NO_GROUPS
+from lambent.realtime.group_arrays import BAKE_GROUPS, FIELDS_FOLLOW, NO_GROUPS
 from lambent.store.light_groups import LightGroupRecord
 from lambent.viewer.modes.walk.light_keys import key_times
 from lambent.viewer.modes.walk.lights import Lights
@@ -37,7 +37,7 @@ def draw(lights: Lights, recordings: Recordings) -> None:
     if play is not None:
         _keys(recordings, play)
     if lights.fields:
-        wrapped([FIELDS_STAY])
+        wrapped([FIELDS_FOLLOW])
 
 
 def _keys(recordings: Recordings, play: PathPlay) -> None:

@@ -1,0 +1,67 @@
+"""A light field in another mix of light groups is that which a bake in this mix takes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.core.arrays import Floats
+from lambent.core.camera import Camera
+from lambent.core.light_mix import Factors
+from lambent.realtime.baked import read_baked
+from lambent.realtime.device import open_device
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
+from lambent.scenes.geometry import patch, placed, sphere
+from lambent.scenes.scene import LightFieldWish, Scene, SceneObject
+from tests.bake.small_scenes import TINY, room_with_step
+
+FINER = TINY.changed("finer", geometry={"texels": 96}, probe={"texels": 64, "samples": 64})
+BALL = replace(room_with_step().object("ball"), mesh=placed(sphere(0.3, 64, 32), (-0.8, 0.5, 0)))
+VIEW = FrameState(Camera("ball", (0.2, 0.9, -0.4), (-0.8, 0.5, 0.0), fov_y_deg=35), 64, 64, n=1, show="specular")
+MIX: Factors = {"lamp": (0.0, 0.0, 0.0), "wall lamp": (2.0, 2.0, 2.0)}
+
+
+def room(lamp: float, wall_lamp: float) -> Scene:
+    """A room with a mirror ball that has a light field, lit from above and from low on a wall."""
+    step = room_with_step()
+    others = [o for o in step.objects if o.name not in ("ball", "lamp")]
+    above = replace(step.object("lamp"), emission=(5 * lamp, 5 * lamp, 5 * lamp))
+    low = patch((-1.99, 0.2, 1.0), (0, 0.6, 0), (0, 0, 0.8))
+    beside = SceneObject("wall lamp", low, "black", emission=(wall_lamp, 3 * wall_lamp, 4 * wall_lamp))
+    wish = LightFieldWish(points=48, texels=46)
+    return replace(step, objects=(*others, above, beside, BALL), light_fields={"ball": wish})
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Floats]:
+    """Of the ball by its light field: as baked, in the mix, and of a bake in the mix."""
+    folder: Path = tmp_path_factory.mktemp("mixes")
+    device = open_device()
+    mixed = Renderer(device, read_baked(bake(room(1, 1), folder / "both", quality=FINER, light_groups="scene")))
+    again = Renderer(device, read_baked(bake(room(1e-6, 2), folder / "again", quality=FINER)))
+    states = {"as baked": VIEW, "ones": replace(VIEW, light=dict.fromkeys(MIX, (1.0, 1.0, 1.0)))}
+    states["mixed"] = replace(VIEW, light=MIX)
+    found = {name: mixed.image(state) for name, state in states.items()}
+    return found | {"as baked again": mixed.image(VIEW), "truth": again.image(VIEW)}
+
+
+def test_it_is_that_of_a_bake_in_this_mix(pictures: dict[str, Floats]) -> None:
+    """Not what was baked; what is left is beside the lamp that is off, whose light texels have spread."""
+    truth = pictures["truth"]
+    ball = truth.sum(axis=-1) > 0
+    off = {
+        name: float(np.abs(np.log((image[ball] + 0.01) / (truth[ball] + 0.01))).mean())
+        for name, image in pictures.items()
+    }
+    assert off["mixed"] < 0.07 * off["as baked"], off
+    assert pictures["mixed"][ball].mean() == pytest.approx(truth[ball].mean(), rel=0.12)
+
+
+def test_without_a_change_the_picture_is_as_baked(pictures: dict[str, Floats]) -> None:
+    np.testing.assert_array_equal(pictures["ones"], pictures["as baked"])
+    np.testing.assert_array_equal(pictures["as baked again"], pictures["as baked"])
