@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 KIND = "answer"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 5
+REVISION = 6
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
@@ -220,15 +220,20 @@ def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
 
 def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Clusters) -> None:
     """Transfer between patches, and rays between points."""
-    from lambent.bake.answering.points import bounded_points, neighbours
+    from lambent.bake.answering.points import bounded_points, neighbours, refined_points
     from lambent.bake.answering.senders import points_near
     from lambent.bake.answering.transfer import Between
 
     how: Settings = context.settings(KIND)
     width, count = context.traced.texels.width, clusters.count
     sides = [context.traced.in_view(sign)[0] for sign in SIGNS[: 2 if any(context.two_sided) else 1]]
-    points, block = bounded_points(spots, width, how.block, clusters.count)
-    codes, near = neighbours(spots, points, block)
+    coarse = bounded_points(spots, width, how.block, clusters.count)
+    distance = np.zeros(len(coarse.texel))
+    for side, of_side in enumerate(sides):
+        mine = np.flatnonzero(coarse.side == side)
+        distance[mine] = ends.distance_in_texels(of_side, coarse.texel[mine], how.importance_rays, context.seed)
+    points = refined_points(spots, width, coarse, distance)
+    codes, near = neighbours(spots, points)
     closest = points_near(spots, codes, near)
     between = Between(ends, spots, sides, clusters, closest, points, spots.exitance(context.scene))
 
