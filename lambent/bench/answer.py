@@ -38,7 +38,6 @@ from lambent.realtime.answering import AnsweredLight
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.resources import light_layers
 from lambent.scenes.scene import Scene
 from lambent.store.answer import StoredAnswer, answer_name, read_answer
 from lambent.store.contract import TIMINGS
@@ -262,15 +261,18 @@ def timed(
 ) -> dict[str, dict[str, float]]:
     """Medians of milliseconds of each edit's steps, after a turn that compiles them."""
     baked = read_baked(store)
+    reference = stored.answer.reference()
     renderer, light = Renderer(open_device(), baked), AnsweredLight(baked, stored)
     found: dict[str, list[dict[str, float]]] = {name: [] for name in edits}
     for _ in range(turns + 1):
         for name, edit in edits.items():
             edited = changed(materials, edit)
             now = [edited.get(one, materials[one]) for one in stored.materials]
-            found[name].append(_steps(stored.answer, now, [materials[one] for one in stored.materials]))
+            found[name].append(_steps(stored.answer, reference, now, [materials[one] for one in stored.materials]))
             begun = time.perf_counter()
-            layers = light_layers(*light.maps(light.lit(edited)))
+            lit = light.lit(edited)
+            groups = light.groups(lit)
+            layers = light.layers(lit) if groups is None else groups.light_map(np.ones((len(groups.records), 3)))
             computed = time.perf_counter()
             renderer.resources.show_light_map(list(layers))
             renderer.finish()
@@ -282,7 +284,7 @@ def timed(
     }
 
 
-def _steps(answer: Answer, now: list[Material], given: list[Material]) -> dict[str, float]:
+def _steps(answer: Answer, reference: Floats, now: list[Material], given: list[Material]) -> dict[str, float]:
     """Milliseconds of solving, gathering and upsampling, and the sweeps of the solution."""
     marks = [time.perf_counter()]
     albedos = edited_albedos(given, now)
@@ -290,7 +292,7 @@ def _steps(answer: Answer, now: list[Material], given: list[Material]) -> dict[s
     marks.append(time.perf_counter())
     light = answer.indirect(albedos, solution)
     marks.append(time.perf_counter())
-    upsampled(light, answer.near)
+    answer.at_texels(light, reference)
     marks.append(time.perf_counter())
     steps = dict(zip(("solve_ms", "gather_ms", "upsample_ms"), (1e3 * np.diff(marks)).tolist(), strict=True))
     return {**steps, "sweeps": float(solution.sweeps)}

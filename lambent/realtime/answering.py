@@ -22,6 +22,8 @@ from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.group_arrays import GroupArrays
+from lambent.realtime.lit_texels import LitTexels, mix_into
+from lambent.realtime.resources import light_layers
 from lambent.store.answer import SeenSpots, StoredAnswer
 
 FAINT = 0.01  # of the mean indirect light: darker texels say nothing of how exact the rest is
@@ -71,16 +73,43 @@ class AnsweredLight:
         whole = light.irradiance.sum(axis=0)
         return self.shown_at_texels(both[0], whole, 0), self.shown_at_texels(both[1], whole, 1)
 
+    def layers(self, light: Lit) -> NDArray[np.float16]:
+        """`maps` as the layers (n, H, W, 4) of a texture."""
+        if light.is_baked:
+            return self._layers_as_baked.copy()
+        found = self._layers_as_baked.copy()
+        factors = np.full((len(light.irradiance), 3), 1 / self._baked.unit)
+        for layer, (rows, texels) in zip(found, self.of_sides, strict=False):
+            mix_into(layer, light.irradiance, rows, texels, factors)
+        return found
+
+    @cached_property
+    def _layers_as_baked(self) -> NDArray[np.float16]:
+        return light_layers(self._baked.irradiance, self._baked.irradiance_back)
+
+    @cached_property
+    def of_sides(self) -> tuple[tuple[NDArray[np.intp], NDArray[np.uint32]], ...]:
+        """By side, which of the texels that answer are on it, and their places in its map."""
+        texels = self._stored.texels
+        each = (np.flatnonzero(texels % 2 == side) for side in range(2))
+        return tuple((mine, texels[mine] // 2) for mine in each)
+
     def shown_at_texels(self, baked: Floats | None, irradiance: Floats, side: int) -> Floats | None:
         """A map of a side (..., H, W, 3) in the scene's units with other irradiance (..., T, 3), W/m^2, in it."""
         if baked is None:
             return None
-        texels = self._stored.texels
-        mine = np.flatnonzero(texels % 2 == side)
+        mine, texels = self.of_sides[side]
         values = np.array(baked, np.float32)
         flat = values.reshape(*values.shape[:-3], -1, 3)
-        flat[..., texels[mine] // 2, :] = irradiance[..., mine, :] / np.float32(self._baked.unit)
+        flat[..., texels, :] = irradiance[..., mine, :] / np.float32(self._baked.unit)
         return values
+
+    @cached_property
+    def stays_as_baked(self) -> tuple[LitTexels | None, ...]:
+        """By side, the light by group of the texels that do not answer."""
+        assert self._baked.groups is not None, "asked for with groups alone"
+        both = zip(self._baked.groups.lit_sides, self.of_sides, strict=True)
+        return tuple(None if side is None else side.without(texels) for side, (_, texels) in both)
 
     @property
     def probes(self) -> tuple[str, ...]:
@@ -175,6 +204,16 @@ class AnsweredGroups(GroupArrays):
         """Light maps by group, as those of `base`."""
         show, irradiance = self.answer.shown_at_texels, self.light.irradiance
         return tuple(show(baked, irradiance, side) for side, baked in enumerate(self.base.sides))
+
+    def light_map(self, factors: Floats) -> tuple[NDArray[np.float16] | None, ...]:
+        """By side, a mix of all groups, as `base` has it."""
+        found = []
+        for (rows, texels), rest in zip(self.answer.of_sides, self.answer.stays_as_baked, strict=True):
+            layer = None if rest is None else rest.mixed(factors)
+            if layer is not None:
+                mix_into(layer, self.light.irradiance, rows, texels, factors / np.float32(self.unit))
+            found.append(layer)
+        return tuple(found)
 
     def probe(self, name: str) -> Floats | None:
         """Radiance of the probe of an object by group, as that of `base`."""

@@ -30,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.answer import Answer, Neighbours, Patches, Points, points_of_rays
+from lambent.core.answer import Answer, Neighbours, Patches, Points, Rays, points_of_rays
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.materials.diffuse_albedos import albedos_of
@@ -168,7 +168,7 @@ def read_answer(store: Store) -> StoredAnswer:
         of_patch[at], material.astype(np.int64)[of_patch[at]], _on_other_sides(other[at], nearest),
         directs[:, at] + with_sun, baked[:, at] + with_sun,
     )  # fmt: skip
-    answer = Answer(patches, senders, rays, nearest, directs, baked, albedos)
+    answer = Answer(patches, senders, Rays.of(rays), nearest, directs, baked, albedos)
     return StoredAnswer(
         answer, texels, other, material[of_patch].astype(np.int64), names, _seen(store, record, number),
         np.zeros(3) if sun is None else np.array(sun.irradiance), of_sun,

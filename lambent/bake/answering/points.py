@@ -82,9 +82,9 @@ def refined_points(spots: Spots, width: int, points: GatherPoints, distance: Flo
     sizes = np.array([block, *levels[:-1]])[:, None]
     closeness, added = distance / sizes, np.diff(np.array(counts), axis=0)
     order = np.argsort(closeness, axis=None, kind="stable")
-    room = min(MORE * len(points.texel), MOST_POINTS) - len(points.texel)
+    room = min(int(MORE * len(points.texel)), MOST_POINTS) - len(points.texel)
     halved = np.zeros(closeness.size, bool)
-    fits = (np.cumsum(added.reshape(-1)[order]) <= room) & (closeness.reshape(-1)[order] < CLOSE)
+    fits = np.less_equal(np.cumsum(added.reshape(-1)[order]), room) & (closeness.reshape(-1)[order] < CLOSE)
     halved[order[fits]] = True
     steps = np.logical_and.accumulate(halved.reshape(closeness.shape), axis=0).sum(axis=0)
     size = np.array([block, *levels])[steps]
