@@ -8,7 +8,7 @@ of it, as much is direct as of the light map, which may lie a texel beside it at
 `shown_rms` has those of the light map besides, of which `baked_rms` is there before any edit. Where light is sorted by
 group, `shown_rms` is of the sum of the groups' own answers. `rms` and `relative_rms` are roots of mean products of the
 errors in two independent halves of the paths, which noise (`noise`, of one whole) does not enter. `naive` is the light
-as it was baked.
+as it was baked. `likely_error` is the bound on `rms` that the window shows.
 
 Contacts are texels from which a quarter of cosine distributed rays meet something within CONTACT_M.
 Times are medians of turns through all edits; `edit_to_picture_ms` is that of solving, gathering, upsampling and upload,
@@ -278,8 +278,10 @@ def timed(
             renderer.finish()
             ended = time.perf_counter()
             found[name][-1] |= {"upload_ms": 1e3 * (ended - computed), "edit_to_picture_ms": 1e3 * (ended - begun)}
+    bounds = {name: {"likely_error": percent(light.likely_error(light.lit(changed(materials, edit))))}
+              for name, edit in edits.items()}  # fmt: skip
     return {
-        name: {key: round(statistics.median(run[key] for run in runs[1:]), 2) for key in runs[0]}
+        name: bounds[name] | {key: round(statistics.median(run[key] for run in runs[1:]), 2) for key in runs[0]}
         for name, runs in found.items()
     }
 

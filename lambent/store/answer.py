@@ -25,7 +25,7 @@ G is the number of light groups, in the order of `store.light_groups`; 1 where l
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +86,7 @@ class StoredAnswer:
     seen : what probes see, by object
     sun : (3,) W/m^2 on what faces it
     of_sun : number of the sun's light group
+    point_sun : (K, 3) W/m^2, its direct irradiance at the points
     """
 
     answer: Answer
@@ -96,6 +97,7 @@ class StoredAnswer:
     seen: dict[str, SeenSpots]
     sun: Floats
     of_sun: int = 0
+    point_sun: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3), np.float32))
 
 
 def read_answer(store: Store) -> StoredAnswer:
@@ -171,7 +173,7 @@ def read_answer(store: Store) -> StoredAnswer:
     answer = Answer(patches, senders, Rays.of(rays), nearest, directs, baked, albedos)
     return StoredAnswer(
         answer, texels, other, material[of_patch].astype(np.int64), names, _seen(store, record, number),
-        np.zeros(3) if sun is None else np.array(sun.irradiance), of_sun,
+        np.zeros(3) if sun is None else np.array(sun.irradiance), of_sun, point_sun,
     )  # fmt: skip
 
 

@@ -41,7 +41,7 @@ class Answering:
         """A line for the panel."""
         if self.likely_error is None or not self.on:
             return self.said
-        return f"light of other surfaces: estimated, off by about {100 * self.likely_error:.1f} %"
+        return f"light of other surfaces: estimated, off by at most about {100 * self.likely_error:.1f} %"
 
 
 @dataclass(frozen=True, eq=False)
