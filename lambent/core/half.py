@@ -23,3 +23,14 @@ def half_bits(value):  # type: ignore[no-untyped-def]
     return np.uint16(
         (bits + np.uint32(0xFFF) + ((bits >> np.uint32(13)) & np.uint32(1)) - np.uint32(112 << 23)) >> np.uint32(13)
     )
+
+
+@numba.njit(parallel=True, cache=True, nogil=True)
+def put_sums(bits, values, rows, places, factors):  # type: ignore[no-untyped-def]
+    """Put sums over n of values (n, T, 3) at `rows` (K,), times factors (n, 3), as half floats into bits (m, 4)."""
+    for k in numba.prange(len(rows)):
+        for c in range(3):
+            total = np.float32(0)
+            for number in range(values.shape[0]):
+                total += values[number, rows[k], c] * factors[number, c]
+            bits[places[k], c] = half_bits(total)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
-from lambent.core.half import half_bits
+from lambent.core.half import put_sums
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,14 +47,4 @@ def mix_into(
     The layer is (H, W, 4); light that a half float cannot hold is as bright as it can, or black.
     """
     bits = layer.reshape(-1, 4).view(np.uint16)
-    _mix(bits, light, rows, texels, np.ascontiguousarray(factors, np.float32))
-
-
-@numba.njit(parallel=True, cache=True, nogil=True)
-def _mix(bits, light, rows, texels, factors):  # type: ignore[no-untyped-def]
-    for k in numba.prange(len(rows)):
-        for c in range(3):
-            total = np.float32(0)
-            for group in range(light.shape[0]):
-                total += light[group, rows[k], c] * factors[group, c]
-            bits[texels[k], c] = half_bits(total)
+    put_sums(bits, light, rows, texels, np.ascontiguousarray(factors, np.float32))

@@ -71,8 +71,9 @@ def test_light_is_the_same_with_its_direct_part_kept() -> None:
     from lambent.bake.tracing.scene_builder import SceneBuilder
 
     scene = SceneBuilder(room_with_step()).build()
-    p = np.random.default_rng(0).uniform(-0.5, 0.5, (256, 3)).astype(np.float32) * [1, 0, 1] + [0, 0.01, 0]
-    up = np.broadcast_to(np.float32([0, 1, 0]), p.shape)
+    p = np.random.default_rng(0).uniform(-0.5, 0.5, (256, 3))
+    p[:, 1] = 0.01
+    up = np.broadcast_to(np.array([0, 1, 0], np.float32), p.shape)
     points = path_tracer.Points(*(vectors(mi.Vector3f, v.astype(np.float32)) for v in (p, up, up)))
 
     def sums(direct: bool) -> list[np.ndarray]:

@@ -132,7 +132,7 @@ def test_two_points_in_a_furnace_have_the_light_of_its_series() -> None:
 def test_texels_show_means_of_their_points() -> None:
     near = Neighbours(np.array([[0, 1], [2, 2]], np.uint32), np.array([[255, 85], [10, 0]], np.uint8))
     light = np.arange(9, dtype=np.float32).reshape(1, 3, 3)
-    assert np.allclose(upsampled(light, near), [[[0.75, 1.75, 2.75], [6, 7, 8]]])
+    assert np.allclose(upsampled(light, near), [[[0.75, 1.75, 2.75], [6.0, 7.0, 8.0]]])
 
 
 def test_ratios_of_no_light_are_one_and_bounded() -> None:

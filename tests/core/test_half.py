@@ -6,7 +6,7 @@ import numba
 import numpy as np
 
 from lambent.core.colour import HALF_MAX
-from lambent.core.half import half_bits
+from lambent.core.half import half_bits, put_sums
 
 
 @numba.njit
@@ -39,3 +39,14 @@ def test_values_between_are_rounded_as_numpy_rounds() -> None:
 def test_what_no_texture_holds_is_bounded() -> None:
     wild = np.array([-1.0, np.nan, np.inf, 1e9, 0.0], np.float32)
     assert bits(wild).view(np.float16).tolist() == [0, 0, HALF_MAX, HALF_MAX, 0]
+
+
+def test_sums_of_rows_are_put_where_they_belong() -> None:
+    rng = np.random.default_rng(1)
+    values, factors = rng.random((3, 9, 3), np.float32), rng.random((3, 3), np.float32)
+    rows, places = np.array([8, 0, 4]), np.array([1, 5, 2])
+    bits = np.zeros((6, 4), np.uint16)
+    put_sums(bits, values, rows, places, factors)
+    expected = np.zeros((6, 4))
+    expected[places, :3] = np.einsum("ntc,nc->tc", values, factors)[rows]
+    assert np.allclose(bits.view(np.float16), expected, rtol=1e-3)

@@ -38,4 +38,4 @@ def direct_part(
     of_samples, of_share = np.split(chart_means(np.concatenate([direct, clean * whole], -1), known, labels), 2, axis=-1)
     level = np.divide(of_samples, of_share, out=np.ones_like(of_share), where=of_share > 0)
     clean = fill(clean * level.clip(1 / MOST_BIAS, MOST_BIAS), known, labels).clip(0, 1)
-    return np.minimum(clean.astype(np.float32) * light, light).astype(np.float16)
+    return np.asarray(np.minimum(clean.astype(np.float32) * light, light), np.float16)

@@ -99,7 +99,7 @@ def finished_groups(
     else:
         light[lit] = closed(clean[lit], known, texels, labels, cuts) if len(lit) else 0
         direct = np.zeros_like(light)
-        for number in lit:
+        for number in lit.tolist():
             progress(count + number, len(by_group), "denoising by group")
             both = by_group[count + number], by_group[number]
             direct[number] = direct_part(*both, light[number], known, labels, SMOOTH)
