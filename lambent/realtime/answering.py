@@ -26,7 +26,7 @@ from lambent.realtime.lit_texels import LitTexels, mix_into
 from lambent.realtime.resources import light_layers
 from lambent.store.answer import SeenSpots, StoredAnswer
 
-MARGIN = 1.4  # of the error over its estimate: at most 1.33 in 15 edits of two rooms, and 1.18 in 5 of a third
+MARGIN = 1.4  # of the error over its estimate: at most 1.33 in 14 edits of two rooms, and 1.18 in 5 of a third
 FAINT = 0.01  # of the mean indirect light: darker texels say nothing of how exact the rest is
 
 
