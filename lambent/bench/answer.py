@@ -8,7 +8,7 @@ of it, as much is direct as of the light map, which may lie a texel beside it at
 `shown_rms` has those of the light map besides, of which `baked_rms` is there before any edit. Where light is sorted by
 group, `shown_rms` is of the sum of the groups' own answers. `rms` and `relative_rms` are roots of mean products of the
 errors in two independent halves of the paths, which noise (`noise`, of one whole) does not enter. `naive` is the light
-as it was baked.
+as it was baked. `likely_error` is the bound on `rms` that the window shows.
 
 Contacts are texels from which a quarter of cosine distributed rays meet something within CONTACT_M.
 Times are medians of turns through all edits; `edit_to_picture_ms` is that of solving, gathering, upsampling and upload,
@@ -38,7 +38,6 @@ from lambent.realtime.answering import AnsweredLight
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.resources import light_layers
 from lambent.scenes.scene import Scene
 from lambent.store.answer import StoredAnswer, answer_name, read_answer
 from lambent.store.contract import TIMINGS
@@ -262,27 +261,32 @@ def timed(
 ) -> dict[str, dict[str, float]]:
     """Medians of milliseconds of each edit's steps, after a turn that compiles them."""
     baked = read_baked(store)
+    reference = stored.answer.reference()
     renderer, light = Renderer(open_device(), baked), AnsweredLight(baked, stored)
     found: dict[str, list[dict[str, float]]] = {name: [] for name in edits}
     for _ in range(turns + 1):
         for name, edit in edits.items():
             edited = changed(materials, edit)
             now = [edited.get(one, materials[one]) for one in stored.materials]
-            found[name].append(_steps(stored.answer, now, [materials[one] for one in stored.materials]))
+            found[name].append(_steps(stored.answer, reference, now, [materials[one] for one in stored.materials]))
             begun = time.perf_counter()
-            layers = light_layers(*light.maps(light.lit(edited)))
+            lit = light.lit(edited)
+            groups = light.groups(lit)
+            layers = light.layers(lit) if groups is None else groups.light_map(np.ones((len(groups.records), 3)))
             computed = time.perf_counter()
             renderer.resources.show_light_map(list(layers))
             renderer.finish()
             ended = time.perf_counter()
             found[name][-1] |= {"upload_ms": 1e3 * (ended - computed), "edit_to_picture_ms": 1e3 * (ended - begun)}
+    bounds = {name: {"likely_error": percent(light.likely_error(light.lit(changed(materials, edit))))}
+              for name, edit in edits.items()}  # fmt: skip
     return {
-        name: {key: round(statistics.median(run[key] for run in runs[1:]), 2) for key in runs[0]}
+        name: bounds[name] | {key: round(statistics.median(run[key] for run in runs[1:]), 2) for key in runs[0]}
         for name, runs in found.items()
     }
 
 
-def _steps(answer: Answer, now: list[Material], given: list[Material]) -> dict[str, float]:
+def _steps(answer: Answer, reference: Floats, now: list[Material], given: list[Material]) -> dict[str, float]:
     """Milliseconds of solving, gathering and upsampling, and the sweeps of the solution."""
     marks = [time.perf_counter()]
     albedos = edited_albedos(given, now)
@@ -290,7 +294,7 @@ def _steps(answer: Answer, now: list[Material], given: list[Material]) -> dict[s
     marks.append(time.perf_counter())
     light = answer.indirect(albedos, solution)
     marks.append(time.perf_counter())
-    upsampled(light, answer.near)
+    answer.at_texels(light, reference)
     marks.append(time.perf_counter())
     steps = dict(zip(("solve_ms", "gather_ms", "upsample_ms"), (1e3 * np.diff(marks)).tolist(), strict=True))
     return {**steps, "sweeps": float(solution.sweeps)}

@@ -20,12 +20,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from lambent.core import answer_loops as loops
 from lambent.core.arrays import Floats
 
 BYTE = 255
@@ -62,12 +64,23 @@ class Patches:
     transfer: NDArray[np.float32]
 
     @cached_property
-    def rows(self) -> list[csr_matrix]:
-        """F of each group, sparse: four of five entries are 0, and BLAS is slow on products with three columns."""
-        return [
-            csr_matrix(of_group)
-            for of_group in np.broadcast_to(self.transfer, (len(self.direct), *self.transfer.shape[-2:]))
-        ]
+    def rows(self) -> SparseRows:
+        """F as sparse rows: four of five entries are 0."""
+        groups = len(self.direct)
+        each = [csr_matrix(one) for one in np.broadcast_to(self.transfer, (groups, *self.transfer.shape[-2:]))]
+        first = np.cumsum([0, *(one.nnz for one in each[:-1])])
+        bounds = np.stack([one.indptr.astype(np.int64) + at for one, at in zip(each, first, strict=True)])
+        senders, shares = (np.concatenate([getattr(one, part) for one in each]) for part in ("indices", "data"))
+        return SparseRows(bounds[:, :-1], bounds[:, 1:], senders, shares)
+
+
+class SparseRows(NamedTuple):
+    """Entries `senders`, `shares` (n,) of rows that go from `starts` to `ends` (G, P)."""
+
+    starts: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    senders: NDArray[np.int32]
+    shares: NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,30 +106,20 @@ class Solution:
 
 
 def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> Solution:
-    """Solve for the light between patches by Jacobi's method.
+    """Solve for the light between patches by the method of Gauss and Seidel.
 
     It ends when no patch of any group changes by more than `tolerance` of its own light: a bound on the brightest
     change would leave dark corners unsolved.
     """
-    count = patches.direct.shape[1]
+    crossing = (patches.paired != np.arange(patches.direct.shape[1]))[:, None]
     reflected = albedos.reflected[patches.material].astype(np.float32)
-    crossing = (patches.paired != np.arange(count))[:, None]
     transmitted = (albedos.transmitted[patches.material] * crossing).astype(np.float32)
-    crosses = bool(transmitted.any())
-    light = patches.direct.copy()
-
-    def exitance() -> Floats:
-        out = light * reflected
-        return np.asarray(out + light[:, patches.paired] * transmitted if crosses else out)
-
-    for sweep in range(1, SWEEPS + 1):
-        arrived = np.stack([rows @ sent for rows, sent in zip(patches.rows, exitance(), strict=True)])
-        new = np.maximum(patches.direct + arrived, 0)  # an equivalent albedo may be negative
-        change = np.abs(new - light)
-        light = new
-        if (change <= tolerance * new + np.float32(1e-30)).all():
-            return Solution(light.astype(np.float32), sweep, True)
-    return Solution(light.astype(np.float32), SWEEPS, False)
+    light = patches.direct.astype(np.float32)
+    direct, paired = np.ascontiguousarray(patches.direct, np.float32), np.asarray(patches.paired, np.int64)
+    sweeps, stopped = loops.solve(
+        *patches.rows, direct, reflected, transmitted, paired, np.float32(tolerance), SWEEPS, light
+    )
+    return Solution(light, int(sweeps.max(initial=0)), bool(stopped.all()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,15 +142,18 @@ class Points:
     direct: NDArray[np.float32]
     light: NDArray[np.float32]
 
-    def exitance(self, albedos: Albedos, ratio: Floats) -> NDArray[np.float32]:
-        """Exitance (G, K, 3), W/m^2, where indirect light is `ratio` (G, K, 3) times as baked."""
-        now = self.direct + (self.light - self.direct) * ratio
-        found = now * albedos.reflected[self.material].astype(np.float32)
-        passes = np.asarray(albedos.transmitted.any(axis=1))[self.material]
-        crossed = np.flatnonzero((self.other != np.arange(len(self.other))) & passes)
-        passed = albedos.transmitted[self.material[crossed]].astype(np.float32)
-        found[:, crossed] += now[:, self.other[crossed]] * passed
-        return np.asarray(found, np.float32)
+    def exitance(self, albedos: Albedos, ratio: Floats, of: NDArray[np.integer] | None = None) -> NDArray[np.float32]:
+        """Exitance (K, G, 3), W/m^2, where indirect light is `ratio` (G, n, 3) times as baked.
+
+        The ratio of point k is number `of` (K,) of these, by default number k.
+        """
+        number = np.arange(len(self.other)) if of is None else of
+        reflected, transmitted = (
+            np.asarray(one, np.float32)[self.material] for one in (albedos.reflected, albedos.transmitted)
+        )
+        lights = (np.ascontiguousarray(one, np.float32) for one in (self.direct, self.light, ratio))
+        direct, light, now = lights
+        return np.asarray(loops.exitance(direct, light, now, number, self.other, reflected, transmitted))
 
 
 def packed_weights(weights: Floats) -> NDArray[np.uint8]:
@@ -176,28 +182,55 @@ def points_of_rays(rays: NDArray[np.uint8]) -> NDArray[np.uint16]:
     return np.asarray(rays[..., 0] | rays[..., 1].astype(np.uint16) << 8, np.uint16)
 
 
-def gathered(rays: NDArray[np.uint8], exitance: Floats) -> NDArray[np.float32]:
-    """Indirect irradiance (G, K, 3) at points with `packed_rays` (K, R, 2 + G), from exitance (G, K, 3).
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """Where the rays of K points end: those of a point that end near the same one are one.
+
+    Attributes
+    ----------
+    starts : (K + 1,) int64
+        The rays of point k go from starts[k] on to starts[k + 1].
+    points : (N,) uint16
+        The point near which each ends.
+    weights : (N, G) uint8
+        By light group: roots over that of `most` (K, G) float32, the largest weight of a point's rays.
+    count : int
+        Rays of each point, those included that end nowhere.
+    """
+
+    starts: NDArray[np.int64]
+    points: NDArray[np.uint16]
+    weights: NDArray[np.uint8]
+    most: NDArray[np.float32]
+    count: int
+
+    @classmethod
+    def of(cls, packed: NDArray[np.uint8]) -> Rays:
+        """Of `packed_rays` (K, R, 2 + G)."""
+        size, count, groups = packed.shape[0], packed.shape[1], packed.shape[2] - 2
+        first = np.arange(size, dtype=np.int64) * count
+        ends, points = np.zeros_like(first), np.zeros(size * count, np.uint16)
+        weights, most = np.zeros((size * count, groups), np.uint8), np.zeros((size, groups), np.float32)
+        table = unpacked_weights(np.arange(BYTE + 1, dtype=np.uint8))
+        loops.merge(np.ascontiguousarray(packed), first, ends, points, weights, most, table)
+        kept = (np.arange(count) < (ends - first)[:, None]).reshape(-1)
+        starts = np.append(0, np.cumsum(ends - first)).astype(np.int64)
+        return cls(starts, points[kept], weights[kept], most, count)
+
+
+def gathered(rays: Rays, exitance: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Indirect irradiance (G, K, 3) at points with such rays, from exitance (n, G, 3).
 
     Rays are cosine distributed: it is pi times the mean of the radiance exitance/pi.
     """
-    table = unpacked_weights(np.arange(BYTE + 1, dtype=np.uint8)) / rays.shape[1]
-    rays, lights = np.ascontiguousarray(rays), np.ascontiguousarray(exitance, np.float32)
-    return np.stack([_gathered(rays, table, of_group, 2 + group) for group, of_group in enumerate(lights)])
-
-
-@numba.njit(parallel=True, cache=True, nogil=True)
-def _gathered(rays, table, exitance, byte):  # type: ignore[no-untyped-def]
-    found = np.zeros((rays.shape[0], 3), np.float32)
-    for k in numba.prange(rays.shape[0]):
-        red = green = blue = np.float32(0)
-        for r in range(rays.shape[1]):
-            weight = table[rays[k, r, byte]]
-            point = np.int64(rays[k, r, 0]) | (np.int64(rays[k, r, 1]) << 8)
-            red += weight * exitance[point, 0]
-            green += weight * exitance[point, 1]
-            blue += weight * exitance[point, 2]
-        found[k, 0], found[k, 1], found[k, 2] = red, green, blue
+    table = ((np.arange(BYTE + 1) / BYTE) ** 2 / rays.count).astype(np.float32)
+    given = rays.starts, rays.points, rays.weights, rays.most, table, exitance
+    groups = exitance.shape[1]
+    if groups == 1:
+        return np.asarray(loops.gather_one(*given))
+    found = np.empty((groups, len(rays.most), 3), np.float32)
+    for first in range(0, groups, 4):
+        loops.gather_four(*given, first, found)
     return found
 
 
@@ -243,10 +276,14 @@ def _upsampled(light, points, shares):  # type: ignore[no-untyped-def]
 
 def ratios(edited: Floats, reference: Floats) -> NDArray[np.float32]:
     """I(edited) / I(reference) of light (G, ..., 3), within [0, MOST_RATIO]; 1 where there was next to none."""
-    axes = tuple(range(1, reference.ndim))
-    least = DARK * np.maximum(reference.mean(axis=axes, keepdims=True), 1e-30)
-    ratio = np.divide(edited, reference, out=np.ones_like(reference), where=reference > least)
+    ratio = np.divide(edited, reference, out=np.ones_like(reference), where=reference > _least(reference))
     return np.clip(ratio, 0, MOST_RATIO)
+
+
+def _least(reference: Floats) -> Floats:
+    """Light (G, 1, ...) of each group below which a ratio says nothing."""
+    axes = tuple(range(1, reference.ndim))
+    return np.asarray(DARK * np.maximum(reference.mean(axis=axes, keepdims=True), 1e-30))
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,8 +294,8 @@ class Answer:
     ----------
     points : Points
         That send and gather light.
-    rays : (K, R, 2 + G) uint8
-        Their `packed_rays`.
+    rays : Rays
+        Theirs.
     near : Neighbours
         Of the T texels.
     direct, baked : (G, T, 3) float32
@@ -269,7 +306,7 @@ class Answer:
 
     patches: Patches
     points: Points
-    rays: NDArray[np.uint8]
+    rays: Rays
     near: Neighbours
     direct: NDArray[np.float32]
     baked: NDArray[np.float32]
@@ -284,9 +321,9 @@ class Answer:
         if albedos.same_as(self.albedos):
             return found
         now = (solution or solved(self.patches, albedos)).irradiance - self.patches.direct
-        ratio = ratios(now, self._patches_as_baked)[:, self.points.patch]
-        for _ in range(PASSES):
-            found = gathered(self.rays, self.points.exitance(albedos, ratio))
+        ratio, of = ratios(now, self._patches_as_baked), self.points.patch
+        for step in range(PASSES):
+            found = gathered(self.rays, self.points.exitance(albedos, ratio, of if step == 0 else None))
             ratio = ratios(found, self._gathered_as_baked)
         return found
 
@@ -296,7 +333,9 @@ class Answer:
 
     @cached_property
     def _gathered_as_baked(self) -> NDArray[np.float32]:
-        return gathered(self.rays, self.points.exitance(self.albedos, np.ones(1, np.float32)))
+        shape = len(self.points.direct), 1, 3
+        none = np.zeros(len(self.points.other), np.int64)
+        return gathered(self.rays, self.points.exitance(self.albedos, np.ones(shape, np.float32), none))
 
     def reference(self) -> NDArray[np.float32]:
         """Indirect irradiance (G, T, 3) at the texels as this computes it for the baked materials."""
@@ -306,7 +345,15 @@ class Answer:
         """Irradiance (G, T, 3) of the texels with other albedos; `baked` itself where they are as baked."""
         if albedos.same_as(self.albedos):
             return self.baked
-        return answered(self.direct, self.baked, upsampled(self.indirect(albedos), self.near), reference)
+        return self.at_texels(self.indirect(albedos), reference)
+
+    def at_texels(self, indirect: NDArray[np.float32], reference: Floats) -> NDArray[np.float32]:
+        """Irradiance (G, T, 3) of the texels, `answered` from indirect light (G, K, 3) of the points."""
+        least = np.array([_least(one[None])[0, 0, 0] for one in reference], np.float32)
+        return np.asarray(loops.texel_light(
+            self.near.points, self.near.shares, indirect, reference, self.direct, self.baked, least,
+            np.float32(MOST_RATIO), np.float32(MOST_EXCESS),
+        ))  # fmt: skip
 
 
 def answered(direct: Floats, baked: Floats, edited: Floats, reference: Floats) -> NDArray[np.float32]:

@@ -6,7 +6,6 @@ Light that is sorted by group goes through the renderer's mixer, which mixes it 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from lambent.realtime.answering import AnsweredLight, Lit
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.resources import light_layers
 
 
 def answered(baked: ProbeLight, answer: AnsweredLight, name: str, light: Lit) -> ProbeLight:
@@ -48,14 +46,9 @@ class AnswerShown:
             self._renderer.mixer.answer(groups)
             return
         resources = self._renderer.resources
-        resources.show_light_map(list(self._layers if light.is_baked else light_layers(*self._answer.maps(light))))
+        resources.show_light_map(list(self._answer.layers(light)))
         for name, baked in self._baked_probes.items():
             made = baked if light.is_baked else answered(baked, self._answer, name, light)
             for item in (resources.objects[k] for k in self._users[name]):
                 item.relight(made, item.emission)
         resources.light_version += 1
-
-    @cached_property
-    def _layers(self) -> np.ndarray:
-        """Light maps as baked."""
-        return light_layers(*self._answer.maps(self._answer.as_baked))

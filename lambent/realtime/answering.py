@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.answer import Albedos
+from lambent.core.answer import Albedos, upsampled
 from lambent.core.arrays import Floats
 from lambent.core.irradiance import irradiance_of
 from lambent.materials.diffuse_albedos import albedos_of, edited_albedos
@@ -22,8 +22,11 @@ from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.group_arrays import GroupArrays
+from lambent.realtime.lit_texels import LitTexels, mix_into
+from lambent.realtime.resources import light_layers
 from lambent.store.answer import SeenSpots, StoredAnswer
 
+MARGIN = 1.4  # of the error over its estimate: at most 1.33 in 14 edits of two rooms, and 1.18 in 5 of a third
 FAINT = 0.01  # of the mean indirect light: darker texels say nothing of how exact the rest is
 
 
@@ -71,16 +74,43 @@ class AnsweredLight:
         whole = light.irradiance.sum(axis=0)
         return self.shown_at_texels(both[0], whole, 0), self.shown_at_texels(both[1], whole, 1)
 
+    def layers(self, light: Lit) -> NDArray[np.float16]:
+        """`maps` as the layers (n, H, W, 4) of a texture."""
+        if light.is_baked:
+            return self._layers_as_baked.copy()
+        found = self._layers_as_baked.copy()
+        factors = np.full((len(light.irradiance), 3), 1 / self._baked.unit)
+        for layer, (rows, texels) in zip(found, self.of_sides, strict=False):
+            mix_into(layer, light.irradiance, rows, texels, factors)
+        return found
+
+    @cached_property
+    def _layers_as_baked(self) -> NDArray[np.float16]:
+        return light_layers(self._baked.irradiance, self._baked.irradiance_back)
+
+    @cached_property
+    def of_sides(self) -> tuple[tuple[NDArray[np.intp], NDArray[np.uint32]], ...]:
+        """By side, which of the texels that answer are on it, and their places in its map."""
+        texels = self._stored.texels
+        each = (np.flatnonzero(texels % 2 == side) for side in range(2))
+        return tuple((mine, texels[mine] // 2) for mine in each)
+
     def shown_at_texels(self, baked: Floats | None, irradiance: Floats, side: int) -> Floats | None:
         """A map of a side (..., H, W, 3) in the scene's units with other irradiance (..., T, 3), W/m^2, in it."""
         if baked is None:
             return None
-        texels = self._stored.texels
-        mine = np.flatnonzero(texels % 2 == side)
+        mine, texels = self.of_sides[side]
         values = np.array(baked, np.float32)
         flat = values.reshape(*values.shape[:-3], -1, 3)
-        flat[..., texels[mine] // 2, :] = irradiance[..., mine, :] / np.float32(self._baked.unit)
+        flat[..., texels, :] = irradiance[..., mine, :] / np.float32(self._baked.unit)
         return values
+
+    @cached_property
+    def stays_as_baked(self) -> tuple[LitTexels | None, ...]:
+        """By side, the light by group of the texels that do not answer."""
+        assert self._baked.groups is not None, "asked for with groups alone"
+        both = zip(self._baked.groups.lit_sides, self.of_sides, strict=True)
+        return tuple(None if side is None else side.without(texels) for side, (_, texels) in both)
 
     @property
     def probes(self) -> tuple[str, ...]:
@@ -122,22 +152,26 @@ class AnsweredLight:
         return tuple(np.array(baked) + self._baked.unit * irradiance_of(change)) if baked else ()
 
     def likely_error(self, light: Lit, factors: Floats | None = None) -> float:
-        """How far the light may be off: root mean square over its mean, by texels, in a mix of `factors` (G, 3).
+        """A bound on the root mean square error of the light over its mean, by texels, in a mix of `factors` (G, 3).
 
-        What an edit changes is taken to be as wrong as this computes the indirect light of the bake itself.
+        What an edit changes, or leaves if that is less, is taken to be as wrong as this computes the indirect light of
+        the bake itself, times MARGIN. The direct sun counts as light, and no edit changes it.
         """
         answer = self._stored.answer
-        shares = np.ones((len(answer.baked), 3)) if factors is None else factors
-
-        def mixed(by_group: Floats) -> Floats:
-            return np.asarray(np.einsum("gtc,gc->tc", by_group, shares))
-
-        before, now = mixed(self._as_baked.irradiance), mixed(light.irradiance)
-        indirect, computed = mixed(answer.baked - answer.direct), mixed(self._reference)
+        shares = np.ones((len(answer.baked), 3), np.float32) if factors is None else np.asarray(factors, np.float32)
+        lights = light.irradiance, answer.baked, answer.direct, self._reference
+        now, before, direct, computed = (np.einsum("gtc,gc->tc", one, shares) for one in lights)
+        indirect = before - direct
         known = indirect > FAINT * indirect.mean()
         wrong = np.divide(computed, indirect, out=np.ones_like(computed), where=known) - 1
-        off = np.clip(wrong, -1, 1) * (now - before)
-        return float(np.sqrt((off**2).mean()) / max(float(now.mean()), 1e-30))
+        off = np.minimum(np.abs(wrong), 1) * np.minimum(np.abs(now - before), now)
+        mean = float((now.mean(axis=0) + self._mean_sun * shares[self._stored.of_sun]).mean())
+        return MARGIN * float(np.sqrt((off**2).mean())) / max(mean, 1e-30)
+
+    @cached_property
+    def _mean_sun(self) -> NDArray[np.float32]:
+        """(3,) mean direct irradiance of the sun on the texels."""
+        return np.asarray(upsampled(self._stored.point_sun[None], self._stored.answer.near)[0].mean(axis=0))
 
     def groups(self, light: Lit) -> GroupArrays | None:
         """The light by group, to be mixed; as baked before an edit, and None where it is not sorted."""
@@ -175,6 +209,16 @@ class AnsweredGroups(GroupArrays):
         """Light maps by group, as those of `base`."""
         show, irradiance = self.answer.shown_at_texels, self.light.irradiance
         return tuple(show(baked, irradiance, side) for side, baked in enumerate(self.base.sides))
+
+    def light_map(self, factors: Floats) -> tuple[NDArray[np.float16] | None, ...]:
+        """By side, a mix of all groups, as `base` has it."""
+        found = []
+        for (rows, texels), rest in zip(self.answer.of_sides, self.answer.stays_as_baked, strict=True):
+            layer = None if rest is None else rest.mixed(factors)
+            if layer is not None:
+                mix_into(layer, self.light.irradiance, rows, texels, factors / np.float32(self.unit))
+            found.append(layer)
+        return tuple(found)
 
     def probe(self, name: str) -> Floats | None:
         """Radiance of the probe of an object by group, as that of `base`."""

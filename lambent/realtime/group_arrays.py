@@ -6,10 +6,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError, did_you_mean
 from lambent.core.light_mix import WHITE, Factors
+from lambent.realtime.lit_texels import LitTexels
 from lambent.store import contract
 from lambent.store.contract import SIDES
 from lambent.store.light_groups import LightGroupRecord, group_name, light_groups
@@ -39,6 +41,15 @@ class GroupArrays:
         lit = [None if one is None or not one.any() else one.astype(np.float32) for one in found]
         scale = np.float32(1 / self.unit)
         return tuple(None if one is None else one if self.unit == 1 else one * scale for one in lit)
+
+    @cached_property
+    def lit_sides(self) -> tuple[LitTexels | None, ...]:
+        """The same as the texels that hold any light."""
+        return tuple(None if side is None else LitTexels.of(side) for side in self.sides)
+
+    def light_map(self, factors: Floats) -> tuple[NDArray[np.float16] | None, ...]:
+        """By side, a mix of all groups as (H, W, 4) half floats."""
+        return tuple(None if side is None else side.mixed(factors) for side in self.lit_sides)
 
     def probe(self, name: str) -> Floats | None:
         """Radiance of the probe of an object by group; None where the store has none."""

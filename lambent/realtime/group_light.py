@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
-from lambent.core.colour import HALF_MAX
 from lambent.core.irradiance import irradiance_of
 from lambent.core.plain import Triple, triple
 from lambent.realtime.baked import BakedScene, Probe
@@ -34,11 +33,7 @@ class GroupLight:
 
     def light_map(self, factors: Floats) -> tuple[NDArray[np.float16] | None, ...]:
         """By side of the light map, (H, W, 4) half floats; None of a side that no light reaches."""
-        return tuple(None if side is None else side.mixed(factors) for side in self._sides)
-
-    @cached_property
-    def _sides(self) -> tuple[_LitTexels | None, ...]:
-        return tuple(None if side is None else _LitTexels.of(side) for side in self.groups.sides)
+        return self.groups.light_map(factors)
 
     def sky(self, factors: Floats) -> tuple[Floats | None, Floats | None]:
         """The environment (6, N, N, 3) as it is seen, and without the sun's disc."""
@@ -102,31 +97,6 @@ class GroupLight:
     def _of(self, member: str, factors: Floats) -> Floats:
         number = self.groups.number(member)
         return np.ones(3, np.float32) if number is None else factors[number]
-
-
-@dataclass(frozen=True, eq=False)
-class _LitTexels:
-    """A side of the light map by group: light (n, K, 3) of the texels (K,) that hold any, of a map (height, width)."""
-
-    light: Floats
-    texels: NDArray[np.intp]
-    size: tuple[int, int]
-
-    @classmethod
-    def of(cls, side: Floats) -> _LitTexels:
-        """Of a map (n, H, W, 3)."""
-        flat = side.reshape(len(side), -1, 3)
-        texels = np.flatnonzero(flat.any(axis=(0, 2)))
-        return cls(np.ascontiguousarray(flat[:, texels]), texels, (side.shape[1], side.shape[2]))
-
-    def mixed(self, factors: Floats) -> NDArray[np.float16]:
-        """(H, W, 4) half floats, alpha 1."""
-        height, width = self.size
-        found = np.zeros((height * width, 4), np.float16)
-        found[:, 3] = 1
-        light = mixed(self.light, factors)
-        found[self.texels, :3] = np.minimum(light, HALF_MAX, out=light)
-        return found.reshape(height, width, 4)
 
 
 def mixed(by_group: Floats, factors: Floats) -> Floats:

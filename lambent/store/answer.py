@@ -25,12 +25,12 @@ G is the number of light groups, in the order of `store.light_groups`; 1 where l
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.answer import Answer, Neighbours, Patches, Points, points_of_rays
+from lambent.core.answer import Answer, Neighbours, Patches, Points, Rays, points_of_rays
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.materials.diffuse_albedos import albedos_of
@@ -86,6 +86,7 @@ class StoredAnswer:
     seen : what probes see, by object
     sun : (3,) W/m^2 on what faces it
     of_sun : number of the sun's light group
+    point_sun : (K, 3) W/m^2, its direct irradiance at the points
     """
 
     answer: Answer
@@ -96,6 +97,7 @@ class StoredAnswer:
     seen: dict[str, SeenSpots]
     sun: Floats
     of_sun: int = 0
+    point_sun: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3), np.float32))
 
 
 def read_answer(store: Store) -> StoredAnswer:
@@ -168,10 +170,10 @@ def read_answer(store: Store) -> StoredAnswer:
         of_patch[at], material.astype(np.int64)[of_patch[at]], _on_other_sides(other[at], nearest),
         directs[:, at] + with_sun, baked[:, at] + with_sun,
     )  # fmt: skip
-    answer = Answer(patches, senders, rays, nearest, directs, baked, albedos)
+    answer = Answer(patches, senders, Rays.of(rays), nearest, directs, baked, albedos)
     return StoredAnswer(
         answer, texels, other, material[of_patch].astype(np.int64), names, _seen(store, record, number),
-        np.zeros(3) if sun is None else np.array(sun.irradiance), of_sun,
+        np.zeros(3) if sun is None else np.array(sun.irradiance), of_sun, point_sun,
     )  # fmt: skip
 
 

@@ -12,8 +12,8 @@
                                            before denoising; may be absent
     light_map/groups, groups_back          (n, H, W, 3) float16, irradiance by light group, in order of meta["groups"],
                                            store.light_groups; irradiance, irradiance_back are the sums; may be absent
-    light_map/direct, direct_back          (n, H, W, 3) float16, the part of it that comes straight from the group's
-                                           emitters, through clear glass that the sun passes too; nowhere more than all
+    light_map/direct, direct_back          (n, H, W, 3) float16, the part straight from the group's emitters and, with
+                                           final gathering, by lobes alone; n = 1 without groups, absent of photons
     light_map/lean                         (H, W, 3) float16, dominant light direction, world space: mean direction of
                                            the incident light, weighted by its irradiance; 0 without a normal map
     environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap) of radiance, sun disc included,

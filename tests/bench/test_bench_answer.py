@@ -40,6 +40,7 @@ def test_rows_of_a_store(tmp_path: Path, groups: str) -> None:
         assert 0 < row["noise"] < row["naive_rms"] and row["shown_rms"] < row["naive_rms"] + row["baked_rms"]
         parts = [row[name] for name in ("solve_ms", "gather_ms", "upsample_ms", "upload_ms")]
         assert min(parts) > 0 and row["edit_to_picture_ms"] > row["upload_ms"] and row["sweeps"] >= 1
+        assert row["rms"] < row["likely_error"] < row["naive_rms"]
         assert row["bytes"] > 1000 and row["precompute_s"] > 0
 
 

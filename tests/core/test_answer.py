@@ -14,6 +14,7 @@ from lambent.core.answer import (
     Neighbours,
     Patches,
     Points,
+    Rays,
     answered,
     gathered,
     packed_rays,
@@ -87,17 +88,31 @@ def test_gathering_sums_what_rays_end_on() -> None:
     assert np.array_equal(points_of_rays(rays), np.where(weight[0] > 0, point, 0))
     light = rng.random((2, MOST_POINTS, 3)).astype(np.float32)
     expected = (weight[..., None] * light[:, point]).mean(axis=2)
-    assert np.allclose(gathered(rays, light), expected, rtol=0.01)
+    assert np.allclose(gathered(Rays.of(rays), light.transpose(1, 0, 2).copy()), expected, rtol=0.01)
+
+
+@pytest.mark.parametrize("groups", [1, 2, 4, 5, 7])
+def test_rays_that_end_at_one_point_are_one(groups: int) -> None:
+    rng = np.random.default_rng(groups)
+    point, weight = rng.integers(0, 20, (6, 256)), rng.random((groups, 6, 256)) * 3
+    weight[:, :2, ::3] = 0
+    weight[:, 5] = 0  # a point that sees nothing
+    merged = Rays.of(packed_rays(point, weight))
+    assert len(merged.points) == 5 * 20 and merged.starts[-1] == 100 and merged.starts[-2] == 100
+    assert (np.diff(merged.points[:20].astype(int)) > 0).all()
+    light = rng.random((20, groups, 3)).astype(np.float32)
+    expected = np.stack([(weight[g][..., None] * light[point, g]).mean(axis=1) for g in range(groups)])
+    assert np.allclose(gathered(merged, light), expected, rtol=0.01)
 
 
 def test_points_send_the_light_of_both_their_sides() -> None:
     light = np.array([[[10.0] * 3, [4.0] * 3]], np.float32)
     points = Points(np.zeros(2, int), np.zeros(2, int), np.array([1, 0]), np.float32(0.5) * light, light)
     sheet = Albedos(np.full((1, 3), 0.2), np.full((1, 3), 0.5))
-    as_baked = points.exitance(sheet, np.ones(1, np.float32))
-    assert np.allclose(as_baked[0, :, 0], [0.2 * 10 + 0.5 * 4, 0.2 * 4 + 0.5 * 10])
+    as_baked = points.exitance(sheet, np.ones((1, 1, 3), np.float32), np.zeros(2, int))
+    assert np.allclose(as_baked[:, 0, 0], [0.2 * 10 + 0.5 * 4, 0.2 * 4 + 0.5 * 10])
     doubled = points.exitance(sheet, np.full((1, 2, 3), 2, np.float32))
-    assert np.allclose(doubled[0, :, 0], 1.5 * as_baked[0, :, 0]), "direct light stays"
+    assert np.allclose(doubled[:, 0, 0], 1.5 * as_baked[:, 0, 0]), "direct light stays"
 
 
 def test_two_points_in_a_furnace_have_the_light_of_its_series() -> None:
@@ -106,7 +121,9 @@ def test_two_points_in_a_furnace_have_the_light_of_its_series() -> None:
     room = Patches(np.zeros(2, int), np.arange(2), direct, np.full((2, 2), 0.5, np.float32))
     points = Points(np.arange(2), np.zeros(2, int), np.arange(2), direct, 2 * direct)
     near = Neighbours(np.array([[0], [1]], np.uint32), np.full((2, 1), 255, np.uint8))
-    answer = Answer(room, points, rays, near, direct, 2 * direct, Albedos(np.full((1, 3), 0.5), np.zeros((1, 3))))
+    answer = Answer(
+        room, points, Rays.of(rays), near, direct, 2 * direct, Albedos(np.full((1, 3), 0.5), np.zeros((1, 3)))
+    )
     for albedo in (0.0, 0.25, 0.8):
         found = answer.irradiance(Albedos(np.full((1, 3), albedo), np.zeros((1, 3))), answer.reference())
         assert np.allclose(found, 1 / (1 - albedo), rtol=0.01)
@@ -115,7 +132,7 @@ def test_two_points_in_a_furnace_have_the_light_of_its_series() -> None:
 def test_texels_show_means_of_their_points() -> None:
     near = Neighbours(np.array([[0, 1], [2, 2]], np.uint32), np.array([[255, 85], [10, 0]], np.uint8))
     light = np.arange(9, dtype=np.float32).reshape(1, 3, 3)
-    assert np.allclose(upsampled(light, near), [[[0.75, 1.75, 2.75], [6, 7, 8]]])
+    assert np.allclose(upsampled(light, near), [[[0.75, 1.75, 2.75], [6.0, 7.0, 8.0]]])
 
 
 def test_ratios_of_no_light_are_one_and_bounded() -> None:
@@ -131,6 +148,13 @@ def test_direct_light_stays_and_light_that_was_not_gathered_never_grows() -> Non
     assert np.allclose(answered(0 * one, 10 * one, 0 * one, 2 * one), 0), "but dies with the light around it"
 
 
+def test_texels_are_answered_as_arrays_are() -> None:
+    answer = small_answer()
+    reference, other = answer.reference(), albedos(8)
+    expected = answered(answer.direct, answer.baked, upsampled(answer.indirect(other), answer.near), reference)
+    assert np.allclose(answer.irradiance(other, reference), expected, rtol=1e-5)
+
+
 def small_answer() -> Answer:
     rng, room = np.random.default_rng(1), patches(1)
     rays = packed_rays(rng.integers(0, 9, (9, 32)), np.ones((1, 9, 32)))
@@ -138,7 +162,7 @@ def small_answer() -> Answer:
     points = Points(rng.integers(0, 30, 9), rng.integers(0, 4, 9), np.arange(9), 0.3 * light, light)
     near = Neighbours(rng.integers(0, 9, (50, 8)).astype(np.uint32), np.full((50, 8), 255, np.uint8))
     baked = (1 + rng.random((1, 50, 3))).astype(np.float32)
-    return Answer(room, points, rays, near, 0.3 * baked, baked, albedos())
+    return Answer(room, points, Rays.of(rays), near, 0.3 * baked, baked, albedos())
 
 
 def test_before_the_first_edit_nothing_changes() -> None:

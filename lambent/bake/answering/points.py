@@ -17,37 +17,37 @@ NORMAL_M = 0.5  # metres that a unit of the normal counts for in the search
 BENT = 4  # power of the cosine between normals
 LEAST = 1e-6
 POINTS_OF_PATCH = 4  # at least: fewer would know less of where light is than patches do
+CLOSE = 4.0  # sides of a block to the surfaces around: nearer ones make blocks smaller
+MORE = 1.5  # times as many points, at most, where surfaces are close
 
 
 @dataclass(frozen=True, eq=False)
 class GatherPoints:
-    """side, texel (K,): on which side of which of `Spots` each lies."""
+    """side, texel (K,): on which side of which of `Spots` each lies; block (K,): texels on a side of its block."""
 
     side: NDArray[np.integer]
     texel: Indices
+    block: Indices
 
 
 def gather_points(spots: Spots, width: int, block: int) -> GatherPoints:
     """One lit texel of each block x block texels, chart and side: the one nearest to the block's middle."""
-    row, column = np.divmod(spots.index, width)
-    across = width // block + 1
-    cell = (row // block) * across + column // block
+    lit = [np.flatnonzero(spots.lit[side]) for side in range(2)]
+    side, texel = np.repeat([0, 1], [len(mine) for mine in lit]), np.concatenate(lit)
+    return _in_blocks(spots, width, side, texel, np.full(len(texel), block))
+
+
+def _cells(spots: Spots, mine: Indices, width: int, block: int) -> tuple[Indices, Floats]:
+    """The block and chart of some texels, as one number, and their squared distances from its middle."""
+    row, column = np.divmod(spots.index[mine], width)
+    cell = (row // block) * (width // block + 1) + column // block
     middle = (block - 1) / 2
     away = (row % block - middle) ** 2 + (column % block - middle) ** 2
-    sides, texels = [], []
-    for side in range(2):
-        mine = np.flatnonzero(spots.lit[side])
-        order = mine[np.lexsort((mine, away[mine], spots.chart[mine], cell[mine]))]
-        key = np.stack([cell[order], spots.chart[order]])
-        first = np.ones(len(order), bool)
-        first[1:] = (np.diff(key, axis=1) != 0).any(axis=0)
-        texels.append(order[first])
-        sides.append(np.full(int(first.sum()), side))
-    return GatherPoints(np.concatenate(sides), np.concatenate(texels))
+    return cell * (int(spots.chart.max(initial=0)) + 2) + spots.chart[mine] + 1, away
 
 
-def bounded_points(spots: Spots, width: int, block: int, patches: int) -> tuple[GatherPoints, int]:
-    """`gather_points` of blocks of such a size, or another, and that size.
+def bounded_points(spots: Spots, width: int, block: int, patches: int) -> GatherPoints:
+    """`gather_points` of blocks of such a size, or another.
 
     Blocks are smaller in small maps, where there would be fewer than POINTS_OF_PATCH points for each of so many
     patches, and larger where rays could not name all points.
@@ -59,10 +59,63 @@ def bounded_points(spots: Spots, width: int, block: int, patches: int) -> tuple[
     while len(found.texel) > MOST_POINTS:
         block += max(1, block // 4)
         found = gather_points(spots, width, block)
-    return found, block
+    return found
 
 
-def neighbours(spots: Spots, points: GatherPoints, block: int) -> tuple[NDArray[np.uint32], Neighbours]:
+def refined_points(spots: Spots, width: int, points: GatherPoints, distance: Floats) -> GatherPoints:
+    """Points in smaller blocks where other surfaces are close: there indirect light changes from texel to texel.
+
+    It does by the distance to these (Ward, Rubinstein and Clear 1988), so that blocks are halved in the order of
+    `distance` (K,) over their size, up to MORE times as many points. Distances are harmonic means, in texels.
+    """
+    if not len(points.texel):
+        return points
+    block = int(points.block[0])
+    levels = [block >> step for step in range(1, block.bit_length())]
+    lit = [np.flatnonzero(spots.lit[side]) for side in range(2)]
+    side, texel = np.repeat([0, 1], [len(mine) for mine in lit]), np.concatenate(lit)
+    owner = _owners(spots, width, points, side, texel)
+    counts = [np.ones(len(points.texel), np.int64)]
+    for level in levels:
+        cell = _cells(spots, texel, width, level)[0] * 2 + side
+        counts.append(np.bincount(owner[np.unique(cell, return_index=True)[1]], minlength=len(points.texel)))
+    sizes = np.array([block, *levels[:-1]])[:, None]
+    closeness, added = distance / sizes, np.diff(np.array(counts), axis=0)
+    order = np.argsort(closeness, axis=None, kind="stable")
+    room = min(int(MORE * len(points.texel)), MOST_POINTS) - len(points.texel)
+    halved = np.zeros(closeness.size, bool)
+    fits = np.less_equal(np.cumsum(added.reshape(-1)[order]), room) & (closeness.reshape(-1)[order] < CLOSE)
+    halved[order[fits]] = True
+    steps = np.logical_and.accumulate(halved.reshape(closeness.shape), axis=0).sum(axis=0)
+    size = np.array([block, *levels])[steps]
+    return _in_blocks(spots, width, side, texel, size[owner])
+
+
+def _owners(spots: Spots, width: int, points: GatherPoints, side: Indices, texel: Indices) -> Indices:
+    """Number of the point in the block of each texel and side."""
+    block = int(points.block[0])
+    of_points = _cells(spots, points.texel, width, block)[0] * 2 + points.side
+    order = np.argsort(of_points)
+    return np.asarray(order[np.searchsorted(of_points[order], _cells(spots, texel, width, block)[0] * 2 + side)])
+
+
+def _in_blocks(spots: Spots, width: int, side: Indices, texel: Indices, size: Indices) -> GatherPoints:
+    """The texel nearest to the middle of each block, chart and side, by the size of its block."""
+    found = []
+    for block in np.unique(size):
+        mine = np.flatnonzero(size == block)
+        cell, away = _cells(spots, texel[mine], width, int(block))
+        cell = cell * 2 + side[mine]
+        order = np.lexsort((mine, away, cell))
+        first = np.ones(len(order), bool)
+        first[1:] = np.diff(cell[order]) != 0
+        found.append(mine[order[first]])
+    chosen = np.concatenate(found)
+    chosen = chosen[np.lexsort((texel[chosen], side[chosen]))]
+    return GatherPoints(side[chosen], texel[chosen], size[chosen])
+
+
+def neighbours(spots: Spots, points: GatherPoints) -> tuple[NDArray[np.uint32], Neighbours]:
     """Texels (T,) that answer, as twice the light map's texel plus the side, and the points near each.
 
     Points are of the same object and side; texels of objects without any have no answer.
@@ -80,7 +133,7 @@ def neighbours(spots: Spots, points: GatherPoints, block: int) -> tuple[NDArray[
             count = min(NEAR, len(known))
             found = KDTree(place[points.texel[known]]).query(place[mine], k=np.arange(1, count + 1))[1]
             at = known[found]  # (n, count)
-            share = _shares(spots, mine, points.texel[at], block)
+            share = _shares(spots, mine, points, at)
             codes.append(spots.index[mine] * 2 + side)
             near.append(np.pad(at, ((0, 0), (0, NEAR - count))))
             shares.append(np.pad(share, ((0, 0), (0, NEAR - count))))
@@ -93,11 +146,13 @@ def neighbours(spots: Spots, points: GatherPoints, block: int) -> tuple[NDArray[
     return code[order].astype(np.uint32), packed
 
 
-def _shares(spots: Spots, mine: Indices, at: Indices, block: int) -> Floats:
-    """(n, count) bytes, the largest of each row BYTE."""
-    size = np.sqrt(spots.area[mine])[:, None] * block * SPREAD
-    squared = ((spots.position[mine][:, None] - spots.position[at]) ** 2).sum(axis=-1) / np.maximum(size**2, 1e-12)
-    cosine = np.maximum((spots.normal[mine][:, None] * spots.normal[at]).sum(axis=-1), 0)
+def _shares(spots: Spots, mine: Indices, points: GatherPoints, at: Indices) -> Floats:
+    """(n, count) bytes of the points `at` (n, count), nearest first; the largest of each row is BYTE."""
+    texel = points.texel[at]
+    size = np.sqrt(spots.area[mine]) * points.block[at[:, 0]] * SPREAD
+    squared = ((spots.position[mine][:, None] - spots.position[texel]) ** 2).sum(axis=-1)
+    squared /= np.maximum(size[:, None] ** 2, 1e-12)
+    cosine = np.maximum((spots.normal[mine][:, None] * spots.normal[texel]).sum(axis=-1), 0)
     nearest = squared.min(axis=1, keepdims=True)
     weight = np.exp(nearest - squared) * (cosine**BENT + LEAST)
     return np.asarray(np.rint(weight / weight.max(axis=1, keepdims=True) * BYTE))

@@ -60,8 +60,31 @@ class RayEnds:
             spots[part], weights[part] = self._pass(sides, mine[part], count, (seed, number))
         return spots, weights
 
+    def distance_in_texels(self, sides: Sides, mine: Indices, count: int, seed: int) -> Floats:
+        """Harmonic means (n,) of the distances from texels `mine` (n,) along `count` rays, in sizes of the texel."""
+        found, at_once = np.zeros(len(mine)), max(1, RAYS_AT_ONCE // count)
+        for number, first in enumerate(range(0, len(mine), at_once)):
+            part = slice(first, first + at_once)
+            ray = self._leaving(sides, mine[part], count, np.random.default_rng((seed, number)))
+            far = rays.distances(self._whole, ray).reshape(-1, count)
+            found[part] = 1 / np.maximum((1 / np.maximum(far, 1e-9)).mean(axis=1), 1e-9)
+        return np.asarray(found / np.maximum(sides.texels.spacing[mine], 1e-9))
+
     def _pass(self, sides: Sides, mine: Indices, count: int, seed: tuple[int, int]) -> tuple[Any, Any]:
-        points, rng, n = points_of(sides, mine), np.random.default_rng(seed), len(mine)
+        rng, n = np.random.default_rng(seed), len(mine)
+        ray = self._leaving(sides, mine, count, rng)
+        sampler = independent(int(rng.integers(1 << 32)), n * count)
+        spot, weight = _followed(
+            self._whole, sampler, mi.Ray3f(ray), self._numbers, self._diffuse, self._coupled, self._size,
+            self._textured, rays.has_holes(self._whole),
+        )  # fmt: skip
+        weight = dr.select(dr.isfinite(weight), weight, 0.0)
+        dr.eval(spot, weight)
+        return np.array(spot).reshape(n, count), np.array(weight).reshape(n, count)
+
+    def _leaving(self, sides: Sides, mine: Indices, count: int, rng: np.random.Generator) -> Any:
+        """Cosine distributed rays (n * count,) from texels `mine` (n,), stratified by texel."""
+        points, n = points_of(sides, mine), len(mine)
         thread = dr.arange(mi.UInt32, n * count)
         per_texel = dr.opaque(mi.UInt32, count)  # a constant count would compile another kernel
         texel, k = thread // per_texel, thread % per_texel
@@ -72,15 +95,7 @@ class RayEnds:
         pairs = zip(hammersley(count).T.astype(np.float32), shifts, strict=True)
         u = [dr.gather(mi.Float, mi.Float(of), k) + dr.gather(mi.Float, mi.Float(shift), texel) for of, shift in pairs]
         local = mi.warp.square_to_cosine_hemisphere(mi.Point2f(u[0] - dr.floor(u[0]), u[1] - dr.floor(u[1])))
-        ray = rays.leaving(self._whole, p, mi.Normal3f(flat), mi.Frame3f(mi.Normal3f(normal)).to_world(local))
-        sampler = independent(int(rng.integers(1 << 32)), n * count)
-        spot, weight = _followed(
-            self._whole, sampler, mi.Ray3f(ray), self._numbers, self._diffuse, self._coupled, self._size,
-            self._textured, rays.has_holes(self._whole),
-        )  # fmt: skip
-        weight = dr.select(dr.isfinite(weight), weight, 0.0)
-        dr.eval(spot, weight)
-        return np.array(spot).reshape(n, count), np.array(weight).reshape(n, count)
+        return rays.leaving(self._whole, p, mi.Normal3f(flat), mi.Frame3f(mi.Normal3f(normal)).to_world(local))
 
 
 @dr.syntax

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, finished_groups, finished_maps
+from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, finished_groups, finished_maps, keeps_direct
 from lambent.bake.artefacts.probe import sharing
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 KIND = "answer"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 5
+REVISION = 6
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
@@ -42,8 +42,8 @@ TILES = 16  # of transfer and of rays
 class Settings:
     """Patches, rays from each, and what light is gathered with.
 
-    Texels get `direct_samples` of direct light; where light is sorted, the light map has it, but for what lobes have
-    sent on, which takes `lobe_samples`. One texel of each block of `block` x `block` texels gathers by `gather_rays`.
+    Where the light map keeps no direct light, texels get `direct_samples` of it; where that is sorted, what lobes have
+    sent on takes `lobe_samples`. One texel of each block of `block` x `block` texels gathers by `gather_rays`.
     """
 
     patches: int = 1000
@@ -64,13 +64,15 @@ SETTINGS = {
 
 def keys(context: BakeContext) -> dict[str, str]:
     how: Settings = context.settings(KIND)
-    light = context.keys("light_map")[IRRADIANCE[0]]
+    of_map, ready = context.keys("light_map"), keeps_direct(context)
+    light = [of_map[name] for name in (IRRADIANCE[0], group_name(SIDES[0], direct=True)) if name in of_map]
     count = 2 if any(context.two_sided) else 1
-    samples = how.lobe_samples if sorts_light(context.methods) else how.direct_samples
+    samples = 0 if ready else how.lobe_samples if sorts_light(context.methods) else how.direct_samples
     effort = [how.patches, how.patch_rays, how.gather_rays, how.block, samples, how.importance_rays]
     key = key_of(KIND, REVISION, light, effort, context.seed)
-    by_group = map(_by_group, TRACED[:count]) if sorts_light(context.methods) else ()
-    found = dict.fromkeys((*TRACED[:count], *by_group, *MAPS[:count]), key)
+    sampled = () if ready else TRACED[:count]
+    by_group = map(_by_group, sampled) if sorts_light(context.methods) else ()
+    found = dict.fromkeys((*sampled, *by_group, *MAPS[:count]), key)
     worn = [(o.name, o.material) for o in context.scene.objects]  # patches are of one material, by its name
     found |= dict.fromkeys(map(answer_name, (*PATCH, *BETWEEN)), key_of(KIND, REVISION, key, worn))
     of_probes = context.keys("probe")
@@ -104,23 +106,31 @@ def _direct(context: BakeContext, side: int) -> Floats:
 
     What lobes alone have sent on counts as direct.
     """
+    if MAPS[side] not in context.stale(KIND):
+        return np.asarray(context.store.read(MAPS[side]))
+    lit = _lit(context)[side]
+    if keeps_direct(context):
+        direct = context.store.read(group_name(SIDES[side], direct=True))
+    else:
+        direct = np.minimum(_sampled_direct(context, side, lit), np.asarray(lit, np.float16))
+    context.put(KIND, MAPS[side], direct, context.provenance())
+    return np.asarray(direct)
+
+
+def _sampled_direct(context: BakeContext, side: int, lit: Floats) -> Floats:
+    """The same for a light map `lit` (G, H, W, 3) that does not keep it."""
     from lambent.bake.answering.direct import cleaned_direct
     from lambent.bake.light.sampling import closed, sampled_halves
 
-    if MAPS[side] not in context.stale(KIND):
-        return np.asarray(context.store.read(MAPS[side]))
-    labels = _sampled_direct(context, side)
+    labels = _direct_samples(context, side)
     halves, known = sampled_halves(context.store.read(TRACED[side]))
-    lit = _lit(context)[side]
     if sorts_light(context.methods):
         clean = _direct_by_group(context, side, lit, known, labels)
     else:
         clean = cleaned_direct(halves, known, lit[0], labels)[None]
-    if known.any():  # where seams of the light map have been moved, its direct part has, too
-        clean = closed(clean, known, context.traced.texels, labels, context.traced.cuts)
-    direct = np.minimum(clean, np.asarray(lit, np.float16))
-    context.put(KIND, MAPS[side], direct, context.provenance())
-    return direct
+    if not known.any():
+        return clean
+    return closed(clean, known, context.traced.texels, labels, context.traced.cuts)  # as the light map is
 
 
 def _lit(context: BakeContext) -> list[Floats]:
@@ -144,10 +154,11 @@ def _direct_by_group(context: BakeContext, side: int, lit: Floats, known: Flags,
     return np.asarray(straight_map + sent)
 
 
-def _sampled_direct(context: BakeContext, side: int) -> Indices:
+def _direct_samples(context: BakeContext, side: int) -> Indices:
     """Take samples of direct light of a side, those by group beside; returns the charts that viewers see (H, W)."""
     from lambent.bake.light.groups import BothWriters
     from lambent.bake.light.sampling import Sampling, tile_samples
+    from lambent.bake.tracing.group_tally import Direct
 
     how: Settings = context.settings(KIND)
     traced, tile = context.traced, context.settings("light_map").tile_texels
@@ -161,7 +172,7 @@ def _sampled_direct(context: BakeContext, side: int) -> Indices:
         parts = 2 * len(traced.sorted_lights.groups)  # all of it, and what comes straight from emitters
         beside = context.samples(KIND, _by_group(TRACED[side]), (1, *size, 3 * parts), (1, tile, tile, 3 * parts))
         writer = BothWriters(whole, beside)
-        sampling = replace(sampling, tally=traced.tally(diffuse=False, direct=True), parts=parts)
+        sampling = replace(sampling, tally=traced.tally(diffuse=False, direct=Direct.straight), parts=parts)
     scene = traced.whole(diffuse=False)
     sides, labels = traced.in_view(SIGNS[side])
     if writer.missing:
@@ -209,15 +220,20 @@ def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
 
 def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Clusters) -> None:
     """Transfer between patches, and rays between points."""
-    from lambent.bake.answering.points import bounded_points, neighbours
+    from lambent.bake.answering.points import bounded_points, neighbours, refined_points
     from lambent.bake.answering.senders import points_near
     from lambent.bake.answering.transfer import Between
 
     how: Settings = context.settings(KIND)
     width, count = context.traced.texels.width, clusters.count
     sides = [context.traced.in_view(sign)[0] for sign in SIGNS[: 2 if any(context.two_sided) else 1]]
-    points, block = bounded_points(spots, width, how.block, clusters.count)
-    codes, near = neighbours(spots, points, block)
+    coarse = bounded_points(spots, width, how.block, clusters.count)
+    distance = np.zeros(len(coarse.texel))
+    for side, of_side in enumerate(sides):
+        mine = np.flatnonzero(coarse.side == side)
+        distance[mine] = ends.distance_in_texels(of_side, coarse.texel[mine], how.importance_rays, context.seed)
+    points = refined_points(spots, width, coarse, distance)
+    codes, near = neighbours(spots, points)
     closest = points_near(spots, codes, near)
     between = Between(ends, spots, sides, clusters, closest, points, spots.exitance(context.scene))
 

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 KIND = "light_map"
 NEEDS = ("geometry",)
 REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 4, 3, 3, 1, 1
+REVISION_OF_DIRECT = 3
 IRRADIANCE = tuple(f"light_map/{side}" for side in SIDES)
 NOISE = tuple(noise_name(side) for side in SIDES)
 TRACED, GATHERED = (f"light_map/{stage}" for stage in ("traced", "gathered"))
@@ -91,13 +92,18 @@ def keys(context: BakeContext) -> dict[str, str]:
     count = _sides(context)
     names = [*IRRADIANCE[:count], *NOISE[:count]]
     raw = [PHOTONS] if _by_photons(context) else [_of_side(stage, i) for stage in _stages(how) for i in range(count)]
+    direct: list[str] = []  # of the last stage
     if grouped:
-        names += [name for side in SIDES[:count] for name in (group_name(side), group_name(side, direct=True))]
-        raw += [_parts(_of_side(stage, side)) for stage in _stages(how) for side in range(count)]
+        names += map(group_name, SIDES[:count])
+        raw += [_parts(_of_side(stage, side)) for stage in _stages(how)[:-1] for side in range(count)]
+    if grouped or keeps_direct(context):
+        direct += [group_name(side, direct=True) for side in SIDES[:count]]
+        direct += [_parts(_of_side(_stages(how)[-1], side)) for side in range(count)]
     if _bumpy_faces(context).any():
         names.append(DOMINANT_DIRECTION)
         raw.append(MOMENTS)
-    return dict.fromkeys(raw, samples) | dict.fromkeys(names, filtered)
+    of_direct = key_of("direct", REVISION_OF_DIRECT, filtered)
+    return dict.fromkeys(raw, samples) | dict.fromkeys(names, filtered) | dict.fromkeys(direct, of_direct)
 
 
 def bake(context: BakeContext) -> None:
@@ -129,6 +135,14 @@ def finished_groups(context: BakeContext) -> tuple[Floats, Floats | None]:
     """The same by light group, (n, H, W, 3)."""
     front, *back = (context.store.read(group_name(side)) for side in SIDES[: _sides(context)])
     return front, back[0] if back else None
+
+
+def keeps_direct(context: BakeContext) -> bool:
+    """Whether the light map keeps all of its direct light apart, what lobes have sent on included.
+
+    Final gathering knows where a path ends: at an emitter, or on cached light.
+    """
+    return not _by_photons(context) and bool(context.settings(KIND).gather_samples)
 
 
 def _by_photons(context: BakeContext) -> bool:
@@ -167,7 +181,9 @@ def _bumpy_faces(context: BakeContext) -> Flags:
 
 
 def _sampled_maps(context: BakeContext) -> Maps:
-    from lambent.bake.light.sampling import finished, gathered, path_traced
+    from lambent.bake.light.direct import direct_part
+    from lambent.bake.light.sampling import SMOOTH, finished, gathered, path_traced, sampled_halves
+    from lambent.bake.tracing.path_tracer import AllLight
 
     def maps(stage: str, sampling: Sampling) -> Maps:
         found = []
@@ -175,6 +191,10 @@ def _sampled_maps(context: BakeContext) -> Maps:
             raw, labels = _samples(context, stage, side, sampling)
             context.progress(0, 1, "denoising")
             found.append(finished(raw, context.traced.texels, labels, context.traced.cuts))
+            if sampling.parts:
+                parts, (halves, known) = context.store.read(_parts(_of_side(stage, side)))[0], sampled_halves(raw)
+                direct = direct_part(parts, halves.mean(axis=0), found[-1][0], known, labels, SMOOTH)
+                context.put(KIND, group_name(SIDES[side], direct=True), direct[None], context.provenance())
         return found
 
     how: Settings = context.settings(KIND)
@@ -183,19 +203,21 @@ def _sampled_maps(context: BakeContext) -> Maps:
         return first
     back = first[1][0] if len(first) > 1 else None
     cache = context.traced.cache(first[0][0], back)
-    return maps(GATHERED, gathered(how.gather_samples, how.gather_noise, how.max_depth, cache))
+    gathering = gathered(how.gather_samples, how.gather_noise, how.max_depth, cache)
+    return maps(GATHERED, replace(gathering, tally=AllLight(direct=True), parts=1))
 
 
 def _sorted_maps(context: BakeContext) -> Maps:
     """The same as sums of the maps of light groups, which are put into the store beside."""
     from lambent.bake.light.groups import finished_groups, group_notes
     from lambent.bake.light.sampling import gathered, path_traced
+    from lambent.bake.tracing.group_tally import Direct
 
     how: Settings = context.settings(KIND)
     traced, count = context.traced, len(context.traced.sorted_lights.groups)
 
-    def maps(stage: str, sampling: Sampling, *, diffuse: bool, direct: bool) -> list[GroupMaps]:
-        parts = count * (1 + direct)
+    def maps(stage: str, sampling: Sampling, *, diffuse: bool, direct: Direct | None) -> list[GroupMaps]:
+        parts = count * (1 + (direct is not None))
         sampling = replace(sampling, tally=traced.tally(diffuse=diffuse, direct=direct), parts=parts)
         found = []
         for side in range(_sides(context)):
@@ -205,11 +227,12 @@ def _sorted_maps(context: BakeContext) -> Maps:
         return found
 
     last = how.gather_samples == 0
-    found = maps(TRACED, path_traced(how.samples, how.noise, how.max_depth), diffuse=True, direct=last)
+    direct = Direct.straight if last else None
+    found = maps(TRACED, path_traced(how.samples, how.noise, how.max_depth), diffuse=True, direct=direct)
     if not last:
         cache = traced.grouped_cache(found[0].light, found[1].light if len(found) > 1 else None)
         sampling = gathered(how.gather_samples, how.gather_noise, how.max_depth, cache)
-        found = maps(GATHERED, sampling, diffuse=False, direct=True)
+        found = maps(GATHERED, sampling, diffuse=False, direct=Direct.uncached)
     notes = context.provenance(groups=group_notes(traced, found[0].light))
     for side, one in zip(SIDES, found, strict=False):
         assert one.direct is not None, "the last stage has it"

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.light.denoise import denoise_charts, fill
+from lambent.bake.light.direct import direct_part
 from lambent.bake.light.sampling import SMOOTH, closed, relative_noise, sampled_halves
 from lambent.bake.light.stitching import Cuts
 from lambent.bake.surfaces.texels import Texels
@@ -65,7 +66,10 @@ class BothWriters:
 
 @dataclass(frozen=True, eq=False)
 class GroupMaps:
-    """A side of the light map, float16: `whole` (H, W, 3), `light` and `direct` by group (n, H, W, 3); its notes."""
+    """A side of the light map, float16: `whole` (H, W, 3), `light` and `direct` by group (n, H, W, 3); its notes.
+
+    Direct light is nowhere more than all light of its group.
+    """
 
     whole: NDArray[np.float16]
     light: NDArray[np.float16]
@@ -78,23 +82,27 @@ def finished_groups(
 ) -> GroupMaps:
     """The maps of `count` groups from samples of the whole (2, H, W, 4) and of parts (H, W, 3 count or 6 count).
 
-    Direct light is nowhere more than all light of its group, whose denoising is another. Maps without it only light
-    the next ones: their seams are left as they are.
+    Maps without direct light only light the next ones: their seams are left as they are.
     """
     halves, known = sampled_halves(raw)
     samples = float(raw[..., 3].sum(axis=0)[known].mean()) if known.any() else 0.0
-    clean = np.moveaxis(parts.reshape(*known.shape, -1, 3), 2, 0).copy()
+    by_group = np.moveaxis(parts.reshape(*known.shape, -1, 3), 2, 0)
+    clean = by_group[:count].copy()
     for number, one in enumerate(clean):
-        progress(number, len(clean), "denoising by group")
+        progress(number, len(by_group), "denoising by group")
         if known.any() and one.any():
             clean[number] = denoise_charts(one, known, labels, smooth=SMOOTH)
     light, direct = np.zeros((count, *known.shape, 3), np.float16), None
-    lit = np.flatnonzero(clean[:count].any(axis=(1, 2, 3)))
-    if len(clean) == count:
+    lit = np.flatnonzero(clean.any(axis=(1, 2, 3)))
+    if len(by_group) == count:
         light[lit] = _filled(clean[lit], known, labels)
     else:
         light[lit] = closed(clean[lit], known, texels, labels, cuts) if len(lit) else 0
-        direct = np.minimum(_filled(clean[count:], known, labels), light)
+        direct = np.zeros_like(light)
+        for number in lit.tolist():
+            progress(count + number, len(by_group), "denoising by group")
+            both = by_group[count + number], by_group[number]
+            direct[number] = direct_part(*both, light[number], known, labels, SMOOTH)
     whole = np.minimum(light.astype(np.float32).sum(axis=0), HALF_MAX).astype(np.float16)
     return GroupMaps(whole, light, direct, {"noise": relative_noise(halves[:, known]), "samples": samples})
 

@@ -38,8 +38,8 @@ class Sampling:
     """How texels are sampled: `samples` (at least, at most) times, until the relative noise is reached.
 
     With a `cache` (`path_tracer.radiance`), paths end at diffuse surfaces, and the scene must be without diffuse terms.
-    Direct light of the sun `unseen` is left out. A `tally` sorts light by group, of which `parts` are kept beside the
-    whole; the cache is then one that it takes.
+    Direct light of the sun `unseen` is left out. A `tally` sums parts of the light, of which the last `parts` are kept
+    beside the whole; the cache is then one that it takes.
     """
 
     samples: tuple[int, int]
@@ -151,13 +151,13 @@ def _sums_of_pass(scene: Any, points: path_tracer.Points, count: int, seed: tupl
 def _estimates(
     scene: Any, sampler: Any, at: path_tracer.Points, u_bsdf: Any, u_emitter: Any, how: Sampling
 ) -> list[Any]:
-    """A sample (mi.Color3f) of each point: the whole, then its parts. Direct light is the second half of a tally's."""
+    """A sample (mi.Color3f) of each point: the whole, then the parts that are kept."""
     if how.tally is None:
         return [how.estimate(scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache, how.unseen)]
     sums = path_tracer.irradiance_sums(
         scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache, how.tally, how.unseen
     )
-    return [mi.Color3f(sum(sums[: how.tally.count])), *sums]
+    return [mi.Color3f(sum(sums[: how.tally.count])), *sums[len(sums) - how.parts :]]
 
 
 def _shifted(points: Floats, shifts: Floats, k: Any, texel: Any) -> Any:

@@ -59,7 +59,7 @@ class ProbeSet:
         """Keep probes by light group too: from its light maps (n, H, W, 3), where whole paths are not traced."""
         whole_paths = self._cache is None
         cache = None if groups is None else self._traced.grouped_cache(groups, groups_back)
-        self._sorting = self._traced.tally(diffuse=whole_paths, direct=False), cache
+        self._sorting = self._traced.tally(diffuse=whole_paths, direct=None), cache
 
     @cached_property
     def _solids(self) -> SolidTest:

@@ -5,6 +5,7 @@ Of an environment with a sun in it, what the sun's picture adds is the sun's, th
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import Any
 
 import drjit as dr
@@ -16,13 +17,20 @@ from lambent.bake.tracing.sun import Sun
 from lambent.scenes.light_groups import SortedLights
 
 
+class Direct(Enum):
+    """Light that is summed apart: `straight` from emitters, or `uncached`, by lobes as well but from no cache."""
+
+    straight = "straight"
+    uncached = "uncached"
+
+
 class GroupTally:
-    """A `path_tracer.Tally` with a sum for each group and, with `direct`, one more for what comes straight from it.
+    """A `path_tracer.Tally` with a sum for each group and, with `direct`, one more for its direct light.
 
     Sums of all light are the first `count`. Its caches are `GroupedCache`s, or None.
     """
 
-    def __init__(self, lights: SortedLights, builder: SceneBuilder, sun: Sun | None, *, direct: bool) -> None:
+    def __init__(self, lights: SortedLights, builder: SceneBuilder, sun: Sun | None, direct: Direct | None) -> None:
         self.count, self._direct = len(lights.groups), direct
         self._sun, self._of_sun, self._of_sky = sun, lights.sun, lights.sky
         known = [(builder.meshes[name].emitter(), group) for name, group in lights.of_objects.items()]
@@ -33,7 +41,7 @@ class GroupTally:
         self._groups, self._size = mi.UInt32(table), len(table)
 
     def begin(self, width: int) -> list[Any]:
-        return [dr.zeros(mi.Color3f, width) for _ in range(self.count * (1 + self._direct))]
+        return [dr.zeros(mi.Color3f, width) for _ in range(self.count * (1 + (self._direct is not None)))]
 
     def emitted(self, sums: list[Any], light: Any, emitter: Any, w: Any, factor: Any, first: Any) -> list[Any]:
         number = dr.reinterpret_array(mi.UInt32, emitter)
@@ -47,8 +55,10 @@ class GroupTally:
         parts = [dr.select(group == number, light - of_sun, 0.0) for number in range(self.count)]
         if self._of_sun is not None:
             parts[self._of_sun] = parts[self._of_sun] + of_sun
-        straight = [dr.select(first, part, 0.0) for part in parts] if self._direct else []
-        return [total + part for total, part in zip(sums, [*parts, *straight], strict=True)]
+        direct = parts if self._direct == Direct.uncached else []
+        if self._direct == Direct.straight:
+            direct = [dr.select(first, part, 0.0) for part in parts]
+        return [total + part for total, part in zip(sums, [*parts, *direct], strict=True)]
 
     def cached(self, sums: list[Any], throughput: Any, cache: Any, si: Any, active: Any) -> list[Any]:
         if cache is None:

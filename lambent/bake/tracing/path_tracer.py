@@ -48,18 +48,23 @@ class Tally(Protocol):
 
 
 class AllLight:
-    """One sum of all light; a cache is a `Cache`, or None."""
+    """One sum of all light; a cache is a `Cache`, or None. With `direct`, one more without the light of the cache."""
 
     count = 1
 
+    def __init__(self, *, direct: bool = False) -> None:
+        self._direct = direct
+
     def begin(self, width: int) -> list[Any]:
-        return [dr.zeros(mi.Color3f, width)]
+        return [dr.zeros(mi.Color3f, width) for _ in range(1 + self._direct)]
 
     def emitted(self, sums: list[Any], light: Any, emitter: Any, w: Any, factor: Any, first: Any) -> list[Any]:
-        return [sums[0] + light]
+        return [total + light for total in sums]
 
     def cached(self, sums: list[Any], throughput: Any, cache: Any, si: Any, active: Any) -> list[Any]:
-        return sums if cache is None else [sums[0] + dr.select(active, throughput * cache(si, active), 0.0)]
+        if cache is None:
+            return sums
+        return [sums[0] + dr.select(active, throughput * cache(si, active), 0.0), *sums[1:]]
 
 
 @dataclass

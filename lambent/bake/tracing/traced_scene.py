@@ -21,7 +21,7 @@ from lambent.bake.surfaces.atlas import Atlas
 from lambent.bake.surfaces.texels import POINTS, Sides, Texels, chart_labels, texels_of
 from lambent.bake.tracing.emitters import balance_emitters
 from lambent.bake.tracing.first_light import FirstLight, sky_without
-from lambent.bake.tracing.group_tally import GroupTally
+from lambent.bake.tracing.group_tally import Direct, GroupTally
 from lambent.bake.tracing.scene_builder import EmitterSampling, SceneBuilder
 from lambent.bake.tracing.solids import SolidTest
 from lambent.bake.tracing.sun import Sun, SunRays
@@ -121,9 +121,9 @@ class TracedScene:
         suns = [] if found is None else [number for number, light in lights if is_sun(light, found)]
         return sorted_lights(self.scene, suns, sun_in_sky=found is not None and found.picture is not None)
 
-    def tally(self, *, diffuse: bool, direct: bool) -> GroupTally:
+    def tally(self, *, diffuse: bool, direct: Direct | None) -> GroupTally:
         """Sorts the light of paths in `whole(diffuse=diffuse)` by group; `direct` light apart as well."""
-        return GroupTally(self.sorted_lights, self.builder(diffuse=diffuse), self.sun, direct=direct)
+        return GroupTally(self.sorted_lights, self.builder(diffuse=diffuse), self.sun, direct)
 
     def grouped_cache(self, irradiance: Floats, irradiance_back: Floats | None) -> GroupedCache:
         """`cache` of the light maps (n, H, W, 3) of groups."""

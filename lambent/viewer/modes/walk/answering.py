@@ -20,7 +20,6 @@ from lambent.realtime.answering import AnsweredLight, Lit
 from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.resources import light_layers
 from lambent.store.answer import has_answer, read_answer
 from lambent.store.store import Store
 from lambent.viewer.work import Work
@@ -42,7 +41,7 @@ class Answering:
         """A line for the panel."""
         if self.likely_error is None or not self.on:
             return self.said
-        return f"light of other surfaces: estimated, off by about {100 * self.likely_error:.1f} %"
+        return f"light of other surfaces: estimated, off by at most about {100 * self.likely_error:.1f} %"
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +121,7 @@ class AnsweringLight:
         light, mixer = self._answer.lit(edited), self._renderer.mixer
         off = None if light.is_baked else self._answer.likely_error(light, mixer.factors)
         groups = self._answer.groups(light)
-        return _Maps(light, None if groups else light_layers(*self._answer.maps(light)), groups, off)
+        return _Maps(light, None if groups else self._answer.layers(light), groups, off)
 
     def _show_maps(self, maps: _Maps) -> None:
         self._shown.likely_error = maps.likely_error
