@@ -47,8 +47,8 @@ class SunLight:
         self.shine(sun.irradiance if sun is not None else (0.0, 0.0, 0.0))
         self.nowhere = upload(layouts.device, [np.zeros((1, 1, 1, 1), np.float16)], "r16float").create_view()
         if self.exists:
-            read = [read_depths(layouts.device, depths, layer) for layer in range(depths.size[2])]
-            blocks = upload(layouts.device, [block_ranges(np.stack(read))], "rg32float")
+            read = (read_depths(layouts.device, depths, layer)[None] for layer in range(depths.size[2]))
+            blocks = upload(layouts.device, [np.concatenate([block_ranges(one) for one in read])], "rg32float")
             textures = (depths, blocks, panes.depths, panes.colours)
             views = (texture.create_view(dimension="2d-array") for texture in textures)
             self.group = layouts.group(layouts.of(*SHADOW_MAP), self.uniform, *views)
@@ -72,13 +72,8 @@ def sun_data(sun: SunRecord | None, parts: SunParts) -> Record:
         data["part_towards"][0, k] = *towards, part.tangent
         data["across"][0, k], data["down"][0, k] = (*across, part.low_m), (*down, part.span_m)
         for row, (u, v, side) in zip(data["squares"][0, MOST_SQUARES * k :], part.squares, strict=False):
-            row[:] = u, v, side_px(parts) / side, side / side_px(parts)
+            row[:] = u, v, SIDE / side, side / SIDE
     return data
-
-
-def side_px(parts: SunParts) -> int:
-    """Texels along a square of the shadow map."""
-    return SIDE // (1 if len(parts) == 1 else 2)
 
 
 def block_ranges(depths: Floats) -> NDArray[np.float32]:
@@ -110,7 +105,7 @@ def _with_neighbours(least: Floats, greatest: Floats) -> Floats:
 def draw_depths(layouts: Layouts, parts: SunParts, resources: Any, panes: Collection[str] = ()) -> Any:
     """Texture of a layer for each square, with the depths of what blocks the sun (of `resources.SceneResources`)."""
     squares = [(part, square) for part in parts for square in part.squares]
-    texture = depth_texture(layouts.device, side_px(parts), side_px(parts), len(squares))
+    texture = depth_texture(layouts.device, SIDE, SIDE, len(squares))
     solid, encoder = SolidDepths(layouts, resources, materials=panes), layouts.device.create_command_encoder()
     for layer, (part, square) in enumerate(squares):
         view = texture.create_view(dimension="2d", base_array_layer=layer, array_layer_count=1)

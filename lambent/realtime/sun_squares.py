@@ -1,7 +1,7 @@
 """Where the shadow map of the sun lies: at most four squares across its light, the smallest first.
 
 The first holds what cameras see, the last the whole scene. A sun wider than WIDE_RAD is cut into four discs, which have
-squares of their own, half as fine: with one of them, blockers at several distances leave penumbras wrong.
+squares of their own: with those of one, blockers at several distances leave wrong penumbras.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def parts_of(direction: Sequence[float], radius_rad: float, corners: Floats, eye
     axes = np.stack(basis(towards))
     turns = (np.arange(PARTS) + 0.5) * 2 * np.pi / PARTS
     middles = towards + ASIDE * tangent * np.column_stack([np.cos(turns), np.sin(turns)]) @ axes
-    found = [squares_of(middle, corners, eyes, SIDE // 2) for middle in normalize(middles)]
+    found = [squares_of(middle, corners, eyes) for middle in normalize(middles)]
     most = max(len(part.squares) for part in found)
     return tuple(
         replace(
