@@ -2,7 +2,7 @@
 
 struct Frame {
     clip_from_world: mat4x4f,
-    eye: vec4f,      // w: which of 16 turns this frame takes of interleaved samples; frames of a still take them all
+    eye: vec4f,      // w: which of 64 turns this frame takes of interleaved samples; frames of a still take them all
     across: vec4f,   // the ray of clip position (x, y) is forward + x across + y up
     up: vec4f,
     forward: vec4f,

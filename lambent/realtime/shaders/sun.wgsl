@@ -44,8 +44,9 @@ fn turn_sun_pattern(pixel: vec2u) {
     let place = ((mixed & 1u) << 3u) | ((pixel.y & 1u) << 2u) | (mixed & 2u) | ((pixel.y & 2u) >> 1u);
     let frames = f32(frame.first_sample & 0xffffu);
     let order = f32(place) + 0.5;
-    sun_part = ((pixel.x & 1u) + 2u * (pixel.y & 1u) + (u32(frame.eye.w) >> 2u)) % sun.parts;
-    sun_turn = fract(vec2f(order / 16.0 + 0.7548776662 * frames, 0.6180339887 * (order + frame.eye.w) + 0.5698402910 * frames));
+    sun_part = ((pixel.x & 1u) + 2u * (pixel.y & 1u) + (u32(frame.eye.w) >> 4u)) % sun.parts;
+    let turn = f32(u32(frame.eye.w) >> 2u); // sixteen in a still: for each part they show all of a ring
+    sun_turn = fract(vec2f((order + 5.0 * turn) / 16.0 + 0.7548776662 * frames, 0.6180339887 * (order + turn) + 0.5698402910 * frames));
 }
 
 // Where a surface lies in the map: place in texels of a square, depth in metres towards the sun, and its slope, metres of
