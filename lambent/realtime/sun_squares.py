@@ -21,9 +21,7 @@ MIDDLE = 0.96  # of what they see lies in the first square, along each axis
 RIM_PX = 4  # texels around the scene
 WIDE_RAD = 0.0175  # a degree; the sun of the sky has .27
 PARTS = 4  # of a wide sun
-ASIDE = np.sqrt(
-    3 / 8
-)  # of the radius, to the middles of discs of half the radius: all four have the variance of the whole
+ASIDE = np.sqrt(3 / 8)  # of the radius, to the middles of discs of half of it: all four have the whole's variance
 
 
 @dataclass(frozen=True)

@@ -2,10 +2,11 @@
 // squares, the smallest first, and the least and greatest depths of blocks of texels. Layers of clear glass beside it
 // (realtime/panes.py) tint what they let through.
 //
-// A wide sun's disc is cut into parts, each seen in a map of its own: one blocker hides others behind it from a map, and
-// no width of a filter suits both. Penumbras are as wide as the sun's disc makes them behind the mean of the blockers (Fernando 2005, "Percentage-closer
-// soft shadows"). The plane of the surface is followed from texel to texel, so that it does not shadow itself. Under the
-// edge of a sheet that touches the surface, texels beyond that edge do not count: what they show is farther from the sun.
+// A wide sun's disc is cut into parts, each with a map of its own: in one map blockers hide others behind them, and no one
+// filter fits all of their penumbras. Those are as wide as a part's disc makes them behind the mean of the blockers
+// (Fernando 2005, "Percentage-closer soft shadows"). The plane of the surface is followed from texel to texel, so that it
+// does not shadow itself. Under the edge of a sheet that touches the surface, texels beyond that edge do not count: what
+// they show is farther from the sun.
 
 #include "vertex.wgsl"
 #include "sun_record.wgsl"
