@@ -165,10 +165,12 @@ def quantity_of(show: str) -> Quantity:
 def frame_data(state: FrameState, bounds: ArrayLike) -> Record:
     """Record of FRAME_DTYPE; `bounds` (2, 3) are those of the scene."""
     camera, width, height = state.camera, state.width, state.height
-    jitter = state.jitter_px
-    if state.accumulate is not None and state.antialias:
+    jitter, turn = state.jitter_px, state.jitter_px[0] + 0.5
+    if state.accumulate is not None:
         index = np.array([state.accumulate + 1])
-        jitter = (float(radical_inverse(index, 2)[0]) - 0.5, float(radical_inverse(index, 3)[0]) - 0.5)
+        turn = float(radical_inverse(index, 2)[0])
+        if state.antialias:
+            jitter = (turn - 0.5, float(radical_inverse(index, 3)[0]) - 0.5)
     low, high = np.asarray(bounds)
     near_m = state.near_m or float(np.clip(1e-4 * np.linalg.norm(high - low), 1e-3, 0.1))
     across, up, forward = image_plane(camera, width, height)
@@ -176,11 +178,12 @@ def frame_data(state: FrameState, bounds: ArrayLike) -> Record:
     data["clip_from_world"] = clip_from_world(camera, width, height, near_m, jitter).T  # WGSL stores columns
     data["eye"][:3], data["across"][:3], data["up"][:3] = camera.position, across, up
     data["forward"][:3] = forward + across * (2 * jitter[0] / width) - up * (2 * jitter[1] / height)
-    data["eye"][3] = np.floor((jitter[0] + 0.5) * TILE) % TILE
+    data["eye"][3] = np.floor(turn * TILE) % TILE
     data["show"] = SHOW[state.show]
     data["scale"] = (state.scale.low, state.scale.high, state.scale.log, quantity_of(state.show).per_y)
     data["first_sample"] = (state.accumulate or 0) * (state.n or QMC_N)
     data["view_transform"] = VIEW_TRANSFORMS[FALSE_COLOUR if state.is_false_coloured else state.view_transform]
     data["prior"] = state.prior
+    data["alone"] = state.accumulate is None and not any(state.jitter_px)
     data["exposure"] = 2.0**state.exposure_ev
     return data

@@ -2,10 +2,12 @@
 
 Layers are peeled (Everitt 2001, "Interactive order-independent transparency"): each pass draws the nearest glass behind
 the layer before, as long as any is left in front of what blocks the sun. What lies beyond the last layer counts as air.
+Texels are twice as large as those of the map.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,13 +26,16 @@ from lambent.realtime.sun_squares import SunSquares
 from lambent.realtime.targets import DEPTH_FORMAT, stored
 from lambent.realtime.textures import BITS
 
-SIDE, MOST_LAYERS = 1024, 8  # texels along a square, half of the shadow map's; faces of triple glazing, and two
+MOST_LAYERS = 8  # faces of triple glazing, and two
 COLOUR_FORMAT = "rgb10a2unorm"
 
 
 @dataclass(frozen=True)
 class PaneLayers:
-    """Textures of `count` layers in each square, number layer x squares + square: depths, and transmittances."""
+    """Textures of `count` layers in each square: depths, and transmittances.
+
+    Number layer x squares + square, of the squares of all parts of the sun.
+    """
 
     count: int
     depths: Any
@@ -43,13 +48,13 @@ def no_panes(device: Any) -> PaneLayers:
 
 
 def pane_layers(
-    layouts: Layouts, squares: SunSquares, resources: Any, solid: Any, names: tuple[str, ...]
+    layouts: Layouts, parts: Sequence[SunSquares], resources: Any, solid: Any, names: tuple[str, ...]
 ) -> PaneLayers:
     """The layers of the materials `names` of a scene (`resources.SceneResources`) before its depths `solid`."""
     items = [item for item in resources.objects if item.record.material in names]
     layers: list[tuple[Any, Any]] = []
     while items and len(layers) < MOST_LAYERS:
-        layer = _peeled(layouts, squares, resources, items, solid, layers[-1][0] if layers else None)
+        layer = _peeled(layouts, parts, resources, items, solid, layers[-1][0] if layers else None)
         if not _holds_any(layouts.device, layer[0]):
             break
         layers.append(layer)
@@ -69,17 +74,17 @@ def pane_data(material: Material) -> NDArray[np.float32]:
 
 
 def _peeled(
-    layouts: Layouts, squares: SunSquares, resources: Any, items: list[Any], solid: Any, before: Any
+    layouts: Layouts, parts: Sequence[SunSquares], resources: Any, items: list[Any], solid: Any, before: Any
 ) -> tuple[Any, Any]:
     """Depths and transmittances of one layer of objects `items`, behind the depths `before`."""
-    device, count = layouts.device, len(squares.squares)
-    made = tuple(_texture(device, SIDE, count, format) for format in (DEPTH_FORMAT, COLOUR_FORMAT))
+    device, squares = layouts.device, [(part, square) for part in parts for square in part.squares]
+    made = tuple(_texture(device, solid.size[0] // 2, len(squares), format) for format in (DEPTH_FORMAT, COLOUR_FORMAT))
     module = device.create_shader_module(code=assemble("pane.wgsl"))
     encoder = device.create_command_encoder()
-    for number, square in enumerate(squares.squares):
+    for number, (part, square) in enumerate(squares):
         data = np.zeros((), FRAME_DTYPE)
-        data["clip_from_world"] = squares.clip_from_world(square).T
-        data["forward"][:3], data["first_sample"] = squares.axes[2], number
+        data["clip_from_world"] = part.clip_from_world(square).T
+        data["forward"][:3], data["first_sample"] = part.axes[2], number
         depth, colour = (t.create_view(dimension="2d", base_array_layer=number, array_layer_count=1) for t in made)
         render = encoder.begin_render_pass(
             color_attachments=stored([colour]),

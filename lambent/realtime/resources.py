@@ -70,7 +70,7 @@ class ObjectResources:
         data["centre"][0] = (*probe.centre, self.light.half_log2_texels("box" if shows_change else cube))
         data["sky_change"][0, :3] = self.light.sky_change
         data["emission"][0, :3] = 0 if dark else np.array(self.emission) / self._unit
-        data["irradiance"].reshape(-1)[: len(probe.irradiance)] = np.array(probe.irradiance) / self._unit
+        data["irradiance"].reshape(-1)[: len(probe.irradiance)] = np.array(probe.irradiance) / (self._unit * probe.gain)
         data["borders"][0] = [*self.record.borders, *[WITHIN] * (MOST_BORDERS - len(self.record.borders))]
         uniform = self._layouts.buffer("UNIFORM", data)
         lamps = self.light.table(table, look_up) if table else self._layouts.empty

@@ -2,7 +2,7 @@
 
 Depths along the sun's direction, 1 nearest to it, in at most four squares: the first holds what cameras see, the last
 the whole scene. What blocks light in a bake blocks it here: all surfaces but the holes of masked ones and clear glass,
-whose layers are beside the map (`panes`).
+whose layers are beside the map (`panes`). Each part of a wide sun has squares of its own (`sun_squares`).
 """
 
 from __future__ import annotations
@@ -21,33 +21,34 @@ from lambent.realtime.layouts import SHADOW_MAP, Layouts
 from lambent.realtime.panes import PaneLayers, no_panes, pane_layers
 from lambent.realtime.solid_depths import SolidDepths, depth_texture, read_depths
 from lambent.realtime.structs import SUN_DTYPE, Record
-from lambent.realtime.sun_squares import SIDE, SunSquares, squares_of
+from lambent.realtime.sun_squares import MOST_SQUARES, SIDE, SunSquares, parts_of
 from lambent.realtime.uploads import upload
 from lambent.store.contract import SunRecord
 
+SunParts = tuple[SunSquares, ...]
 BLOCK = 8  # texels along a block whose least and greatest depths are known: SUN_BLOCK of shaders/sun.wgsl
 
 
 class SunLight:
-    """A sun on the GPU: its record, its shadow map and the blocks of that; none without `squares`.
+    """A sun on the GPU: its record, its shadow map and the blocks of that; none without `parts`.
 
     `nowhere` stands for the pixels that see a sun where there is none.
     """
 
     def __init__(
-        self, layouts: Layouts, sun: SunRecord | None = None, squares: SunSquares | None = None, depths: Any = None,
+        self, layouts: Layouts, sun: SunRecord | None = None, parts: SunParts = (), depths: Any = None,
         panes: PaneLayers | None = None,
     ) -> None:  # fmt: skip
-        self.exists = squares is not None
+        self.exists = len(parts) > 0
         panes = panes or no_panes(layouts.device)
         self.pane_layers = panes.count
-        self._data, self._queue = sun_data(sun, squares), layouts.device.queue
+        self._data, self._queue = sun_data(sun, parts), layouts.device.queue
         self.uniform = layouts.uniform(SUN_DTYPE.itemsize)
         self.shine(sun.irradiance if sun is not None else (0.0, 0.0, 0.0))
         self.nowhere = upload(layouts.device, [np.zeros((1, 1, 1, 1), np.float16)], "r16float").create_view()
-        if squares is not None:
-            read = [read_depths(layouts.device, depths, layer) for layer in range(len(squares.squares))]
-            blocks = upload(layouts.device, [block_ranges(np.stack(read))], "rg32float")
+        if self.exists:
+            read = (read_depths(layouts.device, depths, layer)[None] for layer in range(depths.size[2]))
+            blocks = upload(layouts.device, [np.concatenate([block_ranges(one) for one in read])], "rg32float")
             textures = (depths, blocks, panes.depths, panes.colours)
             views = (texture.create_view(dimension="2d-array") for texture in textures)
             self.group = layouts.group(layouts.of(*SHADOW_MAP), self.uniform, *views)
@@ -59,17 +60,19 @@ class SunLight:
         self._queue.write_buffer(self.uniform, 0, self._data.tobytes())
 
 
-def sun_data(sun: SunRecord | None, squares: SunSquares | None) -> Record:
+def sun_data(sun: SunRecord | None, parts: SunParts) -> Record:
     """Record of SUN_DTYPE; all 0 without a sun."""
     data = np.zeros(1, SUN_DTYPE)
-    if sun is None or squares is None:
+    if sun is None or not parts:
         return data
-    across, down, towards = squares.axes
-    data["towards"][0] = *towards, np.tan(sun.radius_rad)
-    data["across"][0], data["down"][0] = (*across, squares.low_m), (*down, squares.span_m)
-    data["irradiance"][0] = *sun.irradiance, len(squares.squares)
-    for row, (u, v, side) in zip(data["squares"][0], squares.squares, strict=False):
-        row[:] = u, v, SIDE / side, side / SIDE
+    data["towards"][0] = *sun.direction, np.tan(sun.radius_rad)
+    data["irradiance"][0], data["parts"] = (*sun.irradiance, len(parts[0].squares)), len(parts)
+    for k, part in enumerate(parts):
+        across, down, towards = part.axes
+        data["part_towards"][0, k] = *towards, part.tangent
+        data["across"][0, k], data["down"][0, k] = (*across, part.low_m), (*down, part.span_m)
+        for row, (u, v, side) in zip(data["squares"][0, MOST_SQUARES * k :], part.squares, strict=False):
+            row[:] = u, v, SIDE / side, side / SIDE
     return data
 
 
@@ -99,13 +102,14 @@ def _with_neighbours(least: Floats, greatest: Floats) -> Floats:
     return np.stack([minimum_filter(least, size, mode="nearest"), maximum_filter(greatest, size, mode="nearest")], -1)
 
 
-def draw_depths(layouts: Layouts, squares: SunSquares, resources: Any, panes: Collection[str] = ()) -> Any:
+def draw_depths(layouts: Layouts, parts: SunParts, resources: Any, panes: Collection[str] = ()) -> Any:
     """Texture of a layer for each square, with the depths of what blocks the sun (of `resources.SceneResources`)."""
-    texture = depth_texture(layouts.device, SIDE, SIDE, len(squares.squares))
+    squares = [(part, square) for part in parts for square in part.squares]
+    texture = depth_texture(layouts.device, SIDE, SIDE, len(squares))
     solid, encoder = SolidDepths(layouts, resources, materials=panes), layouts.device.create_command_encoder()
-    for layer, square in enumerate(squares.squares):
+    for layer, (part, square) in enumerate(squares):
         view = texture.create_view(dimension="2d", base_array_layer=layer, array_layer_count=1)
-        solid.draw(encoder, view, squares.clip_from_world(square))
+        solid.draw(encoder, view, part.clip_from_world(square))
     layouts.device.queue.submit([encoder.finish()])
     return texture
 
@@ -116,7 +120,7 @@ def sun_light(layouts: Layouts, scene: BakedScene, resources: Any) -> SunLight:
         return SunLight(layouts)
     paths = (camera for path in scene.record.paths for camera in path.keys)
     eyes = np.array([camera.position for camera in (*scene.record.cameras, *paths)], float).reshape(-1, 3)
-    squares = squares_of(scene.sun.direction, scene.positions[scene.faces].astype(float), eyes)
-    names = scene.sun.panes
-    depths = draw_depths(layouts, squares, resources, names)
-    return SunLight(layouts, scene.sun, squares, depths, pane_layers(layouts, squares, resources, depths, names))
+    sun, corners = scene.sun, scene.positions[scene.faces].astype(float)
+    parts = parts_of(sun.direction, sun.radius_rad, corners, eyes)
+    depths = draw_depths(layouts, parts, resources, sun.panes)
+    return SunLight(layouts, sun, parts, depths, pane_layers(layouts, parts, resources, depths, sun.panes))

@@ -1,36 +1,42 @@
 """Where the shadow map of the sun lies: at most four squares across its light, the smallest first.
 
-The first holds what cameras see, the last the whole scene.
+The first holds what cameras see, the last the whole scene. A sun wider than WIDE_RAD is cut into four discs, which have
+squares of their own: with those of one, blockers at several distances leave wrong penumbras.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.directions import basis
+from lambent.core.directions import basis, normalize
 from lambent.core.geometry import points_on_triangles, triangle_areas
 
 SIDE, MOST_SQUARES, RATIO = 2048, 4, 4.0  # texels along a square; squares; times as large as the one before, at least
 POINTS = 1 << 15  # of surfaces, that tell where cameras look
 MIDDLE = 0.96  # of what they see lies in the first square, along each axis
 RIM_PX = 4  # texels around the scene
+WIDE_RAD = 0.0175  # a degree; the sun of the sky has .27
+PARTS = 4  # of a wide sun
+ASIDE = np.sqrt(3 / 8)  # of the radius, to the middles of discs of half of it: all four have the whole's variance
 
 
 @dataclass(frozen=True)
 class SunSquares:
     """Where a shadow map lies: axes (3, 3) across, down and towards the sun, depths from `low_m` over `span_m`.
 
-    squares (n, 3): corner along across and down, and side, all metres.
+    squares (n, 3): corner along across and down, and side, all metres. `tangent` is that of the angular radius of the
+    disc that is seen in them.
     """
 
     axes: Floats
     low_m: float
     span_m: float
     squares: Floats
+    tangent: float = 0.0
 
     def clip_from_world(self, square: Floats) -> Floats:
         """(4, 4) of one square; depth 1 is nearest to the sun."""
@@ -44,7 +50,25 @@ class SunSquares:
         return found
 
 
-def squares_of(direction: Sequence[float], corners: Floats, eyes: Floats, side: int = SIDE) -> SunSquares:
+def parts_of(direction: Sequence[float], radius_rad: float, corners: Floats, eyes: Floats) -> tuple[SunSquares, ...]:
+    """The squares of each part of a sun's disc: one, or those of a wide sun, equally many for each."""
+    towards, tangent = np.asarray(direction, float), float(np.tan(radius_rad))
+    if radius_rad <= WIDE_RAD:
+        return (replace(squares_of(towards, corners, eyes), tangent=tangent),)
+    axes = np.stack(basis(towards))
+    turns = (np.arange(PARTS) + 0.5) * 2 * np.pi / PARTS
+    middles = towards + ASIDE * tangent * np.column_stack([np.cos(turns), np.sin(turns)]) @ axes
+    found = [squares_of(middle, corners, eyes) for middle in normalize(middles)]
+    most = max(len(part.squares) for part in found)
+    return tuple(
+        replace(
+            part, squares=np.pad(part.squares, ((0, most - len(part.squares)), (0, 0)), "edge"), tangent=tangent / 2
+        )
+        for part in found
+    )
+
+
+def squares_of(direction: Sequence[float] | Floats, corners: Floats, eyes: Floats, side: int = SIDE) -> SunSquares:
     """The squares for triangles (F, 3, 3) and the places of cameras (n, 3), for maps of `side` texels."""
     towards = np.asarray(direction, float)
     across, down = basis(towards)

@@ -160,12 +160,12 @@ NAMES = (
     "probe/floor/planes",
 )
 PINNED = {
-    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 fa0bd107 831189ee e5a0bf40 0aea342e",
-    ("preview", "photons", "traced"): "1dec1a65 4cae5d96 6d3ab68c f87f05fa 33cff346 255bf322",
-    ("normal", "paths", "cached"): "6161cd22 5095e777 86bc134f b8c5136c 234455f9 a8ba7855",
-    ("normal", "photons", "traced"): "6161cd22 5095e777 75e36e29 4cdea744 d0ef8ca6 9d871238",
-    ("final", "paths", "cached"): "a38141f9 cef94a2c 07328f74 34c98c48 ec9dbab8 b672cc17",
-    ("final", "photons", "traced"): "a38141f9 cef94a2c f1574cdd e0ee89a5 2d93bb65 ca4df0bf",
+    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 fa0bd107 831189ee 3535df14 78e2f9b2",
+    ("preview", "photons", "traced"): "1dec1a65 4cae5d96 6d3ab68c f87f05fa 8600c2a9 14bb16f7",
+    ("normal", "paths", "cached"): "6161cd22 5095e777 86bc134f b8c5136c 9bf9cee5 1fe36eac",
+    ("normal", "photons", "traced"): "6161cd22 5095e777 75e36e29 4cdea744 7ed8d700 2847edec",
+    ("final", "paths", "cached"): "a38141f9 cef94a2c 07328f74 34c98c48 f25d0b44 3c8e4cd1",
+    ("final", "photons", "traced"): "a38141f9 cef94a2c f1574cdd e0ee89a5 ff0c4745 18ba82d5",
 }
 
 

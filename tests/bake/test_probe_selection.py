@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
+from lambent.bake.probes.probe import Probe
 from lambent.bake.probes.selection import (
     Mirrored,
     by_distance,
     by_planes,
     error,
+    judged,
     specular_occlusion,
 )
 from lambent.core.camera import Camera
@@ -22,6 +24,7 @@ from lambent.core.directions import normalize
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import merge, patch, sphere
 from lambent.scenes.scene import ImageEnvironment, Scene, SceneObject
+from lambent.store.contract import FAR
 from tests.bake.small_scenes import TINY, constant_picture
 
 PAINT = Material(kd=0.5, lobes=(Lobe(distribution="ggx", mx=0.2, my=0.2, r0=0.04),))
@@ -41,6 +44,21 @@ def test_error_and_share_by_hand() -> None:
     assert specular_occlusion(rays(), whole) == pytest.approx(0.25) and specular_occlusion(
         rays(), whole / 100
     ) == pytest.approx(1)
+
+
+@pytest.mark.parametrize(("niches", "open_share", "gain"), [(20, 0.6, 2.0), (90, 1.0, 1.0), (0, 0.9, 0.0)])
+def test_gain_leaves_what_is_no_niche_its_light(niches: int, open_share: float, gain: float) -> None:
+    """Under a white sky: niches that show as much of it as their irradiance has, and open places that show all."""
+    share = np.where(np.arange(100) < niches, 0.2 / max(gain, 1.0), open_share)
+    shown = np.where(np.arange(100) < niches, 0.2, 1.0)
+    up = np.tile([0.0, 0.0, 1.0], (100, 1))
+    seen = Mirrored(
+        0 * up, up, up, np.repeat(shown[:, None], 3, axis=1), np.pi * share, np.ones(100), np.zeros(100, bool)
+    )
+    sky = np.ones((6, 8, 8, 3), np.float32)
+    found = judged(seen, Probe(sky, np.full((6, 8, 8), FAR, np.float32), sky), np.zeros(3), np.zeros((0, 4)))
+    assert found.gain == gain and found.best == pytest.approx(0, abs=1e-3)
+    assert judged(seen, Probe(sky, sky[..., 0], sky), np.zeros(3), np.zeros((0, 4)), through=True).gain == 0
 
 
 def test_planes_turn_the_look_up_as_the_renderer_does() -> None:

@@ -21,7 +21,14 @@ from lambent.core.errors import UserError
 from lambent.core.geometry import triangle_areas
 from lambent.core.progress import Progress, part_of
 from lambent.scenes.scene import Mesh, Scene
-from lambent.store.contract import probe_irradiance, probe_name, radiance_unit, scene_record, shared_probes
+from lambent.store.contract import (
+    probe_irradiance,
+    probe_name,
+    radiance_unit,
+    scene_record,
+    shared_probes,
+)
+from lambent.store.occlusion import occlusion_gain
 from lambent.store.store import Store
 
 REFLECTED = 0.9  # of an object's area: then planar reflectors show it
@@ -108,5 +115,5 @@ def probe_light(store: Store, name: str) -> ProbeLight:
     radiance, distance, planes = (store.read(probe_name(owner, part)) for part in ("radiance", "distance", "planes"))
     centre = np.array(store.artefact(at).meta["centre"], float)
     unit, whole = radiance_unit(store, at), probe_irradiance(store, owner)
-    scaled = np.array(whole) if len(whole) else None
+    scaled = np.array(whole) / occlusion_gain(store, owner) if len(whole) else None
     return ProbeLight(radiance.astype(float) * unit, distance.astype(float), planes, centre, scaled)

@@ -125,7 +125,8 @@ class ProbeSet:
         """Arrays radiance, distance and planes of one object's probe, which others are `sharing`, and its notes.
 
         Noted are the centre, whether the object was left out, and how well one centre stands for the whole surface:
-        `hidden_share` and `parallax_deg` (`hidden`), `mirror_error` and `seen_irradiance` (`selection`).
+        `hidden_share` and `parallax_deg` (`hidden`), `mirror_error`, `seen_irradiance` and
+        `occlusion_gain` (`selection`).
 
         Planes that the scene gives are taken as they are; others are found from the probe itself.
         """
@@ -161,7 +162,8 @@ class ProbeSet:
             if found.needs_distance and given is None:
                 arrays["planes"] = planes[:0]
             meta["mirror_error"] = round(found.best, 3)
-            if found.scales:
+            if found.gain:
+                meta["occlusion_gain"] = found.gain
                 meta["seen_irradiance"] = [float(value) for value in found.irradiance]
         if rays is None:
             of_surface = seen_from(*spread(self._scene.object(name).mesh, HIDDEN_RAYS), seen)

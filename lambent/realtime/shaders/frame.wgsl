@@ -2,7 +2,7 @@
 
 struct Frame {
     clip_from_world: mat4x4f,
-    eye: vec4f,      // w: which of 16 turns this frame takes of interleaved samples; frames of a still take them all
+    eye: vec4f,      // w: which of 64 turns this frame takes of interleaved samples; frames of a still take them all
     across: vec4f,   // the ray of clip position (x, y) is forward + x across + y up
     up: vec4f,
     forward: vec4f,
@@ -12,6 +12,7 @@ struct Frame {
     exposure: f32,   // factor on radiance, 2^EV
     prior: f32,      // share of the last frame of few samples that is shown beside a progressive mean
     scale: vec4f,      // of false colour: low, high, logarithmic, lm/W
+    alone: u32,        // 1: no other frames are averaged with this one
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

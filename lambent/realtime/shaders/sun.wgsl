@@ -2,9 +2,11 @@
 // squares, the smallest first, and the least and greatest depths of blocks of texels. Layers of clear glass beside it
 // (realtime/panes.py) tint what they let through.
 //
-// Penumbras are as wide as the sun's disc makes them behind the mean of the blockers (Fernando 2005, "Percentage-closer
-// soft shadows"). The plane of the surface is followed from texel to texel, so that it does not shadow itself. Under the
-// edge of a sheet that touches the surface, texels beyond that edge do not count: what they show is farther from the sun.
+// A wide sun's disc is cut into parts, each with a map of its own: in one map blockers hide others behind them, and no one
+// filter fits all of their penumbras. Those are as wide as a part's disc makes them behind the mean of the blockers
+// (Fernando 2005, "Percentage-closer soft shadows"). The plane of the surface is followed from texel to texel, so that it
+// does not shadow itself. Under the edge of a sheet that touches the surface, texels beyond that edge do not count: what
+// they show is farther from the sun.
 
 #include "vertex.wgsl"
 #include "sun_record.wgsl"
@@ -34,28 +36,41 @@ const HARDLY = 1e-3;         // weight of taps that meet what blocks the sun, wh
 const PANE_LEAST_PX = 0.6;   // likewise: least radius
 
 var<private> sun_turn: vec2f; // of the pattern at this pixel: share of a ring, share of a turn
+var<private> sun_part: u32;   // of the disc, that this pixel asks for in this frame
 
-// Sixteen patterns in turn over 4 x 4 pixels; others in every frame of a progressive series or of a still.
+// Sixteen patterns in turn over 4 x 4 pixels; others in every frame of a progressive series or of a still. Four pixels
+// and four frames ask for all parts of the disc.
 fn turn_sun_pattern(pixel: vec2u) {
     let mixed = pixel.x ^ pixel.y;
     let place = ((mixed & 1u) << 3u) | ((pixel.y & 1u) << 2u) | (mixed & 2u) | ((pixel.y & 2u) >> 1u);
     let frames = f32(frame.first_sample & 0xffffu);
     let order = f32(place) + 0.5;
-    sun_turn = fract(vec2f(order / 16.0 + 0.7548776662 * frames, 0.6180339887 * (order + frame.eye.w) + 0.5698402910 * frames));
+    sun_part = ((pixel.x & 1u) + 2u * (pixel.y & 1u) + (u32(frame.eye.w) >> 4u)) % sun.parts;
+    let turn = f32(u32(frame.eye.w) >> 2u); // sixteen in a still: for each part they show all of a ring
+    sun_turn = fract(vec2f((order + 5.0 * turn) / 16.0 + 0.7548776662 * frames, 0.6180339887 * (order + turn) + 0.5698402910 * frames));
 }
 
 // Where a surface lies in the map: place in texels of a square, depth in metres towards the sun, and its slope, metres of
 // depth per metre along rows and columns.
 struct SunPlace {
     texel: vec2f,
-    square: u32,
+    square: u32, // of the part, its number of squares where there is none
     depth_m: f32,
     slope: vec2f,
     texel_m: f32,
 }
 
+// Layers of the map: all squares of one part after those of another.
+fn sun_layer(at: SunPlace) -> u32 {
+    return sun_part * u32(sun.irradiance.w) + at.square;
+}
+
+fn sun_layers() -> u32 {
+    return sun.parts * u32(sun.irradiance.w);
+}
+
 fn sun_depth_m(stored: f32) -> f32 {
-    return sun.across.w + sun.down.w * stored;
+    return sun.across[sun_part].w + sun.down[sun_part].w * stored;
 }
 
 // Least and greatest depth (m) within `radius` texels, and somewhat beyond: a block's range is that of its neighbours, too.
@@ -64,7 +79,7 @@ fn sun_range(at: SunPlace, radius: f32) -> vec2f {
     let level = u32(clamp(ceil(log2((radius + 1.0) / SUN_BLOCK)), 0.0, log2(f32(across))));
     let corner = select(vec2i(across, across - (across >> (level - 1u))), vec2i(0), level == 0u);
     let block = vec2i(at.texel / (SUN_BLOCK * exp2(f32(level))));
-    let range = textureLoad(sun_blocks, corner + block, at.square, 0).xy;
+    let range = textureLoad(sun_blocks, corner + block, sun_layer(at), 0).xy;
     return vec2f(sun_depth_m(range.x), sun_depth_m(range.y));
 }
 
@@ -73,7 +88,7 @@ fn sun_rise(at: SunPlace, offset: vec2f) -> f32 {
     let most = vec2f(textureDimensions(sun_depths)) - 1.0;
     let texel = clamp(floor(at.texel + offset), vec2f(0.0), most);
     let here = at.depth_m + dot(at.slope, (texel + 0.5 - at.texel) * at.texel_m);
-    return sun_depth_m(textureLoad(sun_depths, vec2i(texel), at.square, 0)) - here;
+    return sun_depth_m(textureLoad(sun_depths, vec2i(texel), sun_layer(at), 0)) - here;
 }
 
 // A point of a disc of radius 1, and the next: n of them are spread evenly over it (Vogel 1979).
@@ -94,21 +109,21 @@ fn next_sun_tap(tap: SunTap) -> SunTap {
 }
 
 fn sun_place(p_world: vec3f, n_world: vec3f) -> SunPlace {
-    let axes = vec2f(dot(sun.across.xyz, p_world), dot(sun.down.xyz, p_world));
+    let axes = vec2f(dot(sun.across[sun_part].xyz, p_world), dot(sun.down[sun_part].xyz, p_world));
     let side = f32(textureDimensions(sun_depths).x);
     var at = SunPlace();
     at.square = u32(sun.irradiance.w);
     for (var k = 0u; k < u32(sun.irradiance.w); k++) {
-        at.texel = (axes - sun.squares[k].xy) * sun.squares[k].z;
-        at.texel_m = sun.squares[k].w;
+        at.texel = (axes - sun.squares[4u * sun_part + k].xy) * sun.squares[4u * sun_part + k].z;
+        at.texel_m = sun.squares[4u * sun_part + k].w;
         if (all(at.texel > vec2f(2.0)) && all(at.texel < vec2f(side - 2.0))) {
             at.square = k;
             break;
         }
     }
-    at.depth_m = dot(sun.towards.xyz, p_world);
-    let facing = dot(sun.towards.xyz, n_world);
-    let falls = -vec2f(dot(sun.across.xyz, n_world), dot(sun.down.xyz, n_world)) * select(-1.0, 1.0, facing > 0.0);
+    at.depth_m = dot(sun.part_towards[sun_part].xyz, p_world);
+    let facing = dot(sun.part_towards[sun_part].xyz, n_world);
+    let falls = -vec2f(dot(sun.across[sun_part].xyz, n_world), dot(sun.down[sun_part].xyz, n_world)) * select(-1.0, 1.0, facing > 0.0);
     at.slope = falls / max(abs(facing), length(falls) / SUN_STEEPEST);
     return at;
 }
@@ -119,9 +134,9 @@ fn sun_place(p_world: vec3f, n_world: vec3f) -> SunPlace {
 // costs them more than it saves: one loop looks for blockers and then compares.
 fn sun_visibility(p_world: vec3f, n_world: vec3f) -> f32 {
     let at = sun_place(p_world, n_world);
-    let bias_m = SUN_BIAS_PX * at.texel_m + SUN_ROUNDING * sun.down.w;
-    let px_per_m = sun.towards.w / at.texel_m;
-    var highest_m = sun.across.w + sun.down.w - at.depth_m;
+    let bias_m = SUN_BIAS_PX * at.texel_m + SUN_ROUNDING * sun.down[sun_part].w;
+    let px_per_m = sun.part_towards[sun_part].w / at.texel_m;
+    var highest_m = sun.across[sun_part].w + sun.down[sun_part].w - at.depth_m;
     var radius = 0.0;
     var range = vec2f(0.0);
     let inside = at.square < u32(sun.irradiance.w);
@@ -186,7 +201,7 @@ fn pane_texel(at: SunPlace, offset: vec2f) -> vec2i {
 fn pane_rise(at: SunPlace, texel: vec2i, layer: u32) -> f32 {
     let to_sun = vec2f(textureDimensions(sun_depths)) / vec2f(textureDimensions(pane_depths));
     let here = at.depth_m + dot(at.slope, ((vec2f(texel) + 0.5) * to_sun - at.texel) * at.texel_m);
-    return sun_depth_m(textureLoad(pane_depths, texel, layer * u32(sun.irradiance.w) + at.square, 0)) - here;
+    return sun_depth_m(textureLoad(pane_depths, texel, layer * sun_layers() + sun_layer(at), 0)) - here;
 }
 
 // What the clear glass between a point and the part of the sun that it sees lets through; edges are as wide as the sun's
@@ -195,7 +210,7 @@ fn sun_through_panes(p_world: vec3f, n_world: vec3f) -> vec3f {
     let at = sun_place(p_world, n_world);
     let to_sun = f32(textureDimensions(sun_depths).x) / f32(textureDimensions(pane_depths).x);
     let texel_m = at.texel_m * to_sun;
-    let bias_m = SUN_BIAS_PX * texel_m + SUN_ROUNDING * sun.down.w;
+    let bias_m = SUN_BIAS_PX * texel_m + SUN_ROUNDING * sun.down[sun_part].w;
     let inside = at.square < u32(sun.irradiance.w);
     var tap = first_sun_tap();
     var rise_m = 0.0;
@@ -204,7 +219,7 @@ fn sun_through_panes(p_world: vec3f, n_world: vec3f) -> vec3f {
         rise_m = max(rise_m, pane_rise(at, pane_texel(at, reach * tap.across), 0u));
         tap = next_sun_tap(tap);
     }
-    let radius = max(sun.towards.w * rise_m / texel_m, PANE_LEAST_PX);
+    let radius = max(sun.part_towards[sun_part].w * rise_m / texel_m, PANE_LEAST_PX);
     var sum = vec4f(0.0);
     tap = first_sun_tap();
     let taps = select(0u, PANE_TAPS, rise_m > bias_m);
@@ -213,13 +228,22 @@ fn sun_through_panes(p_world: vec3f, n_world: vec3f) -> vec3f {
         let texel = pane_texel(at, offset);
         var passed = vec3f(1.0);
         for (var layer = 0u; layer < PANES; layer++) {
-            let colour = textureLoad(pane_colours, texel, layer * u32(sun.irradiance.w) + at.square, 0).rgb;
+            let colour = textureLoad(pane_colours, texel, layer * sun_layers() + sun_layer(at), 0).rgb;
             passed *= select(vec3f(1.0), colour, pane_rise(at, texel, layer) > bias_m);
         }
         sum += select(HARDLY, 1.0, sun_rise(at, offset * to_sun) <= bias_m) * vec4f(passed, 1.0);
         tap = next_sun_tap(tap);
     }
     return select(vec3f(1.0), sum.rgb / sum.a, taps > 0u);
+}
+
+// Mean over four pixels of one triangle, which ask for the four parts, in a frame that is shown alone. Adapters shade 2 x 2
+// pixels at once, and those of them that the triangle does not cover as well.
+fn mean_of_parts(seen: vec3f, pixel: vec2u) -> vec3f {
+    let is_odd = vec2f(pixel & vec2u(1u));
+    let row = seen + (0.5 - is_odd.x) * dpdxFine(seen);
+    let all = row + (0.5 - is_odd.y) * dpdyFine(row);
+    return select(seen, clamp(all, vec3f(0.0), vec3f(1.0)), sun.parts > 1u && frame.alone == 1u);
 }
 
 @fragment fn sun_main(v: Varyings, @builtin(front_facing) front: bool) -> @location(0) vec4f {
@@ -231,5 +255,5 @@ fn sun_through_panes(p_world: vec3f, n_world: vec3f) -> vec3f {
     for (var i = 0u; i < select(0u, 1u, TRANSMITS | (facing > 0.0)); i++) { seen = sun_visibility(v.p_world, n); }
     var passed = vec3f(1.0);
     for (var i = 0u; i < select(0u, 1u, PANES > 0u && seen > 0.0); i++) { passed = sun_through_panes(v.p_world, n); }
-    return vec4f(seen * passed, 1.0);
+    return vec4f(mean_of_parts(seen * passed, vec2u(v.position.xy)), 1.0);
 }

@@ -2,8 +2,10 @@
 
 struct Sun {
     towards: vec4f,    // unit; w: tangent of its angular radius
-    across: vec4f,     // unit, along rows of the map; w: depth of 0, m
-    down: vec4f,       // unit, along columns; w: metres that depths of 0 to 1 span
     irradiance: vec4f, // W/m^2 on a surface that faces it; w: number of squares, 0 where there is no sun
-    squares: array<vec4f, 4>, // corner (across, down), m; texels per metre; metres per texel
+    parts: u32,        // into which the disc is cut; each has squares of its own
+    part_towards: array<vec4f, 4>, // unit; w: tangent of a part's angular radius
+    across: array<vec4f, 4>,       // unit, along rows of the map; w: depth of 0, m
+    down: array<vec4f, 4>,         // unit, along columns; w: metres that depths of 0 to 1 span
+    squares: array<vec4f, 16>,     // 4 a part: corner (across, down), m; texels per metre; metres per texel
 }
