@@ -27,7 +27,7 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import basis
 from lambent.core.geometry import triangle_areas, triangle_normals
 from lambent.materials.document import Material
-from lambent.scenes.floor_plan import FloorPlan, floor_plan, may_have_walls, shared_cells
+from lambent.scenes.floor_plan import FloorPlan, Surroundings, floor_plan, may_have_walls, shared_cells
 from lambent.scenes.scene import Mesh, ReflectorRule, Scene, SceneObject
 
 LEAST_AREA_M2 = 0.25  # of all parts in one plane
@@ -99,13 +99,16 @@ def find_reflectors(scene: Scene) -> tuple[Reflector, ...]:
 
 def _with_walls(found: Sequence[Reflector], scene: Scene) -> list[Reflector]:
     """The reflectors, those with walls on their edges with a floor plan."""
-    corners = scene.corners
+    if not found:
+        return []
+    around = Surroundings(scene.corners)
     meshes = {o.name: o.mesh for o in scene.objects}
     faces = [np.concatenate([meshes[part.object].corners[part.faces] for part in r.parts]) for r in found]
     normals = [np.array(r.plane[:3]) for r in found]
-    walled = [i for i in range(len(found)) if may_have_walls(faces[i], normals[i], corners)]
+    near = [around.over(*one) for one in zip(faces, normals, strict=True)]
+    walled = [i for i in range(len(found)) if may_have_walls(faces[i], normals[i], near[i])]
     cells = shared_cells([found[i].area_m2 for i in walled])
-    plans = {i: floor_plan(faces[i], normals[i], corners, n) for i, n in zip(walled, cells, strict=True)}
+    plans = {i: floor_plan(faces[i], normals[i], near[i], n) for i, n in zip(walled, cells, strict=True)}
     return [replace(r, plan=plans.get(i)) for i, r in enumerate(found)]
 
 
