@@ -49,7 +49,9 @@ def test_the_sun_in_a_window_is_a_lamp_of_its_own() -> None:
     sun = max(lamps, key=lambda lamp: lamp.excess.max())
     assert sun.radius_rad < 0.04
     assert sun.excess.max() == pytest.approx(3000, rel=0.002)
-    assert sum(lamp.power for lamp in lamps if lamp is not sun) == pytest.approx(4.9 * 2 * np.pi * (1 - np.cos(0.3)), rel=0.1)
+    assert sum(lamp.power for lamp in lamps if lamp is not sun) == pytest.approx(
+        4.9 * 2 * np.pi * (1 - np.cos(0.3)), rel=0.1
+    )
 
 
 def test_a_long_lamp_is_cut_across() -> None:
@@ -96,3 +98,12 @@ def test_neighbours_are_mutual_and_near() -> None:
     np.testing.assert_array_equal(texel_at(w, n), np.arange(6 * n * n))
     assert (np.einsum("ijk,ik->ij", w[beside], w) > np.cos(0.36)).all()
     assert all(texel in beside[other] for texel in range(6 * n * n) for other in beside[texel])
+
+
+@pytest.mark.parametrize("direction", [(0.0, -0.2, 1.0), (0.1, 1.0, 0.2)])
+def test_a_lamp_leaves_a_bright_third_of_the_sky_that_stays(direction: tuple[float, float, float]) -> None:
+    cube = lit(((0.0, 1.0, 0.0), 0.7, 2.0), (direction, 0.05, 90.0), rest=0.05)
+    lamps = find_lamps(cube)
+    assert {lamp.excess.max() > 80 for lamp in lamps} == {True}
+    around = float(np.sum([lamp.flux.sum(axis=0)[0] for lamp in lamps]))
+    assert around == pytest.approx(89 * 2 * np.pi * (1 - np.cos(0.05)), rel=0.15)
