@@ -115,7 +115,7 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CE
     `corners` (F, 3, 3) are the triangles of the scene, `cells` the number of cells per size of the reflector. A wall
     stands on an edge where triangles cross the planes at both HEIGHTS over the reflector, within NEAR of the edge.
     """
-    from lambent.scenes.plan_cells import (
+    from lambent.core.plan_cells import (
         filled,
         inner,
         share_filled,
@@ -165,7 +165,7 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CE
 
 def _without_strips(covered: Flags, standing: Flags, width: float) -> Flags:
     """`covered` without the strips along its edge that `standing` cuts off, up to `width` cells wide in the mean."""
-    from lambent.scenes.plan_cells import without_strips
+    from lambent.core.plan_cells import without_strips
 
     if not (covered & standing).any():
         return covered
