@@ -1,8 +1,9 @@
 """Lamps of a cube map: connected bright texels, and the cube map without them.
 
 A lamp is brighter than `BRIGHT` times the mean of all directions and holds at least `LEAST_SHARE` of the light. It
-leaves the map, its texels get the median of the ring around them, and the search is made again: when the sun is gone,
-the window it shone through is a lamp of its own. Large lamps are cut, so that all are small beside wide lobes.
+leaves the map, its texels get the median of the ring around them, and the search is made again: for fainter ones, then
+for those within what is too large for a lamp, as the sun in a bright sky. Large lamps are cut, so that all are small
+beside wide lobes: first the sun from the window that it shines through.
 """
 
 from __future__ import annotations
@@ -20,11 +21,12 @@ from lambent.core.colour import luminance
 from lambent.core.cubemap import directions_at, texel_solid_angles
 from lambent.core.directions import normalize
 
-BRIGHT = 4.0  # times the mean radiance
-LEAST_SHARE = 0.002  # of all light
-MOST = 16
-SEARCHES = 2
-LEAST_RADIUS = 0.12  # of lamps that are cut in two while there are fewer than `MOST`
+BRIGHT = (2.0, 2.0, 4.0, 8.0)  # times the mean of what is left, one search after the other
+LEAST_SHARE = 0.001  # of all light
+LARGEST_SR = 1.0  # of what is a lamp, before it is cut: a bright half of the sky is none
+MOST = 32
+CONTRAST = 16.0  # of the brightest texel of a lamp to its median, from which on the two are apart: the sun in a window
+LEAST_RADIUS = 0.06  # of lamps that are cut in two while there are fewer than `MOST`
 CUT_INSTEAD = 8.0  # times as bright as the faintest: better cut than that kept
 RING = 3  # texels around a lamp whose median takes its place
 CORNER = 12**-0.5  # four points at -+ this share of a texel have its variance
@@ -56,13 +58,11 @@ def find_lamps(cube: Floats) -> list[Lamp]:
     rest = cube.reshape(-1, 3).astype(np.float64)
     total = float(luminance(rest) @ omega)
     lamps: list[Lamp] = []
-    for _ in range(SEARCHES if n > 1 else 0):
-        found = [lamp for lamp in _search(rest, omega, n, total)]
+    for times in BRIGHT if n > 1 else ():
+        found = _search(rest, omega, n, total, times)
         for lamp in found:
             rest[lamp.texels] -= lamp.excess
         lamps += found
-        if not found:
-            break
     lamps = sorted(lamps, key=lambda lamp: -lamp.power)[:MOST]
     while large := max((lamp for lamp in lamps if lamp.radius_rad > LEAST_RADIUS), key=_worth_cutting, default=None):
         if len(lamps) == MOST:
@@ -79,10 +79,15 @@ def _worth_cutting(lamp: Lamp) -> float:
 
 
 def _halves(lamp: Lamp, omega: Floats, n: int) -> list[Lamp]:
-    """A lamp, cut through its middle across its length."""
-    w = normalize(corners(lamp.texels, n)).mean(axis=1)
-    mean, covariance = moments(w, luminance(lamp.flux))
-    first = (w - mean) @ np.linalg.eigh(covariance)[1][:, -1] < 0
+    """A lamp, cut through its middle across its length; or its brightest part and the rest, where these differ much."""
+    bright = luminance(lamp.excess)
+    peak, median = float(bright.max()), float(np.median(bright))
+    if peak > CONTRAST * median:
+        first = bright > np.sqrt(peak * median)
+    else:
+        w = normalize(corners(lamp.texels, n)).mean(axis=1)
+        mean, covariance = moments(w, luminance(lamp.flux))
+        first = (w - mean) @ np.linalg.eigh(covariance)[1][:, -1] < 0
     return [_lamp(lamp.texels[part], lamp.excess[part], omega, n) for part in (first, ~first)]
 
 
@@ -91,11 +96,11 @@ def _lamp(texels: NDArray[np.intp], excess: Floats, omega: Floats, n: int) -> La
     return Lamp(texels, excess, flux, _radius(texels, flux, n))
 
 
-def _search(rest: Floats, omega: Floats, n: int, total: float) -> list[Lamp]:
-    """Lamps of radiance `rest` (6 N N, 3)."""
+def _search(rest: Floats, omega: Floats, n: int, total: float, times: float) -> list[Lamp]:
+    """Lamps of radiance `rest` (6 N N, 3), so many `times` as bright as its mean."""
     bright = luminance(rest)
     light = bright * omega
-    at = np.flatnonzero(bright > BRIGHT * light.sum() / (4 * np.pi))
+    at = np.flatnonzero(bright > times * light.sum() / (4 * np.pi))
     beside = neighbours(n)
     place = np.full(len(rest), -1)
     place[at] = np.arange(len(at))
@@ -109,7 +114,7 @@ def _search(rest: Floats, omega: Floats, n: int, total: float) -> list[Lamp]:
     for number in brightest[share[brightest] >= LEAST_SHARE * total]:
         texels = at[label == number]
         excess = np.maximum(rest[texels] - _around(rest, texels, place, beside), 0)
-        if excess.any():
+        if excess.any() and omega[texels].sum() < LARGEST_SR:
             found.append(_lamp(texels, excess, omega, n))
     return found
 

@@ -33,7 +33,7 @@ from lambent.realtime.incident import LookUp
 
 GROUPS = 4
 GROUP_RATIO = 1.25  # of radii, from which on two lamps may be in two groups
-FIRST, LAST = 0.54, 0.62  # widths of a lobe, in radii of a group, between which the group leaves
+FIRST, LAST = 0.47, 0.54  # widths of a lobe, in radii of a group, between which the group leaves
 NONE = 1e9
 HEAD_ROWS, LAMP_ROWS = 2, 4
 

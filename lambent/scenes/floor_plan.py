@@ -34,6 +34,7 @@ NEAR = 0.02  # of the size: largest distance from an edge to a wall on it
 WINDOW = 0.05  # of the size: the stretch of edge over which SHARE counts
 STEPS = 16  # per cell, of distances in a plan
 FINE = 4  # subcells along each axis of a cell, to find which share of it the reflector covers
+AROUND = 0.25  # of a reflector's longer side: more than NEAR, and than BORDER of FEWEST_CELLS
 MARGIN = 0.25  # cells before a wall that count as past it: light from outside may be a thousand times as bright
 
 
@@ -69,6 +70,26 @@ def shared_cells(areas_m2: Sequence[float]) -> list[float]:
     return [float(count) for count in cells(low)]
 
 
+class Surroundings:
+    """All triangles (F, 3, 3) of a scene, found by the spheres around them: a reflector meets few."""
+
+    def __init__(self, corners: Floats) -> None:
+        self._corners = corners
+        self._middles = corners.mean(axis=1)
+        self._radii = np.sqrt(((corners - self._middles[:, None]) ** 2).sum(axis=2)).max(axis=1, initial=0)
+
+    def over(self, faces: Floats, normal: Floats) -> Floats:
+        """(N, 3, 3) those that may matter to the plan of a reflector of triangles (K, 3, 3), and few others."""
+        flat = faces @ np.stack(basis(normal), axis=1)
+        low, high = flat.reshape(-1, 2).min(axis=0), flat.reshape(-1, 2).max(axis=0)
+        height = self._middles @ normal - float((faces @ normal).mean())
+        found = np.flatnonzero((height + self._radii > 0) & (height - self._radii < max(HEIGHTS) * _size(flat)))
+        at, reach = self._middles[found] @ np.stack(basis(normal), axis=1), self._radii[found, None]
+        margin = AROUND * (high - low).max()
+        found = found[((at + reach > low - margin) & (at - reach < high + margin)).all(axis=1)]
+        return np.asarray(self._corners[found])
+
+
 def may_have_walls(faces: Floats, normal: Floats, corners: Floats) -> bool:
     """Whether a triangle crosses a plane at one of HEIGHTS over the rectangle around a reflector, or close to it."""
     axes = np.stack(basis(normal), axis=1)
@@ -94,6 +115,13 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CE
     `corners` (F, 3, 3) are the triangles of the scene, `cells` the number of cells per size of the reflector. A wall
     stands on an edge where triangles cross the planes at both HEIGHTS over the reflector, within NEAR of the edge.
     """
+    from lambent.core.plan_cells import (
+        filled,
+        inner,
+        share_filled,
+        within,
+    )  # compiled, and only for scenes with reflectors
+
     across, along = basis(normal)
     axes = np.stack([across, along], axis=1)
     flat = faces @ axes
@@ -111,18 +139,16 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CE
     share = np.zeros((rows, columns))
     for over in HEIGHTS:
         standing = _drawn((_cut(height - over * size, corners) @ axes - corner) / cell, (rows, columns))
-        if standing.any():
-            share += (distance_transform_edt(~standing) <= NEAR * size / cell) / len(HEIGHTS)
+        share += within(standing, NEAR * size / cell) / len(HEIGHTS)
     if not share.any():
         return None
-    fine = _filled(((flat - corner) / cell + 0.5) * FINE - 0.5, (rows * FINE, columns * FINE))
+    fine = filled(((flat - corner) / cell + 0.5) * FINE - 0.5, rows * FINE, columns * FINE)
     foot = _cut(height - FOOT * size, corners)
     standing = _drawn(((foot @ axes - corner) / cell + 0.5) * FINE - 0.5, fine.shape)
     fine = _without_strips(fine, standing, NEAR * size / cell * FINE)
-    counts = fine.view(np.uint8).reshape(rows, FINE, columns, FINE).sum(axis=3, dtype=np.uint8)
-    share_of = counts.sum(axis=1, dtype=np.uint8) / FINE**2
+    share_of = share_filled(fine, FINE)
     covered = share_of >= 0.5
-    edge = covered & ~_eroded(covered)
+    edge = covered & ~inner(covered)
     window = 2 * round(WINDOW * size / cell) + 1
     along_edge = uniform_filter(edge.astype(float), window, mode="constant")
     walled = uniform_filter(share * edge, window, mode="constant") >= SHARE * np.maximum(along_edge, 1e-9)
@@ -139,50 +165,18 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CE
 
 def _without_strips(covered: Flags, standing: Flags, width: float) -> Flags:
     """`covered` without the strips along its edge that `standing` cuts off, up to `width` cells wide in the mean."""
+    from lambent.core.plan_cells import without_strips
+
     if not (covered & standing).any():
         return covered
     pieces, count = label(covered & ~standing)
-    rim = np.flatnonzero((pieces > 0) & ~_eroded(pieces > 0))
-    edge = np.flatnonzero(covered & ~_eroded(covered))
-    cells = np.bincount(pieces.ravel(), minlength=count + 1)
-    border = np.bincount(pieces.ravel()[rim], minlength=count + 1)
-    at_edge = np.bincount(pieces.ravel()[edge], minlength=count + 1) > 0
-    strip = at_edge & (2 * cells <= width * border)
-    strip[0] = False
-    return np.asarray(covered & ~strip[pieces]) if strip.any() else covered
-
-
-def _eroded(covered: Flags) -> Flags:
-    """Cells whose four neighbours are covered, too."""
-    inner = np.zeros_like(covered)
-    inner[1:-1, 1:-1] = covered[1:-1, 1:-1] & covered[2:, 1:-1] & covered[:-2, 1:-1]
-    inner[1:-1, 1:-1] &= covered[1:-1, 2:] & covered[1:-1, :-2]
-    return inner
+    return without_strips(covered, pieces, count, width)
 
 
 def _edge_from(share: Floats, covered: Flags) -> Floats:
     """Cells from the centre of a covered cell to the edge, by the covered shares of it and of its neighbours."""
     around = maximum_filter(np.where(covered, 0.0, share), footprint=np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]]))
     return np.asarray(np.where(covered, share - 0.5 + around, 0.0))
-
-
-def _filled(triangles: Floats, shape: tuple[int, int]) -> Flags:
-    """Cells whose centre, at whole coordinates (column, row), lies in a triangle (K, 3, 2): by rows, summed up."""
-    change = np.zeros((shape[0], shape[1] + 1), np.int32)
-    for triangle in triangles:
-        first, last = int(np.ceil(triangle[:, 1].min())), int(np.floor(triangle[:, 1].max()))
-        row = np.arange(max(first, 0), min(last + 1, shape[0]))
-        left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
-        for (x0, y0), (x1, y1) in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
-            if y0 != y1:
-                share = (row - y0) / (y1 - y0)
-                x = np.where((share >= 0) & (share <= 1), x0 + share * (x1 - x0), np.nan)
-                left, right = np.fmin(left, x), np.fmax(right, x)
-        met = left <= right
-        begin, end = (np.ceil(x[met]).clip(0, shape[1]).astype(int) for x in (left, np.floor(right) + 1))
-        np.add.at(change, (row[met], begin), 1)
-        np.add.at(change, (row[met], np.maximum(begin, end)), -1)
-    return np.asarray(change.cumsum(axis=1, dtype=np.int32)[:, :-1] > 0)
 
 
 def _cut(height: Floats, corners: Floats) -> Floats:

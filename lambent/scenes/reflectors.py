@@ -12,8 +12,9 @@ be a whole object: the top of a table is found, its edge and its legs are not. `
 
 from __future__ import annotations
 
+import logging
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -27,14 +28,18 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import basis
 from lambent.core.geometry import triangle_areas, triangle_normals
 from lambent.materials.document import Material
-from lambent.scenes.floor_plan import FloorPlan, floor_plan, may_have_walls, shared_cells
+from lambent.scenes.floor_plan import FloorPlan, Surroundings, floor_plan, may_have_walls, shared_cells
 from lambent.scenes.scene import Mesh, ReflectorRule, Scene, SceneObject
+
+log = logging.getLogger(__name__)
 
 LEAST_AREA_M2 = 0.25  # of all parts in one plane
 ROUGHEST = 0.2  # sqrt(mx my) of the narrowest lobe: a mirrored view covers hardly more than such a lobe
 LEAST_PART_M2 = 0.02  # of one object in a plane: less is an edge that lies there by chance
 FLAT_M = 1e-3  # largest distance of positions from the plane
 FLAT_DEG = 2.0  # largest angle of faces, and of shading normals at their corners, from the plane's normal
+MOST = 256  # of a scene, the largest: a frame shows a few
+TRIED = 2 * MOST  # large ones after which only objects that rules name are searched on; seeds come by their area
 SEED_SHARE = 1 / 16  # of LEAST_AREA_M2 in one bin of the histogram: a plane may straddle bins in all four dimensions
 
 
@@ -75,17 +80,22 @@ def find_reflectors(scene: Scene) -> tuple[Reflector, ...]:
         return ()
     faces = _Faces.of(candidates)
     free = np.ones(len(faces.area), bool)
+    is_forced = np.isin(faces.owner, [i for i, o in enumerate(candidates) if o.name in forced])
     found: list[tuple[Floats, Indices]] = []
+    count = 0  # of those that are large, whatever their parts
 
     def take(plane: Floats) -> None:
+        nonlocal count
         mine = faces.in_plane(plane, free)
         free[mine] = False
         found.append((plane, mine))
+        count += bool(faces.area[mine].sum() >= LEAST_AREA_M2)
 
     for plane in _given_planes(scene.reflector_rules):
         take(plane)
-    for seed in faces.seeds(np.isin(faces.owner, [i for i, o in enumerate(candidates) if o.name in forced])):
-        if free[seed] and len(near := faces.in_plane(faces.plane_of(seed), free)):
+    for seed in faces.seeds(is_forced):
+        wanted = free[seed] and (count < TRIED or is_forced[seed])
+        if wanted and len(near := faces.in_plane(faces.plane_of(seed), free)):
             take(faces.fitted(near))
     large = []
     for plane, mine in found:
@@ -94,18 +104,31 @@ def find_reflectors(scene: Scene) -> tuple[Reflector, ...]:
         mine = mine[np.isin(owner, parts)]
         if faces.area[mine].sum() >= LEAST_AREA_M2 or any(candidates[i].name in forced for i in parts):
             large.append(faces.reflector(plane, mine, candidates, scene.materials))
-    return tuple(sorted(_with_walls(large, scene), key=lambda r: -r.area_m2))
+    kept = _largest(large, forced)
+    return tuple(sorted(_with_walls(kept, scene), key=lambda r: -r.area_m2))
+
+
+def _largest(found: list[Reflector], forced: Collection[str]) -> list[Reflector]:
+    """MOST of the reflectors, those with `forced` objects and then the largest, in their order."""
+    first = sorted(found, key=lambda r: (not any(part.object in forced for part in r.parts), -r.area_m2))[:MOST]
+    if len(first) < len(found):
+        log.warning("more than %d planar reflectors: the largest are kept, probes show the others", MOST)
+    kept = set(map(id, first))
+    return [r for r in found if id(r) in kept]
 
 
 def _with_walls(found: Sequence[Reflector], scene: Scene) -> list[Reflector]:
     """The reflectors, those with walls on their edges with a floor plan."""
-    corners = scene.corners
+    if not found:
+        return []
+    around = Surroundings(scene.corners)
     meshes = {o.name: o.mesh for o in scene.objects}
     faces = [np.concatenate([meshes[part.object].corners[part.faces] for part in r.parts]) for r in found]
     normals = [np.array(r.plane[:3]) for r in found]
-    walled = [i for i in range(len(found)) if may_have_walls(faces[i], normals[i], corners)]
+    near = [around.over(*one) for one in zip(faces, normals, strict=True)]
+    walled = [i for i in range(len(found)) if may_have_walls(faces[i], normals[i], near[i])]
     cells = shared_cells([found[i].area_m2 for i in walled])
-    plans = {i: floor_plan(faces[i], normals[i], corners, n) for i, n in zip(walled, cells, strict=True)}
+    plans = {i: floor_plan(faces[i], normals[i], near[i], n) for i, n in zip(walled, cells, strict=True)}
     return [replace(r, plan=plans.get(i)) for i, r in enumerate(found)]
 
 

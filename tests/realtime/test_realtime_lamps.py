@@ -118,7 +118,7 @@ def test_nothing_pops_while_a_roughness_is_dragged(device) -> None:
         lobe = Lobe(mx=m, my=m, r0=0.8, alpha=0.4)
         return np.clip(renderer.image(replace(state, materials={"m": material((lobe,))})), 0, 4) ** (1 / 2.2)
 
-    steps = 0.018 * 1.02 ** np.arange(80)
+    steps = 0.0155 * 1.02 ** np.arange(80)
     out = [groups_out(Lobe(mx=m, my=m), radii) for m in steps]
     assert out[0] == 0 and out[-1] == 2
     images = [shown(m) for m in steps]

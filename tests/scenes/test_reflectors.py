@@ -10,7 +10,7 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
-from lambent.scenes import load_scene
+from lambent.scenes import load_scene, reflectors
 from lambent.scenes.geometry import box, merge, patch, placed, sphere, turn
 from lambent.scenes.reflectors import find_reflectors
 from lambent.scenes.scene import ReflectorRule, Scene, SceneObject
@@ -113,3 +113,12 @@ def test_a_part_of_something_that_transmits_is_seen_from_both_sides() -> None:
     for material, both in ((glossy, False), (glossy.model_copy(update={"lobes": (*glossy.lobes, through)}), True)):
         scene = Scene("test", (SceneObject("bent", bent, "m"),), {"m": material})
         assert next(r for r in find_reflectors(scene) if abs(r.plane[1]) > 0.9).two_sided is both
+
+
+def test_of_very_many_the_largest_are_kept_and_those_that_rules_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reflectors, "MOST", 4)
+    monkeypatch.setattr(reflectors, "TRIED", 8)
+    sides = np.linspace(0.6, 2.0, 30)
+    tiles = [SceneObject(f"tile{i}", patch((3 * i, i, 0), (0, 0, s), (s, 0, 0)), "varnish") for i, s in enumerate(sides)]
+    found = find_reflectors(scene_of(*tiles, rules=(ReflectorRule("tile3", use=True),)))
+    assert [r.parts[0].object for r in found] == ["tile29", "tile28", "tile27", "tile3"]

@@ -135,7 +135,7 @@ def _cut_of(builder: SceneBuilder, o: SceneObject, anywhere: SolidTest, whole: A
     areas = np.array([triangle_areas(mesh.corners).sum() for mesh in meshes])
     counts = np.ceil(POINTS * areas / areas.sum()).astype(int)
     material = builder.scene.materials[o.material]
-    seen = [seen_in(*spread(m, n), places, material, whole) for m, n in zip(meshes, counts, strict=True)]
+    seen = seen_in([spread(m, n) for m, n in zip(meshes, counts, strict=True)], places, material, whole)
     known = [(s, centre_of(m, middle, solids, without)) for s, m in zip(seen, meshes, strict=True) if s is not None]
     if not known:
         return [()]

@@ -35,7 +35,7 @@ POINTS = 512  # all over the object
 SPREAD = 16  # directions from each
 LEAST = 16  # points in view: with fewer, nothing is known
 DEPTH = 4  # surfaces on a path
-SAMPLES = 8  # paths per texel of a probe
+SAMPLES = 4  # paths per texel of a probe: what is seen has fewer of its own
 
 
 @dataclass(frozen=True)
@@ -47,20 +47,25 @@ class Seen:
     light: Floats
 
 
-def seen_in(points: Floats, normals: Floats, places: Floats, material: Material, whole: Any) -> Seen | None:
-    """What viewers at `places` (m, 3) see in points (n, 3) of unit normals (n, 3); None where too few are in view."""
+def seen_in(surfaces: list[tuple[Floats, Floats]], places: Floats, material: Material, whole: Any) -> list[Seen | None]:
+    """What viewers at `places` (m, 3) see in each surface, points and unit normals (n, 3); None in too few points."""
     rng = np.random.default_rng(0)
+    points, normals = (np.concatenate(one) for one in zip(*surfaces, strict=True))
     found, eyes = viewers_of(points, normals, places, whole, rng)
-    if found.sum() < LEAST:
-        return None
+    if not found.any():
+        return [None] * len(surfaces)
     at, n, view = points[found], normals[found], normalize(eyes[found] - points[found])
     if material.transmits:
         w = np.repeat(-view[:, None], SPREAD, axis=1)
     else:
         w = spread_mirrored(view, n, widest_lobe(material), SPREAD, rng)
     ray = leaving(whole, np.repeat(at, SPREAD, axis=0), np.repeat(n, SPREAD, axis=0), w.reshape(-1, 3))
-    light = luminance(light_along(whole, ray, DEPTH, None, 1))
-    return Seen(array_of(ray.o).astype(float).reshape(w.shape), w, light.reshape(-1, SPREAD).mean(axis=1))
+    light = luminance(light_along(whole, ray, DEPTH, None, 1)).reshape(-1, SPREAD).mean(axis=1)
+    origins = array_of(ray.o).astype(float).reshape(w.shape)
+    counts = [int(mine.sum()) for mine in np.split(found, np.cumsum([len(p) for p, _ in surfaces])[:-1])]
+    ends = np.cumsum(counts)[:-1]
+    each = zip(*(np.split(values, ends) for values in (origins, w, light)), strict=True)
+    return [Seen(*one) if count >= LEAST else None for one, count in zip(each, counts, strict=True)]
 
 
 def small_probe(first: Any, whole: Any, centre: Floats) -> Probe:

@@ -133,8 +133,12 @@ def sky_image(sky: SunSky) -> NDArray[np.float32]:
     coarse = sunsky_radiance(sky, _directions(r, c).reshape(-1, 3), sun=False)
     image = coarse.reshape(len(rows), len(columns), 3).repeat(COARSE, axis=0).repeat(COARSE, axis=1)
     sun = sun_disc(sky)
-    pixels = np.stack(np.meshgrid(np.arange(HEIGHT), np.arange(WIDTH), indexing="ij"), axis=-1).reshape(-1, 2)
-    near = pixels[(_directions(*pixels.T) @ sun.direction) > np.cos(sun.radius_rad + 2 * np.pi / HEIGHT)]
+    reach_rad = sun.radius_rad + 2 * np.pi / HEIGHT
+    beside = (
+        np.abs(np.arange(HEIGHT) * (np.pi / (HEIGHT - 1)) - np.arccos(np.clip(sun.direction[1], -1, 1))) < reach_rad
+    )
+    pixels = np.stack(np.meshgrid(np.flatnonzero(beside), np.arange(WIDTH), indexing="ij"), axis=-1).reshape(-1, 2)
+    near = pixels[(_directions(*pixels.T) @ sun.direction) > np.cos(reach_rad)]
     offset = (np.arange(SUPERSAMPLES) + 0.5) / SUPERSAMPLES - 0.5
     for mine in slices(len(near), PIXELS_AT_ONCE):
         r, c = near[mine, 0, None, None] + offset[:, None], near[mine, 1, None, None] + offset

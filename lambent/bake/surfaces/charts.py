@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import xatlas
 
+from lambent.bake.surfaces.clusters import clusters_of
 from lambent.bake.surfaces.layers import in_first_layer, layers_of, lie_flat
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import normalize
@@ -26,12 +27,7 @@ SMALL = 12.0  # texels: a smaller chart may be merged with others
 FLAT_DEG = 25.0  # between its normals and their mean, as long as a chart is merged
 SLIM = 0.35  # share of the texels it takes that a chart lies on, below which it may be merged, too
 ANGLES = np.arange(8) * np.pi / 16  # that charts are turned by, to take fewer texels
-LONGEST = 24.0  # texels: a merged chart with a longer side is halved even where that takes a little more...
 STRETCH = 2.5  # texels of surface that one of a chart by xatlas is long at most
-TRIED = 1.03  # ...up to this, because halves of halves may take less
-MANY = 4096  # faces of a merged chart that is not turned to find what it costs
-FEWEST = 4.0  # texels that a chart takes at least
-MIXED = 0.1  # texels that one texel is worth whose faces are mixed over a depth of one texel
 
 
 @dataclass(frozen=True)
@@ -254,10 +250,12 @@ def _by_direction(mesh: Mesh, owner: int, faces: Indices, size_m: Floats, first:
     axis = np.where(areas > 0, np.abs(normals).argmax(axis=1), np.ptp(corners, axis=1).argmin(axis=1))
     towards = 2 * axis + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0)
     charts: list[Chart] = []
+    turns = _turns(ANGLES)
     for direction in np.unique(towards):
-        left, depth = [np.flatnonzero(towards == direction)], direction // 2
+        left, depth = [np.flatnonzero(towards == direction)], int(direction // 2)
         while left:
-            for mine in _clusters(corners, areas, size_m, left.pop(), depth):
+            one = left.pop()
+            for mine in (one[group] for group in clusters_of(corners[one], areas[one], size_m[one], depth, turns)):
                 local = corners[mine] / _mean_size(areas[mine], size_m[mine])
                 flat = upright(np.delete(local, depth, axis=2))
                 layers = layers_of(flat, local[:, :, depth])
@@ -271,35 +269,3 @@ def _by_direction(mesh: Mesh, owner: int, faces: Indices, size_m: Floats, first:
 
 def _mean_size(areas: Floats, size_m: Floats) -> float:
     return float(np.average(size_m, weights=areas)) if areas.sum() > 0 else float(size_m.mean())
-
-
-def _clusters(corners: Floats, areas: Floats, size_m: Floats, faces: Indices, depth: int) -> list[Indices]:
-    """Faces in groups that lie close together, each halved as long as that costs less."""
-    centres, turns = (corners.min(axis=1) + corners.max(axis=1)) / 2, _turns(ANGLES)
-
-    def cost(mine: Indices) -> tuple[float, float]:
-        size = _mean_size(areas[mine], size_m[mine])
-        points = corners[mine].reshape(-1, 3) / size
-        tried = turns if len(mine) < MANY else turns[:1]  # it will be halved anyway
-        sides = np.ptp(np.delete(points, depth, axis=1) @ tried, axis=1)
-        mixed = areas[mine].sum() / size**2 * np.ptp(points[:, depth])
-        return float(texels_taken(sides).min() + MIXED * mixed), float(sides[0].max())
-
-    left, found = [(faces, *cost(faces))], []
-    while left:
-        mine, price, side = left.pop()
-        if price <= 2 * FEWEST:
-            found.append(mine)
-            continue
-        best: tuple[float, list[tuple[Indices, float, float]]] = (np.inf, [])
-        for axis in range(3):
-            along = centres[mine, axis]
-            lower: Flags = along < (along.min() + along.max()) / 2
-            if lower.any() and not lower.all():
-                halves = [(half, *cost(half)) for half in (mine[lower], mine[~lower])]
-                best = min(best, (halves[0][1] + halves[1][1], halves), key=lambda one: one[0])
-        if best[1] and best[0] < (TRIED * price if side > LONGEST else price):
-            left += best[1]
-        else:
-            found.append(mine)
-    return found

@@ -6,14 +6,14 @@
 #include "lamp_light.wgsl"
 
 @group(2) @binding(1) var cleaned_cubes: texture_cube_array<f32>; // without 0, 1, ... groups of lamps
-@group(2) @binding(2) var<uniform> lamps: array<vec4f, 66>;
+@group(2) @binding(2) var<uniform> lamps: array<vec4f, 130>;
 
 override LAYERS: u32 = 2u; // 1 where no lobe is between two cube maps, which the loop need not allow for
 
 const LAMP_HEAD = 2u;
 const LAMP_ROWS = 4u;
-const FIRST_OUT = 0.54;
-const LAST_OUT = 0.62;
+const FIRST_OUT = 0.47;
+const LAST_OUT = 0.54;
 
 // How many groups have left the cube map for a lobe; fractions are shares of the last (lamps.py).
 fn groups_out(lobe: LambentLobe) -> f32 {
