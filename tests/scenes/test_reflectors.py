@@ -119,6 +119,8 @@ def test_of_very_many_the_largest_are_kept_and_those_that_rules_name(monkeypatch
     monkeypatch.setattr(reflectors, "MOST", 4)
     monkeypatch.setattr(reflectors, "TRIED", 8)
     sides = np.linspace(0.6, 2.0, 30)
-    tiles = [SceneObject(f"tile{i}", patch((3 * i, i, 0), (0, 0, s), (s, 0, 0)), "varnish") for i, s in enumerate(sides)]
+    tiles = [
+        SceneObject(f"tile{i}", patch((3 * i, i, 0), (0, 0, s), (s, 0, 0)), "varnish") for i, s in enumerate(sides)
+    ]
     found = find_reflectors(scene_of(*tiles, rules=(ReflectorRule("tile3", use=True),)))
     assert [r.parts[0].object for r in found] == ["tile29", "tile28", "tile27", "tile3"]
