@@ -264,7 +264,7 @@ class Renderer:
         self.streaming.follow(draws, data, self._clusters, waits=self.waits)
         passing = target_view is not None and state.accumulate is None  # seen once, so half floats do
         halves = passing or self.resources.mixes_parts  # single precision cannot be blended everywhere
-        target = self._targets.fit(state.size, "rgba16float" if halves else "rgba32float")
+        target = self._targets.fit(state.size, "rgba16float" if halves else "rgba32float", passing=passing)
         context = FrameContext(
             slicing, state, data, self._frame_group, self.resources, self._clusters, self._targets, self._timer, target,
             draws, views, Counter(), waits=self.waits, shown=target_view,

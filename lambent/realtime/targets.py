@@ -49,9 +49,13 @@ class Targets:
         self._size: tuple[int, int] = (0, 0)
         self._made: dict[str, Any] = {}
 
-    def fit(self, size: tuple[int, int], format: str) -> Target:
-        """What light is drawn into; `format` is that of the radiance."""
-        return Target(self._texture("depth", size, DEPTH_FORMAT), self._texture(format, size, format))
+    def fit(self, size: tuple[int, int], format: str, *, passing: bool = False) -> Target:
+        """What light is drawn into; `format` is that of the radiance.
+
+        Passing frames have a target of their own: the last of them stays while others are drawn.
+        """
+        name = f"{format}, passing" if passing else format
+        return Target(self._texture("depth", size, DEPTH_FORMAT), self._texture(name, size, format))
 
     def display(self, name: str, size: tuple[int, int]) -> Any:
         """A display image that stays here."""

@@ -42,6 +42,12 @@ def test_points_are_dense_along_a_contact_and_as_many_as_allowed() -> None:
     assert np.array_equal(far.texel, coarse.texel), "in the open nothing changes"
 
 
+def test_points_at_each_texel_are_no_finer() -> None:
+    spots = plane()
+    finest = gather_points(spots, SIZE, 1)
+    assert refined_points(spots, SIZE, finest, np.full(len(finest.texel), 0.1)) is finest
+
+
 def test_texels_show_their_own_point_where_each_has_one() -> None:
     spots = plane()
     coarse = gather_points(spots, SIZE, 2)

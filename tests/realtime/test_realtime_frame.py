@@ -310,10 +310,15 @@ def test_impossible_frames_are_refused(device, change: dict[str, object]) -> Non
         renderer.image(replace(FrameState(FORWARD, 8, 8), **change))
 
 
-def test_a_series_begins_from_the_frame_of_few_samples(device) -> None:
-    """Shown is the mean of the progressive series beside what was shown before, by the share that the state says."""
+@pytest.mark.parametrize("mixes", [False, True])
+def test_a_series_begins_from_the_frame_of_few_samples(device, mixes: bool) -> None:
+    """Shown is the mean of the progressive series beside what was shown before, by the share that the state says.
+
+    Where parts of objects are mixed, both are half floats.
+    """
     gloss = Material(name="m", lobes=(Lobe(mx=0.25, my=0.25, r0=1.0),))
     renderer = Renderer(device, baked_scene(sphere_and_torus(), gloss, studio(32)))
+    renderer.resources.mixes_parts = mixes
     few = FrameState(CAMERA, 64, 48, view_transform="linear", antialias=False)
     one = replace(few, integrator="qmc", n=1, accumulate=0)
     alone = renderer.display_image(replace(one, prior=0.5))

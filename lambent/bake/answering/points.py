@@ -68,9 +68,9 @@ def refined_points(spots: Spots, width: int, points: GatherPoints, distance: Flo
     It does by the distance to these (Ward, Rubinstein and Clear 1988), so that blocks are halved in the order of
     `distance` (K,) over their size, up to MORE times as many points. Distances are harmonic means, in texels.
     """
-    if not len(points.texel):
+    block = int(points.block[0]) if len(points.block) else 1
+    if block == 1:
         return points
-    block = int(points.block[0])
     levels = [block >> step for step in range(1, block.bit_length())]
     lit = [np.flatnonzero(spots.lit[side]) for side in range(2)]
     side, texel = np.repeat([0, 1], [len(mine) for mine in lit]), np.concatenate(lit)
