@@ -72,7 +72,8 @@ def test_a_scene_is_baked_edited_and_opened_again(opened, tmp_path):
     session.click(*session.point("Interreflections"))
     session.wait_for(lambda state: "glaze##edited" in state["rects"])
     session.click(*session.point("bake"))
-    bounced = session.wait_for(lambda state: state["samples"] >= 64 and not state["busy"])
+    session.wait_for(lambda state: state["samples"] >= 64 and state["brightness"] > 1.02 * edited["brightness"])
+    bounced = session.wait_for(lambda state: not state["busy"])
     assert 1.02 * edited["brightness"] < bounced["brightness"] < 3 * edited["brightness"]
     assert session.close() == 0, session.log()
     saved = Session.open(tmp_path / "teatray-001.edits.json")

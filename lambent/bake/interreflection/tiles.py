@@ -120,6 +120,8 @@ class TileTracer:
     def __call__(self, job: Job) -> tuple[Tile, ...]:
         """The tiles of the terms of the job's material."""
         engine()  # before Mitsuba is imported
+        # Before the thread: imports and numba's compiler parse Python, and CPython 3.11 fails where two threads do.
+        from lambent.bake.interreflection import binning, paths  # noqa: F401
         from lambent.bake.interreflection.sums import compile_sums
 
         adding: list[Future[list[Sums]]] = []

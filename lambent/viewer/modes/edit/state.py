@@ -185,9 +185,10 @@ class EditState:
         if frame is not None and frame.wish is self._wish and frame.settled:
             compared.fit(frame)
             if not self._metered:
-                self._metered = True
-                if look.exposure_ev == 0.0:  # not yet chosen by hand
-                    look.exposure_ev = metered(frame.radiance) or 0.0
+                found = metered(frame.radiance)  # None before there is light
+                self._metered = found is not None
+                if found is not None and look.exposure_ev == 0.0:  # not chosen by hand meanwhile
+                    look.exposure_ev = found
         wish = Wish(
             self._now, compared.materials, compared.chosen == DIRECT, compared.scale if self.is_difference else None,
             look.view_transform, look.exposure_ev, look.scale, surfaces,
