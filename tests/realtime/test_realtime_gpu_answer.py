@@ -115,7 +115,8 @@ def test_without_room_the_cores_have_it(device: Any, monkeypatch: pytest.MonkeyP
     answer = room(1)
 
     class Small:
-        limits = {**device.limits, "max-storage-buffer-binding-size": 1000}
+        def __init__(self) -> None:
+            self.limits = {**device.limits, "max-storage-buffer-binding-size": 1000}
 
         def __getattr__(self, name: str) -> Any:
             return getattr(device, name)

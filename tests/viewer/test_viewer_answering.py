@@ -43,6 +43,13 @@ def settled(light: AnsweringLight, edited: dict) -> None:
         light.update(edited)
 
 
+@pytest.fixture(params=["cores", "shaders"])
+def computed_by(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the adapter is."""
+    monkeypatch.setattr(answering, "computes", lambda _: request.param == "shaders")
+
+
+@pytest.mark.usefixtures("computed_by")
 def test_light_follows_an_edit_and_comes_back(tmp_path: Path) -> None:
     store = bake(room_with_step(), tmp_path / "s", quality=TINY)
     renderer, shown = Renderer(open_device(), store), Answering()
@@ -65,6 +72,7 @@ def test_a_store_without_an_answer_is_named(tmp_path: Path) -> None:
     assert not shown.possible and shown.note == WITHOUT
 
 
+@pytest.mark.usefixtures("computed_by")
 def test_an_edit_drops_the_probes_of_the_one_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first edit's probes are given up after the one under way, and made where the edit comes back."""
     second = SceneObject("other ball", placed(sphere(0.3, 16, 8), (0.8, 1.2, -0.8)), "mirror")
@@ -95,6 +103,7 @@ def test_an_edit_drops_the_probes_of_the_one_before(tmp_path: Path, monkeypatch:
     assert np.allclose(shown, fresh.image(VIEW), rtol=0.02, atol=0.01 * shown.mean())
 
 
+@pytest.mark.usefixtures("computed_by")
 def test_a_store_with_light_groups_answers_in_its_mix(tmp_path: Path) -> None:
     store = bake(room_with_step(), tmp_path / "s", quality=TINY, light_groups="scene")
     renderer, shown = Renderer(open_device(), store), Answering()

@@ -37,10 +37,10 @@ class TexelsOnGpu:
         count = 3 * len(self.texels)
         return np.stack([self.stages.read(one, np.float32, count).reshape(-1, 3) for one in self.buffers])
 
-    def draw(self, texture: Any, per_unit: float) -> None:
-        """Write the light of all groups' only one, times `per_unit`, to its texels of a light map's texture."""
+    def draw(self, texture: Any, sides: int, per_unit: float) -> None:
+        """Write the light, of one group and times `per_unit`, to its texels on one or both sides of a light map."""
         (buffer,) = self.buffers
-        parameters = len(self.texels), texture.size[0], float(per_unit)
+        parameters = len(self.texels), texture.size[0], sides, float(per_unit)
         resources = self._places, buffer, texture.create_view(dimension="2d-array")
         self.stages.submit([self.stages.call("show", parameters, *resources, threads=len(self.texels))])
 

@@ -5,6 +5,7 @@
 struct Show {
     texels: u32,
     width: u32,  // of the light map
+    layers: u32,  // that it has, one for each side
     per_unit: f32,  // of the scene
 }
 
@@ -15,7 +16,7 @@ struct Show {
 
 @compute @workgroup_size(256) fn show_main(@builtin(global_invocation_id) id: vec3u) {
     let texel = id.x;
-    if (texel >= show.texels) { return; }
+    if (texel >= show.texels || places[texel] % 2u >= show.layers) { return; }
     let at = 3u * texel;
     let light = show.per_unit * vec3f(irradiance[at], irradiance[at + 1u], irradiance[at + 2u]);
     let place = places[texel] / 2u;
