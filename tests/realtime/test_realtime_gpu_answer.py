@@ -111,6 +111,16 @@ def test_a_sweep_too_few_says_so(device: Any, monkeypatch: pytest.MonkeyPatch) -
     assert on_gpu.sweeps() == [(2, False)]
 
 
+def test_sweeps_in_many_submissions_are_those_of_one(device: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    answer, found, taken = room(2), [], []
+    for sweeps in (100, 3):
+        monkeypatch.setattr("lambent.realtime.answered.gpu_answer.SWEEPS_AT_ONCE", sweeps)
+        on_gpu = GpuAnswer(device, answer, answer.reference(), texels_of(answer))
+        found.append(on_gpu.begin(EDITS[0]).irradiance())
+        taken.append(on_gpu.sweeps())
+    assert np.array_equal(found[0], found[1]) and taken[0] == taken[1] and min(taken[0])[0] > 3
+
+
 def test_without_room_the_cores_have_it(device: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     answer = room(1)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,8 +12,10 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
+from lambent.core.answer import Albedos
 from lambent.core.camera import Camera
 from lambent.realtime.answer_shown import answered
+from lambent.realtime.answered.gpu_answer import GpuAnswer, TexelsOnGpu
 from lambent.realtime.answering import answered_scene
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
@@ -44,9 +47,18 @@ def settled(light: AnsweringLight, edited: dict) -> None:
 
 
 @pytest.fixture(params=["cores", "shaders"])
-def computed_by(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+def computed_by(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Whatever the adapter is."""
+    begin, begun = GpuAnswer.begin, list[Albedos]()
+
+    def counted(self: GpuAnswer, albedos: Albedos) -> TexelsOnGpu:
+        begun.append(albedos)
+        return begin(self, albedos)
+
+    monkeypatch.setattr(GpuAnswer, "begin", counted)
     monkeypatch.setattr(answering, "computes", lambda _: request.param == "shaders")
+    yield
+    assert bool(begun) == (request.param == "shaders")
 
 
 @pytest.mark.usefixtures("computed_by")

@@ -1,12 +1,13 @@
-"""One answer in the memory of a GPU: an edit is a single submission, from albedos to the irradiance of texels.
+"""One answer in the memory of a GPU, from albedos to the irradiance of texels.
 
-Light groups go through the stages one after another, each with arrays of its own, so that a binding holds one group.
+Light groups have arrays of their own, so that a binding holds one group. Sweeps over the patches go on until every
+group's solution stands, some in each submission, so that a frame waits for few; all else is one submission.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -20,7 +21,8 @@ from lambent.realtime.answered.stages import Call, NoRoom, Stages
 
 NEAR = 8  # points of a texel, as the shader says
 GPU_TOLERANCE = 1e-5  # relative change of a patch in the last sweep
-GPU_SWEEPS = 2 * SWEEPS  # Jacobi's method takes about twice those of Gauss and Seidel's
+GPU_SWEEPS = 2 * SWEEPS  # at most: Jacobi's method takes about twice those of Gauss and Seidel's
+SWEEPS_AT_ONCE = 32  # of a submission
 LIGHT_BYTES = 12  # three float32
 
 
@@ -69,14 +71,18 @@ class GpuAnswer:
         self._stages, self._texels = Stages(device), texels
         self._lock = threading.Lock()  # an edit's albedos and its submission go together
         self._shared = _Shared(self._stages, answer)
+        numbers = range(len(answer.direct))
+        self._solvers = [_Solver(self._stages, self._shared, answer, group) for group in numbers]
+        self._shared.colour(answer.albedos)
+        _solve(self._stages, self._solvers)
         as_baked = answer.indirect(answer.albedos)
         self._groups = [
-            _Group(self._stages, self._shared, answer, group, as_baked[group], reference[group])
-            for group in range(len(answer.direct))
+            _Group(self._stages, self._shared, self._solvers[group], answer, group, as_baked[group], reference[group])
+            for group in numbers
         ]
 
     def begin(self, albedos: Albedos) -> TexelsOnGpu:
-        """Ask for the light with other albedos, and return at once.
+        """Solve for the light of patches with other albedos, and ask for that of texels without waiting for it.
 
         Raises
         ------
@@ -86,17 +92,18 @@ class GpuAnswer:
         found = tuple(self._stages.empty(len(self._texels) * LIGHT_BYTES) for _ in self._groups)
         with self._lock:
             self._shared.colour(albedos)
+            _solve(self._stages, self._solvers)
             calls = (group.calls(to) for group, to in zip(self._groups, found, strict=True))
             self._stages.submit([call for of_group in calls for call in of_group])
         return TexelsOnGpu(self._stages, found, self._texels)
 
     def solved(self) -> NDArray[np.float32]:
         """Indirect irradiance (G, P, 3) of patches in the last edit, read back: for tests."""
-        return np.stack([group.patches_now() for group in self._groups])
+        return np.stack([solver.light() for solver in self._solvers])
 
     def sweeps(self) -> list[tuple[int, bool]]:
         """Sweeps of each group in the last edit, and whether its solution stands: for tests."""
-        return [group.outcome() for group in self._groups]
+        return [solver.outcome() for solver in self._solvers]
 
 
 class _Shared:
@@ -118,23 +125,58 @@ class _Shared:
         self._stages.write(self.albedos, np.pad(both, ((0, 0), (0, 1))).astype(np.float32))
 
 
+class _Solver:
+    """Patches of one light group, and the calls that solve for their light."""
+
+    def __init__(self, stages: Stages, shared: _Shared, answer: Answer, group: int) -> None:
+        self._stages, self._patches = stages, answer.patches.direct.shape[1]
+        rows, size = answer.patches.rows, self._patches * LIGHT_BYTES
+        first, last = (int(rows.starts[group, 0]), int(rows.ends[group, -1])) if self._patches else (0, 0)
+        starts = np.append(rows.starts[group], last) - first
+        both = rows.senders[first:last].astype(np.uint32), rows.shares[first:last].astype(np.float32).view(np.uint32)
+        direct = np.asarray(answer.patches.direct[group], np.float32)
+        self.indirect, sent, self._outcome = stages.empty(size), stages.empty(size), stages.empty(8)
+        given = (stages.buffer(starts.astype(np.uint32)), stages.buffer(np.stack(both, axis=1)), shared.patches,
+                 shared.albedos, stages.buffer(direct), self.indirect, sent, self._outcome)  # fmt: skip
+        sweeps = min(SWEEPS_AT_ONCE, GPU_SWEEPS)
+        self.begins, self.goes_on = (
+            stages.call("solve", (self._patches, sweeps, anew, GPU_TOLERANCE), *given, threads=1) for anew in (1, 0)
+        )
+
+    def light(self) -> NDArray[np.float32]:
+        """(P, 3) indirect irradiance of patches, read back."""
+        return self._stages.read(self.indirect, np.float32, 3 * self._patches).reshape(-1, 3)
+
+    def outcome(self) -> tuple[int, bool]:
+        """Sweeps taken, and whether the solution stands."""
+        sweeps, stands = self._stages.read(self._outcome, np.uint32, 2)
+        return int(sweeps), bool(stands)
+
+
+def _solve(stages: Stages, solvers: Sequence[_Solver]) -> None:
+    """Solve for the light of patches in all groups; waits for the GPU."""
+    stages.submit([solver.begins for solver in solvers])
+    for _ in range(SWEEPS_AT_ONCE, GPU_SWEEPS, SWEEPS_AT_ONCE):
+        left = [solver.goes_on for solver in solvers if not solver.outcome()[1]]
+        if not left:
+            return
+        stages.submit(left)
+
+
 class _Group:
-    """The arrays of one light group, and its calls."""
+    """The arrays of one light group, and its calls after its patches are solved for."""
 
     def __init__(
-        self, stages: Stages, shared: _Shared, answer: Answer, group: int, gathered: Floats, reference: Floats
-    ) -> None:
+        self, stages: Stages, shared: _Shared, solver: _Solver, answer: Answer, group: int, gathered: Floats,
+        reference: Floats,
+    ) -> None:  # fmt: skip
         self._stages, self._shared = stages, shared
         points, rays = answer.points, answer.rays
-        self._patches, self._points, self._texels = answer.patches.direct.shape[1], len(points.other), len(reference)
+        self._points, self._texels = len(points.other), len(reference)
         self._sent = stages.empty(self._points * LIGHT_BYTES)
         self._found = stages.empty(self._points * LIGHT_BYTES)
-        self._solve = self._solving(answer, group)
-        shared.colour(answer.albedos)
-        stages.submit([self._solve])
-        patches_baked = self.patches_now()
         lights = stages.buffer(np.concatenate([points.direct[group], points.light[group]], axis=1).astype(np.float32))
-        self._first = self._exitance(lights, True, self._indirect, patches_baked)
+        self._first = self._exitance(lights, True, solver.indirect, solver.light())
         self._next = self._exitance(lights, False, self._found, gathered)
         weights, most = stages.buffer(rays.weights[:, group]), stages.buffer(rays.most[:, group])
         given = shared.ray_starts, shared.ray_ends, weights, most, self._sent, self._found
@@ -144,34 +186,12 @@ class _Group:
         self._least = _least(reference)
 
     def calls(self, found: Any) -> Iterator[Call]:
-        """All stages in order, the last of which writes the irradiance of texels to `found`."""
-        yield self._solve
+        """Stages in order, the last of which writes the irradiance of texels to `found`."""
         for step in range(PASSES):
             yield self._first if step == 0 else self._next
             yield self._gather
         given = self._shared.near, self._found, *self._of_texels, found
         yield self._stages.call("texels", (self._texels, self._least), *given, threads=self._texels)
-
-    def patches_now(self) -> NDArray[np.float32]:
-        """(P, 3) indirect irradiance of patches, read back."""
-        return self._stages.read(self._indirect, np.float32, 3 * self._patches).reshape(-1, 3)
-
-    def outcome(self) -> tuple[int, bool]:
-        """Sweeps taken, and whether the solution stands."""
-        sweeps, stands = self._stages.read(self._outcome, np.uint32, 2)
-        return int(sweeps), bool(stands)
-
-    def _solving(self, answer: Answer, group: int) -> Call:
-        """One workgroup that solves for the light of patches."""
-        stages, rows, size = self._stages, answer.patches.rows, self._patches * LIGHT_BYTES
-        first, last = (int(rows.starts[group, 0]), int(rows.ends[group, -1])) if self._patches else (0, 0)
-        starts = np.append(rows.starts[group], last) - first
-        both = rows.senders[first:last].astype(np.uint32), rows.shares[first:last].astype(np.float32).view(np.uint32)
-        direct = np.asarray(answer.patches.direct[group], np.float32)
-        self._indirect, sent, self._outcome = stages.empty(size), stages.empty(size), stages.empty(8)
-        given = (stages.buffer(starts.astype(np.uint32)), stages.buffer(np.stack(both, axis=1)), self._shared.patches,
-                 self._shared.albedos, stages.buffer(direct), self._indirect, sent, self._outcome)  # fmt: skip
-        return stages.call("solve", (self._patches, GPU_SWEEPS, GPU_TOLERANCE), *given, threads=1)
 
     def _exitance(self, lights: Any, by_patch: bool, now: Any, baked: Floats) -> Call:
         before = self._stages.buffer(np.asarray(baked, np.float32))

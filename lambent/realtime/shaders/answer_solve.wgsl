@@ -1,6 +1,7 @@
 // Light between patches: B = D + F (a B + t B of the other side), by Jacobi's method (`lambent.core.answer.solved`).
 //
 // One workgroup solves for one light group, so that barriers order its sweeps and it stops when no patch changes any more.
+// Sweeps are divided among submissions, between which frames are drawn.
 
 #include "answer.wgsl"
 
@@ -8,7 +9,8 @@ const LANES = 256u;
 
 struct Solve {
     patches: u32,
-    sweeps: u32,  // at most
+    sweeps: u32,  // at most, in this call
+    anew: u32,  // whether this call is the first
     tolerance: f32,  // relative change of a patch
 }
 
@@ -50,9 +52,13 @@ fn arrived(p: u32) -> vec3f {
 }
 
 @compute @workgroup_size(256) fn solve_main(@builtin(local_invocation_index) lane: u32) {
-    for (var i = lane; i < 3u * solve.patches; i += LANES) { indirect[i] = 0.0; }
+    if (solve.anew != 0u) {
+        for (var i = lane; i < 3u * solve.patches; i += LANES) { indirect[i] = 0.0; }
+        if (lane == 0u) { outcome[0] = 0u; }
+    }
+    if (lane == 0u) { stands = select(outcome[1], 0u, solve.anew != 0u); }
     var taken = 0u;
-    var done = 0u;
+    var done = workgroupUniformLoad(&stands);
     while (taken < solve.sweeps && done == 0u) {
         storageBarrier();
         for (var p = lane; p < solve.patches; p += LANES) { send(p); }
@@ -74,7 +80,7 @@ fn arrived(p: u32) -> vec3f {
         taken++;
     }
     if (lane == 0u) {
-        outcome[0] = taken;
+        outcome[0] += taken;
         outcome[1] = done;
     }
 }
