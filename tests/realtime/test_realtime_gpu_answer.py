@@ -121,6 +121,21 @@ def test_sweeps_in_many_submissions_are_those_of_one(device: Any, monkeypatch: p
     assert np.array_equal(found[0], found[1]) and taken[0] == taken[1] and min(taken[0])[0] > 3
 
 
+def test_many_patches_with_long_rows_are_solved(device: Any) -> None:
+    """More steps of a thread than a software adapter lets one submission take."""
+    rng, count = np.random.default_rng(2), 1000
+    transfer = rng.random((1, count, count)).astype(np.float32)
+    transfer /= transfer.sum(axis=2, keepdims=True)
+    small = room(1)
+    direct = (rng.random((1, count, 3)) ** 4).astype(np.float32)
+    large = Patches(rng.integers(0, MATERIALS, count), np.arange(count), direct, transfer)
+    answer = Answer(large, small.points, small.rays, small.near, small.direct, small.baked, small.albedos)
+    on_gpu, white = GpuAnswer(device, answer, answer.reference(), texels_of(answer)), EDITS[2]
+    on_gpu.begin(white)
+    exact = solved(large, white, tolerance=1e-6).irradiance - direct
+    assert on_gpu.sweeps()[0][1] and np.allclose(on_gpu.solved(), exact, rtol=1e-3)
+
+
 def test_without_room_the_cores_have_it(device: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     answer = room(1)
 

@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 
 from lambent.core.answer import PASSES, SWEEPS, Albedos, Answer, Neighbours, least_light
 from lambent.core.arrays import Floats
-from lambent.realtime.answered.stages import Call, NoRoom, Stages
+from lambent.realtime.answered.stages import GROUP, Call, NoRoom, Stages
 
 NEAR = 8  # points of a texel, as the shader says
 GPU_TOLERANCE = 1e-5  # relative change of a patch in the last sweep
 GPU_SWEEPS = 2 * SWEEPS  # at most: Jacobi's method takes about twice those of Gauss and Seidel's
-SWEEPS_AT_ONCE = 32  # of a submission
+SWEEPS_AT_ONCE = 32  # of a submission, at most
+STEPS_AT_ONCE = 1 << 15  # of loops in a submission, for frames to wait little; llvmpipe ends loops after 65535 steps
 LIGHT_BYTES = 12  # three float32
 
 
@@ -138,7 +139,10 @@ class _Solver:
         self.indirect, sent, self._outcome = stages.empty(size), stages.empty(size), stages.empty(8)
         given = (stages.buffer(starts.astype(np.uint32)), stages.buffer(np.stack(both, axis=1)), shared.patches,
                  shared.albedos, stages.buffer(direct), self.indirect, sent, self._outcome)  # fmt: skip
-        sweeps = min(SWEEPS_AT_ONCE, GPU_SWEEPS)
+        longest = int((rows.ends[group] - rows.starts[group]).max(initial=0))
+        steps = -(-self._patches // GROUP) * (longest + 3)  # of a thread in a sweep
+        sweeps = max(1, min(SWEEPS_AT_ONCE, GPU_SWEEPS, STEPS_AT_ONCE // max(1, steps)))
+        self.submissions = -(-GPU_SWEEPS // sweeps)  # at most
         self.begins, self.goes_on = (
             stages.call("solve", (self._patches, sweeps, anew, GPU_TOLERANCE), *given, threads=1) for anew in (1, 0)
         )
@@ -156,11 +160,10 @@ class _Solver:
 def _solve(stages: Stages, solvers: Sequence[_Solver]) -> None:
     """Solve for the light of patches in all groups; waits for the GPU."""
     stages.submit([solver.begins for solver in solvers])
-    for _ in range(SWEEPS_AT_ONCE, GPU_SWEEPS, SWEEPS_AT_ONCE):
-        left = [solver.goes_on for solver in solvers if not solver.outcome()[1]]
-        if not left:
-            return
-        stages.submit(left)
+    submitted = 1
+    while left := [one for one in solvers if submitted < one.submissions and not one.outcome()[1]]:
+        stages.submit([solver.goes_on for solver in left])
+        submitted += 1
 
 
 class _Group:
