@@ -276,11 +276,11 @@ def _upsampled(light, points, shares):  # type: ignore[no-untyped-def]
 
 def ratios(edited: Floats, reference: Floats) -> NDArray[np.float32]:
     """I(edited) / I(reference) of light (G, ..., 3), within [0, MOST_RATIO]; 1 where there was next to none."""
-    ratio = np.divide(edited, reference, out=np.ones_like(reference), where=reference > _least(reference))
+    ratio = np.divide(edited, reference, out=np.ones_like(reference), where=reference > least_light(reference))
     return np.clip(ratio, 0, MOST_RATIO)
 
 
-def _least(reference: Floats) -> Floats:
+def least_light(reference: Floats) -> Floats:
     """Light (G, 1, ...) of each group below which a ratio says nothing."""
     axes = tuple(range(1, reference.ndim))
     return np.asarray(DARK * np.maximum(reference.mean(axis=axes, keepdims=True), 1e-30))
@@ -349,7 +349,7 @@ class Answer:
 
     def at_texels(self, indirect: NDArray[np.float32], reference: Floats) -> NDArray[np.float32]:
         """Irradiance (G, T, 3) of the texels, `answered` from indirect light (G, K, 3) of the points."""
-        least = np.array([_least(one[None])[0, 0, 0] for one in reference], np.float32)
+        least = np.array([least_light(one[None])[0, 0, 0] for one in reference], np.float32)
         return np.asarray(loops.texel_light(
             self.near.points, self.near.shares, indirect, reference, self.direct, self.baked, least,
             np.float32(MOST_RATIO), np.float32(MOST_EXCESS),

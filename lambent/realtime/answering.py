@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +20,13 @@ from lambent.core.arrays import Floats
 from lambent.core.irradiance import irradiance_of
 from lambent.materials.diffuse_albedos import albedos_of, edited_albedos
 from lambent.materials.document import Material
+from lambent.realtime.answered.gpu_answer import TexelsOnGpu, gpu_answer
+from lambent.realtime.answered.stages import NoRoom
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.lit_texels import LitTexels, mix_into
-from lambent.realtime.resources import light_layers
+from lambent.realtime.resources import SceneResources, light_layers
 from lambent.store.answer import SeenSpots, StoredAnswer
 
 MARGIN = 1.4  # of the error over its estimate: at most 1.33 in 14 edits of two rooms, and 1.18 in 5 of a third
@@ -32,25 +35,38 @@ FAINT = 0.01  # of the mean indirect light: darker texels say nothing of how exa
 
 @dataclass(frozen=True, eq=False)
 class Lit:
-    """Irradiance (G, T, 3) of the texels that answer, by light group, W/m^2, for materials of these albedos.
+    """Light of the texels that answer, for materials of these albedos.
 
-    `is_baked` says whether it is as baked.
+    `is_baked` says whether it is as baked. `on_gpu` is the light in the memory of a GPU, where one has computed it.
     """
 
-    irradiance: NDArray[np.float32]
+    in_memory: NDArray[np.float32] | None
     reflected: Floats
     transmitted: Floats
     is_baked: bool
+    on_gpu: TexelsOnGpu | None = None
+
+    @cached_property
+    def irradiance(self) -> NDArray[np.float32]:
+        """(G, T, 3) by light group, W/m^2; waits for the GPU and reads it back where that has it."""
+        if self.in_memory is not None:
+            return self.in_memory
+        assert self.on_gpu is not None, "light is in memory or on a GPU"
+        return self.on_gpu.irradiance()
 
 
 class AnsweredLight:
-    """The light of one baked scene for other colours of its materials. Methods may run in any thread."""
+    """The light of one baked scene for other colours of its materials. Methods may run in any thread.
 
-    def __init__(self, baked: BakedScene, stored: StoredAnswer) -> None:
+    A `device` computes it by shaders, as far as it has room; else the processor's cores do.
+    """
+
+    def __init__(self, baked: BakedScene, stored: StoredAnswer, device: Any = None) -> None:
         self._baked, self._stored = baked, stored
         self._materials = [baked.record.materials[name] for name in stored.materials]
         self._reference = stored.answer.reference()
         self._as_baked = Lit(stored.answer.baked, *_shown(self._materials), is_baked=True)
+        self._gpu = None if device is None else gpu_answer(device, stored.answer, self._reference, stored.texels)
 
     @property
     def as_baked(self) -> Lit:
@@ -63,8 +79,21 @@ class AnsweredLight:
         albedos = edited_albedos(self._materials, now)
         if albedos.same_as(self._stored.answer.albedos):
             return self._as_baked
+        if self._gpu is not None:
+            try:
+                return Lit(None, *_shown(now), is_baked=False, on_gpu=self._gpu.begin(albedos))
+            except NoRoom:  # something else has taken the memory since
+                self._gpu = None
         light = self._stored.answer.irradiance(albedos, self._reference)
         return Lit(light, *_shown(now), is_baked=False)
+
+    def show(self, light: Lit, resources: SceneResources) -> None:
+        """Show light of one group in a renderer's light map; where a GPU has computed it, it stays there."""
+        if light.on_gpu is None:
+            resources.show_light_map(list(self.layers(light)))
+            return
+        base, draw = self._layers_as_baked, light.on_gpu.draw
+        resources.draw_light_map(base, lambda texture: draw(texture, len(base), 1 / self._baked.unit))
 
     def maps(self, light: Lit) -> tuple[Floats | None, Floats | None]:
         """Light maps (H, W, 3) of both sides in the scene's units; what does not answer is as baked."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
+import wgpu
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
@@ -27,9 +28,11 @@ from lambent.realtime.structs import OBJECT_DTYPE
 from lambent.realtime.sun import SunLight, sun_light
 from lambent.realtime.sun_disc import without_sun
 from lambent.realtime.textures import TextureCache
-from lambent.realtime.uploads import upload, with_alpha
+from lambent.realtime.uploads import layers_of, upload, with_alpha
 from lambent.scenes.scene import Look
 from lambent.store.contract import MOST_BORDERS, ObjectRecord
+
+LIGHT_MAP_USAGE = wgpu.TextureUsage.STORAGE_BINDING | wgpu.TextureUsage.COPY_SRC  # besides those of all textures
 
 
 def device_needs(scene: BakedScene) -> dict[str, int]:
@@ -92,8 +95,8 @@ class SceneResources:
         self.vertices = layouts.buffer("VERTEX", np.nan_to_num(vertices).astype(np.float32))
         self.indices = layouts.buffer("INDEX", scene.faces.astype(np.uint32))
         layers = light_layers(scene.irradiance, scene.irradiance_back, scene.dominant_direction)
-        self.light_layers = list(layers)  # as they are shown
-        self._light_texture = upload(device, [layers], "rgba16float")
+        self._light_layers, self._drawn_over = list(layers), None  # type: list[NDArray[np.float16]], Any
+        self._light_texture = upload(device, [layers], "rgba16float", LIGHT_MAP_USAGE)
         self.light_view = self._light_texture.create_view(dimension="2d-array")
         self.light_version = 0  # grows with every answer of light to edited materials, and with other textures
         sky = scene.far_light or DARK
@@ -142,14 +145,36 @@ class SceneResources:
 
         A third map is the dominant direction.
         """
+        replaced = sum(texels is not None for texels in sides[:2])
+        if self._drawn_over is not None and replaced == len(self._drawn_over):
+            self._drawn_over = None  # nothing that was drawn is left to be read back
+        layers = self.light_layers
         for layer, texels in enumerate(sides):
             if texels is not None:
-                self.light_layers[layer] = texels
+                layers[layer] = texels
                 height, width = texels.shape[:2]
                 self._layouts.device.queue.write_texture(
                     {"texture": self._light_texture, "origin": (0, 0, layer)}, np.ascontiguousarray(texels),
                     {"bytes_per_row": width * 8, "rows_per_image": height}, (width, height, 1),
                 )  # fmt: skip
+
+    def draw_light_map(self, base: NDArray[np.float16], draw: Callable[[Any], None]) -> None:
+        """Have `draw` write texels into the light map's texture, over `base` (n, H, W, 4).
+
+        The base is not uploaded again while it is what was drawn over last: `draw` writes the same texels each time.
+        """
+        if self._drawn_over is not base:
+            self.show_light_map(list(base))
+        draw(self._light_texture)
+        self._drawn_over = base
+
+    @property
+    def light_layers(self) -> list[NDArray[np.float16]]:
+        """Light maps (H, W, 4) as they are shown; read back where the GPU has drawn them."""
+        if self._drawn_over is not None:
+            self._light_layers = list(layers_of(self._layouts.device, self._light_texture))
+            self._drawn_over = None
+        return self._light_layers
 
     def light_of(self, name: str) -> ProbeLight:
         """The light that the object of this name and those that share it are shown in."""

@@ -25,10 +25,13 @@ def with_alpha(rgb: Floats) -> NDArray[np.float16]:
     return rgba
 
 
-def upload(device: Any, levels: Sequence[NDArray[Any]], format: str) -> Any:
-    """Texture of MIP levels (layers, rows, columns, channels) whose texels are those of `format`."""
+def upload(device: Any, levels: Sequence[NDArray[Any]], format: str, usage: int = 0) -> Any:
+    """Texture of MIP levels (layers, rows, columns, channels) whose texels are those of `format`.
+
+    It is sampled and written to, and has the `usage` that is given besides.
+    """
     layers, height, width = levels[0].shape[:3]
-    usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
+    usage |= wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
     size = (width, height, layers)
     texture = device.create_texture(size=size, format=format, mip_level_count=len(levels), usage=usage)
     for level, values in enumerate(levels):
@@ -40,6 +43,14 @@ def upload(device: Any, levels: Sequence[NDArray[Any]], format: str) -> Any:
             (columns, rows, layers),
         )
     return texture
+
+
+def layers_of(device: Any, texture: Any) -> NDArray[np.float16]:
+    """Texels (layers, height, width, 4) of a texture of half floats, read back; waits for the GPU."""
+    width, height, layers = texture.size
+    rows = {"bytes_per_row": 8 * width, "rows_per_image": height}
+    data = device.queue.read_texture({"texture": texture}, rows, (width, height, layers))
+    return np.frombuffer(data, np.float16).reshape(layers, height, width, 4)
 
 
 def cube_texture(device: Any, levels: Sequence[Floats], format: str = "rgba16float") -> Any:

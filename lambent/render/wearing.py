@@ -9,6 +9,7 @@ from lambent.core.plain import Triple
 from lambent.materials.document import Material
 from lambent.materials.recolour import recoloured
 from lambent.realtime.answer_shown import AnswerShown
+from lambent.realtime.answered.stages import computes
 from lambent.realtime.answering import AnsweredLight
 from lambent.realtime.group_arrays import FIELDS_FOLLOW
 from lambent.realtime.renderer import Renderer
@@ -60,7 +61,8 @@ class Wearing:
 
     @cached_property
     def _shown(self) -> tuple[AnsweredLight, AnswerShown]:
-        answer = AnsweredLight(self._renderer.scene, read_answer(self._store))
+        device = self._renderer.device
+        answer = AnsweredLight(self._renderer.scene, read_answer(self._store), device if computes(device) else None)
         return answer, AnswerShown(self._renderer, answer)
 
     def _tell(self, materials: Mapping[str, Material]) -> None:

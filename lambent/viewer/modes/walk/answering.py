@@ -1,7 +1,8 @@
 """Light that answers edited materials while the camera goes on: computed in a thread, shown as soon as it is there.
 
 The light map comes first, the probes after it, each when it is ready. An edit that comes in between drops the probes of
-the one before: the light map is never behind by more than one computation.
+the one before: the light map is never behind by more than one computation. Where a real GPU draws, its shaders compute
+the light map in its texture, and the thread reads it back for the probes and the estimate of its error alone.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from lambent.core.errors import UserError
 from lambent.core.progress import Progress
 from lambent.materials.document import Material
 from lambent.realtime.answer_shown import answered, users_of
+from lambent.realtime.answered.stages import computes
 from lambent.realtime.answering import AnsweredLight, Lit
 from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.probe_light import ProbeLight
@@ -24,6 +26,8 @@ from lambent.store.answer import has_answer, read_answer
 from lambent.store.store import Store
 from lambent.viewer.work import Work
 
+AS_BAKED = "light of other surfaces: as baked"
+ESTIMATED = "light of other surfaces: estimated"
 WITHOUT = "the light of other surfaces stays as baked: this store has no answer (`lambent bake --only answer`)"
 
 
@@ -46,11 +50,22 @@ class Answering:
 
 @dataclass(frozen=True, eq=False)
 class _Maps:
-    """`groups` are mixed where light is sorted so; else `layers` are shown, and probes follow."""
+    """`groups` are mixed where light is sorted so; else the light is shown, and probes follow.
+
+    `layers` are the light maps, and None of light that is on the GPU already: its error is estimated with its probes.
+    """
 
     light: Lit
     layers: NDArray[np.float16] | None
     groups: GroupArrays | None
+    likely_error: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Probes:
+    """The light of probes by object, and the error of the light that they see."""
+
+    lights: dict[str, ProbeLight]
     likely_error: float | None
 
 
@@ -69,7 +84,7 @@ class AnsweringLight:
         self._users: dict[str, list[int]] = {}  # numbers of the objects that show each
         shown.possible = has_answer(store) and not renderer.scene.replaced
         if shown.possible:
-            shown.said = "light of other surfaces: as baked"
+            shown.said = AS_BAKED
         elif renderer.scene.replaced:
             shown.said = "the light of other surfaces stays as baked: an object is replaced"
 
@@ -117,18 +132,32 @@ class AnsweringLight:
     def _maps(self, edited: Mapping[str, Material]) -> _Maps:
         """In the thread: the light maps of edited materials."""
         if self._answer is None:
-            self._answer = AnsweredLight(self._renderer.scene, read_answer(self._store))
-        light, mixer = self._answer.lit(edited), self._renderer.mixer
-        off = None if light.is_baked else self._answer.likely_error(light, mixer.factors)
+            device = self._renderer.device
+            stored, shaders = read_answer(self._store), device if computes(device) else None
+            self._answer = AnsweredLight(self._renderer.scene, stored, shaders)
+        light = self._answer.lit(edited)
         groups = self._answer.groups(light)
-        return _Maps(light, None if groups else self._answer.layers(light), groups, off)
+        if groups is None and light.on_gpu is not None:
+            return _Maps(light, None, None, None)
+        return _Maps(light, None if groups else self._answer.layers(light), groups, self._likely_error(light))
+
+    def _likely_error(self, light: Lit) -> float | None:
+        """In the thread: the error of light that is not as baked."""
+        assert self._answer is not None, "light comes from an answer"
+        return None if light.is_baked else self._answer.likely_error(light, self._renderer.mixer.factors)
 
     def _show_maps(self, maps: _Maps) -> None:
+        self._shown.said = AS_BAKED if maps.light.is_baked else ESTIMATED
         self._shown.likely_error = maps.likely_error
         if maps.groups is not None:  # the mixer makes light maps and probes of them
             self._renderer.mixer.answer(maps.groups)
-        elif maps.layers is not None:
-            self._renderer.resources.show_light_map(list(maps.layers))
+        else:
+            resources = self._renderer.resources
+            if maps.layers is not None:
+                resources.show_light_map(list(maps.layers))
+            else:
+                assert self._answer is not None, "light comes from an answer"
+                self._answer.show(maps.light, resources)
             self._probes_of = maps.light
         self._renderer.resources.light_version += 1
 
@@ -141,15 +170,17 @@ class AnsweringLight:
             self._users = users_of(self._first, self._as_baked)
         baked = self._as_baked
 
-        def run(progress: Progress) -> dict[str, ProbeLight]:
+        def run(progress: Progress) -> _Probes:
+            off = self._likely_error(light) if light.on_gpu is not None else self._shown.likely_error
             found = {}
             for number, name in enumerate(answer.probes):
                 progress(number, len(answer.probes), "probes")
                 found[name] = baked[name] if light.is_baked else answered(baked[name], answer, name, light)
-            return found
+            return _Probes(found, off)
 
-        def show(found: dict[str, ProbeLight]) -> None:
-            for name, made in found.items():
+        def show(found: _Probes) -> None:
+            self._shown.likely_error = found.likely_error
+            for name, made in found.lights.items():
                 for item in (resources.objects[k] for k in self._users[name]):
                     item.relight(made, item.emission)
             resources.light_version += 1

@@ -1,0 +1,227 @@
+"""One answer in the memory of a GPU, from albedos to the irradiance of texels.
+
+Light groups have arrays of their own, so that a binding holds one group. Sweeps over the patches go on until every
+group's solution stands, some in each submission, so that a frame waits for few; all else is one submission.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.answer import PASSES, SWEEPS, Albedos, Answer, Neighbours, least_light
+from lambent.core.arrays import Floats
+from lambent.realtime.answered.stages import GROUP, Call, NoRoom, Stages
+
+NEAR = 8  # points of a texel, as the shader says
+GPU_TOLERANCE = 1e-5  # relative change of a patch in the last sweep
+GPU_SWEEPS = 2 * SWEEPS  # at most: Jacobi's method takes about twice those of Gauss and Seidel's
+SWEEPS_AT_ONCE = 32  # of a submission, at most
+STEPS_AT_ONCE = 1 << 15  # of loops in a submission, for frames to wait little; llvmpipe ends loops after 65535 steps
+LIGHT_BYTES = 12  # three float32
+
+
+@dataclass(frozen=True, eq=False)
+class TexelsOnGpu:
+    """Irradiance of T texels that answer an edit, by light group in one buffer each."""
+
+    stages: Stages
+    buffers: tuple[Any, ...]
+    texels: NDArray[np.uint32]
+
+    def irradiance(self) -> NDArray[np.float32]:
+        """(G, T, 3) W/m^2, read back; waits for the GPU."""
+        count = 3 * len(self.texels)
+        return np.stack([self.stages.read(one, np.float32, count).reshape(-1, 3) for one in self.buffers])
+
+    def draw(self, texture: Any, sides: int, per_unit: float) -> None:
+        """Write the light, of one group and times `per_unit`, to its texels on one or both sides of a light map."""
+        (buffer,) = self.buffers
+        parameters = len(self.texels), texture.size[0], sides, float(per_unit)
+        resources = self._places, buffer, texture.create_view(dimension="2d-array")
+        self.stages.submit([self.stages.call("show", parameters, *resources, threads=len(self.texels))])
+
+    @cached_property
+    def _places(self) -> Any:
+        return self.stages.buffer(self.texels)
+
+
+class GpuAnswer:
+    """An answer's arrays and calls on a device. Methods may run in any thread.
+
+    Parameters
+    ----------
+    reference : (G, T, 3)
+        `answer.reference()`.
+    texels : (T,) uint32
+        Twice row * width + column in the light map, plus 1 on the other side.
+
+    Raises
+    ------
+    NoRoom
+        Where an array does not fit.
+    """
+
+    def __init__(self, device: Any, answer: Answer, reference: Floats, texels: NDArray[np.uint32]) -> None:
+        self._stages, self._texels = Stages(device), texels
+        self._lock = threading.Lock()  # an edit's albedos and its submission go together
+        self._shared = _Shared(self._stages, answer)
+        numbers = range(len(answer.direct))
+        self._solvers = [_Solver(self._stages, self._shared, answer, group) for group in numbers]
+        self._shared.colour(answer.albedos)
+        _solve(self._stages, self._solvers)
+        as_baked = answer.indirect(answer.albedos)
+        self._groups = [
+            _Group(self._stages, self._shared, self._solvers[group], answer, group, as_baked[group], reference[group])
+            for group in numbers
+        ]
+
+    def begin(self, albedos: Albedos) -> TexelsOnGpu:
+        """Solve for the light of patches with other albedos, and ask for that of texels without waiting for it.
+
+        Raises
+        ------
+        NoRoom
+            Where the adapter has no more memory.
+        """
+        found = tuple(self._stages.empty(len(self._texels) * LIGHT_BYTES) for _ in self._groups)
+        with self._lock:
+            self._shared.colour(albedos)
+            _solve(self._stages, self._solvers)
+            calls = (group.calls(to) for group, to in zip(self._groups, found, strict=True))
+            self._stages.submit([call for of_group in calls for call in of_group])
+        return TexelsOnGpu(self._stages, found, self._texels)
+
+    def solved(self) -> NDArray[np.float32]:
+        """Indirect irradiance (G, P, 3) of patches in the last edit, read back: for tests."""
+        return np.stack([solver.light() for solver in self._solvers])
+
+    def sweeps(self) -> list[tuple[int, bool]]:
+        """Sweeps of each group in the last edit, and whether its solution stands: for tests."""
+        return [solver.outcome() for solver in self._solvers]
+
+
+class _Shared:
+    """What all light groups read."""
+
+    def __init__(self, stages: Stages, answer: Answer) -> None:
+        patches, points, rays = answer.patches, answer.points, answer.rays
+        self._stages = stages
+        self.albedos = stages.empty(2 * 16 * len(answer.albedos.reflected))
+        self.patches = stages.buffer(np.stack([patches.material, patches.paired], axis=1).astype(np.uint32))
+        about = [points.patch, points.material, points.other, np.zeros(len(points.patch))]
+        self.points = stages.buffer(np.stack(about, axis=1).astype(np.uint32))
+        self.ray_starts, self.ray_ends = stages.buffer(rays.starts.astype(np.uint32)), stages.buffer(rays.points)
+        self.near = stages.buffer(packed_near(answer.near))
+
+    def colour(self, albedos: Albedos) -> None:
+        """Send albedos for the next calls."""
+        both = np.concatenate([albedos.reflected, albedos.transmitted])
+        self._stages.write(self.albedos, np.pad(both, ((0, 0), (0, 1))).astype(np.float32))
+
+
+class _Solver:
+    """Patches of one light group, and the calls that solve for their light."""
+
+    def __init__(self, stages: Stages, shared: _Shared, answer: Answer, group: int) -> None:
+        self._stages, self._patches = stages, answer.patches.direct.shape[1]
+        rows, size = answer.patches.rows, self._patches * LIGHT_BYTES
+        first, last = (int(rows.starts[group, 0]), int(rows.ends[group, -1])) if self._patches else (0, 0)
+        starts = np.append(rows.starts[group], last) - first
+        both = rows.senders[first:last].astype(np.uint32), rows.shares[first:last].astype(np.float32).view(np.uint32)
+        direct = np.asarray(answer.patches.direct[group], np.float32)
+        self.indirect, sent, self._outcome = stages.empty(size), stages.empty(size), stages.empty(8)
+        given = (stages.buffer(starts.astype(np.uint32)), stages.buffer(np.stack(both, axis=1)), shared.patches,
+                 shared.albedos, stages.buffer(direct), self.indirect, sent, self._outcome)  # fmt: skip
+        longest = int((rows.ends[group] - rows.starts[group]).max(initial=0))
+        steps = -(-self._patches // GROUP) * (longest + 3)  # of a thread in a sweep
+        sweeps = max(1, min(SWEEPS_AT_ONCE, GPU_SWEEPS, STEPS_AT_ONCE // max(1, steps)))
+        self.submissions = -(-GPU_SWEEPS // sweeps)  # at most
+        self.begins, self.goes_on = (
+            stages.call("solve", (self._patches, sweeps, anew, GPU_TOLERANCE), *given, threads=1) for anew in (1, 0)
+        )
+
+    def light(self) -> NDArray[np.float32]:
+        """(P, 3) indirect irradiance of patches, read back."""
+        return self._stages.read(self.indirect, np.float32, 3 * self._patches).reshape(-1, 3)
+
+    def outcome(self) -> tuple[int, bool]:
+        """Sweeps taken, and whether the solution stands."""
+        sweeps, stands = self._stages.read(self._outcome, np.uint32, 2)
+        return int(sweeps), bool(stands)
+
+
+def _solve(stages: Stages, solvers: Sequence[_Solver]) -> None:
+    """Solve for the light of patches in all groups; waits for the GPU."""
+    stages.submit([solver.begins for solver in solvers])
+    submitted = 1
+    while left := [one for one in solvers if submitted < one.submissions and not one.outcome()[1]]:
+        stages.submit([solver.goes_on for solver in left])
+        submitted += 1
+
+
+class _Group:
+    """The arrays of one light group, and its calls after its patches are solved for."""
+
+    def __init__(
+        self, stages: Stages, shared: _Shared, solver: _Solver, answer: Answer, group: int, gathered: Floats,
+        reference: Floats,
+    ) -> None:  # fmt: skip
+        self._stages, self._shared = stages, shared
+        points, rays = answer.points, answer.rays
+        self._points, self._texels = len(points.other), len(reference)
+        self._sent = stages.empty(self._points * LIGHT_BYTES)
+        self._found = stages.empty(self._points * LIGHT_BYTES)
+        lights = stages.buffer(np.concatenate([points.direct[group], points.light[group]], axis=1).astype(np.float32))
+        self._first = self._exitance(lights, True, solver.indirect, solver.light())
+        self._next = self._exitance(lights, False, self._found, gathered)
+        weights, most = stages.buffer(rays.weights[:, group]), stages.buffer(rays.most[:, group])
+        given = shared.ray_starts, shared.ray_ends, weights, most, self._sent, self._found
+        self._gather = stages.call("gather", (self._points, rays.count), *given, threads=self._points)
+        arrays = reference, answer.direct[group], answer.baked[group]
+        self._of_texels = [stages.buffer(np.asarray(one, np.float32)) for one in arrays]
+        self._least = _least(reference)
+
+    def calls(self, found: Any) -> Iterator[Call]:
+        """Stages in order, the last of which writes the irradiance of texels to `found`."""
+        for step in range(PASSES):
+            yield self._first if step == 0 else self._next
+            yield self._gather
+        given = self._shared.near, self._found, *self._of_texels, found
+        yield self._stages.call("texels", (self._texels, self._least), *given, threads=self._texels)
+
+    def _exitance(self, lights: Any, by_patch: bool, now: Any, baked: Floats) -> Call:
+        before = self._stages.buffer(np.asarray(baked, np.float32))
+        given = self._shared.points, lights, self._shared.albedos, now, before, self._sent
+        return self._stages.call(
+            "exitance", (self._points, int(by_patch), _least(baked)), *given, threads=self._points
+        )  # fmt: skip
+
+
+def _least(light: Floats) -> float:
+    """Light below which a ratio to light (n, 3) says nothing."""
+    return float(least_light(light[None])[0, 0, 0]) if len(light) else 0.0
+
+
+def packed_near(near: Neighbours) -> NDArray[np.uint32]:
+    """(T, 6) words: eight points of 16 bits, then their eight shares of 8 bits."""
+    missing = NEAR - near.points.shape[1]
+    if missing < 0:
+        raise NoRoom
+    points = np.pad(near.points, ((0, 0), (0, missing))).astype("<u2").view("<u4")
+    shares = np.pad(near.shares, ((0, 0), (0, missing))).astype(np.uint8).view("<u4")
+    return np.concatenate([points, shares], axis=1)
+
+
+def gpu_answer(device: Any, answer: Answer, reference: Floats, texels: NDArray[np.uint32]) -> GpuAnswer | None:
+    """An answer on a device; None where it has no room, so that the cores compute."""
+    try:
+        return GpuAnswer(device, answer, reference, texels)
+    except NoRoom:
+        return None
