@@ -39,6 +39,7 @@ SWEEPS = 400  # at most: with albedos up to MOST_ALBEDO even a closed box is don
 MOST_ALBEDO = 0.97  # of an edited surface
 MOST_RATIO = 64.0  # of the light after an edit, and one over it before
 MOST_EXCESS = 1.25  # of the baked indirect light over what is gathered, as far as an edit makes it brighter
+MOST_SHARES = 1.3  # of the light of all others that reaches a patch; by weights it can be more than 1
 DARK = 1e-6  # of the mean indirect light: below it a ratio is 1
 
 
@@ -65,9 +66,18 @@ class Patches:
 
     @cached_property
     def rows(self) -> SparseRows:
-        """F as sparse rows: four of five entries are 0."""
+        """F as sparse rows, whose sums are at most MOST_SHARES: four of five entries are 0."""
+        return self._rows(MOST_SHARES)
+
+    @cached_property
+    def passive_rows(self) -> SparseRows:
+        """F whose rows sum to 1 at most: with it no light grows, whatever the albedos."""
+        return self._rows(1.0)
+
+    def _rows(self, most: float) -> SparseRows:
         groups = len(self.direct)
-        each = [csr_matrix(one) for one in np.broadcast_to(self.transfer, (groups, *self.transfer.shape[-2:]))]
+        bounded = self.transfer * np.minimum(1, most / np.maximum(self.transfer.sum(axis=-1, keepdims=True), most))
+        each = [csr_matrix(one) for one in np.broadcast_to(bounded, (groups, *bounded.shape[-2:]))]
         first = np.cumsum([0, *(one.nnz for one in each[:-1])])
         bounds = np.stack([one.indptr.astype(np.int64) + at for one, at in zip(each, first, strict=True)])
         senders, shares = (np.concatenate([getattr(one, part) for one in each]) for part in ("indices", "data"))
@@ -109,17 +119,20 @@ def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> 
     """Solve for the light between patches by the method of Gauss and Seidel.
 
     It ends when no patch of any group changes by more than `tolerance` of its own light: a bound on the brightest
-    change would leave dark corners unsolved.
+    change would leave dark corners unsolved. Where light would grow without end, it is solved by `passive_rows`.
     """
     crossing = (patches.paired != np.arange(patches.direct.shape[1]))[:, None]
     reflected = albedos.reflected[patches.material].astype(np.float32)
     transmitted = (albedos.transmitted[patches.material] * crossing).astype(np.float32)
-    light = patches.direct.astype(np.float32)
     direct, paired = np.ascontiguousarray(patches.direct, np.float32), np.asarray(patches.paired, np.int64)
-    sweeps, stopped = loops.solve(
-        *patches.rows, direct, reflected, transmitted, paired, np.float32(tolerance), SWEEPS, light
-    )
-    return Solution(light, int(sweeps.max(initial=0)), bool(stopped.all()))
+
+    def by(rows: SparseRows) -> Solution:
+        light, step = direct.copy(), np.float32(tolerance)
+        sweeps, stopped = loops.solve(*rows, direct, reflected, transmitted, paired, step, SWEEPS, light)
+        return Solution(light, int(sweeps.max(initial=0)), bool(stopped.all()))
+
+    found = by(patches.rows)
+    return found if found.converged else by(patches.passive_rows)
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,8 @@ def solve(starts, ends, senders, shares, direct, reflected, transmitted, paired,
                 other = paired[p]
                 for c, arrived in enumerate((red, green, blue)):
                     new = max(direct[group, p, c] + arrived, np.float32(0))  # an equivalent albedo may be negative
-                    if abs(new - light[group, p, c]) > tolerance * new + NO_LIGHT:
+                    # Not `>`: a difference of infinities, which is not a number, does not stand.
+                    if not abs(new - light[group, p, c]) <= tolerance * new + NO_LIGHT:
                         stands = False
                     light[group, p, c] = new
                     sent[p, c] = new * reflected[p, c] + light[group, other, c] * transmitted[p, c]

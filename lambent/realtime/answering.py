@@ -20,7 +20,7 @@ from lambent.core.arrays import Floats
 from lambent.core.irradiance import irradiance_of
 from lambent.materials.diffuse_albedos import albedos_of, edited_albedos
 from lambent.materials.document import Material
-from lambent.realtime.answered.gpu_answer import TexelsOnGpu, gpu_answer
+from lambent.realtime.answered.gpu_answer import TexelsOnGpu, Unsolved, gpu_answer
 from lambent.realtime.answered.stages import NoRoom
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import finite
@@ -84,6 +84,8 @@ class AnsweredLight:
                 return Lit(None, *_shown(now), is_baked=False, on_gpu=self._gpu.begin(albedos))
             except NoRoom:  # something else has taken the memory since
                 self._gpu = None
+            except Unsolved:
+                pass  # by the cores, this time
         light = self._stored.answer.irradiance(albedos, self._reference)
         return Lit(light, *_shown(now), is_baked=False)
 

@@ -8,6 +8,7 @@ import pytest
 from lambent.core.answer import (
     MOST_EXCESS,
     MOST_POINTS,
+    MOST_SHARES,
     MOST_WEIGHT,
     Albedos,
     Answer,
@@ -72,6 +73,15 @@ def test_dark_corners_are_solved_as_well_as_bright_ones() -> None:
 def test_a_solution_that_does_not_come_to_an_end_says_so() -> None:
     room = Patches(np.zeros(2, int), np.arange(2), np.ones((1, 2, 3), np.float32), np.full((2, 2), 0.5, np.float32))
     assert not solved(room, Albedos(np.full((1, 3), 1.0), np.zeros((1, 3)))).converged
+
+
+def test_light_that_would_grow_without_end_is_bounded() -> None:
+    """Two patches that see each other 3.5 times: in dark colours 1.3 times, in light ones as a closed box would."""
+    direct, numbers = np.ones((1, 2, 3), np.float32), np.arange(2)
+    pair = Patches(np.zeros(2, int), numbers, direct, np.array([[0, 3.5], [3.5, 0]], np.float32))
+    for albedo, share in ((0.2, MOST_SHARES), (0.85, 1.0)):
+        found = solved(pair, Albedos(np.full((1, 3), albedo), np.zeros((1, 3))), tolerance=1e-6)
+        assert found.converged and found.irradiance == pytest.approx(1 / (1 - share * albedo), rel=1e-4)
 
 
 def test_weights_keep_their_relative_size_in_a_byte() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from lambent.core.answer import MOST_ALBEDO, Albedos, Answer, Neighbours, Patches, Points, Rays, packed_rays, solved
 from lambent.realtime.answered import stages
-from lambent.realtime.answered.gpu_answer import GpuAnswer, gpu_answer
+from lambent.realtime.answered.gpu_answer import GpuAnswer, Unsolved, gpu_answer
 
 PATCHES, POINTS, TEXELS, MATERIALS = 70, 300, 900, 4  # more points and texels than a workgroup has threads
 
@@ -64,6 +65,16 @@ def test_the_gpu_answers_as_the_cores_do(device: Any, groups: int) -> None:
         assert np.abs(exact / answer.baked - 1).max() > 0.2, "the edit changes the light"
 
 
+def test_light_that_grows_without_end_is_left_to_the_cores(device: Any) -> None:
+    answer = room(1)
+    crowded = replace(answer, patches=replace(answer.patches, transfer=3 * answer.patches.transfer))
+    on_gpu = GpuAnswer(device, crowded, crowded.reference(), texels_of(crowded))
+    with pytest.raises(Unsolved):
+        on_gpu.begin(EDITS[2])
+    found = on_gpu.begin(EDITS[1]).irradiance()
+    assert np.isfinite(found).all(), "the next edit is solved"
+
+
 def test_the_gpu_finds_the_series_of_a_furnace(device: Any) -> None:
     """Direct light 1 everywhere, albedo a, every ray ends on a point: all light is 1 / (1 - a)."""
     direct, rays = np.ones((1, 2, 3), np.float32), packed_rays(np.tile([0, 1], (2, 8)), np.ones((1, 2, 16)))
@@ -107,7 +118,8 @@ def test_a_sweep_too_few_says_so(device: Any, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr("lambent.realtime.answered.gpu_answer.GPU_SWEEPS", 2)
     answer = room(1)
     on_gpu = GpuAnswer(device, answer, answer.reference(), texels_of(answer))
-    on_gpu.begin(EDITS[0])
+    with pytest.raises(Unsolved):
+        on_gpu.begin(EDITS[0])
     assert on_gpu.sweeps() == [(2, False)]
 
 

@@ -52,6 +52,10 @@ class TexelsOnGpu:
         return self.stages.buffer(self.texels)
 
 
+class Unsolved(Exception):
+    """Light between patches does not stand."""
+
+
 class GpuAnswer:
     """An answer's arrays and calls on a device. Methods may run in any thread.
 
@@ -89,11 +93,14 @@ class GpuAnswer:
         ------
         NoRoom
             Where the adapter has no more memory.
+        Unsolved
+            Where light grows from sweep to sweep: the cores have a bound for that.
         """
         found = tuple(self._stages.empty(len(self._texels) * LIGHT_BYTES) for _ in self._groups)
         with self._lock:
             self._shared.colour(albedos)
-            _solve(self._stages, self._solvers)
+            if not _solve(self._stages, self._solvers):
+                raise Unsolved
             calls = (group.calls(to) for group, to in zip(self._groups, found, strict=True))
             self._stages.submit([call for of_group in calls for call in of_group])
         return TexelsOnGpu(self._stages, found, self._texels)
@@ -157,13 +164,14 @@ class _Solver:
         return int(sweeps), bool(stands)
 
 
-def _solve(stages: Stages, solvers: Sequence[_Solver]) -> None:
-    """Solve for the light of patches in all groups; waits for the GPU."""
+def _solve(stages: Stages, solvers: Sequence[_Solver]) -> bool:
+    """Solve for the light of patches in all groups, and tell whether it stands; waits for the GPU."""
     stages.submit([solver.begins for solver in solvers])
     submitted = 1
     while left := [one for one in solvers if submitted < one.submissions and not one.outcome()[1]]:
         stages.submit([solver.goes_on for solver in left])
         submitted += 1
+    return all(one.outcome()[1] for one in solvers)
 
 
 class _Group:

@@ -24,6 +24,8 @@ struct Solve {
 @group(0) @binding(7) var<storage, read_write> sent: array<f32>;
 @group(0) @binding(8) var<storage, read_write> outcome: array<u32>;  // sweeps taken, and whether the solution stands
 
+const ENDLESS = 1e30; // W/m^2: no light that stands; differences of infinities may compare as any
+
 var<workgroup> moved: atomic<u32>;
 var<workgroup> stands: u32;
 
@@ -72,7 +74,8 @@ fn arrived(p: u32) -> vec3f {
             indirect[3u * p + 1u] = now.g;
             indirect[3u * p + 2u] = now.b;
             let light = light_of(p);
-            if (any(abs(light - before) > solve.tolerance * light + vec3f(NO_LIGHT))) { atomicStore(&moved, 1u); }
+            let moves = any(abs(light - before) > solve.tolerance * light + vec3f(NO_LIGHT));
+            if (moves || any(light > vec3f(ENDLESS))) { atomicStore(&moved, 1u); }
         }
         workgroupBarrier();
         if (lane == 0u) { stands = 1u - atomicLoad(&moved); }
