@@ -32,7 +32,7 @@ def test_rows_of_a_scene_and_of_its_series() -> None:
     assert 0 < row["opened_flip"] < 0.3 and row["settings"] == 3
     assert all(row["flip_worst"] >= row[f"flip_{kind}"] > 0 for kind in KINDS)
     close, slow = row["rival_flip"] <= row["flip"] + 1e-4, isinstance(row["rival_seconds"], str)
-    assert close != slow, "either it came as close, or it says how long it tried"
+    assert close or slow, "it came as close, or says how long it tried"
     assert [one["series"] for one in compared] == ["64,1", "16,8"]
     assert all(one["error_seconds"] > 0 and one["flip"] > 0 for one in compared)
     assert report["summary"]["best_series"]["ring"]["relmse"] in ("64,1", "16,8")
