@@ -1,4 +1,4 @@
-"""Arrays to textures."""
+"""Arrays to textures and buffers."""
 
 from __future__ import annotations
 
@@ -16,6 +16,12 @@ from lambent.core.colour import HALF_MAX
 def half(values: Floats) -> NDArray[np.float16]:
     """As half floats, cut at the largest of them."""
     return np.clip(values, -HALF_MAX, HALF_MAX).astype(np.float16)
+
+
+def whole_words(data: NDArray[Any]) -> NDArray[np.uint8]:
+    """Bytes of an array, padded to whole words as buffers are written."""
+    flat = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
+    return np.pad(flat, (0, -len(flat) % 4)) if len(flat) % 4 else flat
 
 
 def with_alpha(rgb: Floats) -> NDArray[np.float16]:

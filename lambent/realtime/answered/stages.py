@@ -16,6 +16,7 @@ from lambent.core.colour import HALF_MAX
 from lambent.realtime.device import adapter_info
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.shader_source import assemble
+from lambent.realtime.uploads import whole_words
 
 GROUP = 256  # threads of a workgroup, as the shaders say
 READ, WRITTEN = "storage", "written storage"
@@ -85,11 +86,10 @@ class Stages:
 
     def write(self, buffer: Any, data: NDArray[Any]) -> None:
         """Send an array to the beginning of a buffer."""
-        flat = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
-        if len(flat) == 0:
+        if data.size == 0:
             return
         try:
-            self.device.queue.write_buffer(buffer, 0, np.pad(flat, (0, -len(flat) % 4)) if len(flat) % 4 else flat)
+            self.device.queue.write_buffer(buffer, 0, whole_words(data))
         except wgpu.GPUOutOfMemoryError as error:  # the copy on its way takes room, too
             raise NoRoom from error
 

@@ -16,6 +16,7 @@ from lambent.core.wavelets import TAPS
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.shader_source import assemble
 from lambent.realtime.targets import PassTimer
+from lambent.realtime.uploads import whole_words
 
 GROUP = 256  # threads of a workgroup, as the shaders say
 REACH = 64 << 10  # bytes of parameters that a dispatch sees
@@ -82,11 +83,10 @@ class Commands:
     def write(self, buffer: Any, data: NDArray[Any]) -> None:
         """Send `data` to the beginning of a buffer, after all that was recorded."""
         self.submit()
-        flat = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
-        if len(flat) == 0:
+        if data.size == 0:
             return
         try:
-            self.device.queue.write_buffer(buffer, 0, np.pad(flat, (0, -len(flat) % 4)) if len(flat) % 4 else flat)
+            self.device.queue.write_buffer(buffer, 0, whole_words(data))
         except wgpu.GPUOutOfMemoryError as error:  # the copy on its way takes room, too
             raise OutOfGpuMemory(data.nbytes) from error
 
