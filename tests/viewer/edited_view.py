@@ -132,9 +132,20 @@ def until(state, condition):
 
 
 def settled(state):
-    """Let the picture come to rest; its last frame."""
-    state.tick()
-    until(state, lambda: not state.painter.busy and not state.loading.busy)
+    """Let the picture come to rest; its last frame.
+
+    A tick at rest may still change the exposure: rest is a tick that finds and leaves nothing to do.
+    """
+
+    def rests():
+        return not state.painter.busy and not state.loading.busy
+
+    def rested():
+        before = rests()
+        state.tick()
+        return before and rests()
+
+    until(state, rested)
     return state.painter.frame
 
 

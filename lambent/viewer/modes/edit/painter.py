@@ -102,6 +102,7 @@ class Painter:
         self._fade_from_s = 0.0
         self._compared: tuple[Materials, Image] | None = None
         self._wish, self._tasks, self._closed = Wish(), deque[Callable[[], None]](), False
+        self._at_task = False  # taken, and not yet in a frame
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._work, daemon=True)
         self._thread.start()
@@ -130,7 +131,7 @@ class Painter:
     def busy(self) -> bool:
         """Whether another frame is coming."""
         frame = self.frame
-        return bool(self._tasks) or frame is None or frame.wish is not self._wish or not frame.settled
+        return bool(self._tasks) or self._at_task or frame is None or frame.wish is not self._wish or not frame.settled
 
     def close(self) -> None:
         """End the thread."""
@@ -186,6 +187,7 @@ class Painter:
             if self._closed:
                 return False
             wish, task = self._wish, self._tasks.popleft() if self._tasks else None
+            self._at_task = task is not None
         began_s = self._clock()
         try:
             if task is not None:
@@ -196,6 +198,7 @@ class Painter:
             self._go_on_without_gpu(wish)
             self._draw(wish, began_s)
         with self._changed:
+            self._at_task = False
             self._changed.wait_for(
                 lambda: self._taken is self.frame or wish is not self._wish or self._tasks or self._closed, FRAME_S
             )

@@ -181,10 +181,10 @@ class EditState:
             self._document = document
             self.material = document.merged.get(self.material, self.material)
         surfaces = SHOWN[self.bounced.shown]
-        compared, frame = self.compared, self.painter.frame
-        if frame is not None and frame.wish is self._wish and frame.settled:
+        compared, at_rest = self.compared, not self.painter.busy
+        if at_rest and (frame := self.painter.frame) is not None:  # read after, or it may be one from before
             compared.fit(frame)
-            if not self._metered:
+            if not self._metered and not self.loading.busy:  # a half-loaded picture is darker
                 found = metered(frame.radiance)  # None before there is light
                 self._metered = found is not None
                 if found is not None and look.exposure_ev == 0.0:  # not chosen by hand meanwhile
