@@ -151,7 +151,7 @@ def test_interreflections_are_the_whole_sum_while_materials_are_edited_in_turn(d
         )
         painter.want(Wish(dict(now)))
         time.sleep(0.01)
-    end = time.monotonic() + 60
+    end = time.monotonic() + 180
     while painter.busy:
         checked(painter)
         assert time.monotonic() < end, "it never settles"

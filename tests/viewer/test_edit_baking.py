@@ -70,7 +70,7 @@ def test_closing_ends_the_process(begun):
     process = bake._process._process
     began = time.monotonic()
     bake.close()
-    assert process.poll() is not None and time.monotonic() - began < 5
+    assert process.poll() is not None and time.monotonic() - began < 60  # it sleeps for 600
     assert not bake.running and bake.error == ""
     bake.close()
 

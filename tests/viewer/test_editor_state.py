@@ -16,7 +16,7 @@ from lambent.viewer.edits import MaterialEdits
 from lambent.viewer.work import Work
 from tests.viewer.measured_specimens import BRASS, FROSTED, write_measurement
 
-PATIENCE_S = 60.0
+PATIENCE_S = 180.0
 
 
 @pytest.fixture(scope="module")

@@ -38,7 +38,7 @@ RED = {"grey": GREY.model_copy(update={"kd": (0.5, 0.05, 0.05)})}
 
 def settled(light: AnsweringLight, edited: dict) -> None:
     """Frames until nothing is computed any more."""
-    end = time.monotonic() + 60
+    end = time.monotonic() + 180
     light.update(edited)
     while light.busy:
         assert time.monotonic() < end
@@ -100,7 +100,7 @@ def test_an_edit_drops_the_probes_of_the_one_before(tmp_path: Path, monkeypatch:
         return answered(*given)
 
     monkeypatch.setattr(answering, "answered", slow)
-    end = time.monotonic() + 60
+    end = time.monotonic() + 180
     while not made:
         light.update(RED)
         assert time.monotonic() < end

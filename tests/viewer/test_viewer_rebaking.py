@@ -37,7 +37,7 @@ from tests.viewer.window_session import ROOT
 
 SIZE = (64, 48)
 PLACE = Rect(0, 0, *SIZE)
-LONGEST_S = 60.0
+LONGEST_S = 180.0
 WORKER = """
 import json, sys, time
 from pathlib import Path
@@ -340,7 +340,7 @@ def test_an_edit_meanwhile_and_closing_end_the_process(store, screen, monkeypatc
     second = room.pictures._rebaked._process._process
     began_s = time.monotonic()
     room.pictures.close()
-    assert second.poll() is not None and time.monotonic() - began_s < 5
+    assert second.poll() is not None and time.monotonic() - began_s < 60  # it sleeps for 600
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from tests.viewer.drawn_frames import drawn
 from tests.viewer.small_store import FRONT, MATERIALS, SIDE
 
 SIZE = (48, 32)
-LONGEST_S = 40.0  # for a picture: libraries are loaded and kernels compiled first
+LONGEST_S = 180.0  # for a picture: libraries are loaded and kernels compiled first
 
 
 @pytest.fixture(scope="module")
