@@ -87,9 +87,10 @@ def bake_probe(scene: Surroundings, centre: Floats, n: int, samples: int, seed: 
 
 
 def bake_small(scene: Surroundings, centres: Floats, n: int, samples: int, seed: int) -> list[Probe]:
-    """Probes at all `centres` (k, 3), each texel of `samples` paths, traced together: launches cost more than their paths.
+    """Probes at all `centres` (k, 3), each texel of `samples` paths.
 
-    They have no light by group, and noisy texels get no more paths.
+    They are traced together, since a launch costs as much as its paths. They have no light by group, and noisy texels
+    get no more paths.
     """
     block = _block(samples)
     texels, base = np.arange(len(centres) * 6 * n * n), -(-samples // block)

@@ -113,7 +113,7 @@ def _unwrapped(objects: tuple[SceneObject, ...], pieces: list[Piece]) -> list[tu
 def _charts(
     mesh: Mesh, owner: int, faces: Indices, pieces: list[tuple[Floats, Indices, Floats]], size_m: Floats
 ) -> list[Chart]:
-    """The charts of an object's `pieces` as xatlas has them, whose faces are `faces` (K,), with texels of `size_m` (K,).
+    """The charts of an object's `pieces` as xatlas has them, of faces (K,) with texels of `size_m` (K,).
 
     Faces without area in the map, stretched ones, and those that pass others of their chart within a texel have no
     corners (K, 0, 2).
