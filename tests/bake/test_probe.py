@@ -11,7 +11,7 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.probes.centre import flat_axis, probe_centre
 from lambent.bake.probes.planes import bounding_planes
-from lambent.bake.probes.probe import MOST, _blocks_needed
+from lambent.bake.probes.probe import MOST, Surroundings, _blocks_needed, bake_probe, bake_small
 from lambent.bake.reference.path_traced import render_reference
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.camera import Camera
@@ -191,3 +191,13 @@ def test_a_coupled_wall_darkens_towards_grazing() -> None:
         si = scene.ray_intersect(mi.Ray3f(mi.Point3f(start), mi.Vector3f(-towards)))
         seen = np.array(cache(si, si.is_valid())).ravel()
         np.testing.assert_allclose(seen, np.array(kd) * factor, rtol=1e-4)
+
+
+def test_probes_of_several_places_are_those_of_each() -> None:
+    whole = SceneBuilder(coloured_room()).build()
+    around, centres = Surroundings(whole, whole, None, 2), np.array([(0.0, 0.5, 0.0), (0.9, -0.2, 0.4)])
+    for probe, centre in zip(bake_small(around, centres, 8, 16, 0), centres, strict=True):
+        alone = bake_probe(around, centre, 8, 16, 0, noise=np.inf)
+        np.testing.assert_allclose(probe.radiance.mean(axis=(1, 2)), alone.radiance.mean(axis=(1, 2)), atol=0.02)
+        np.testing.assert_array_equal(probe.distance, alone.distance)
+        np.testing.assert_array_equal(probe.normals, alone.normals)

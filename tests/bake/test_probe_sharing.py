@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.probes.sharing import _grouped
+from lambent.bake.probes.sharing import MOST, _grouped, _largest
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.realtime.baked import read_baked
@@ -91,3 +91,20 @@ def test_a_damaged_list_of_owners_is_refused(tmp_path: Path) -> None:
         store.set_document("shared_probes", {"owners": {"cup": 3}})
         with pytest.raises(UserError, match="shared_probes"):
             shared_probes(store)
+
+
+def test_a_scene_has_so_many_probes_at_most_those_that_fill_the_view() -> None:
+    count = MOST + 6
+    worth, size, given = np.arange(count), np.linspace(0.01, 0.02, count), np.zeros(count, bool)
+    given[0] = True  # the smallest
+    owner = np.arange(count)
+    owner[3] = 2  # two objects of one probe fill more than any other
+    assert _largest(owner, worth, size, given).tolist() == [0, 2, *range(count - MOST + 2, count)]
+    assert len(_largest(owner[:9], worth[:9], size[:9], given[:9])) == 8, "few keep theirs"
+
+
+def test_objects_beyond_the_most_show_the_nearest_probe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lambent.bake.probes.sharing.MOST", 1)
+    store = bake(laid_table(), tmp_path / "s", quality=TINY)
+    (own,) = probes_of(store)
+    assert set(shared_probes(store).values()) == {own} and own not in shared_probes(store)

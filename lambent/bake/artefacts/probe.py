@@ -57,7 +57,8 @@ def keys(context: BakeContext) -> dict[str, str]:
         if name in owners:
             continue
         inputs = [light, name, scene.probe_centres.get(name), how.texels, how.samples, how.noise, context.seed]
-        inputs += sharing(owners, name)
+        if others := sharing(owners, name):
+            inputs += [*others, "mirrored together"]
         if name in backs:
             inputs.append("from both sides")
         if not _cached(context):
@@ -114,7 +115,7 @@ def _owners(context: BakeContext) -> dict[str, str]:
     worn = [scene.materials[scene.object(name).material] for name in names]
     look = [(m.transmits, [(lobe.mx, lobe.my) for lobe in m.lobes]) for m in worn]
     lamps = [o.name for o in scene.objects if any(o.emission)]
-    key = key_of(SHARED_PROBES, 1, names, look, given, lamps, *geometry_inputs(scene))
+    key = key_of(SHARED_PROBES, 2, names, look, given, lamps, *geometry_inputs(scene))
     said = store.documents.get(SHARED_PROBES)
     if not isinstance(said, dict) or said.get("key") != key:
         with context.timed(SHARING):

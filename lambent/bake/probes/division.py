@@ -115,7 +115,7 @@ def _cut_of(builder: SceneBuilder, o: SceneObject, anywhere: SolidTest, whole: A
     """The borders of the object's parts; of one where it stays whole. Viewers are at `places`, if there are any."""
     from lambent.bake.probes.centre import centre_among, centre_of
     from lambent.bake.probes.hidden import hidden_share, seen_from, spread
-    from lambent.bake.probes.worth import POINTS, pays, seen_in, small_probe
+    from lambent.bake.probes.worth import POINTS, pays, seen_in, small_probes
 
     without = builder.build(leave_out={o.name})
     solids, middle = anywhere.within(without), np.mean(builder.scene.bounds, axis=0)
@@ -140,7 +140,7 @@ def _cut_of(builder: SceneBuilder, o: SceneObject, anywhere: SolidTest, whole: A
     if not known:
         return [()]
     centres = [centre_of(o.mesh, middle, solids, without), *(c for _, c in known)]
-    trials = [(small_probe(without, whole, c), c) for c in centres]
+    trials = list(zip(small_probes(without, whole, np.array(centres)), centres, strict=True))
     return cut if pays([s for s, _ in known], trials[1:], trials[0]) else [()]
 
 

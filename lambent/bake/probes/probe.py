@@ -68,21 +68,42 @@ def bake_probe(scene: Surroundings, centre: Floats, n: int, samples: int, seed: 
     need to come down to `noise`, at most MOST times as many in all.
     """
     rng = np.random.default_rng(seed)
-    block = next(size for size in BLOCKS if size <= samples)
+    block = _block(samples)
     base = -(-samples // block)
     texels = np.arange(6 * n * n)
-    total, squares = _sums(scene, centre, n, np.repeat(texels, base), block, rng)
+    total, squares = _sums(scene, centre[None], n, np.repeat(texels, base), block, rng)
     first = total.reshape(len(texels), base, -1).sum(axis=1)
     needed = _blocks_needed(first[:, :3], squares.reshape(-1, base, 3).sum(axis=1), base * block, noise) * base
     more = np.repeat(texels, np.ceil(needed).astype(int) - base)
-    extra = _sums(scene, centre, n, more, block, rng)[0]
+    extra = _sums(scene, centre[None], n, more, block, rng)[0]
     for channel in range(first.shape[1]):
         first[:, channel] += np.bincount(more, extra[:, channel], minlength=len(texels))
     count = (base + np.bincount(more, minlength=len(texels))) * block
     means = (first / count[:, None]).reshape(6, n, n, -1, 3)
     rounded, unit = in_halves(means[..., 0, :])
     groups = None if scene.tally is None else np.moveaxis(means[..., 1:, :], -2, 0).astype(np.float32)
-    return Probe(rounded.astype(np.float32) * np.float32(unit), *_geometry(scene.first, centre, n), groups)
+    distance, normals = _geometry(scene.first, centre[None], n)
+    return Probe(rounded.astype(np.float32) * np.float32(unit), distance[0], normals[0], groups)
+
+
+def bake_small(scene: Surroundings, centres: Floats, n: int, samples: int, seed: int) -> list[Probe]:
+    """Probes at all `centres` (k, 3), each texel of `samples` paths.
+
+    They are traced together, since a launch costs as much as its paths. They have no light by group, and noisy texels
+    get no more paths.
+    """
+    block = _block(samples)
+    texels, base = np.arange(len(centres) * 6 * n * n), -(-samples // block)
+    total, _ = _sums(scene, centres, n, np.repeat(texels, base), block, np.random.default_rng(seed))
+    means = total[:, :3].reshape(len(centres), 6, n, n, base, 3).mean(axis=-2) / block
+    return [
+        Probe(mean.astype(np.float32), distance, normals)
+        for mean, distance, normals in zip(means, *_geometry(scene.first, centres, n), strict=True)
+    ]
+
+
+def _block(samples: int) -> int:
+    return next(size for size in BLOCKS if size <= samples)
 
 
 def _blocks_needed(total: Floats, squares: Floats, samples: int, noise: float) -> Floats:
@@ -97,9 +118,11 @@ def _blocks_needed(total: Floats, squares: Floats, samples: int, noise: float) -
 
 
 def _sums(
-    scene: Surroundings, centre: Floats, n: int, texels: Indices, samples: int, rng: np.random.Generator
+    scene: Surroundings, centres: Floats, n: int, texels: Indices, samples: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
     """Sums over `samples` paths through each of the texels, of radiance and of its squares (k, 3).
+
+    Texels are counted through the probes at all `centres` (m, 3).
 
     Radiance is (k, 3 + 3 n), the whole and each of n groups.
     """
@@ -107,22 +130,22 @@ def _sums(
     total, squares = np.zeros((len(texels), 3 + 3 * groups)), np.zeros((len(texels), 3))
     at_once = max(1, PATHS_AT_ONCE // samples)
     for mine in slices(len(texels), at_once):
-        total[mine], squares[mine] = _pass(scene, centre, n, texels[mine], samples, int(rng.integers(1 << 32)))
+        total[mine], squares[mine] = _pass(scene, centres, n, texels[mine], samples, int(rng.integers(1 << 32)))
     return total, squares
 
 
 def _pass(
-    scene: Surroundings, centre: Floats, n: int, texels: Indices, samples: int, seed: int
+    scene: Surroundings, centres: Floats, n: int, texels: Indices, samples: int, seed: int
 ) -> tuple[Floats, Floats]:
     sampler = mi.load_dict({"type": "multijitter", "sample_count": samples})
     sampler.set_samples_per_wavefront(samples)
     width = len(texels) * samples
     sampler.seed(seed, width)
     texel = dr.gather(mi.UInt32, mi.UInt32(texels.astype(np.uint32)), dr.arange(mi.UInt32, width) // samples)
-    column, row, face = texel % n, texel // n % n, texel // (n * n)
+    column, row, face = texel % n, texel // n % n, texel // (n * n) % 6
     jitter = sampler.next_2d()
     s, t = (column + jitter.x) / n * 2 - 1, (row + jitter.y) / n * 2 - 1
-    ray = mi.Ray3f(_origin(centre) + dr.zeros(mi.Point3f, width), dr.normalize(_direction(face, s, t)))
+    ray = mi.Ray3f(_origins(centres, texel // (6 * n * n)), dr.normalize(_direction(face, s, t)))
     reach = _distance(scene.first, ray)[0]  # paths begin just before the surface that the probe itself sees
     near = mi.Ray3f(ray(dr.maximum(reach * (1 - rays.APPROACH) - rays.APPROACH, 0.0)), ray.d)
     tally, start = scene.tally or path_tracer.AllLight(), path_tracer.camera_start(near)
@@ -135,9 +158,9 @@ def _pass(
     return np.concatenate([block_sums(one, samples) for one in values], axis=-1), block_sums(square, samples)
 
 
-def _origin(centre: Floats) -> Any:
-    """The centre as data, not as constants: all probes share their kernels then."""
-    return mi.Point3f(*(dr.opaque(mi.Float, float(x)) for x in centre))
+def _origins(centres: Floats, number: Any) -> Any:
+    """The centres (m, 3) of these numbers, as data, not as constants: all probes share their kernels then."""
+    return dr.gather(mi.Point3f, vectors(mi.Point3f, np.asarray(centres, float)), number)
 
 
 def _distance(scene: Any, ray: Any) -> tuple[Any, Any]:
@@ -154,11 +177,15 @@ def _direction(face: Any, s: Any, t: Any) -> Any:
     return w
 
 
-def _geometry(scene: Any, centre: Floats, n: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Distance and normal at the texels' centres."""
-    direction = vectors(mi.Vector3f, normalize(face_directions(n)))
-    distance, si = _distance(scene, mi.Ray3f(_origin(centre), direction))
+def _geometry(scene: Any, centres: Floats, n: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Distances (m, 6, n, n) and normals (m, 6, n, n, 3) at the texels' centres, of probes at all `centres` (m, 3)."""
+    count = 6 * n * n
+    thread = dr.arange(mi.UInt32, count * len(centres))
+    directions = vectors(mi.Vector3f, normalize(face_directions(n)))
+    direction = dr.gather(mi.Vector3f, directions, thread % count)
+    distance, si = _distance(scene, mi.Ray3f(_origins(centres, thread // count), direction))
     normal = dr.select(dr.dot(si.n, direction) > 0, -si.n, si.n)
     normal = dr.select(si.is_valid(), normal, -direction)
     dr.eval(distance, normal)
-    return np.array(distance).reshape(6, n, n), array_of(normal).reshape(6, n, n, 3)
+    shape = (len(centres), 6, n, n)
+    return np.array(distance).reshape(shape), array_of(normal).reshape(*shape, 3)

@@ -24,8 +24,8 @@ from lambent.bake.probes.selection import (
     WORTH,
     Mirrored,
     judged,
+    largest_r0,
     mirrored,
-    together,
 )
 from lambent.bake.tracing.path_tracer import Tally
 from lambent.bake.tracing.solids import SolidTest
@@ -33,7 +33,8 @@ from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
 from lambent.core.colour import halves, in_halves
 
-LEAST_POINTS = 512  # on each of the objects that share a probe, from which rays are mirrored
+LEAST_POINTS = 512  # on each of the objects that share a probe, from which rays are mirrored...
+MOST_POINTS = 16384  # ...as long as all have no more
 
 
 class ProbeSet:
@@ -77,17 +78,20 @@ class ProbeSet:
         if self._cache is None:
             return None
         own = [self._builder.shape_number(part) for part in self._own(names)]
-        found = []
-        for name in names:
-            o = self._scene.object(name)
-            points, normals = spread(o.mesh, max(RAYS // len(names), LEAST_POINTS))
+        count = max(RAYS // len(names), min(LEAST_POINTS, MOST_POINTS // len(names)))
+        surfaces = [spread(self._scene.object(name).mesh, count) for name in names]
+        for i, name in enumerate(names):
             if name in self._backs:
-                points, normals = np.concatenate([points, points]), np.concatenate([normals, -normals])
-            found.append(mirrored(
-                points, normals, self._traced.places, self._scene.materials[o.material], self._whole, self._cache,
-                MIRROR_DEPTH, own, seed,
-            ))  # fmt: skip
-        return together([rays for rays in found if rays is not None])
+                points, normals = surfaces[i]
+                surfaces[i] = np.concatenate([points, points]), np.concatenate([normals, -normals])
+        points, normals = (np.concatenate(a) for a in zip(*surfaces, strict=True))
+        each = [len(mine) for mine, _ in surfaces]
+        worn = [self._scene.materials[self._scene.object(name).material] for name in names]
+        clear = np.repeat([material.transmits for material in worn], each)
+        r0 = np.repeat([largest_r0(material) for material in worn], each)
+        return mirrored(
+            points, normals, clear, r0, self._traced.places, self._whole, self._cache, MIRROR_DEPTH, own, seed
+        )
 
     def _own(self, names: tuple[str, ...]) -> frozenset[str]:
         """The objects and all other parts of each one's whole: what a probe leaves out."""

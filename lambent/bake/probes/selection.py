@@ -15,7 +15,7 @@ probe. The error decides three things, each where a choice lowers it to WORTH of
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -63,29 +63,33 @@ class Mirrored:
 
 
 def mirrored(
-    points: Floats, normals: Floats, places: Floats, material: Material, scene: Any, cache: LightMapCache, depth: int,
-    family: list[int], seed: int,
+    points: Floats, normals: Floats, clear: Flags, r0: Floats, places: Floats, scene: Any, cache: LightMapCache,
+    depth: int, family: list[int], seed: int,
 ) -> Mirrored | None:  # fmt: skip
     """Rays that viewers at `places` (m, 3) see mirrored in points (n, 3) of unit normals (n, 3), one viewer a point.
 
-    Through a transmitting material rays go straight on. None where too few points are in view.
-    `family` are the numbers of the Mitsuba shapes of the object and of its other parts.
+    Where the material is `clear` (n,) rays go straight on; `r0` (n,) is its reflectance at normal incidence. None where
+    too few points are in view. `family` are the numbers of the Mitsuba shapes of the objects and of their other parts.
     """
     found, eyes = viewers_of(points, normals, places, scene, np.random.default_rng(seed))
     if found.sum() < LEAST_RAYS:
         return None
     at, n = points[found], normals[found]
     view = normalize(eyes[found] - at)
-    directions = -view if material.transmits else reflect(view, n)
+    directions = np.where(clear[found, None], -view, reflect(view, n))
     ray = leaving(scene, at, n, directions)
     radiance = light_along(scene, ray, depth, cache, seed)
     met = scene.ray_intersect_preliminary(ray).shape
     own = np.isin(np.array(dr.reinterpret_array(mi.UInt32, met)), family)
     below = scene.ray_intersect(rays_from(array_of(leaving(scene, at, n, n).o), -n))
     irradiance = array_of(cache.irradiance(below, below.is_valid())).astype(float)
-    r0 = max((float(np.mean(lobe.r0)) for lobe in material.lobes), default=1.0)
-    share = np.asarray(fresnel(np.abs((view * n).sum(axis=1)), r0))
+    share = np.asarray(fresnel(np.abs((view * n).sum(axis=1)), r0[found]))
     return Mirrored(array_of(ray.o).astype(float), directions, n, radiance, luminance(irradiance), share, own)
+
+
+def largest_r0(material: Material) -> float:
+    """Reflectance at normal incidence of a material's brightest lobe, the mean of its channels; 1 without lobes."""
+    return max((float(np.mean(lobe.r0)) for lobe in material.lobes), default=1.0)
 
 
 def widest_lobe(material: Material) -> float:
@@ -108,13 +112,6 @@ def light_along(scene: Any, ray: Any, depth: int, cache: LightMapCache | None, s
     sampler = independent(seed & 0xFFFFFFFF, dr.width(ray.o))
     value = path_tracer.radiance(scene, sampler, path_tracer.camera_start(ray), depth, cache)
     return array_of(dr.select(dr.all(dr.isfinite(value)), value, 0.0)).astype(float)
-
-
-def together(found: list[Mirrored]) -> Mirrored | None:
-    """The rays of several objects in one; None where there are none."""
-    if len(found) < 2:
-        return found[0] if found else None
-    return Mirrored(*(np.concatenate([getattr(rays, f.name) for rays in found]) for f in fields(Mirrored)))
 
 
 def viewers_of(

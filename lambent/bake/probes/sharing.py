@@ -8,7 +8,8 @@ inverse root of the size above and below. No object larger than SMALL and its lo
 shares another's probe, nor one whose centre is further off than NEAR of what is mirrored: look-ups from far away are
 turned wrongly. Groups are found greedily, the largest first.
 
-Objects that fill a few pixels from nearby, or that nobody sees, have no probe: they show the nearest.
+Objects that fill a few pixels from nearby, or that nobody sees, have no probe: they show the nearest. So do the groups
+that fill least of the view where a scene has very many (leaves, say): there are MOST probes.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from lambent.core.geometry import triangle_areas
 
 POINTS = 256  # on each object
 NEIGHBOURS = 12  # whose probes are tried for it
+MOST = 64  # probes of a scene, some two CPU seconds each at `preview`; more only where it places more itself
 MEDIUM, SMALL = 0.1, 0.06  # radians
 NEAR, REACH = 0.5, 0.75  # of the distance of what is mirrored, and the quantile of that
 FEW = 0.006  # radians: six pixels of a picture of 60 degrees and 1080 rows
@@ -70,7 +72,8 @@ def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[
     if len(names) < 2 or not len(places):
         return {}
     meshes = [scene.object(name).mesh for name in names]
-    centres = np.stack([outside(mesh, np.mean(scene.bounds, axis=0), whole) for mesh in meshes])
+    middle = np.mean(scene.bounds, axis=0)
+    centres = np.stack([outside(mesh, middle, whole) for mesh in meshes])
     looked = _looked(builder, whole, places, names)
     given = np.array([name in scene.probe_centres or name in scene.probe_planes for name in names])
     shown = given | ((looked.valid.sum(axis=1) >= SEEN) & (looked.largest >= FEW))
@@ -89,10 +92,21 @@ def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[
     limits = np.minimum(HIDDEN * np.sqrt(MEDIUM / np.maximum(looked.size, 1e-9)), 1)
     lost = _lost(looked, len(names))
     owner = _grouped(worth, pairs, _wrong(builder, whole, names, centres, looked, pairs), lost, limits)
-    own = np.unique(owner[worth])
-    for i in np.flatnonzero(~shown):
+    own = _largest(owner, worth, looked.size, given)
+    for i in np.flatnonzero(~np.isin(owner, own)):
         owner[i] = own[np.argmin(np.linalg.norm(centres[own] - centres[i], axis=1))]
     return {name: names[owner[i]] for i, name in enumerate(names) if owner[i] != i}
+
+
+def _largest(
+    owner: NDArray[np.int64], worth: NDArray[np.int64], size: Floats, given: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """The owners whose probes are baked: the MOST whose objects `worth` one fill most of the view, and all `given`."""
+    filled = np.bincount(owner[worth], size[worth] ** 2, minlength=len(owner))
+    filled[given] = np.inf
+    own = np.unique(owner[worth])
+    kept = own[np.argsort(-filled[own], kind="stable")]
+    return np.sort(kept[: max(MOST, int(given.sum()))])
 
 
 def _looked(builder: SceneBuilder, whole: Any, places: Floats, names: list[str]) -> Looked:

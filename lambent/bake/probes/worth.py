@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.probes.planes import bounding_planes
-from lambent.bake.probes.probe import Probe, Surroundings, bake_probe
+from lambent.bake.probes.probe import Probe, Surroundings, bake_small
 from lambent.bake.probes.selection import (
     TRIAL_TEXELS,
     WORTH,
@@ -68,9 +68,9 @@ def seen_in(surfaces: list[tuple[Floats, Floats]], places: Floats, material: Mat
     return [Seen(*one) if count >= LEAST else None for one, count in zip(each, counts, strict=True)]
 
 
-def small_probe(first: Any, whole: Any, centre: Floats) -> Probe:
-    """A probe for a trial; `first` is the scene that it sees itself."""
-    return bake_probe(Surroundings(first, whole, None, DEPTH), centre, TRIAL_TEXELS, SAMPLES, 0, noise=np.inf)
+def small_probes(first: Any, whole: Any, centres: Floats) -> list[Probe]:
+    """Probes at centres (m, 3) for a trial; `first` is the scene that they see themselves."""
+    return bake_small(Surroundings(first, whole, None, DEPTH), centres, TRIAL_TEXELS, SAMPLES, 0)
 
 
 def differences(seen: Seen, probe: Probe, centre: Floats) -> Floats:

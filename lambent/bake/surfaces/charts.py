@@ -83,13 +83,8 @@ def charts_of(objects: tuple[SceneObject, ...], pieces: list[Piece], sizes_m: Fl
         size = np.zeros(len(o.mesh.faces))
         for i in mine:
             size[pieces[i].faces] = sizes_m[i]
-        first = np.cumsum([0] + [len(unwrapped[i][0]) for i in mine])
-        own = [
-            c
-            for i, n in zip(mine, first, strict=False)
-            for c in _charts(o.mesh, pieces[i], unwrapped[i], sizes_m[i], n)
-        ]
-        charts += _merged(o.mesh, owner, own, size)
+        faces = np.concatenate([np.zeros(0, np.int64), *(pieces[i].faces for i in mine)])
+        charts += _merged(o.mesh, owner, _charts(o.mesh, owner, faces, [unwrapped[i] for i in mine], size[faces]), size)
     return charts
 
 
@@ -115,8 +110,10 @@ def _unwrapped(objects: tuple[SceneObject, ...], pieces: list[Piece]) -> list[tu
     return [atlas[i] for i in range(len(pieces))]
 
 
-def _charts(mesh: Mesh, piece: Piece, found: tuple[Floats, Indices, Floats], size_m: float, first: int) -> list[Chart]:
-    """The charts of a piece, its vertices counted from `first`.
+def _charts(
+    mesh: Mesh, owner: int, faces: Indices, pieces: list[tuple[Floats, Indices, Floats]], size_m: Floats
+) -> list[Chart]:
+    """The charts of an object's `pieces` as xatlas has them, of faces (K,) with texels of `size_m` (K,).
 
     Faces without area in the map, stretched ones, and those that pass others of their chart within a texel have no
     corners (K, 0, 2).
@@ -124,13 +121,15 @@ def _charts(mesh: Mesh, piece: Piece, found: tuple[Floats, Indices, Floats], siz
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    vertex_of, indices, uv = found
-    indices = indices.astype(np.int64)
+    first = np.cumsum([0, *(len(vertices) for vertices, _, _ in pieces)])
+    uv = np.concatenate([np.zeros((0, 2), np.float32), *(own for _, _, own in pieces)])
+    each = (own.astype(np.int64) + start for (_, own, _), start in zip(pieces, first, strict=False))
+    indices = np.concatenate([np.zeros((0, 3), np.int64), *each])
     edges = np.concatenate([indices[:, :2], indices[:, 1:]])
-    shape = (len(vertex_of), len(vertex_of))
+    shape = (len(uv), len(uv))
     graph = coo_matrix((np.ones(len(edges), bool), (edges[:, 0], edges[:, 1])), shape=shape)
     label = connected_components(graph, directed=False)[1][indices[:, 0]]
-    world = mesh.corners_of(piece.faces) / size_m
+    world = mesh.corners_of(faces) / size_m[:, None, None]
     corners = _in_texels(world, uv[indices].astype(float), label)
     lost = ~np.isfinite(corners).all(axis=(1, 2)) | _is_stretched(world, corners)
     charts = []
@@ -143,8 +142,8 @@ def _charts(mesh: Mesh, piece: Piece, found: tuple[Floats, Indices, Floats], siz
             while not flat[label[mine[0]]] and not (inside := in_first_layer(corners[kept], world[kept])).all():
                 kept = kept[inside]  # a smaller chart lies anew
             lost[np.setdiff1d(mine, kept, assume_unique=True) if len(kept) < len(mine) else []] = True
-            charts.append(Chart(piece.owner, piece.faces[kept], corners[kept], first + indices[kept]))
-    charts.append(Chart(piece.owner, piece.faces[lost], np.zeros((lost.sum(), 0, 2)), first + indices[lost]))
+            charts.append(Chart(owner, faces[kept], corners[kept], indices[kept]))
+    charts.append(Chart(owner, faces[lost], np.zeros((lost.sum(), 0, 2)), indices[lost]))
     return charts
 
 

@@ -6,6 +6,8 @@ refraction", eqs 19-28, 34). Light of a second bounce is lost, so that reflectan
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from lambent.core.directions import Floats
@@ -42,6 +44,7 @@ def transmittance(cos_i: Floats, eta: float, m: float = 0.0, distribution: str =
     return _returned(1 - fresnel(cos_d, eta), cos_o, ci, z, cos_d, m, distribution)
 
 
+@cache
 def mean_reflectance(eta: float, m: float = 0.0, distribution: str = "ggx") -> float:
     """Share of diffuse light that is reflected."""
     if m == 0 and eta < 1:  # inside a smooth surface: by reciprocity from outside
@@ -49,6 +52,7 @@ def mean_reflectance(eta: float, m: float = 0.0, distribution: str = "ggx") -> f
     return _mean(reflectance(COS, eta, m, distribution))
 
 
+@cache
 def mean_transmittance(eta: float, m: float = 0.0, distribution: str = "ggx") -> float:
     """Share of diffuse light that is transmitted."""
     return _mean(transmittance(COS, eta, m, distribution))
