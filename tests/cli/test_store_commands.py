@@ -174,7 +174,7 @@ def test_a_bake_says_what_its_scene_lost(lambent, tmp_path):
     corners = [f"v {x} {y} 0" for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
     (tmp_path / "a.obj").write_text("\n".join([*corners, "v nan 0 0", "f 1 2 3", "f 1 3 4", "f 1 2 5"]))
     done = lambent("bake", tmp_path / "a.obj", "-o", tmp_path / "a.store", "--only", "geometry")
-    assert "warning: a: 1 triangles dropped: a corner is not finite" in done.err
+    assert "warning: object: 1 triangles dropped: a corner is not finite" in done.err
 
 
 def test_many_warnings_are_counted(capsys):
