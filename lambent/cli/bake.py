@@ -19,6 +19,8 @@ from lambent.core.discovery import known, modules_in, names_in
 from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from lambent.bake.interreflection.proposal import Proposal
     from lambent.bake.workers import Workers
     from lambent.core.progress import Progress
@@ -32,6 +34,7 @@ else:
     Kind = StrEnum("Kind", {name: name for name in names_in(artefacts)})
 
 INTERREFLECTION = "interreflection"
+MOST_WARNINGS = 12  # lines on stderr; --json and `lambent inspect` have all
 
 
 def command(
@@ -129,6 +132,7 @@ def command(
     what = load_scene(scene, crease_angle)
     loading = time.perf_counter() - start
     _check_lit(what)
+    _say_warnings(what.warnings)
     edited, changed = _edited(what, output, view or [], session)
     if session is not None:
         _check_session(session.document, what, edit)
@@ -189,6 +193,14 @@ def _check_lit(scene: Scene) -> None:
     if not shines or not scene.cameras:
         lacks, section = ("nothing gives light", "[environment]") if not shines else ("no camera", "[[cameras]]")
         raise UserError(lacks, field=scene.name, hint=f"add {section} to its scene.toml")
+
+
+def _say_warnings(warnings: Sequence[str]) -> None:
+    """What the scene's loader left out or changed, before the time of a bake is spent on it."""
+    for text in warnings[:MOST_WARNINGS]:
+        say(f"warning: {text}")
+    if (more := len(warnings) - MOST_WARNINGS) > 0:
+        say(f"and {more} more warnings, which `lambent inspect` lists")
 
 
 def _check_session(document: SessionDocument, scene: Scene, file: Path | None) -> None:

@@ -13,6 +13,7 @@ from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
     from lambent.core.false_colour import Range
+    from lambent.render import Settings
 
 SHEET_SIZE = "640x360"  # of each of the variants
 MEASURED = {"luminance": "full", "illuminance": "light-map"}  # the part of the light that has it
@@ -200,6 +201,10 @@ def command(
         recolour=parse_recolours(recolour or ()), replacements=parse_replacements(replace or ()), variant=variant,
     )  # fmt: skip
     settings.check()
+    for option in ("false_range", "linear"):
+        if _is_said(context, option) and not settings.is_false_coloured:
+            name = "--range" if option == "false_range" else "--linear"
+            raise UserError("is of false colours", field=name, hint="add --view false-colour")
     if edit is not None:
         _check_edit(context, edit)
         check_output(output, WRITABLE, force=force)
@@ -217,6 +222,8 @@ def command(
     check_output(output, (".png",) if variants else (*WRITABLE, FILM), force=force or moves)
     if keyframes is not None and not moves:
         raise UserError("keyframes are of films", field="--keyframes", hint="write to .mp4, or name a --path")
+    if not moves:
+        _check_still(context, settings)
     if moves and camera is not None:
         raise UserError("a film needs a path", field="--camera", hint="name a path with --path")
     if path is not None and not moves:
@@ -240,6 +247,18 @@ def command(
     exposed = "" if done.ev100 is None else f"EV100 {done.ev100:.1f}, "
     text = f"{output}: {size}, {done.frames} frame(s), {done.integrator}, {exposed}{done.seconds:.1f} s"
     show(asdict(done), text, json)
+
+
+def _check_still(context: typer.Context, settings: Settings) -> None:
+    """Refuse options that only a film has."""
+    if _is_said(context, "fps"):
+        raise UserError("is of films", field="--fps", hint="write to .mp4, or name a --path")
+    for name, keys in settings.light.groups.items() if settings.light is not None else ():
+        if len(keys) > 1 or keys[0][0] > 0:
+            got = f"{name} at {keys[-1][0]:g} s"
+            raise UserError(
+                "a still has no time", field="--light", got=got, hint="leave out @SECONDS, or write to .mp4"
+            )
 
 
 def _exposure_of(ev100: float, exposure: float | None) -> float:

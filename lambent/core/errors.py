@@ -51,6 +51,20 @@ class UserError(Exception):
         super().__init__(" ".join("".join(parts).splitlines()))
 
 
+TABLE, LIST, NUMBER = "a table of keys and values", "a list", "a number"
+EXPECTED_TYPES = {
+    "dict_type": TABLE,
+    "model_type": TABLE,
+    "dataclass_type": TABLE,
+    "list_type": LIST,
+    "tuple_type": LIST,
+    "string_type": "a text",
+    "bool_type": "true or false",
+    "float_type": NUMBER,
+    "int_type": "a whole number",
+}  # by pydantic's types of errors: users write tables and lists, not dictionaries
+
+
 def invalid(error: Any, file: str | Path, known: Iterable[str] = ()) -> UserError:
     """The first fault of a pydantic `ValidationError`; `known` are the keys that an unknown one may have meant."""
     first = error.errors()[0]
@@ -59,9 +73,11 @@ def invalid(error: Any, file: str | Path, known: Iterable[str] = ()) -> UserErro
         return UserError("unknown key", file=file, field=field, hint=did_you_mean(str(first["loc"][-1]), known))
     if first["type"] == "missing":
         return UserError("is missing", file=file, field=field)
-    whole = isinstance(first["input"], dict)  # too long to be shown
-    message = first["msg"].removeprefix("Value error, ")
-    return UserError(message, file=file, field=field, got=None if whole else first["input"])
+    got = None if isinstance(first["input"], dict) else first["input"]  # a table is too long to be shown
+    if first["type"] in EXPECTED_TYPES:
+        expected = EXPECTED_TYPES[first["type"]]
+        return UserError("is of another type", file=file, field=field, got=got, expected=expected)
+    return UserError(first["msg"].removeprefix("Value error, "), file=file, field=field, got=got)
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str | None:

@@ -127,11 +127,12 @@ class View:
             found = cls(camera, projection, _twice_atan_deg(tangent / shape), camera.fov_y_deg)
             return found if field_deg is None else cls(camera, projection, field_deg, _taller_deg(field_deg, shape))
         if projection is Projection.cylinder:
-            wide = field_deg or 360.0
+            wide = 360.0 if field_deg is None else field_deg
             return cls(camera, projection, wide, _twice_atan_deg(math.radians(wide) / 2 * shape))
         if width != height:
             raise UserError("a fisheye is square", field="--size", got=f"{width}x{height}", expected=f"{width}x{width}")
-        return cls(camera, projection, field_deg or 180.0, field_deg or 180.0)
+        wide = 180.0 if field_deg is None else field_deg
+        return cls(camera, projection, wide, wide)
 
 
 def _twice_atan_deg(tangent: float) -> float:

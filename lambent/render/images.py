@@ -24,6 +24,7 @@ from lambent.core.photometry import LUMINANCE, Quantity, photometric
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.core.projections import Projection, View
+from lambent.realtime.integrators import INTEGRATORS
 from lambent.scenes.look_track import LookTrack
 from lambent.scenes.replacement import Replacement
 from lambent.scenes.scene import Variant
@@ -124,6 +125,7 @@ class Settings:
 
     def check(self) -> None:
         """Raise `UserError` for a view transform or an exposure that cannot be; renderers check the rest."""
+        known("integrator", self.integrator, (*INTEGRATORS, PATH_TRACER), field="--integrator")
         known("view transform", self.view, VIEWS, field="--view")
         if self.scale is not None:
             self.scale.check()

@@ -37,7 +37,12 @@ def size_warnings(scene: Scene) -> list[str]:
     extent = float((high - low).max())
     if SMALL <= extent <= LARGE:
         return []
-    return [f"the scene is {extent:.3g} m large: is its unit the metre? (scene.toml can scale a geometry file)"]
+    return [f"the scene is {_metres(extent)} m large: is its unit the metre? (scene.toml can scale a geometry file)"]
+
+
+def _metres(extent: float) -> str:
+    """Three digits, and no power of ten below a million metres."""
+    return f"{extent:.3g}" if not 1000 <= extent < 1e6 else f"{float(f'{extent:.3g}'):.0f}"
 
 
 def mesh_faults(mesh: Mesh) -> list[str]:

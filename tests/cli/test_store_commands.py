@@ -168,3 +168,20 @@ def test_bake_of_the_geometry(lambent, tmp_path):
 def test_bake_into_a_folder_that_is_something_else(refused, tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
     assert "not a store" in refused("bake", "builtin:box", "-o", tmp_path, "--only", "geometry")
+
+
+def test_a_bake_says_what_its_scene_lost(lambent, tmp_path):
+    corners = [f"v {x} {y} 0" for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    (tmp_path / "a.obj").write_text("\n".join([*corners, "v nan 0 0", "f 1 2 3", "f 1 3 4", "f 1 2 5"]))
+    done = lambent("bake", tmp_path / "a.obj", "-o", tmp_path / "a.store", "--only", "geometry")
+    assert "warning: object: 1 triangles dropped: a corner is not finite" in done.err
+
+
+def test_many_warnings_are_counted(capsys):
+    from lambent.cli.bake import MOST_WARNINGS, _say_warnings
+
+    _say_warnings([f"fault {i}" for i in range(MOST_WARNINGS + 3)])
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "warning: fault 0"
+    assert len(lines) == MOST_WARNINGS + 1
+    assert lines[-1].startswith("and 3 more warnings")

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
-from lambent.core.errors import UserError
+from lambent.core.errors import UserError, invalid
 from lambent.core.inputs import foreign_bytes
 
 
@@ -34,3 +35,18 @@ def test_what_is_no_fault_of_the_bytes_passes() -> None:
         with pytest.raises(type(error)) as caught, foreign_bytes("the reader", Path("a.bin")):
             raise error
         assert caught.value is error
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "words"),
+    [
+        (dict[str, dict[str, int]], {"red": "oak"}, "red: is of another type; found oak; expected a table of keys"),
+        (list[int], 3, "is of another type; found 3; expected a list"),
+        (dict[str, list[int]], {"a": {"b": 1}}, "a: is of another type; expected a list"),
+        (dict[str, str], {"a": 3}, "a: is of another type; found 3; expected a text"),
+    ],
+)
+def test_a_value_of_another_type_is_said_in_the_words_of_files(kind: type, value: object, words: str) -> None:
+    with pytest.raises(ValidationError) as raised:
+        TypeAdapter(kind).validate_python(value)
+    assert words in str(invalid(raised.value, "scene.toml"))

@@ -112,3 +112,10 @@ def test_pictures_without_a_view(tmp_path):
 def test_fisheyes_are_square():
     with pytest.raises(UserError, match="square"):
         of(Projection.fisheye, size=(64, 32))
+
+
+@pytest.mark.parametrize("projection", ["fisheye", "hemispherical", "cylinder"])
+def test_a_field_of_view_of_0_is_refused(projection):
+    view = View.of(Camera("a", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)), Projection(projection), 8, 8, 0.0)
+    with pytest.raises(UserError, match="field of view is out of range"):
+        view.check()

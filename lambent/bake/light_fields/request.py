@@ -24,7 +24,7 @@ FIELDS, MEGABYTES = "light_fields", "light_field_mb"  # what a store notes of th
 def noted(before: Mapping[str, Any], asked: str | None, budget_mb: float | None) -> dict[str, str]:
     """What a store notes: what is asked, else what was `before`, else what the scene says."""
     budget = before.get(MEGABYTES, BUDGET_MB) if budget_mb is None else budget_mb
-    return {FIELDS: asked or before.get(FIELDS, AS_SCENE), MEGABYTES: str(budget)}
+    return {FIELDS: before.get(FIELDS, AS_SCENE) if asked is None else asked, MEGABYTES: str(budget)}
 
 
 def as_asked(scene: Scene, asked: str) -> Scene:

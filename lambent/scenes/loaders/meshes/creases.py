@@ -9,7 +9,7 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.directions import normalize
-from lambent.core.geometry import area_vectors, triangle_areas, triangle_normals
+from lambent.core.geometry import area_vectors, triangle_normals
 from lambent.scenes.geometry import tangents_along
 from lambent.scenes.scene import Mesh, SceneObject
 
@@ -20,8 +20,8 @@ NAMED = 2
 
 def leaning_faces(mesh: Mesh) -> int:
     """Triangles with a normal that leans more than LEANING_DEG from them; 0 if they are less than MUCH of the area."""
-    corners = mesh.corners.astype(float)
-    faces, areas = triangle_normals(corners), triangle_areas(corners)
+    vectors = area_vectors(mesh.corners.astype(float))
+    faces, areas = normalize(vectors), np.linalg.norm(vectors, axis=-1) / 2
     cosine = np.abs((mesh.normals[mesh.faces].astype(float) * faces[:, None]).sum(axis=2)).min(axis=1)
     leaning = (cosine < np.cos(np.radians(LEANING_DEG))) & (areas > 0)
     return int(leaning.sum()) if areas[leaning].sum() > MUCH * areas.sum() else 0
