@@ -12,6 +12,7 @@ from pathlib import Path
 
 from lambent.bake.bake import bake
 from lambent.bake.quality import Quality
+from lambent.bake.watch import Watch
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
@@ -40,6 +41,7 @@ def bake_again(
     *,
     textures: Mapping[str, str] | None = None,
     quality: Quality | None = None,
+    watch: Watch | None = None,
 ) -> Store:
     """Bake light map and probes of the store in `folder` into `copy`, with some of its materials replaced.
 
@@ -52,6 +54,8 @@ def bake_again(
         Names of materials whose textures others wear, by the name of these; "" is none.
     quality : Quality, optional
         By default the preset that the store was baked with.
+    watch : Watch, optional
+        Told what the copy has of the light.
 
     Raises
     ------
@@ -79,7 +83,7 @@ def bake_again(
         if not _same_geometry(store, copied):
             hint = "`lambent bake` of the scene with these materials shows it"
             raise UserError("these materials need probes or parts that the store does not have", file=folder, hint=hint)
-    return bake(scene, copy, only=set(KINDS), quality=effort, seed=seed, progress=progress)
+    return bake(scene, copy, only=set(KINDS), quality=effort, seed=seed, progress=progress, watch=watch)
 
 
 def _prepare(store: Store, folder: Path) -> None:
