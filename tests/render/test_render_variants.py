@@ -14,13 +14,14 @@ from lambent.core.errors import UserError
 from lambent.core.images import read_encoded, read_image
 from lambent.core.light_mix import GroupMix, LightMix, parse_light
 from lambent.render import Settings, film, sheet, still
-from lambent.render.sheet import laid_out, shape_of, with_the_baked_state
+from lambent.render.sheet import Exposures, laid_out, shape_of, with_the_baked_state
 from lambent.scenes.look_track import LookTrack
 from lambent.scenes.scene import Look, MaterialTextures, Texture, Variant
 from lambent.store.contract import scene_record, write_scene_record
 from lambent.store.session import FILE, RoomState, WalkSession, write_session
 from lambent.store.states import variants_of
 from lambent.store.store import Store
+from lambent.store.views import Views, change_views
 from tests.bake.small_scenes import TINY, room_with_step
 from tests.viewer.small_store import MATERIALS, with_light_groups, write_small_store
 
@@ -198,3 +199,46 @@ def frames_of_track(store: Path, folder: Path, track: LookTrack, path: CameraPat
     short = CameraPath(path.name, path.keys, 0.5)
     film(store, folder / "f-#.exr", short, replace(SMALL, samples=4, looks=track), fps=2)
     return [read_image(file) for file in sorted(folder.glob("*.exr"))]
+
+
+def test_pictures_of_a_sheet_share_an_exposure_by_their_light(adapter: None, store: Path, tmp_path: Path) -> None:
+    """The mix at half the light has one stop more; under `one` it has none."""
+    done = sheet(store, tmp_path / "a.png", "front", SMALL)
+    found = done.ev100_by_name
+    assert found is not None and list(found) == ["as baked", "red", "dim"] and done.ev100 == found["as baked"]
+    assert found["red"] == found["as baked"]
+    assert found["dim"] == pytest.approx(found["as baked"] - 1, abs=0.03)
+    each = sheet(store, tmp_path / "a.png", "front", SMALL, exposures="each").ev100_by_name
+    assert each is not None and each["red"] != each["as baked"]
+    one = sheet(store, tmp_path / "a.png", "front", SMALL, exposures="one")
+    assert one.ev100_by_name is None and one.ev100 == pytest.approx(found["as baked"])
+    said = sheet(store, tmp_path / "a.png", "front", replace(SMALL, exposure_ev=-2.0), exposures="each")
+    assert said.exposure_ev == -2.0 and said.ev100_by_name is None
+    with pytest.raises(UserError, match="--exposure: unknown exposure of a sheet; found all"):
+        sheet(store, tmp_path / "a.png", "front", SMALL, exposures="all")
+
+
+def test_the_exposure_of_the_scene_is_that_of_light_as_baked() -> None:
+    shared = Exposures("light", 2.0)
+    assert shared.wanted(LightMix()) == 2.0
+    shared.take(2.0)
+    assert shared.wanted(DIM) is None
+    shared.take(3.0)
+    assert (shared.wanted(LightMix()), shared.wanted(DIM)) == (2.0, 3.0)
+    assert Exposures("one", 2.0).wanted(DIM) == 2.0 and Exposures("each", 2.0).wanted(LightMix()) is None
+
+
+def test_a_stored_state_brings_its_light_to_a_saved_view(adapter: None, store: Path, tmp_path: Path) -> None:
+    """A state whose light is as baked says so; a variant without a mix leaves the view's."""
+    dusk = Views(cameras=(replace(WITHIN, name="dusk"),), lights={"dusk": DIM})
+    change_views(store, lambda _: dusk)
+    states = {"plain": RoomState(materials={"plaster": RED.material})}
+    write_session(store / FILE, WalkSession(now=RoomState(), states=states))
+
+    def mean(variant: str) -> float:
+        still(store, tmp_path / "v.exr", "dusk", replace(SMALL, variant=variant))
+        found = read_image(tmp_path / "v.exr").mean()
+        (tmp_path / "v.exr").unlink()
+        return float(found)
+
+    assert mean("red") == pytest.approx(mean("plain") / 2, rel=6e-3)

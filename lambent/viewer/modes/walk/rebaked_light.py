@@ -208,8 +208,8 @@ def steps(
     if since is None or not since.arrived.light_map:
         before = list(resources.light_layers)
         after = rebaked.layers(light, before)
-        new = [number for number in order if rebaked.lit[number]]
-        for layers in texel_steps(before[: len(after)], after, batches_of(rebaked.texel_object, new, len(order))):
+        there = [number for number in order if rebaked.lit[number]]
+        for layers in texel_steps(before[: len(after)], after, batches_of(rebaked.texel_object, there, len(order))):
             yield _uploads_map(layers)
     for owner, users in probe_users(shown, resources, order).items():
         found = None if since is not None and owner in since.scene.probes else rebaked.probe(owner, light)

@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, Any
 
+import numpy as np
+
 from lambent.bake.again import KINDS, copy_beside
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
@@ -172,11 +174,11 @@ class RebakedLight:
         """Say in a line how far it is, and once that the picture is exact."""
         if self._failed:
             return
-        fade, lit = self._fade, [] if self._light is None else self._light.lit
+        fade, lit = self._fade, self._light.lit if self._light is not None else np.zeros(0, bool)
         if self._process is not None:
             passed = minutes(self._screen.clock() - self._began_s)
             first = f" ({minutes(self._first_s)} the first time)" if self._first_s else ""
-            shown = f"; new light on {sum(lit)} of {len(lit)} objects" if fade is not None and any(lit) else ""
+            shown = f"; new light on {lit.sum()} of {len(lit)} objects" if fade is not None and lit.any() else ""
             self._shown.line = f"baking anew {passed}{first}: {self._step}{shown}"
         elif fade is not None and fade.done and not self._shown.said:
             self._shown.said, left = True, fade.left
