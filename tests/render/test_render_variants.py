@@ -210,10 +210,6 @@ def test_pictures_of_a_sheet_share_an_exposure_by_their_light(adapter: None, sto
     assert found["dim"] == pytest.approx(found["as baked"] - 1, abs=0.03)
     each = sheet(store, tmp_path / "a.png", "front", SMALL, exposures="each").ev100_by_name
     assert each is not None and each["red"] != each["as baked"]
-    one = sheet(store, tmp_path / "a.png", "front", SMALL, exposures="one")
-    assert one.ev100_by_name is None and one.ev100 == pytest.approx(found["as baked"])
-    said = sheet(store, tmp_path / "a.png", "front", replace(SMALL, exposure_ev=-2.0), exposures="each")
-    assert said.exposure_ev == -2.0 and said.ev100_by_name is None
     with pytest.raises(UserError, match="--exposure: unknown exposure of a sheet; found all"):
         sheet(store, tmp_path / "a.png", "front", SMALL, exposures="all")
 
@@ -226,6 +222,12 @@ def test_the_exposure_of_the_scene_is_that_of_light_as_baked() -> None:
     shared.take(3.0)
     assert (shared.wanted(LightMix()), shared.wanted(DIM)) == (2.0, 3.0)
     assert Exposures("one", 2.0).wanted(DIM) == 2.0 and Exposures("each", 2.0).wanted(LightMix()) is None
+    one = Exposures("one", None)
+    assert one.wanted(LightMix()) is None
+    one.take(1.5)
+    assert one.wanted(DIM) == 1.5 and not one.differ and one.notes == [""]
+    shared.take(2.0)
+    assert shared.differ and len(set(shared.notes)) == 2
 
 
 def test_a_stored_state_brings_its_light_to_a_saved_view(adapter: None, store: Path, tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from lambent.bake.bake import bake
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.light_mix import GroupMix, LightMix
+from lambent.materials.document import Lobe
 from lambent.realtime.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.scenes import load_scene
@@ -136,6 +137,22 @@ def test_a_folder_of_somebody_else_is_left_alone(store, tmp_path):
     with pytest.raises(UserError, match="not empty"):
         bake_again(store, tmp_path / "full", {}, quality=TINY)
     assert (tmp_path / "full" / "letter.txt").read_text() == "dear"
+
+
+def test_an_edit_that_needs_what_the_store_lacks_is_one_line(store, tmp_path):
+    """A matte material that mirrors, and one that lets light through; its name and what is lacking are said."""
+    scene = load_scene("builtin:box")
+    probes = {a.name.split("/")[1] for a in Store.open(store).artefacts("probe")}
+    bare = next(o for o in scene.objects if o.name not in probes and not scene.materials[o.material].lobes)
+    material = scene.materials[bare.material]
+    glossy = material.model_copy(update={"lobes": (Lobe(mx=0.05, my=0.05, r0=0.5),)})
+    with pytest.raises(UserError, match=f"{bare.material}: as it is now it needs a probe"):
+        bake_again(store, tmp_path / "copy", {bare.material: glossy}, quality=TINY)
+    if "light_map/irradiance_back" not in Store.open(store):
+        thin = material.model_copy(update={"kd": (0.2,) * 3, "kt_d": (0.4,) * 3})
+        with pytest.raises(UserError, match=f"{bare.material}: as it is now it needs a light map of its far side"):
+            bake_again(store, tmp_path / "copy", {bare.material: thin}, quality=TINY)
+    assert not (tmp_path / "copy").exists()
 
 
 def test_settings_of_its_own_are_one_line(store, tmp_path):
