@@ -189,8 +189,9 @@ def laid_out(
         row, column = divmod(number, columns)
         x, y = gap + column * (width + gap), gap + row * (height + caption)
         page.paste(Image.fromarray(picture), (x, y))
-        words = printable(name)
-        while draw.textlength(words + note, font) > width and len(words) > 1:
-            words = f"{words.removesuffix('...')[:-1]}..."
+        kept = words = printable(name)
+        while kept and draw.textlength(words + note, font) > width:
+            kept = kept[:-1]
+            words = f"{kept}..." if kept else ""
         draw.text((x + width / 2, y + height + caption / 2), words + note, font=font, fill=INK, anchor="mm")
     return np.asarray(page, np.uint8)

@@ -146,6 +146,8 @@ def test_names_and_shapes_of_sheets() -> None:
     pictures = [np.full((40, 60, 3), 128, np.uint8)] * 3
     page = laid_out(pictures, ["short", "a name that is much too long for its picture", "\x1b[31m"], 2)
     assert page.shape == (2 * (40 + 28) + 7, 2 * (60 + 7) + 7, 3)
+    narrow = laid_out(pictures, ["short"] * 3, 2, [", EV100 11.5 and more than fits"] * 3)
+    assert narrow.shape == page.shape, "a note is not cut, and a name may vanish beside it"
     assert (page[:, :6] == 255).all() and (page[7 + 68 :, 74:] == 255).all(), "an empty place"
     assert [one.name for one in with_the_baked_state(VARIANTS)] == ["as baked", "red", "dim"]
     assert [one.name for one in with_the_baked_state((Variant("plain"), *VARIANTS))] == ["plain", "red", "dim"]
