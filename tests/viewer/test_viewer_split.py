@@ -7,6 +7,7 @@ import pytest
 
 from lambent.core.light_mix import GroupMix, LightMix
 from lambent.realtime.device import open_device
+from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 from lambent.store.session import RoomState
 from lambent.store.store import Store
@@ -144,3 +145,19 @@ def test_films_have_the_light_and_the_textures_of_the_room(pictures, state, rend
     worn = pictures._film_renderer.resources.materials
     assert worn["plaster"] is pictures._film_renderer.resources._textured["brass"]
     film.cancel()
+
+
+def test_a_second_renderer_shares_what_no_edit_changes_and_draws_the_same(adapter, tmp_path):
+    """Light as baked is shared by probe; light that one of both gets is not the other's."""
+    first = Renderer(open_device(), Store.open(write_small_store(tmp_path / "s")))
+    second = Renderer(first.device, first.scene, kin=first)
+    both = list(zip(first.resources.objects, second.resources.objects, strict=True))
+    assert all(a.light is b.light and a is not b for a, b in both)
+    frame = FrameState(first.scene.record.cameras[0], 48, 32)
+    before = first.image(frame)
+    np.testing.assert_array_equal(second.image(frame), before)
+    item = second.resources.objects[0]
+    item.relight(item.light.relit(item.light.probe.radiance * 0, ()), item.emission)
+    second.resources.show_light_map([layer * 0 for layer in second.resources.light_layers])
+    assert second.image(frame).mean() < before.mean()
+    np.testing.assert_array_equal(first.image(frame), before)
