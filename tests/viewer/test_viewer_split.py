@@ -1,5 +1,6 @@
 """Two states of the room beside each other: each side is the picture of its state, in its light, and both are live."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +21,7 @@ from tests.viewer.small_store import MATERIALS, SIDE, with_light_groups, write_s
 
 SIZE = 96, 64
 PLACE = Rect(0, 0, *SIZE)
-LONGEST = 400  # frames until all light is there
+LONGEST_S = 60.0  # until a picture rests, however busy the machine is
 OFF = LightMix({"lamp": GroupMix(on=False), "sky": GroupMix(intensity=2.0)})
 RED = MATERIALS["plaster"].model_copy(update={"kd": (0.6, 0.1, 0.1)})
 
@@ -53,7 +54,8 @@ def pictures(renderer, state):
 
 def rested(pictures, state):
     """Frames until nothing more is to come."""
-    for _ in range(LONGEST):
+    end_s = time.monotonic() + LONGEST_S
+    while time.monotonic() < end_s:
         drawn(pictures, state, SIZE, dt_s=0.0)
         if pictures.wait_s() is None:
             return
