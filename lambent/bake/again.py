@@ -12,18 +12,19 @@ from pathlib import Path
 
 from lambent.bake.bake import bake
 from lambent.bake.quality import Quality
+from lambent.bake.watch import Watch
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
-from lambent.scenes.scene import Look
+from lambent.scenes.scene import Look, Scene
 from lambent.scenes.variants import textures_worn
-from lambent.store.contract import LAST_RUN, TIMINGS
+from lambent.store.contract import LAST_RUN, SIDES, TIMINGS, needs_probe, probe_name, scene_record, shared_probes
 from lambent.store.source import SOURCE, scene_of
 from lambent.store.store import MANIFEST, Store
 
 COPY_OF = "copy_of"  # document: name of the store whose light the copy has for other materials
 KINDS = ("light_map", "probe")
-LIGHT = "light_map/irradiance"
+LIGHT, BACK = (f"light_map/{side}" for side in SIDES)
 
 
 def copy_beside(folder: Path) -> Path:
@@ -40,6 +41,7 @@ def bake_again(
     *,
     textures: Mapping[str, str] | None = None,
     quality: Quality | None = None,
+    watch: Watch | None = None,
 ) -> Store:
     """Bake light map and probes of the store in `folder` into `copy`, with some of its materials replaced.
 
@@ -52,12 +54,14 @@ def bake_again(
         Names of materials whose textures others wear, by the name of these; "" is none.
     quality : Quality, optional
         By default the preset that the store was baked with.
+    watch : Watch, optional
+        Told what the copy has of the light.
 
     Raises
     ------
     UserError
         Where the store does not say where its scene is, or was baked with settings of its own; where `copy` is
-        something else; where other materials need other geometry.
+        something else; where other materials need other geometry, probes or sides of the light map.
     """
     store = Store.open(folder)
     if not isinstance(store.documents.get(SOURCE), str):
@@ -73,13 +77,37 @@ def bake_again(
         textures=textures_worn(scene.textures, worn),
         measured={name: file for name, file in scene.measured.items() if name not in materials},
     )
+    _check_parts(store, scene, materials)
     _prepare(store, copy)
     effort, seed = quality or str(made_with.get("quality")), int(made_with.get("seed", 0))
     with bake(scene, copy, only={"geometry"}, quality=effort, seed=seed, progress=progress) as copied:
         if not _same_geometry(store, copied):
             hint = "`lambent bake` of the scene with these materials shows it"
             raise UserError("these materials need probes or parts that the store does not have", file=folder, hint=hint)
-    return bake(scene, copy, only=set(KINDS), quality=effort, seed=seed, progress=progress)
+    return bake(scene, copy, only=set(KINDS), quality=effort, seed=seed, progress=progress, watch=watch)
+
+
+def _check_parts(store: Store, scene: Scene, materials: Mapping[str, Material]) -> None:
+    """`UserError` where a material needs a probe, or a light map of its far side, that the store does not have.
+
+    The renderer would show the nearest probe, and no light, in their place: such a picture is not that of a bake.
+    """
+    record, shared = scene_record(store), shared_probes(store)
+    for name in sorted(materials):
+        given, wanted = record.materials.get(name), materials[name]
+        worn_by = [o.name for o in record.objects if o.material == name]
+        if given is None or not worn_by:
+            continue
+        lacks = ""
+        owners = [shared.get(one, one) for one in worn_by]
+        if needs_probe(wanted) and not needs_probe(given):
+            lacks = "" if all(probe_name(one, "radiance") in store for one in owners) else "a probe"
+        if wanted.transmits and not given.transmits and BACK not in store:
+            lacks = "a light map of its far side"
+        if lacks:
+            hint = f"a [[variants]] of the scene with {name} so makes `lambent bake` bake it"
+            hint = hint if lacks == "a probe" else f"bake the scene with {name} so"
+            raise UserError(f"as it is now it needs {lacks}, which the store lacks", field=name, hint=hint)
 
 
 def _prepare(store: Store, folder: Path) -> None:

@@ -28,6 +28,7 @@ from lambent.bake.probes.division import divided
 from lambent.bake.quality import Quality, quality_named
 from lambent.bake.timing import Stopwatch
 from lambent.bake.view import View
+from lambent.bake.watch import Watch
 from lambent.bake.workers import InProcess, Workers
 from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
@@ -60,6 +61,7 @@ def bake(
     bounces: Bounces | None = None,
     environment: ImageEnvironment | None = None,
     workers: Workers | None = None,
+    watch: Watch | None = None,
 ) -> Store:
     """Bake a scene into a store, or bring a store up to date.
 
@@ -94,6 +96,8 @@ def bake(
         What lights the views instead of the scene's own environment.
     workers : Workers, optional
         Who traces "interreflection", tile by tile: see `lambent.bake.cluster.opened`. By default this process.
+    watch : Watch, optional
+        Told what is finished, and regions of the light map before it is.
 
     Returns
     -------
@@ -141,11 +145,13 @@ def bake(
         context = BakeContext(
             scene, store, kinds, quality, methods, seed, progress, undivided, tuple(views), editables or {},
             environment, bounces or Bounces(), workers or InProcess(), timed,
+            watch or Watch(),
         )  # fmt: skip
         for kind in order:
             if context.stale(kind):
                 with timed(kind, continued=bool(context.begun(kind))):
                     kinds[kind].bake(context)
+            context.watch.arrived(kind, context.keys(kind).keys())
             if describe := getattr(kinds[kind], "describe", None):
                 describe(context)
         timed.finish(start)

@@ -26,6 +26,7 @@ from lambent.bake.quality import Quality
 from lambent.bake.surfaces.atlas import Atlas, separated
 from lambent.bake.timing import Timed, untimed
 from lambent.bake.view import View
+from lambent.bake.watch import Watch
 from lambent.bake.workers import InProcess, Workers
 from lambent.core.progress import Progress, silent
 from lambent.materials.factored.of_lobes import of_material
@@ -58,6 +59,7 @@ class BakeContext:
     them whole, as views show them. `editables` are terms of materials that are not those of their documents;
     `bounces` says what interreflections are baked for, and `environment` lights the views instead of the scene's own.
     `workers` do jobs that other processes can do. `timed(step)` notes what a step takes that is no kind of artefact.
+    `watch` is told what is finished.
     """
 
     scene: Scene
@@ -74,6 +76,7 @@ class BakeContext:
     bounces: Bounces = field(default_factory=Bounces)
     workers: Workers = field(default_factory=InProcess)
     timed: Timed = untimed
+    watch: Watch = field(default_factory=Watch)
     _keys: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def settings(self, kind: str) -> Any:

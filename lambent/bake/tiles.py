@@ -47,6 +47,7 @@ def run_tiles(
     progress: Progress,
     what: str,
     cost: Callable[[tuple[slice, ...]], float] = lambda region: 1.0,
+    wrote: Callable[[], None] = lambda: None,
 ) -> None:
     """Compute the missing chunks of an array and write each as soon as it is done.
 
@@ -56,6 +57,8 @@ def run_tiles(
         Content of a region, from the region and the tile's seed.
     cost : callable
         Expected work of a region in any unit, so that progress moves evenly.
+    wrote : callable
+        Called after each chunk.
     """
     name, region = writer.artefact.name, writer.artefact.region
     costs: dict[Chunk, float] = {chunk: cost(region(chunk)) for chunk in writer.artefact.chunk_grid}
@@ -66,3 +69,4 @@ def run_tiles(
         writer.write(chunk, np.asarray(tile(region(chunk), seed_of(seed, name, chunk))))
         done += costs[chunk]
         progress(done, total, what)
+        wrote()

@@ -53,7 +53,12 @@ def command(
     ] = "lamps",
     samples: Annotated[int | None, typer.Option(min=1, help="Per pixel (path, qmc) or per lobe.")] = None,
     exposure: Annotated[
-        float | None, typer.Option(help="In EV: stops on radiance. [default: the scene's, else metered]")
+        str | None,
+        typer.Option(
+            help="In EV: stops on radiance. [default: the scene's, else metered] With --variants also light: variants "
+            "in the same light share one, other light is metered [default]; each: every picture is; one: that of the "
+            "first for all. Captions say EV100 where it differs."
+        ),
     ] = None,
     ev100: Annotated[
         float | None, typer.Option("--ev100", help="The same as EV100, 15 in the sun, 8 in a room by night.")
@@ -185,8 +190,9 @@ def command(
     from lambent.materials.recolour import parse_recolours
     from lambent.scenes.replacement import parse_replacements
 
+    exposure_ev, exposures = parse_exposure(exposure, variants=variants)
     if ev100 is not None:
-        exposure = _exposure_of(ev100, exposure)
+        exposure_ev = _exposure_of(ev100, exposure)
     if part in MEASURED:
         if view not in ("filmic", "false-colour"):
             raise UserError("is shown in false colours", field="--show", got=part, hint="leave out --view")
@@ -195,7 +201,7 @@ def command(
     if variants and not _is_said(context, "size"):
         size = SHEET_SIZE
     settings = render.Settings(
-        *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
+        *parse_size(size), integrator, samples, exposure_ev, view, scale, log=not linear, show=part, planar=planar,
         lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb, seed=seed,
         light=parse_light(light) if light else None, sky_turn_deg=sky_turn, light_field_cache=light_field_cache,
         recolour=parse_recolours(recolour or ()), replacements=parse_replacements(replace or ()), variant=variant,
@@ -240,7 +246,9 @@ def command(
                 store, output, path, settings, fps=fps, keyframes=keyframes, scene=scene, note=note, progress=progress
             )
         elif variants:
-            done = render.sheet(store, output, camera, settings, scene=scene, note=note, progress=progress)
+            done = render.sheet(
+                store, output, camera, settings, exposures=exposures, scene=scene, note=note, progress=progress
+            )
         else:
             done = render.still(store, output, camera, settings, scene=scene, note=note, progress=progress)
     size = f"{done.width}x{done.height}"
@@ -261,7 +269,24 @@ def _check_still(context: typer.Context, settings: Settings) -> None:
             )
 
 
-def _exposure_of(ev100: float, exposure: float | None) -> float:
+def parse_exposure(text: str | None, *, variants: bool) -> tuple[float | None, str]:
+    """Stops, if they are said, and how the pictures of a sheet of `variants` are exposed, of "-1.5" or "each"."""
+    from lambent.render.sheet import BY_LIGHT, EXPOSURES
+
+    if text is None:
+        return None, BY_LIGHT
+    if text in EXPOSURES:
+        if not variants:
+            raise UserError("is of a sheet", field="--exposure", got=text, expected="EV", hint="or add --variants")
+        return None, text
+    try:
+        return float(text), BY_LIGHT
+    except ValueError:
+        expected = "EV, such as -1.5" + (f", or {', '.join(EXPOSURES)}" if variants else "")
+        raise UserError("not an exposure", field="--exposure", got=text, expected=expected) from None
+
+
+def _exposure_of(ev100: float, exposure: str | None) -> float:
     """Stops on radiance of an EV100."""
     from lambent.core.exposure import ev100_of, exposure_of
     from lambent.render.images import MOST_EV

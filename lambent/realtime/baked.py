@@ -187,6 +187,13 @@ def read_baked(store: Store, light_field_mb: float | None = None, policy: str = 
     )
 
 
+def read_probe(store: Store, name: str, unit: float) -> Probe:
+    """The probe of an object, its light in `unit` W/(sr m^2)."""
+    array = contract.probe_name(name, "radiance")
+    scale = np.float32(contract.radiance_unit(store, array) / unit)
+    return _probe(store, name, finite(store.read(array))[0] * scale)
+
+
 def _probe(store: Store, name: str, radiance: Floats) -> Probe:
     centre = numbers_of(store, contract.probe_name(name, "radiance"), "centre", 3)
     distance, planes = (contract.probe_name(name, part) for part in ("distance", "planes"))

@@ -67,16 +67,24 @@ class Renderer:
         What the store lacks, in plain words.
     """
 
-    def __init__(self, device: Any, source: Store | BakedScene, beside: Renderer | None = None) -> None:
-        """`beside` draws the same scene on the same device already: what stays on the GPU is shared with it."""
+    def __init__(
+        self, device: Any, source: Store | BakedScene, beside: Renderer | None = None, kin: Renderer | None = None
+    ) -> None:
+        """`beside` draws the same scene on the same device already: what stays on the GPU is shared with it.
+
+        Of `kin`, only what no edit changes: this renderer has light of its own.
+        """
         self.device = device
         self.scene = source if isinstance(source, BakedScene) else read_baked(source)
         self.missing = self.scene.missing
-        self._layouts: Layouts = beside._layouts if beside else Layouts(device)
+        shared = beside or kin
+        self._layouts: Layouts = shared._layouts if shared else Layouts(device)
         layouts, scene = self._layouts, self.scene
-        self.resources: SceneResources = beside.resources if beside else SceneResources(layouts, self.scene)
+        self.resources: SceneResources = (
+            beside.resources if beside else SceneResources(layouts, self.scene, kin.resources if kin else None)
+        )
         self._clusters: Clusters = (
-            beside._clusters if beside else Clusters(scene.positions, scene.faces, scene.record.objects)
+            shared._clusters if shared else Clusters(scene.positions, scene.faces, scene.record.objects)
         )
         self.streaming: Streaming = beside.streaming if beside else Streaming(scene, self.resources.objects)
         self.mixer: LightMixer = beside.mixer if beside else LightMixer(layouts, scene, self.resources)

@@ -84,7 +84,8 @@ class ObjectResources:
 class SceneResources:
     """Everything of a baked scene that stays on the GPU from frame to frame."""
 
-    def __init__(self, layouts: Layouts, scene: BakedScene) -> None:
+    def __init__(self, layouts: Layouts, scene: BakedScene, kin: SceneResources | None = None) -> None:
+        """`kin` shows the same scene in light of its own: cube maps and lamps of probes as baked are shared with it."""
         self.scene, self._layouts, device = scene, layouts, layouts.device
         self.sampler = device.create_sampler(
             mag_filter="linear", min_filter="linear", mipmap_filter="linear",
@@ -105,7 +106,8 @@ class SceneResources:
         self.mirrored_sky_group = (
             self.sky_group if cleaned is sky else self.sky_group_of(with_alpha(finite(cleaned.radiance)[0]))
         )
-        lights: dict[Probe | None, ProbeLight] = {}
+        self._as_baked: dict[Probe | None, ProbeLight] = {} if kin is None else kin._as_baked
+        lights = self._as_baked
         beyond = neighbouring_faces(scene)
         self.objects, known = [], look_ups()
         for record in scene.record.objects:

@@ -27,7 +27,7 @@ from lambent.scenes.loaders.keyframes import Known, read_keyframes
 from lambent.scenes.variants import looks_as_loaded, variant_named
 from lambent.store.contract import SceneRecord, scene_record
 from lambent.store.light_groups import light_groups
-from lambent.store.states import variants_of
+from lambent.store.states import says_light, variants_of
 from lambent.store.store import Store
 from lambent.store.views import read_views, with_views
 
@@ -41,7 +41,8 @@ class Rendered:
     """The written file, its size in pixels, its frames, the time that it took, and the exposure it is displayed with.
 
     `exposure_ev` in stops on radiance and `ev100` are None of files of radiance, and of false colours; of these `scale`
-    says what they mean: low, high, log, unit. `light_fields` is of those that do not fit `Settings.light_field_mb`.
+    says what they mean: low, high, log, unit. Of a sheet they are those of its first picture; `ev100_by_name` has
+    all where they differ. `light_fields` is of those that do not fit `Settings.light_field_mb`.
     """
 
     file: Path
@@ -54,6 +55,7 @@ class Rendered:
     ev100: float | None = None
     scale: dict[str, float | bool | str] | None = None
     light_fields: dict[str, Any] | None = None
+    ev100_by_name: dict[str, float] | None = None
 
 
 def ignore(text: str) -> None:
@@ -96,7 +98,7 @@ def still(
     check_writable(file, WRITABLE)
     opened, record = opened_with_views(store)
     view = view_of(record, camera)
-    says_mix = settings.light is not None or _mix_of_variant(settings, opened).groups
+    says_mix = settings.light is not None or says_light(opened, settings.variant)
     if camera is not None and not says_mix and (mix := read_views(opened.folder).lights.get(view.name)):
         settings = _lit(settings, opened, MixTrack.of(mix), "saved with the view", note)
     drawn = images(opened, settings, scene=scene, note=note)
@@ -173,7 +175,7 @@ def film(
     chosen = path if isinstance(path, CameraPath) else _named("path", record.paths, path)
     if keyframes is not None:
         settings = _with_keyframes(settings, opened, record, keyframes)
-    says_mix = settings.light is not None or _mix_of_variant(settings, opened).groups
+    says_mix = settings.light is not None or says_light(opened, settings.variant)
     if not says_mix and (track := read_views(opened.folder).tracks.get(chosen.name)):
         settings = _lit(settings, opened, track, "saved with the walk", note)
     if file.suffix.lower() == FILM:

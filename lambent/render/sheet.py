@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.camera import Camera
+from lambent.core.discovery import known
 from lambent.core.errors import UserError
+from lambent.core.exposure import ev100_of
 from lambent.core.images import check_writable, write_shown
 from lambent.core.light_mix import LightMix
 from lambent.core.plain import printable
@@ -23,7 +25,7 @@ from lambent.scenes.scene import Variant
 from lambent.scenes.variants import variant_named
 from lambent.store.answer import has_answer
 from lambent.store.light_groups import light_groups
-from lambent.store.states import variants_of
+from lambent.store.states import says_light, variants_of
 from lambent.store.store import Store
 from lambent.store.views import read_views
 
@@ -32,6 +34,7 @@ MOST_PIXELS = 1 << 27  # of a sheet
 LEAST_INK_PX = 14  # height of the letters
 PAPER, INK = (255, 255, 255), (30, 30, 30)
 STAYS = "light as baked"
+ONE, EACH, BY_LIGHT = EXPOSURES = ("one", "each", "light")
 
 
 def sheet(
@@ -40,6 +43,7 @@ def sheet(
     camera: Camera | str | None = None,
     settings: Settings = DEFAULT,
     *,
+    exposures: str = BY_LIGHT,
     scene: str | None = None,
     note: Note = ignore,
     progress: Progress = silent,
@@ -51,7 +55,11 @@ def sheet(
     file : path
         .png.
     settings : Settings
-        As of a still; the size is that of each picture. All are displayed with the exposure of the first.
+        As of a still; the size is that of each picture. Its exposure, where it has one, is that of all pictures.
+    exposures : {"light", "each", "one"}
+        Whether pictures that show the same mix of light share an exposure, each is metered by itself, or all have that
+        of the first. Where they differ, captions have them as EV100. The exposure of the scene is that of its light as
+        baked; another mix is metered.
 
     The other parameters are those of `output.still`.
 
@@ -61,6 +69,7 @@ def sheet(
         Where the store has no variants, the sheet would be too large, or as `output.still` raises it.
     """
     began, file = time.perf_counter(), Path(file)
+    known("exposure of a sheet", exposures, EXPOSURES, field="--exposure")
     check_writable(file, (".png",))
     opened, record = opened_with_views(store)
     found = variants_of(opened, saved=False)
@@ -75,19 +84,63 @@ def sheet(
     view = view_of(record, camera)
     saved = read_views(opened.folder).lights.get(view.name, LightMix()) if camera is not None else LightMix()
     drawn = images(opened, replace(settings, variant=""), scene=scene, note=note)
-    pictures, names = [], []
+    pictures, names = list[NDArray[np.uint8]](), list[str]()
+    metered = Exposures(ONE if settings.exposure_ev is not None else exposures, drawn.exposure_ev)
     for number, variant in enumerate(variants):
         part = part_of(progress, number / len(variants), (number + 1) / len(variants), variant.name)
-        lit = variant if variant.light.groups else replace(variant, light=saved)
+        lit = variant if says_light(opened, variant.name) else replace(variant, light=saved)
         shown, stays = _as_possible(lit, opened, settings, note)
         drawn.wear(shown)
+        mixes = settings.light is None and settings.integrator != PATH_TRACER
+        drawn.exposure_ev = metered.wanted(shown.light if mixes else LightMix())
         pictures.append(drawn.displayed(view, part))
+        metered.take(drawn.exposure_ev)
         names.append(f"{variant.name} ({STAYS})" if stays else variant.name)
-    picture = laid_out(pictures, names, columns)
+    picture = laid_out(pictures, names, columns, metered.notes)
     write_shown(file, picture)
+    drawn.exposure_ev = metered.used[0]
     seconds, said = time.perf_counter() - began, displayed_as(file, drawn)
+    if metered.differ:
+        said["ev100_by_name"] = {
+            one.name: ev100_of(ev) for one, ev in zip(variants, metered.used, strict=True) if ev is not None
+        }
     height, width = picture.shape[:2]
     return Rendered(file, width, height, settings.integrator, len(pictures), seconds, **said)
+
+
+class Exposures:
+    """Exposures of the pictures of a sheet, in EV, in the order in which they are drawn.
+
+    `how` is one of EXPOSURES, `of_scene` the exposure that was chosen for the light as baked, if any.
+    """
+
+    def __init__(self, how: str, of_scene: float | None) -> None:
+        self.used: list[float | None] = []
+        self._how, self._of_scene = how, of_scene
+        self._by_light: dict[object, float] = {}
+        self._light: object = ()
+
+    def wanted(self, light: LightMix) -> float | None:
+        """The exposure of the next picture, in this mix; None where it is to be metered."""
+        self._light = () if self._how == ONE else tuple(sorted(light.factors.items()))
+        if self._how == EACH:
+            return None
+        return self._by_light.get(self._light, None if self._light else self._of_scene)
+
+    def take(self, exposure_ev: float | None) -> None:
+        """What the picture was displayed with; None of false colours."""
+        self.used.append(exposure_ev)
+        if exposure_ev is not None:
+            self._by_light[self._light] = exposure_ev
+
+    @property
+    def differ(self) -> bool:
+        return len(set(self.used)) > 1
+
+    @property
+    def notes(self) -> list[str]:
+        """What captions say of each."""
+        return [f", EV100 {ev100_of(ev):.1f}" if self.differ and ev is not None else "" for ev in self.used]
 
 
 def with_the_baked_state(variants: Sequence[Variant]) -> list[Variant]:
@@ -117,8 +170,13 @@ def shape_of(count: int, aspect: float) -> tuple[int, int]:
     return min(fits, key=lambda c: abs(math.log(c[0] * aspect / c[1] * 3 / 4)) + 0.5 * (c[0] * c[1] / count - 1))
 
 
-def laid_out(pictures: Sequence[NDArray[np.uint8]], names: Sequence[str], columns: int) -> NDArray[np.uint8]:
-    """One picture of pictures (H, W, 3) of one size, row by row, with names beneath them, cut where they are long."""
+def laid_out(
+    pictures: Sequence[NDArray[np.uint8]], names: Sequence[str], columns: int, notes: Sequence[str] = ()
+) -> NDArray[np.uint8]:
+    """One picture of pictures (H, W, 3) of one size, row by row, with names beneath them, cut where they are long.
+
+    Behind a name comes its note, if there are `notes`, which is not cut.
+    """
     from PIL import Image, ImageDraw, ImageFont
 
     height, width = pictures[0].shape[:2]
@@ -127,12 +185,13 @@ def laid_out(pictures: Sequence[NDArray[np.uint8]], names: Sequence[str], column
     rows = math.ceil(len(pictures) / columns)
     page = Image.new("RGB", (columns * (width + gap) + gap, rows * (height + caption) + gap), PAPER)
     draw, font = ImageDraw.Draw(page), ImageFont.load_default(size)
-    for number, (picture, name) in enumerate(zip(pictures, names, strict=True)):
+    for number, (picture, name, note) in enumerate(zip(pictures, names, notes or [""] * len(names), strict=True)):
         row, column = divmod(number, columns)
         x, y = gap + column * (width + gap), gap + row * (height + caption)
         page.paste(Image.fromarray(picture), (x, y))
-        words = printable(name)
-        while draw.textlength(words, font) > width and len(words) > 1:
-            words = f"{words.removesuffix('...')[:-1]}..."
-        draw.text((x + width / 2, y + height + caption / 2), words, font=font, fill=INK, anchor="mm")
+        kept = words = printable(name)
+        while kept and draw.textlength(words + note, font) > width:
+            kept = kept[:-1]
+            words = f"{kept}..." if kept else ""
+        draw.text((x + width / 2, y + height + caption / 2), words + note, font=font, fill=INK, anchor="mm")
     return np.asarray(page, np.uint8)

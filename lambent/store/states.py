@@ -29,6 +29,13 @@ def variants_of(store: Store, *, saved: bool = True) -> tuple[Variant, ...]:
     return tuple(found.values())
 
 
+def says_light(store: Store, name: str) -> bool:
+    """Whether a variant of this name says what the light is: a mix, or, of a state, that it is as baked."""
+    session, found = read_session(store.folder / FILE), {one.name: one for one in variants_of(store)}
+    of_session = session is not None and (name in session.states or name == SAVED)
+    return name in found and (of_session or bool(found[name].light.groups))
+
+
 def _variant(name: str, room: RoomState, record: SceneRecord) -> Variant:
     known = room.only(record.materials)
     own = {one: one if one in record.textures else "" for one in record.materials}

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lambent.core.errors import UserError
-from lambent.core.light_mix import LightMix
+from lambent.core.light_mix import LightMix, MixTrack
 from lambent.core.plain import plain_name
 from lambent.editing.history import History
 from lambent.materials.document import Material
@@ -23,10 +23,11 @@ class _State:
     other: RoomState | None = None
     stored: Mapping[str, RoomState] = field(default_factory=dict)
     beside: Mapping[str, Hashable] = field(default_factory=dict)
+    tracks: Mapping[str, MixTrack | None] = field(default_factory=dict)  # light along paths that was changed, by path
 
 
 class MaterialEdits:
-    """Materials that differ from the scene's, and the mix of its light, with undo and redo of both.
+    """Materials that differ from the scene's, the mix of its light, and light along paths, with one undo and redo.
 
     A stroke is what one drag of a slider does: any number of changes, then one `end_stroke`. It is undone as a whole.
 
@@ -42,6 +43,7 @@ class MaterialEdits:
         self.scene = scene
         self.saved: dict[str, Material] = {}
         self._history: History[_State] = History(_State())
+        self._first_tracks: dict[str, MixTrack | None] = {}  # by path, before the first change
 
     @property
     def edited(self) -> Mapping[str, Material]:
@@ -118,6 +120,16 @@ class MaterialEdits:
         changed = {name: one for name, one in known.materials.items() if one != self.scene[name]}
         return known.model_copy(update={"materials": changed})
 
+    @property
+    def tracks(self) -> Mapping[str, MixTrack | None]:
+        """The light along each path whose light was changed, as it is now."""
+        return {**self._first_tracks, **self._history.now.tracks}
+
+    def light_path(self, path: str, before: MixTrack | None, track: MixTrack | None) -> None:
+        """Other light along a path than `before`, as a stroke of its own."""
+        self._first_tracks.setdefault(path, before)
+        self._step(tracks={**self._history.now.tracks, path: track})
+
     def beside(self, name: str) -> Hashable:
         """What was kept beside a material; None where nothing was."""
         return self._history.now.beside.get(name)
@@ -141,12 +153,12 @@ class MaterialEdits:
 
     def begin_from(self, session: WalkSession) -> None:
         """Begin a new history with a session that was saved: what was done before it cannot be undone."""
-        self._history = History(self._state_of(session))
+        self._history = History(replace(self._state_of(session), tracks=self.tracks))
 
     def go_to(self, session: WalkSession) -> None:
         """Take all of a session, as a stroke of its own."""
         self.end_stroke()
-        self._history.change(replace(self._state_of(session), beside=self._history.now.beside))
+        self._history.change(replace(self._state_of(session), beside=self._history.now.beside, tracks=self.tracks))
 
     def _state_of(self, session: WalkSession) -> _State:
         return _State(self._room(session.now), session.beside, session.states)

@@ -14,13 +14,14 @@ from lambent.core.errors import UserError
 from lambent.core.images import read_encoded, read_image
 from lambent.core.light_mix import GroupMix, LightMix, parse_light
 from lambent.render import Settings, film, sheet, still
-from lambent.render.sheet import laid_out, shape_of, with_the_baked_state
+from lambent.render.sheet import Exposures, laid_out, shape_of, with_the_baked_state
 from lambent.scenes.look_track import LookTrack
 from lambent.scenes.scene import Look, MaterialTextures, Texture, Variant
 from lambent.store.contract import scene_record, write_scene_record
 from lambent.store.session import FILE, RoomState, WalkSession, write_session
 from lambent.store.states import variants_of
 from lambent.store.store import Store
+from lambent.store.views import Views, change_views
 from tests.bake.small_scenes import TINY, room_with_step
 from tests.viewer.small_store import MATERIALS, with_light_groups, write_small_store
 
@@ -145,6 +146,8 @@ def test_names_and_shapes_of_sheets() -> None:
     pictures = [np.full((40, 60, 3), 128, np.uint8)] * 3
     page = laid_out(pictures, ["short", "a name that is much too long for its picture", "\x1b[31m"], 2)
     assert page.shape == (2 * (40 + 28) + 7, 2 * (60 + 7) + 7, 3)
+    narrow = laid_out(pictures, ["short"] * 3, 2, [", EV100 11.5 and more than fits"] * 3)
+    assert narrow.shape == page.shape, "a note is not cut, and a name may vanish beside it"
     assert (page[:, :6] == 255).all() and (page[7 + 68 :, 74:] == 255).all(), "an empty place"
     assert [one.name for one in with_the_baked_state(VARIANTS)] == ["as baked", "red", "dim"]
     assert [one.name for one in with_the_baked_state((Variant("plain"), *VARIANTS))] == ["plain", "red", "dim"]
@@ -198,3 +201,48 @@ def frames_of_track(store: Path, folder: Path, track: LookTrack, path: CameraPat
     short = CameraPath(path.name, path.keys, 0.5)
     film(store, folder / "f-#.exr", short, replace(SMALL, samples=4, looks=track), fps=2)
     return [read_image(file) for file in sorted(folder.glob("*.exr"))]
+
+
+def test_pictures_of_a_sheet_share_an_exposure_by_their_light(adapter: None, store: Path, tmp_path: Path) -> None:
+    """Half the light is metered one stop above the light as baked, which has the exposure of its scene."""
+    done = sheet(store, tmp_path / "a.png", "front", SMALL)
+    found = done.ev100_by_name
+    assert found is not None and list(found) == ["as baked", "red", "dim"] and done.ev100 == found["as baked"]
+    assert found["red"] == found["as baked"]
+    each = sheet(store, tmp_path / "a.png", "front", SMALL, exposures="each").ev100_by_name
+    assert each is not None and each["red"] != each["as baked"]
+    assert each["dim"] == found["dim"] == pytest.approx(each["as baked"] - 1, abs=0.03)
+    with pytest.raises(UserError, match="--exposure: unknown exposure of a sheet; found all"):
+        sheet(store, tmp_path / "a.png", "front", SMALL, exposures="all")
+
+
+def test_the_exposure_of_the_scene_is_that_of_light_as_baked() -> None:
+    shared = Exposures("light", 2.0)
+    assert shared.wanted(LightMix()) == 2.0
+    shared.take(2.0)
+    assert shared.wanted(DIM) is None
+    shared.take(3.0)
+    assert (shared.wanted(LightMix()), shared.wanted(DIM)) == (2.0, 3.0)
+    assert Exposures("one", 2.0).wanted(DIM) == 2.0 and Exposures("each", 2.0).wanted(LightMix()) is None
+    one = Exposures("one", None)
+    assert one.wanted(LightMix()) is None
+    one.take(1.5)
+    assert one.wanted(DIM) == 1.5 and not one.differ and one.notes == [""]
+    shared.take(2.0)
+    assert shared.differ and len(set(shared.notes)) == 2
+
+
+def test_a_stored_state_brings_its_light_to_a_saved_view(adapter: None, store: Path, tmp_path: Path) -> None:
+    """A state whose light is as baked says so; a variant without a mix leaves the view's."""
+    dusk = Views(cameras=(replace(WITHIN, name="dusk"),), lights={"dusk": DIM})
+    change_views(store, lambda _: dusk)
+    states = {"plain": RoomState(materials={"plaster": RED.material})}
+    write_session(store / FILE, WalkSession(now=RoomState(), states=states))
+
+    def mean(variant: str) -> float:
+        still(store, tmp_path / "v.exr", "dusk", replace(SMALL, variant=variant))
+        found = read_image(tmp_path / "v.exr").mean()
+        (tmp_path / "v.exr").unlink()
+        return float(found)
+
+    assert mean("red") == pytest.approx(mean("plain") / 2, rel=6e-3)

@@ -161,3 +161,42 @@ def test_the_panel_sets_keys_along_a_path(panels, state, tmp_path):
     panels.click("x##key 0.0")
     panels.frame(2)
     assert "tour" not in read_views(tmp_path).tracks
+
+
+def test_undo_goes_through_materials_mixes_and_keys_of_light_in_one_order(state, tmp_path):
+    """Each step of undo takes the last change back, whatever it was; the file of the walks follows."""
+    saving(state, tmp_path)
+    state.lights.groups, edits, path = GROUPS, state.materials.edits, state.scene.paths[0]
+    state.navigation.scrub(path, 0.0)
+
+    def keys():
+        state.recordings.follow()
+        return key_times(read_views(tmp_path).tracks.get(path.name))
+
+    name = sorted(state.scene.materials)[0]
+    red = state.scene.materials[name].model_copy(update={"kd": (0.6, 0.1, 0.1)})
+    edits.dress({name: red})
+    state.lights.mix = HALF
+    edits.end_stroke()
+    state.recordings.set_key()
+    state.navigation.scrub(path, 1.0)
+    state.lights.mix = OFF
+    edits.end_stroke()
+    state.recordings.set_key()
+    assert keys() == (0.0, 1.0)
+    edits.undo()
+    assert keys() == (0.0,) and state.lights.mix == OFF
+    edits.undo()
+    assert keys() == (0.0,) and state.lights.mix == HALF
+    edits.undo()
+    assert keys() == () and state.lights.mix == HALF and edits.edited == {name: red}
+    edits.undo()
+    edits.undo()
+    assert state.lights.mix == LightMix() and not edits.edited and not edits.can_undo
+    for _ in range(5):
+        edits.redo()
+    assert keys() == (0.0, 1.0) and state.lights.mix == OFF
+    state.recordings.drop_key(0.0)
+    assert keys() == (1.0,)
+    edits.undo()
+    assert keys() == (0.0, 1.0)

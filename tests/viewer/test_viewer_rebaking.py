@@ -15,12 +15,14 @@ from lambent.bake.bake import bake
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.light_mix import GroupMix, LightMix
+from lambent.materials.document import Lobe
 from lambent.realtime.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.scenes import load_scene
 from lambent.store.store import Store
 from lambent.viewer.modes.walk import rebaking
 from lambent.viewer.modes.walk.answering import AnsweringLight
+from lambent.viewer.modes.walk.arrivals import Arrived
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.rebaked_light import (
     FADE_STEPS,
@@ -52,8 +54,29 @@ from lambent.bake.again import bake_again
 from lambent.materials.document import Material
 from tests.bake.small_scenes import TINY
 materials = {name: Material.model_validate(one) for name, one in asked["materials"].items()}
-bake_again(Path(sys.argv[1]), Path(sys.argv[2]), materials, quality=TINY)
-say(baked=True)
+from lambent.viewer.modes.walk.rebaking_worker import Told
+told = Told(sys.stdout.buffer)
+told.region_pause = 0.0
+bake_again(Path(sys.argv[1]), Path(sys.argv[2]), materials, quality=TINY, watch=told)
+told.say(baked=True)
+"""
+IN_TILES = """
+import time
+from lambent.bake.again import bake_again
+from lambent.materials.document import Material
+from lambent.viewer.modes.walk.rebaking_worker import Told
+from tests.bake.small_scenes import TINY
+class Waits(Told):
+    region_pause = 0.0
+    def region(self, light, finished):
+        super().region(light, finished)
+        while finished.mean() > 0.5 and not Path({flag!r}).exists():
+            time.sleep(0.01)
+materials = {{name: Material.model_validate(one) for name, one in asked["materials"].items()}}
+tiles = TINY.changed("tiles", light_map={{"tile_texels": 16}})
+told = Waits(sys.stdout.buffer)
+bake_again(Path(sys.argv[1]), Path(sys.argv[2]), materials, quality=tiles, watch=told)
+told.say(baked=True)
 """
 ENDLESS = """
 import runpy, sys, time
@@ -116,6 +139,22 @@ def test_a_folder_of_somebody_else_is_left_alone(store, tmp_path):
     assert (tmp_path / "full" / "letter.txt").read_text() == "dear"
 
 
+def test_an_edit_that_needs_what_the_store_lacks_is_one_line(store, tmp_path):
+    """A matte material that mirrors, and one that lets light through; its name and what is lacking are said."""
+    scene = load_scene("builtin:box")
+    probes = {a.name.split("/")[1] for a in Store.open(store).artefacts("probe")}
+    bare = next(o for o in scene.objects if o.name not in probes and not scene.materials[o.material].lobes)
+    material = scene.materials[bare.material]
+    glossy = material.model_copy(update={"lobes": (Lobe(mx=0.05, my=0.05, r0=0.5),)})
+    with pytest.raises(UserError, match=f"{bare.material}: as it is now it needs a probe"):
+        bake_again(store, tmp_path / "copy", {bare.material: glossy}, quality=TINY)
+    if "light_map/irradiance_back" not in Store.open(store):
+        thin = material.model_copy(update={"kd": (0.2,) * 3, "kt_d": (0.4,) * 3})
+        with pytest.raises(UserError, match=f"{bare.material}: as it is now it needs a light map of its far side"):
+            bake_again(store, tmp_path / "copy", {bare.material: thin}, quality=TINY)
+    assert not (tmp_path / "copy").exists()
+
+
 def test_settings_of_its_own_are_one_line(store, tmp_path):
     with pytest.raises(UserError, match="unknown quality"):
         bake_again(store, tmp_path / "copy", {})
@@ -154,7 +193,7 @@ def test_every_lit_texel_belongs_to_an_object(store):
     owner = texel_objects(scene)
     count = len(scene.record.objects)
     assert owner.shape == scene.irradiance.shape[:2] and set(np.unique(owner)) >= set(range(count))
-    batch = batches_of(owner, list(range(count)))
+    batch = batches_of(owner, list(range(count)), count)
     assert batch.max() == min(count, 16) - 1 and (batch[owner == 0] == 0).all()
 
 
@@ -224,7 +263,7 @@ def test_an_edit_is_estimated_then_baked_then_exact(room, store):
         re.fullmatch(r"baking anew \d:\d\d \(\d:\d\d the first time\): light map 25 %", line) for line in room.lines
     )
     assert state.rebaking.line == "exact: baked anew" and "exact again" in state.screen.messages[-1].text
-    estimated = next(n for n, line in enumerate(room.lines) if line.startswith("the light that was baked"))
+    estimated = next(n for n, line in enumerate(room.lines) if "; new light on" in line or "comes in" in line)
     whole = np.abs(room.seen[-1] - room.seen[estimated - 1])
     frames = np.array([np.abs(b - a) for a, b in zip(room.seen[estimated - 1 :], room.seen[estimated:], strict=False)])
     assert whole.max() > 0.01, "the estimate was one"
@@ -279,6 +318,52 @@ def test_a_state_that_goes_beside_keeps_its_light_and_undo_of_all_is_as_baked(
     room.frame()
     room.until(lambda: not room.pictures._lane.busy)
     np.testing.assert_allclose(image(room.pictures._lane.renderer, state), baked, rtol=2e-3, atol=1e-5)
+    room.pictures.close()
+
+
+@pytest.mark.parametrize("groups", ["none", "scene"])
+def test_objects_whose_light_is_finished_go_over_while_others_are_baked(boxes, screen, monkeypatch, tmp_path, groups):
+    flag = tmp_path / "go on"
+    room = Room(boxes[groups], screen, monkeypatch, tmp_path, IN_TILES.format(flag=str(flag)))
+    state, rebaked = room.state, room.pictures._rebaked
+    room.paint()
+    room.frame()
+    room.until(lambda: not room.pictures._lane.busy)
+    estimate = room.renderer.resources.light_layers[0].astype(np.float32)
+    room.until(lambda: rebaked._fade is not None and rebaked._light.lit.any() and rebaked._fade.shown is rebaked._light)
+    room.until(lambda: not rebaked._fade.moves and rebaked._fade.shown is rebaked._light)
+    lit, texel_object = rebaked._light.lit, rebaked._light.texel_object
+    shown = room.renderer.resources.light_layers[0].astype(np.float32)
+    theirs = np.append(lit, False)[texel_object]
+    assert lit.any() and not lit.all() and not state.rebaking.exact
+    assert f"new light on {lit.sum()} of {len(lit)} objects" in state.rebaking.line
+    np.testing.assert_array_equal(shown[~theirs], estimate[~theirs])
+    assert np.abs(shown - estimate)[theirs].mean() > 1e-3
+    flag.touch()
+    room.until(lambda: state.rebaking.exact)
+    truth = Renderer(open_device(), Store.open(copy_beside(boxes[groups])))
+    np.testing.assert_allclose(image(room.renderer, state), image(truth, state), rtol=4e-3, atol=1e-4)
+    whole = room.renderer.resources.light_layers[0].astype(np.float32)
+    off = np.abs(shown - whole)[theirs].mean() / np.abs(estimate - whole)[theirs].mean()
+    assert off < 0.5, "early light is near to the final one"
+    room.pictures.close()
+
+
+def test_light_of_an_edit_that_was_given_up_is_not_shown(store, screen, monkeypatch, tmp_path):
+    """A second edit comes while the first one's light goes in: nothing of the first stays."""
+    flag = tmp_path / "go on"
+    room = Room(store, screen, monkeypatch, tmp_path, IN_TILES.format(flag=str(flag)))
+    state, rebaked, edits = room.state, room.pictures._rebaked, room.state.materials.edits
+    room.paint()
+    room.until(lambda: rebaked._fade is not None and rebaked._fade.moves)
+    name = sorted(state.scene.materials)[0]
+    edits.dress({name: state.scene.materials[name].model_copy(update={"kd": (0.2, 0.3, 0.7)})})
+    room.frame()
+    assert rebaked._fade is None and rebaked._light is None and state.rebaking.share is None
+    flag.touch()
+    room.until(lambda: state.rebaking.exact)
+    truth = Renderer(open_device(), Store.open(copy_beside(store)))
+    np.testing.assert_allclose(image(room.renderer, state), image(truth, state), rtol=2e-3, atol=1e-4)
     room.pictures.close()
 
 
@@ -387,7 +472,10 @@ def test_the_worker_ends_with_the_window(store, tmp_path):
 def test_reading_takes_the_units_of_the_scene_that_is_shown(store, tmp_path):
     scene = Renderer(open_device(), Store.open(store)).scene
     bake_again(store, tmp_path / "copy", {}, quality=TINY)
-    again = Rebaked.read(tmp_path / "copy", scene)
-    np.testing.assert_array_equal(again.layers({})[0][..., :3], scene.irradiance.astype(np.float16))
+    copy = Store.open(tmp_path / "copy")
+    names = frozenset(one.name for one in copy.artefacts("probe"))
+    again = Rebaked.read(tmp_path / "copy", scene, Arrived(None, True, names, True))
+    np.testing.assert_array_equal(again.layers({}, [])[0][..., :3], scene.irradiance.astype(np.float16))
+    assert again.scene.probes.keys() == scene.probes.keys()
     for name, probe in scene.probes.items():
         np.testing.assert_allclose(again.probe(name, {}).radiance, probe.radiance, rtol=1e-3)

@@ -6,7 +6,7 @@ from them, and the noise is found from them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -275,9 +275,23 @@ def _samples(
             progress=context.progress,
             what=f"light map, {stage.removeprefix('light_map/')}" + (", far sides" if side else ""),
             cost=lambda region: 1 + float(of_map[region[1], region[2]].sum()),
+            wrote=_early(context, stage, side, labels),
         )
     writer.finish()
     return context.store.read(name), labels
+
+
+def _early(context: BakeContext, stage: str, side: int, labels: Indices) -> Callable[[], None]:
+    """What tells a watch regions of the light that is shown: samples of the last stage, on the front."""
+    from lambent.bake.light.early import EarlyLight
+
+    if context.watch.region_pause is None or side or stage != _stages(context.settings(KIND))[-1]:
+        return lambda: None
+    traced, groups = context.traced, 0
+    if sorts_light(context.methods):
+        groups = len(traced.sorted_lights.groups)
+    surface = traced.texels, labels, traced.cuts
+    return EarlyLight(context.watch, context.store, stage, _parts(stage), groups, surface).wrote
 
 
 def _photon_maps(context: BakeContext) -> Maps:

@@ -74,6 +74,7 @@ def bake(context: BakeContext) -> None:
     stale, how, owners, parts = context.stale(KIND), context.settings(KIND), _owners(context), _parts(context)
     missing = [name for name in _objects(context) if stale & {probe_name(name, part) for part in parts}]
     context.store.forget(probe_name(name, part) for name in owners for part in (*PARTS, GROUPS))
+    context.watch.arrived(KIND, context.keys(KIND).keys() - stale)
     engine()  # before Mitsuba is imported
     from lambent.bake.probes.probe_set import ProbeSet
 
@@ -91,6 +92,7 @@ def bake(context: BakeContext) -> None:
             log.warning(TOO_FEW, name, 100 * meta["hidden_share"], meta["parallax_deg"])
         for part in parts:
             context.put(KIND, probe_name(name, part), result[part], context.provenance(**meta))
+        context.watch.arrived(KIND, [probe_name(name, part) for part in parts])
     context.progress(1, 1, "probes")
 
 

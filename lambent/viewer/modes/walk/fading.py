@@ -13,27 +13,47 @@ from lambent.viewer.modes.walk.rebaked_light import Rebaked, Step, probe_users, 
 
 
 class Fade:
-    """From what a lane shows to the light of a bake; seen by a camera in a picture of `size`.
+    """From what a lane shows in a mix of light groups to the light of a bake, as far as that has arrived.
 
     Attributes
     ----------
     lane : Lane
-    done : bool
-        Whether all of it is in the picture.
-    left : tuple of str
-        Objects whose probes the bake does not have: they stay as they were.
+    shown : Rebaked or None
+        What is in the picture, or goes into it.
     """
 
-    def __init__(self, rebaked: Rebaked, lane: Lane, light: Factors, camera: Camera, size: tuple[int, int]) -> None:
-        self.lane, self.done, self._light, self._rebaked = lane, False, dict(light), rebaked
+    def __init__(self, lane: Lane, light: Factors) -> None:
+        self.lane, self._light = lane, dict(light)
+        self.shown: Rebaked | None = None
         self._room, self._answered = lane.room, lane.shown.on
-        resources, scene = self._resources, lane.renderer.scene
-        self._before = list(resources.light_layers), [item.light for item in resources.objects]
-        owners = probe_users(scene, resources, range(len(resources.objects)))
-        self.left = tuple(name for name in owners if name not in rebaked.scene.probes)
-        self._steps = steps(rebaked, scene, resources, light, camera, size)
+        self._before = list(self._resources.light_layers), [item.light for item in self._resources.objects]
         self._thread = ThreadPoolExecutor(1, "rebaked")
-        self._next: Future[Step | None] = self._thread.submit(next, self._steps, None)
+        self._next: Future[Step | None] | None = None  # None: nothing goes over
+
+    def bring(self, rebaked: Rebaked, camera: Camera, size: tuple[int, int]) -> None:
+        """Begin to bring in what has arrived since `shown`; seen by a camera in a picture of `size`."""
+        assert not self.moves, "one after the other"
+        scene = self.lane.renderer.scene
+        self._steps = steps(rebaked, self.shown, scene, self._resources, self._light, camera, size)
+        self.shown = rebaked
+        self._next = self._thread.submit(next, self._steps, None)
+
+    @property
+    def moves(self) -> bool:
+        """Whether light is going over."""
+        return self._next is not None
+
+    @property
+    def done(self) -> bool:
+        """Whether all light of the bake is in the picture."""
+        return not self.moves and self.shown is not None and self.shown.arrived.whole
+
+    @property
+    def left(self) -> tuple[str, ...]:
+        """Objects whose probes the bake does not have: they stay as they were."""
+        scene, resources = self.lane.renderer.scene, self._resources
+        owners = probe_users(scene, resources, range(len(resources.objects)))
+        return tuple(name for name in owners if self.shown is None or name not in self.shown.scene.probes)
 
     @property
     def _resources(self) -> SceneResources:
@@ -42,7 +62,7 @@ class Fade:
     @property
     def _groups(self) -> GroupArrays | None:
         """Light by group of the bake, where the scene has light groups, too."""
-        return None if self.lane.renderer.scene.groups is None else self._rebaked.scene.groups
+        return None if self.shown is None or self.lane.renderer.scene.groups is None else self.shown.scene.groups
 
     def serves(self, lane: Lane, light: Factors) -> bool:
         """Whether this is the light of what the lane shows; once it is there, mixes of its light groups are, too."""
@@ -53,7 +73,7 @@ class Fade:
 
     def step(self) -> None:
         """Upload what is ready; nothing where the thread is not done with it."""
-        if self.done or not self._next.done():
+        if self._next is None or not self._next.done():
             return
         upload = self._next.result()
         if upload is not None:
@@ -61,9 +81,8 @@ class Fade:
             self._resources.light_version += 1
             self._next = self._thread.submit(next, self._steps, None)
             return
-        self.done = True
-        self._thread.shutdown()
-        if (groups := self._groups) is not None:
+        self._next = None
+        if self.done and (groups := self._groups) is not None:
             self.lane.renderer.mixer.answer(groups)
 
     @property

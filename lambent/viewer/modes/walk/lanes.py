@@ -41,7 +41,8 @@ class Lane:
 
     def another(self, screen: Screen) -> Lane:
         """A lane of the same scene, in light as baked."""
-        renderer, shown = Renderer(self.renderer.device, self.renderer.scene), Answering()
+        renderer = Renderer(self.renderer.device, self.renderer.scene, kin=self.renderer)
+        shown = Answering()
         answering = None if self.answering is None else self.answering.another(renderer, shown)
         return Lane.of(renderer, screen, answering, shown)
 

@@ -21,6 +21,8 @@ class Rebaking:
         How far the step under way is, 0 to 1; None where there is none.
     exact : bool
         Whether the picture has the light of a bake for the materials as they are.
+    said : bool
+        Whether the line says so.
     """
 
     on: bool = True
@@ -28,3 +30,4 @@ class Rebaking:
     line: str = ""
     share: float | None = None
     exact: bool = False
+    said: bool = False

@@ -15,18 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.surfaces.coverage import pieces_of
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.camera import Camera, image_plane
 from lambent.core.light_mix import Factors
-from lambent.realtime.baked import BakedScene, Probe, read_baked
+from lambent.realtime.baked import BakedScene, Probe, read_probe
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.group_arrays import groups_in
 from lambent.realtime.group_light import GroupLight
 from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.resources import ObjectResources, SceneResources, light_layers
 from lambent.realtime.sun_disc import without_sun
-from lambent.store.contract import ObjectRecord, SceneRecord
+from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, SceneRecord
 from lambent.store.store import Store
+from lambent.viewer.modes.walk.arrivals import Arrived
 
 FADE_STEPS = 8  # frames in which one region goes over
 STAGGER = 2  # frames from the begin of one region to that of the next
@@ -39,36 +40,62 @@ Step = Callable[[SceneResources], None]  # what one frame uploads
 
 @dataclass(frozen=True, eq=False)
 class Rebaked:
-    """The scene that is shown, in the light of the copy.
+    """The scene that is shown, in as much light of the copy as has arrived.
 
     Attributes
     ----------
     scene : BakedScene
-        With light map, probes and light by group of the copy, in the units of the scene that is shown.
+        With light map, probes and light by group of the copy, in the units of the scene that is shown. Probes are
+        those that have arrived; without the light map `region` is of use.
     texel_object : (H, W) int64
         Number of the object that each texel of the light map belongs to; the count of objects where there is none.
+    arrived : Arrived
+    lit : bool array
+        By object number, whether all of its texels have arrived.
     """
 
     scene: BakedScene
     texel_object: Indices
+    arrived: Arrived
+    lit: Flags
 
     @classmethod
-    def read(cls, copy: Path, shown: BakedScene) -> Rebaked:
-        """The light of the copy in a folder."""
-        store = Store.open(copy)
-        found = read_baked(store)
-        scale = np.float32(found.unit / shown.unit)
-        front, back = (None if side is None else side * scale for side in (found.irradiance, found.irradiance_back))
-        lit = replace(
-            shown, irradiance=front, irradiance_back=back, dominant_direction=found.dominant_direction,
-            probes={name: replace(one, radiance=one.radiance * scale) for name, one in found.probes.items()},
-            groups=groups_in(store, shown.unit),
-        )  # fmt: skip
-        return cls(lit, texel_objects(shown))
+    def read(cls, copy: Path, shown: BakedScene, arrived: Arrived, before: Rebaked | None = None) -> Rebaked:
+        """The light that has arrived in the copy in a folder; what was read `before` is not read again.
 
-    def layers(self, light: Factors) -> Layers:
-        """Layers (H, W, 4) as `resources.light_layers` has them, in a mix of light groups."""
-        scene, groups = self.scene, self.scene.groups
+        All of it is in memory then: another bake may change the copy.
+        """
+        texel_object = texel_objects(shown) if before is None else before.texel_object
+        count = len(shown.record.objects)
+        if not arrived.light_map:
+            lit = np.ones(count + 1, bool)
+            if arrived.region is not None:
+                lit[texel_object[~arrived.region.finished]] = False
+            else:
+                lit[:] = False
+            return cls(replace(shown, probes={}), texel_object, arrived, lit[:count])
+        store = Store.open(copy)
+        known = before is not None and before.arrived.light_map
+        scene = before.scene if before is not None and known else _with_light_map(store, shown)
+        groups = None if scene.groups is None else replace(scene.groups, store=store)
+        probes = dict(scene.probes)
+        for name in shown.probes:
+            if name not in probes and arrived.has_probe(name, by_group=groups is not None):
+                probes[name] = read_probe(store, name, shown.unit)
+                if groups is not None:
+                    groups.probe(name)  # which keeps it
+        return cls(replace(scene, probes=probes, groups=groups), texel_object, arrived, np.ones(count, bool))
+
+    def layers(self, light: Factors, shown: Layers) -> Layers:
+        """Layers (H, W, 4) as `resources.light_layers` has them, in a mix of light groups; `shown` where none is."""
+        scene, groups, region = self.scene, self.scene.groups, self.arrived.region
+        if not self.arrived.light_map:
+            if region is None:
+                return list(shown)
+            factors = np.ones((len(region.light), 3), np.float32) if groups is None else groups.factors(light)
+            front = np.einsum("nhwc,nc->hwc", region.light.astype(np.float32), factors / np.float32(scene.unit))
+            there = np.append(self.lit, False)[self.texel_object][..., None]
+            return [np.where(there, light_layers(front, None)[0], shown[0]), *shown[1:]]
         sides = [scene.irradiance, scene.irradiance_back]
         if groups is not None:
             mixed = GroupLight(scene, groups).light_map(groups.factors(light))
@@ -76,13 +103,31 @@ class Rebaked:
         return list(light_layers(sides[0], sides[1], scene.dominant_direction))
 
     def probe(self, name: str, light: Factors) -> Probe | None:
-        """The probe of an object without the sun's disc, in a mix of light groups; None where the copy has none."""
+        """The probe of an object without the sun's disc, in a mix of light groups; None where it is not there."""
         scene, groups = self.scene, self.scene.groups
         found = scene.probes.get(name)
         if found is None:
             return None
         by_group = None if groups is None else GroupLight(scene, groups).probe(name, groups.factors(light))
         return by_group or without_sun(found, scene.sun, scene.unit)
+
+
+def _with_light_map(store: Store, shown: BakedScene) -> BakedScene:
+    """The scene that is shown with the light map of a store, without probes."""
+    scale = np.float32(1 / shown.unit)
+    front, back = (finite(store.read(name))[0] * scale if name in store else None for name in map(light_name, SIDES))
+    direction = store.read(DOMINANT_DIRECTION) if DOMINANT_DIRECTION in store else None
+    groups = groups_in(store, shown.unit)
+    if groups is not None:
+        _ = groups.lit_sides  # in memory from now on
+    return replace(
+        shown, irradiance=front, irradiance_back=back, dominant_direction=direction, probes={}, groups=groups
+    )
+
+
+def light_name(side: str) -> str:
+    """Name of the array of a side of the light map."""
+    return f"light_map/{side}"
 
 
 def texel_objects(scene: BakedScene) -> Indices:
@@ -140,10 +185,10 @@ def _between(a: NDArray[np.float16], b: NDArray[np.float16], share: Floats) -> N
     return np.asarray(wide + (b - wide) * share, np.float16)
 
 
-def batches_of(texel_object: Indices, order: Sequence[int]) -> Indices:
-    """(H, W) number of the batch in which each texel goes over; texels of no object go last."""
+def batches_of(texel_object: Indices, order: Sequence[int], objects: int) -> Indices:
+    """(H, W) number of the batch in which each texel goes over; texels of none of the objects in `order` go last."""
     count = len(order)
-    rank = np.full(count + 1, min(count, MOST_BATCHES) - 1 if count else 0)
+    rank = np.full(objects + 1, min(count, MOST_BATCHES) - 1 if count else 0)
     for place, number in enumerate(order):
         rank[number] = place * min(count, MOST_BATCHES) // count
     return np.asarray(rank[texel_object])
@@ -151,20 +196,23 @@ def batches_of(texel_object: Indices, order: Sequence[int]) -> Indices:
 
 def steps(
     rebaked: Rebaked,
+    since: Rebaked | None,
     shown: BakedScene,
     resources: SceneResources,
     light: Factors,
     camera: Camera,
     size: tuple[int, int],
 ) -> Iterator[Step]:
-    """All uploads, in order, a frame each. Iterate in a thread: each takes a while to make."""
+    """All uploads of what has arrived `since`, in order, a frame each. Iterate in a thread: each takes a while."""
     order = in_view_order(shown.record, camera, size)
-    after = rebaked.layers(light)
-    before = list(resources.light_layers[: len(after)])
-    for layers in texel_steps(before, after, batches_of(rebaked.texel_object, order)):
-        yield _uploads_map(layers)
+    if since is None or not since.arrived.light_map:
+        before = list(resources.light_layers)
+        after = rebaked.layers(light, before)
+        there = [number for number in order if rebaked.lit[number]]
+        for layers in texel_steps(before[: len(after)], after, batches_of(rebaked.texel_object, there, len(order))):
+            yield _uploads_map(layers)
     for owner, users in probe_users(shown, resources, order).items():
-        found = rebaked.probe(owner, light)
+        found = None if since is not None and owner in since.scene.probes else rebaked.probe(owner, light)
         if found is None:
             continue
         old, new = users[0].light, finite(found.radiance)[0]

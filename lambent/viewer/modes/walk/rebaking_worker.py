@@ -4,7 +4,9 @@ python -m lambent.viewer.modes.walk.rebaking_worker STORE COPY
 
 The first line of stdin is a JSON object with "materials", documents by name, and "textures", names by name; the end of
 stdin ends the process, at any moment, and the copy goes on from there the next time. Every line of stdout is a JSON
-object: "what", "done" and "total" of a step; "error", a line for the user; or "baked", when all of it is there.
+object: "what", "done" and "total" of a step; "error", a line for the user; "kind" and "there", names of arrays that the
+copy holds now; "region", the shape (n, H, W) of light that is finished before its light map (`bake.watch`), followed by
+its bytes, n H W 3 half floats, and H W of flags; or "baked", when all of it is there.
 """
 
 from __future__ import annotations
@@ -13,35 +15,64 @@ import json
 import os
 import sys
 import threading
+from collections.abc import Collection
 from pathlib import Path
 from typing import BinaryIO
 
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.again import KINDS, bake_again
+from lambent.bake.watch import Watch
+from lambent.core.arrays import Flags
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 
 NICENESS = 10  # the window comes first
+REGION_PAUSE = 10.0  # so at most a tenth of the time goes to regions that are finished early
+
+
+class Told(Watch):
+    """Writes what arrives to a stream, each in a line, the light of regions after it."""
+
+    region_pause: float | None = REGION_PAUSE
+
+    def __init__(self, out: BinaryIO) -> None:
+        self._out, self._told = out, set[str]()
+
+    def say(self, **words: object) -> None:
+        self._out.write(json.dumps(words).encode() + b"\n")
+        self._out.flush()
+
+    def arrived(self, kind: str, names: Collection[str]) -> None:
+        new = sorted(set(names) - self._told)
+        if kind in KINDS and new:
+            self._told.update(new)
+            self.say(kind=kind, there=new)
+
+    def region(self, light: NDArray[np.float16], finished: Flags) -> None:
+        self.say(region=light.shape[:3])
+        self._out.write(np.ascontiguousarray(light, np.float16).tobytes())
+        self._out.write(np.ascontiguousarray(finished, bool).tobytes())
+        self._out.flush()
 
 
 def main(store: Path, copy: Path, asked: bytes, out: BinaryIO) -> None:
     """Bake, and say how far it is."""
-    from lambent.bake.again import bake_again
-
     wanted = json.loads(asked)
     materials = {name: Material.model_validate(said) for name, said in wanted["materials"].items()}
 
-    def say(**words: object) -> None:
-        out.write(json.dumps(words).encode() + b"\n")
-        out.flush()
+    told = Told(out)
 
     def progress(done: float, total: float, what: str) -> None:
-        say(what=what, done=done, total=total)
+        told.say(what=what, done=done, total=total)
 
     try:
-        bake_again(store, copy, materials, progress, textures=wanted["textures"])
+        bake_again(store, copy, materials, progress, textures=wanted["textures"], watch=told)
     except UserError as error:
-        say(error=str(error))
+        told.say(error=str(error))
     else:
-        say(baked=True)
+        told.say(baked=True)
 
 
 def _end_with(stream: BinaryIO) -> None:

@@ -12,7 +12,7 @@ from lambent.core.light_mix import MixTrack
 from lambent.core.plain import Triple, triple
 from lambent.viewer.cameras import LONGEST_STEP_S
 from lambent.viewer.edits import rescue_file
-from lambent.viewer.modes.walk.light_keys import mix_at, with_key, without_key
+from lambent.viewer.modes.walk.light_keys import key_times, mix_at, with_key, without_key
 from lambent.viewer.modes.walk.lights import Lights, RecordedLight
 from lambent.viewer.modes.walk.views import Kind, SavedViews, write_alone
 from lambent.viewer.navigation import Navigation, PathPlay
@@ -131,6 +131,7 @@ class Recordings:
     lights: Lights = field(default_factory=Lights)
     recorder: Recorder = field(default_factory=Recorder)
     view_name: str = ""  # typed for the next saved view
+    written: dict[str, MixTrack | None] = field(default_factory=dict)  # light along paths that was saved from here
     keying: bool = False  # keys of light are being set: a path that rests shows the mix, not its own light
 
     @property
@@ -158,21 +159,41 @@ class Recordings:
         return self.recorder.track if path == self.recorder.draft else self.views.saved.tracks.get(path.name)
 
     def set_key(self) -> None:
-        """Keep the mix as it is now as the light of the path at this moment."""
+        """Keep the mix as it is now as the light of the path at this moment, as a step of undo."""
         play = self.navigation.path
         if play is None:
             return
         groups = [group.name for group in self.lights.groups]
-        track = with_key(self.track_of(play.path), play.time_s, self.lights.mix, groups)
-        if self.views.set_track(play.path.name, track):
+        before = self.track_of(play.path)
+        if self._light_path(play.path.name, before, with_key(before, play.time_s, self.lights.mix, groups)):
             self.screen.say(f"the light of {play.path.name} at {play.time_s:.1f} s is the present mix")
 
     def drop_key(self, time_s: float) -> None:
-        """Remove a key of the path's light."""
+        """Remove a key of the path's light, as a step of undo."""
         play = self.navigation.path
         track = None if play is None else self.track_of(play.path)
         if play is not None and track is not None:
-            self.views.set_track(play.path.name, without_key(track, time_s))
+            self._light_path(play.path.name, track, without_key(track, time_s))
+
+    def _light_path(self, path: str, before: MixTrack | None, track: MixTrack | None) -> bool:
+        """Save other light along a path, as a step of undo; whether that was possible."""
+        if not self.views.set_track(path, track):
+            return False
+        self.lights.edits.light_path(path, before, track)
+        self.written[path] = track
+        return True
+
+    def _follow_undo(self) -> None:
+        """Save the light along paths that undo or redo has changed."""
+        for path, track in self.lights.edits.tracks.items():
+            if track == self.written.get(path):
+                continue
+            self.written[path] = track
+            if path not in {one.name for one in self.paths}:
+                self.screen.say(f"the light of {path} is not changed: there is no path of this name")
+            elif self.views.set_track(path, track):
+                keys = len(key_times(track))
+                self.screen.say(f"the light of {path} has {keys} key{'' if keys == 1 else 's'} again")
 
     def go_to_key(self, time_s: float) -> None:
         """Stand at a key of the path's light, with its mix at hand, as a step of undo."""
@@ -226,6 +247,7 @@ class Recordings:
 
     def follow(self) -> None:
         """Take the camera of this frame into a recording, which ends where it becomes too long."""
+        self._follow_undo()
         now_s = self.screen.clock()
         if self.recorder.on:
             self.recorder.light.take(self.lights.mix, now_s - self.recorder.began_s)

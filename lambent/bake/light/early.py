@@ -1,0 +1,65 @@
+"""Regions of the light map that are finished before the others, denoised for those who watch the bake."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from lambent.bake.light.sampling import cleaned, sampled_halves
+from lambent.bake.light.stitching import Cuts
+from lambent.bake.surfaces.texels import Texels
+from lambent.bake.watch import Watch
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.store.store import Store
+
+
+class EarlyLight:
+    """Tells a watch the light of the tiles that are written, not more often than it wants to know.
+
+    Parameters
+    ----------
+    whole, parts : str
+        Names of the arrays of samples, (2, H, W, 4), and by group (1, H, W, 3 n or more).
+    groups : int
+        Count of light groups; 0 where light is not sorted.
+    surface : tuple
+        Texels, their charts (H, W) and their cuts, as `sampling.cleaned` takes them.
+    """
+
+    def __init__(
+        self, watch: Watch, store: Store, whole: str, parts: str, groups: int,
+        surface: tuple[Texels, Indices, Cuts],
+    ) -> None:  # fmt: skip
+        self._watch, self._store, self._whole, self._parts, self._groups = watch, store, whole, parts, groups
+        self._surface = surface
+        self._next_s = -np.inf
+
+    def wrote(self) -> None:
+        """A tile was written."""
+        began_s, pause = time.monotonic(), self._watch.region_pause
+        if pause is None or began_s < self._next_s:
+            return
+        raw, written = self._store.read_partial(self._whole)
+        if written.all():
+            return  # the light map itself follows
+        halves, known = sampled_halves(raw)
+        light = [halves.mean(axis=0)]
+        if self._groups:
+            by_group = self._store.read_partial(self._parts)[0][0]
+            light = [by_group[..., 3 * number : 3 * number + 3] for number in range(self._groups)]
+        self._watch.region(np.stack([self._clean(one, known) for one in light]), self._finished())
+        now_s = time.monotonic()
+        self._next_s = now_s + pause * (now_s - began_s)
+
+    def _clean(self, light: Floats, known: Flags) -> Floats:
+        return cleaned(light, known, *self._surface) if light.any() else np.zeros(light.shape, np.float16)
+
+    def _finished(self) -> Flags:
+        """(H, W) texels of written tiles."""
+        artefact = self._store.artefact(self._whole)
+        found = np.zeros(artefact.shape[1:3], bool)
+        for chunk in artefact.chunk_grid:
+            if artefact.version(chunk) is not None:
+                found[artefact.region(chunk)[1:3]] = True
+        return found
