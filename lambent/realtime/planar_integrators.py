@@ -22,8 +22,8 @@ TILE = 64  # pixels that sample a lobe in turns
 MOST_SHARED = 7  # samples per lobe that are chosen where the pixels of a tile share it
 TURN = 0.088  # of a pixel's samples against those of the one before it in turn
 # Factors on the filter, 1 where it covers the lobe, by experiment: the narrower the better where each sample finds its
-# own hit, and where 64 pixels share the lobe.
-FIXED_BIAS, INTERLEAVED_BIAS = 0.4, 0.03
+# own hit, and where 64 pixels share the lobe: at grazing angles round filters blur the slim lobe.
+FIXED_BIAS, INTERLEAVED_BIAS = 0.4, 0.003
 MOST_RINGS = 3
 THREE_STEPS = {"MARCH_STEPS": 0}
 # Hidden hits count a fifth. Samples that leave the buffer are filtered in the probe as those of fixed rings are.

@@ -147,6 +147,41 @@ def test_few_samples_come_near_the_converged_image(device: Any, m: float) -> Non
     assert error["interleaved"] < 0.1 * converged.mean() + 0.05
 
 
+def barred_window(material: Material) -> BakedScene:
+    """A black wall whose opening, cut by bars, shows a bright sky to the floor."""
+    meshes = {
+        "under": placed(box((6.0, 0.7, 0.1)), (0, 0.35, -2)),
+        "over": placed(box((6.0, 1.4, 0.1)), (0, 2.7, -2)),
+        "left": placed(box((2.5, 1.3, 0.1)), (-1.75, 1.35, -2)),
+        "right": placed(box((2.5, 1.3, 0.1)), (1.75, 1.35, -2)),
+        **{f"bar{i}": placed(box((0.06, 1.3, 0.1)), (x, 1.35, -2)) for i, x in enumerate((-0.25, 0.0, 0.25))},
+        "floor": patch((-3, 0, 3), (6, 0, 0), (0, 0, -6)),
+    }
+    sky = np.full((6, 4, 4, 3), 5.0, np.float32)
+    scene = unbaked_scene(meshes, Material(name="black", kd=0.0), sky)
+    objects = tuple(
+        o.model_copy(update={"material": "floor"}) if o.name == "floor" else o for o in scene.record.objects
+    )
+    dark = Probe((0.0, 0.0, 0.0), np.zeros((6, 4, 4, 3), np.float32))
+    update = {"objects": objects, "materials": {**scene.record.materials, "floor": material}, "reflectors": (FLOOR,)}
+    return replace(scene, record=scene.record.model_copy(update=update), probes=dict.fromkeys(meshes, dark))
+
+
+def test_filters_leave_the_streaks_of_mirrored_windows_apart(device: Any) -> None:
+    """At grazing angles a lobe is long and slim; round filters of .03 of it fill what is dark between streaks.
+
+    The mean error is 7.9 % of the light with such filters, 5.5 % with a tenth of their solid angle.
+    """
+    renderer = Renderer(device, barred_window(mirror(0.15, distribution="ggx")))
+    low = Camera(name="low", position=(0.2, 0.6, 3.0), target=(0.0, 0.4, -2.0), fov_y_deg=50)
+    asked = FrameState(low, 192, 128, antialias=False, n=7, show="specular")
+    exact = renderer.converged(asked, 512)
+    floor = exact.max(axis=-1) > 0.02
+    assert 0.1 < floor.mean() < 0.9
+    error = np.abs(renderer.still_radiance(asked, 16) - exact)[floor].mean()
+    assert error < 0.065 * exact[floor].mean()
+
+
 def test_uniform_light_stays_uniform(device: Any) -> None:
     """White furnace: under one radiance everywhere, a floor with albedo 1 shows it, whatever the method."""
     scene = scene_of(mirror(0.05))
