@@ -184,7 +184,7 @@ def unpacked_weights(packed: NDArray[np.uint8]) -> NDArray[np.float32]:
 def packed_rays(point: NDArray[np.integer], weight: Floats) -> NDArray[np.uint8]:
     """Rays (..., 2 + G) bytes: the point near which each ends, low byte first, and its weights (G, ...) by group.
 
-    Weights are 0 where it met none. Points are below MOST_POINTS. Rays are sorted by their points, which files pack well.
+    Weights are 0 where it met none. Points are below MOST_POINTS. Rays are sorted by these, which files pack well.
     """
     number = np.where((weight > 0).any(axis=0), point, 0).astype(np.uint16)
     weights = (packed_weights(of_group) for of_group in weight)
@@ -237,8 +237,9 @@ class Rays:
         """These rays, and those of other points after them."""
         starts = np.concatenate([self.starts, other.starts[1:] + self.starts[-1]])
         most = np.concatenate([self.most, other.most * np.float32(self.count / max(other.count, 1))])
-        both = (np.concatenate([getattr(one, part) for one in (self, other)]) for part in ("points", "weights"))
-        return Rays(starts, *both, most, self.count)
+        points = np.concatenate([self.points, other.points])
+        weights = np.concatenate([self.weights, other.weights])
+        return Rays(starts, points, weights, most, self.count)
 
     def of_first(self, count: int) -> Rays:
         """The rays of the first `count` points."""

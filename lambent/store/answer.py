@@ -128,8 +128,8 @@ def read_answer(store: Store) -> StoredAnswer:
     material, paired, direct, transfer, rays, more_rays, points, point_sun, across, texels, near, shares, patch = (
         store.read(answer_name(part))
         for part in (
-            "patch_material", "patch_paired", "patch_direct", "transfer", "rays", "receiver_rays", "points", "point_sun",
-            "point_other", "texels", "near", "shares", "patch",
+            "patch_material", "patch_paired", "patch_direct", "transfer", "rays", "receiver_rays", "points",
+            "point_sun", "point_other", "texels", "near", "shares", "patch",
         )
     )  # fmt: skip
     names = tuple(map(str, store.artefact(answer_name("patch")).meta.get("materials", ())))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,15 @@ class GatherPoints:
     side: NDArray[np.integer]
     texel: Indices
     block: Indices
+
+    def __getitem__(self, some: Any) -> GatherPoints:
+        return GatherPoints(self.side[some], self.texel[some], self.block[some])
+
+    def followed_by(self, other: GatherPoints) -> GatherPoints:
+        """These points, and others after them."""
+        both = zip((self.side, self.texel, self.block), (other.side, other.texel, other.block), strict=True)
+        side, texel, block = (np.concatenate(one) for one in both)
+        return GatherPoints(side, texel, block)
 
 
 def gather_points(spots: Spots, width: int, block: int) -> GatherPoints:
@@ -77,27 +87,20 @@ def refined_points(spots: Spots, width: int, points: GatherPoints, distance: Flo
     return _in_blocks(spots, width, *_halved(spots, width, points, distance, most, CLOSE))
 
 
-def with_receivers(
+def receiving_points(
     spots: Spots, width: int, points: GatherPoints, distance: Floats, senders: GatherPoints
 ) -> GatherPoints:
-    """`senders`, which `refined_points` gave, and after them points that gather alone, in still smaller blocks.
+    """Points that gather alone, in still smaller blocks than `senders`, which `refined_points` gave.
 
-    Together they are up to MORE_RECEIVERS times as many as `points`. Blocks of the senders are as small as those of
-    the receivers around them.
+    Together they are up to MORE_RECEIVERS times as many as `points`.
     """
     if not len(points.block) or points.block[0] == 1:
-        return senders
+        return senders[:0]
     most = int(MORE_RECEIVERS * len(points.texel))
-    side, texel, size = _halved(spots, width, points, distance, most, CLOSE_RECEIVERS)
-    found = _in_blocks(spots, width, side, texel, size)
-    size_at = np.zeros((2, len(spots.area)), np.int64)
-    size_at[side, texel] = size
+    found = _in_blocks(spots, width, *_halved(spots, width, points, distance, most, CLOSE_RECEIVERS))
     taken = np.zeros((2, len(spots.area)), bool)
     taken[senders.side, senders.texel] = True
-    new = ~taken[found.side, found.texel]
-    both = ((senders.side, found.side), (senders.texel, found.texel))
-    of_side, of_texel = (np.concatenate([one, other[new]]) for one, other in both)
-    return GatherPoints(of_side, of_texel, size_at[of_side, of_texel])
+    return found[~taken[found.side, found.texel]]
 
 
 def seeing(spots: Spots, points: GatherPoints, seen: Floats) -> GatherPoints:
@@ -109,14 +112,13 @@ def seeing(spots: Spots, points: GatherPoints, seen: Floats) -> GatherPoints:
     indirect = luminance((spots.irradiance - spots.direct).sum(axis=0))[points.side, points.texel]
     sees = seen >= BLIND * indirect
     owner = 2 * spots.object[points.texel] + points.side
-    kept = sees | ~np.isin(owner, owner[sees])
-    return GatherPoints(points.side[kept], points.texel[kept], points.block[kept])
+    return points[sees | ~np.isin(owner, owner[sees])]
 
 
 def _halved(
     spots: Spots, width: int, points: GatherPoints, distance: Floats, most: int, close: float
 ) -> tuple[Indices, Indices, Indices]:
-    """Side and number of all lit texels, and sizes of their blocks: up to `most`, smaller where `distance` is below `close`."""
+    """Side and number of all lit texels, and sizes of their blocks: up to `most`, halved where surfaces are `close`."""
     block = int(points.block[0])
     levels = [block >> step for step in range(1, block.bit_length())]
     lit = [np.flatnonzero(spots.lit[side]) for side in range(2)]

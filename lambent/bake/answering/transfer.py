@@ -88,8 +88,8 @@ class Between:
 def chosen_rays(met: Indices, weight: Floats, light: Floats, kept: int, shift: Floats) -> tuple[Indices, Floats]:
     """Rays (n, kept) of all R of each point that stand for these, and factors (n, kept) of their weights.
 
-    They are chosen with chances half by the light that they bring and half by their weights, so that a few rays to spots
-    of sun have not all the noise, and none of a dark surface counts for many. Choices are systematic, in the order of
+    Chances are half by the light that rays bring and half by their weights, so that a few rays to spots of sun have not
+    all the noise, and none of a dark surface counts for many. Choices are systematic, in the order of
     what rays have `met` (n, R): rays to one surface are chosen as often as they should be, but for one.
 
     Parameters

@@ -25,12 +25,13 @@ from lambent.store.store import Writer
 
 if TYPE_CHECKING:
     from lambent.bake.answering.patches import Clusters
+    from lambent.bake.answering.points import GatherPoints
     from lambent.bake.answering.rays import RayEnds
     from lambent.bake.answering.spots import Spots
 
 KIND = "answer"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 7
+REVISION = 8
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
@@ -227,9 +228,7 @@ def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
 
 def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Clusters) -> None:
     """Transfer between patches, and rays between points."""
-    from lambent.bake.answering.points import (
-        GatherPoints, bounded_points, neighbours, refined_points, seeing, with_receivers,
-    )  # fmt: skip
+    from lambent.bake.answering.points import bounded_points, neighbours, receiving_points, refined_points, seeing
     from lambent.bake.answering.senders import points_near
     from lambent.bake.answering.transfer import Between, light_seen
 
@@ -247,14 +246,8 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
         return seeing(spots, of, light_seen(ends, spots, sides, of, exitance, how.importance_rays, context.seed))
 
     points = sighted(refined_points(spots, width, coarse, distance))
-    everyone = with_receivers(spots, width, coarse, distance, points)
-    receivers = sighted(
-        GatherPoints(*(of[len(points.texel) :] for of in (everyone.side, everyone.texel, everyone.block)))
-    )
-    everyone = GatherPoints(
-        *(np.concatenate([of[: len(points.texel)], more]) for of, more in
-          ((everyone.side, receivers.side), (everyone.texel, receivers.texel), (everyone.block, receivers.block)))
-    )  # fmt: skip
+    receivers = sighted(receiving_points(spots, width, coarse, distance, points))
+    everyone = points.followed_by(receivers)
     closest = points_near(spots, *neighbours(spots, points))
     codes, near = neighbours(spots, everyone)
     across = closest[1 - points.side, points.texel]
