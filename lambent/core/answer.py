@@ -7,7 +7,8 @@
 
 B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, a and t their diffuse albedos of reflection and
 transmission, F (P, P) the share of what a patch receives that comes from each other one. Patches have most bounces; the
-last PASSES are gathered among some thirty times as many points, each with its own direct light. Light is linear, so D,
+last PASSES are gathered among some thirty times as many points, each with its own direct light. Beside contacts, where
+light changes from texel to texel, more points gather in the last pass, and send nothing. Light is linear, so D,
 E and I have a leading axis of light groups, and so has F: each group's light lies elsewhere within a patch. A ratio,
 and not a difference, is applied to the baked light, so that it keeps its detail and the error is relative; with albedos
 as baked the ratio is 1 and nothing changes.
@@ -183,11 +184,13 @@ def unpacked_weights(packed: NDArray[np.uint8]) -> NDArray[np.float32]:
 def packed_rays(point: NDArray[np.integer], weight: Floats) -> NDArray[np.uint8]:
     """Rays (..., 2 + G) bytes: the point near which each ends, low byte first, and its weights (G, ...) by group.
 
-    Weights are 0 where it met none. Points are below MOST_POINTS.
+    Weights are 0 where it met none. Points are below MOST_POINTS. Rays are sorted by these, which files pack well.
     """
     number = np.where((weight > 0).any(axis=0), point, 0).astype(np.uint16)
     weights = (packed_weights(of_group) for of_group in weight)
-    return np.stack([(number & BYTE).astype(np.uint8), (number >> 8).astype(np.uint8), *weights], axis=-1)
+    rays = np.stack([(number & BYTE).astype(np.uint8), (number >> 8).astype(np.uint8), *weights], axis=-1)
+    order = np.argsort(number, axis=-1, kind="stable")
+    return np.take_along_axis(rays, order[..., None], axis=-2)
 
 
 def points_of_rays(rays: NDArray[np.uint8]) -> NDArray[np.uint16]:
@@ -229,6 +232,18 @@ class Rays:
         kept = (np.arange(count) < (ends - first)[:, None]).reshape(-1)
         starts = np.append(0, np.cumsum(ends - first)).astype(np.int64)
         return cls(starts, points[kept], weights[kept], most, count)
+
+    def followed_by(self, other: Rays) -> Rays:
+        """These rays, and those of other points after them."""
+        starts = np.concatenate([self.starts, other.starts[1:] + self.starts[-1]])
+        most = np.concatenate([self.most, other.most * np.float32(self.count / max(other.count, 1))])
+        points = np.concatenate([self.points, other.points])
+        weights = np.concatenate([self.weights, other.weights])
+        return Rays(starts, points, weights, most, self.count)
+
+    def of_first(self, count: int) -> Rays:
+        """The rays of the first `count` points."""
+        return Rays(self.starts[: count + 1], self.points, self.weights, self.most[:count], self.count)
 
 
 def gathered(rays: Rays, exitance: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -306,11 +321,11 @@ class Answer:
     Attributes
     ----------
     points : Points
-        That send and gather light.
+        K points that send and gather light.
     rays : Rays
-        Theirs.
+        Theirs, then those of F points that gather alone: of K + F.
     near : Neighbours
-        Of the T texels.
+        Of the T texels, among all of these.
     direct, baked : (G, T, 3) float32
         Direct irradiance of the texels, and all of it, as the light map has them: W/m^2, direct sun left out.
     albedos : Albedos
@@ -326,7 +341,7 @@ class Answer:
     albedos: Albedos
 
     def indirect(self, albedos: Albedos, solution: Solution | None = None) -> NDArray[np.float32]:
-        """Indirect irradiance (G, K, 3) at the points, as far as their rays see it.
+        """Indirect irradiance (G, K + F, 3) at the points, as far as their rays see it.
 
         `solution` is that of the patches, if there is one already.
         """
@@ -335,10 +350,14 @@ class Answer:
             return found
         now = (solution or solved(self.patches, albedos)).irradiance - self.patches.direct
         ratio, of = ratios(now, self._patches_as_baked), self.points.patch
-        for step in range(PASSES):
-            found = gathered(self.rays, self.points.exitance(albedos, ratio, of if step == 0 else None))
-            ratio = ratios(found, self._gathered_as_baked)
-        return found
+        for step in range(PASSES - 1):
+            among = gathered(self._senders_rays, self.points.exitance(albedos, ratio, of if step == 0 else None))
+            ratio = ratios(among, self._gathered_as_baked[:, : among.shape[1]])
+        return gathered(self.rays, self.points.exitance(albedos, ratio))
+
+    @cached_property
+    def _senders_rays(self) -> Rays:
+        return self.rays.of_first(len(self.points.other))
 
     @cached_property
     def _patches_as_baked(self) -> Floats:
@@ -361,7 +380,7 @@ class Answer:
         return self.at_texels(self.indirect(albedos), reference)
 
     def at_texels(self, indirect: NDArray[np.float32], reference: Floats) -> NDArray[np.float32]:
-        """Irradiance (G, T, 3) of the texels, `answered` from indirect light (G, K, 3) of the points."""
+        """Irradiance (G, T, 3) of the texels, `answered` from indirect light (G, K + F, 3) of the points."""
         least = np.array([least_light(one[None])[0, 0, 0] for one in reference], np.float32)
         return np.asarray(loops.texel_light(
             self.near.points, self.near.shares, indirect, reference, self.direct, self.baked, least,

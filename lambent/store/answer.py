@@ -8,9 +8,11 @@ answer/patch_direct        (G, P, 3) float32, direct irradiance with the sun's, 
 answer/direct, direct_back (G, H, W, 3) float16, direct irradiance of texels without the sun's, at most that of the
                            light map; light that only lobes have sent on counts as direct
 answer/transfer            (P, G P) float16, share of a patch's light by the patches that send it, group after group
-answer/rays                (K, R, 2 + G) uint8, `core.answer.packed_rays` of the points that send and gather light
-answer/points              (K,) uint32, the texel and side of each, as below
-answer/point_sun           (K, 3) float32, direct irradiance of the sun there, W/m^2
+answer/rays                (2 + G, K, R) uint8, `core.answer.packed_rays` of the points that send and gather light
+answer/receiver_rays       (2 + G, F, S) uint8, of points beside contacts, which gather and do not send
+answer/points              (K + F,) uint32, the texel and side of each, as below; those that do not send are last
+answer/point_sun           (K + F, 3) float32, direct irradiance of the sun there, W/m^2
+answer/point_other         (K,) uint32, the point on the other side of the surface; its own where light does not cross
 answer/texels              (T,) uint32, texels that answer: twice (row * W + column), plus 1 on the other side
 answer/near                (T, 8) uint32, points near each, and
 answer/shares              (T, 8) uint8, what these count
@@ -58,7 +60,18 @@ def probe_spots_name(object_name: str, part: str) -> str:
 
 def has_answer(store: Store) -> bool:
     """Whether a store's light can answer other colours of its materials, by group where it is sorted so."""
-    needed = ("transfer", "rays", "points", "point_sun", "near", "texels", "patch_direct", *DIRECT[:1])
+    needed = (
+        "transfer",
+        "rays",
+        "receiver_rays",
+        "points",
+        "point_other",
+        "point_sun",
+        "near",
+        "texels",
+        "patch_direct",
+        *DIRECT[:1],
+    )
     if LAST not in store or not all(answer_name(part) in store for part in needed):
         return False
     return store.artefact(answer_name("patch_direct")).shape[0] == max(1, len(light_groups(store)))
@@ -86,7 +99,7 @@ class StoredAnswer:
     seen : what probes see, by object
     sun : (3,) W/m^2 on what faces it
     of_sun : number of the sun's light group
-    point_sun : (K, 3) W/m^2, its direct irradiance at the points
+    point_sun : (K + F, 3) W/m^2, its direct irradiance at the points
     """
 
     answer: Answer
@@ -112,15 +125,17 @@ def read_answer(store: Store) -> StoredAnswer:
         hint = "bake the scene again with `lambent bake --only answer`"
         raise UserError("store has no light that answers other colours", file=store.folder, field="answer", hint=hint)
     record = scene_record(store)
-    material, paired, direct, transfer, rays, points, point_sun, texels, near, shares, patch = (
+    material, paired, direct, transfer, rays, more_rays, points, point_sun, across, texels, near, shares, patch = (
         store.read(answer_name(part))
         for part in (
-            "patch_material", "patch_paired", "patch_direct", "transfer", "rays", "points", "point_sun",
-            "texels", "near", "shares", "patch",
+            "patch_material", "patch_paired", "patch_direct", "transfer", "rays", "receiver_rays", "points",
+            "point_sun", "point_other", "texels", "near", "shares", "patch",
         )
     )  # fmt: skip
     names = tuple(map(str, store.artefact(answer_name("patch")).meta.get("materials", ())))
     count, height, width = len(material), *patch.shape[1:]
+    rays, more_rays = np.moveaxis(rays, 0, -1), np.moveaxis(more_rays, 0, -1)
+    senders = len(rays)
     fits = (
         set(names) <= set(record.materials)
         and (not count or int(material.max()) < len(names))
@@ -128,16 +143,18 @@ def read_answer(store: Store) -> StoredAnswer:
         and (not count or int(paired.max()) < count)
         and direct.shape[1:] == (count, 3)
         and transfer.shape == (count, len(direct) * count)
-        and rays.shape[2] == 2 + len(direct)
+        and rays.shape[2] == more_rays.shape[2] == 2 + len(direct)
         and near.shape == shares.shape
         and near.shape[0] == len(texels)
-        and (not near.size or int(near.max()) < len(rays))
+        and (not near.size or int(near.max()) < len(points))
         and (not shares.size or bool((shares.sum(axis=1) > 0).all()))
         and (not len(texels) or int(texels.max()) < 2 * height * width)
-        and points.shape == rays.shape[:1]
+        and len(points) == senders + len(more_rays)
+        and across.shape == (senders,)
+        and (not senders or int(across.max()) < senders)
         and point_sun.shape == (len(points), 3)
         and bool(np.isin(points, texels).all())
-        and (not rays.size or int(points_of_rays(rays).max()) < len(points))
+        and all(not one.size or int(points_of_rays(one).max()) < max(senders, 1) for one in (rays, more_rays))
     )
     if not fits:
         raise UserError("broken store", file=store.folder, field="answer", got="arrays that do not fit together")
@@ -162,24 +179,20 @@ def read_answer(store: Store) -> StoredAnswer:
     other = number[(texels ^ 1).astype(np.int64)]
     sun = sun_beside(store)
     of_sun = next((n for n, group in enumerate(light_groups(store)) if SUN in group.members), 0)
-    directs, at = np.minimum(directs, baked), number[points]
-    with_sun = np.zeros((groups, len(points), 3), np.float32)
-    with_sun[of_sun] = point_sun
+    directs, at = np.minimum(directs, baked), number[points[:senders]]
+    with_sun = np.zeros((groups, senders, 3), np.float32)
+    with_sun[of_sun] = point_sun[:senders]
     nearest = Neighbours(near, shares)
-    senders = Points(
-        of_patch[at], material.astype(np.int64)[of_patch[at]], _on_other_sides(other[at], nearest),
+    sending = Points(
+        of_patch[at], material.astype(np.int64)[of_patch[at]], across.astype(np.int64),
         directs[:, at] + with_sun, baked[:, at] + with_sun,
     )  # fmt: skip
-    answer = Answer(patches, senders, Rays.of(rays), nearest, directs, baked, albedos)
+    all_rays = Rays.of(rays).followed_by(Rays.of(more_rays))
+    answer = Answer(patches, sending, all_rays, nearest, directs, baked, albedos)
     return StoredAnswer(
         answer, texels, other, material[of_patch].astype(np.int64), names, _seen(store, record, number),
         np.zeros(3) if sun is None else np.array(sun.irradiance), of_sun, point_sun,
     )  # fmt: skip
-
-
-def _on_other_sides(row: NDArray[np.int64], near: Neighbours) -> NDArray[np.int64]:
-    """(K,) the point that counts most for the other side of a point's texel, `row` (K,); its own where that is -1."""
-    return np.asarray(np.where(row >= 0, near.closest[row], np.arange(len(row))))
 
 
 def _at_texels(store: Store, names: list[str], texels: NDArray[np.uint32]) -> NDArray[np.float32]:

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from lambent.bake.answering.points import MORE, gather_points, neighbours, refined_points
+from lambent.bake.answering.points import (
+    MORE,
+    MORE_RECEIVERS,
+    gather_points,
+    neighbours,
+    receiving_points,
+    refined_points,
+    seeing,
+)
 from lambent.bake.answering.spots import Spots
+from lambent.bake.answering.transfer import chosen_rays
 from lambent.core.answer import BYTE
 
 SIZE = 32
@@ -61,3 +72,41 @@ def test_texels_show_their_own_point_where_each_has_one() -> None:
         at = np.searchsorted(codes, 2 * spots.index[texel])
         share = shown.shares[at][shown.points[at] == own[int(texel)]]
         assert share.max() == BYTE
+
+
+def test_points_that_gather_alone_are_others_and_finer() -> None:
+    spots = plane()
+    coarse = gather_points(spots, SIZE, 4)
+    away = 2 * (spots.position[coarse.texel, 0] + 0.5)  # from a wall at the left border
+    senders = refined_points(spots, SIZE, coarse, away)
+    found = receiving_points(spots, SIZE, coarse, away, senders)
+    assert len(found.texel) and not np.isin(found.texel, senders.texel).any()
+    both = senders.followed_by(found)
+    assert len(both.texel) <= MORE_RECEIVERS * len(coarse.texel) + len(senders.texel)
+    assert np.isin(np.arange(SIZE) * SIZE, both.texel).all(), "each texel at the wall has its own"
+
+
+def test_blind_points_are_left_out_unless_all_are() -> None:
+    spots = plane()
+    spots = replace(spots, direct=np.zeros_like(spots.direct))
+    points = gather_points(spots, SIZE, 4)
+    seen = np.ones(len(points.texel))
+    seen[:5] = 0
+    assert np.array_equal(seeing(spots, points, seen).texel, points.texel[5:])
+    assert np.array_equal(seeing(spots, points, 0 * seen).texel, points.texel)
+
+
+def test_chosen_rays_stand_for_all() -> None:
+    """Sums over chosen rays are those over all, for the light as it was and as it is after an edit."""
+    rng = np.random.default_rng(0)
+    met = rng.integers(-1, 30, (400, 256))
+    weight = rng.random(met.shape) * (met >= 0)
+    exitance = rng.random(30) ** 6  # a few are bright
+    light = weight * exitance[np.maximum(met, 0)]
+    chosen, scale = chosen_rays(met, weight, light, 64, rng.random(400))
+    kept = np.take_along_axis(weight, chosen, axis=1) * scale
+    at = np.maximum(np.take_along_axis(met, chosen, axis=1), 0)
+    for sent in (exitance, rng.random(30)):
+        whole, found = (weight * sent[np.maximum(met, 0)]).mean(axis=1), (kept * sent[at]).mean(axis=1)
+        assert np.abs(found.mean() / whole.mean() - 1) < 0.01 and np.std(found / whole) < 0.06
+    assert kept.max() <= 2.1 * weight.mean(axis=1).max()

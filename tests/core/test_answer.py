@@ -95,7 +95,7 @@ def test_gathering_sums_what_rays_end_on() -> None:
     point, weight = rng.integers(0, MOST_POINTS, (5, 64)), rng.random((2, 5, 64)) * 2
     weight[:, :, ::7] = 0
     rays = packed_rays(point, weight)
-    assert np.array_equal(points_of_rays(rays), np.where(weight[0] > 0, point, 0))
+    assert np.array_equal(points_of_rays(rays), np.sort(np.where(weight[0] > 0, point, 0)))
     light = rng.random((2, MOST_POINTS, 3)).astype(np.float32)
     expected = (weight[..., None] * light[:, point]).mean(axis=2)
     assert np.allclose(gathered(Rays.of(rays), light.transpose(1, 0, 2).copy()), expected, rtol=0.01)
@@ -113,6 +113,18 @@ def test_rays_that_end_at_one_point_are_one(groups: int) -> None:
     light = rng.random((20, groups, 3)).astype(np.float32)
     expected = np.stack([(weight[g][..., None] * light[point, g]).mean(axis=1) for g in range(groups)])
     assert np.allclose(gathered(merged, light), expected, rtol=0.01)
+
+
+def test_points_that_gather_alone_follow_those_that_send() -> None:
+    rng = np.random.default_rng(2)
+    point, weight = rng.integers(0, 5, (5, 64)), rng.random((2, 5, 64))
+    more, of_more = rng.integers(0, 5, (3, 16)), rng.random((2, 3, 16))
+    senders = Rays.of(packed_rays(point, weight))
+    both, light = senders.followed_by(Rays.of(packed_rays(more, of_more))), rng.random((5, 2, 3)).astype(np.float32)
+    expected = (of_more[..., None] * np.moveaxis(light, 1, 0)[np.arange(2)[:, None, None], more]).mean(axis=2)
+    assert np.allclose(gathered(both, light)[:, 5:], expected, rtol=0.01)
+    assert np.allclose(gathered(both, light)[:, :5], gathered(senders, light), rtol=1e-6)
+    assert np.array_equal(gathered(both.of_first(5), light), gathered(senders, light))
 
 
 def test_points_send_the_light_of_both_their_sides() -> None:

@@ -12,7 +12,13 @@ from lambent.core.answer import MOST_ALBEDO, Albedos, Answer, Neighbours, Patche
 from lambent.realtime.answered import stages
 from lambent.realtime.answered.gpu_answer import GpuAnswer, Unsolved, gpu_answer
 
-PATCHES, POINTS, TEXELS, MATERIALS = 70, 300, 900, 4  # more points and texels than a workgroup has threads
+PATCHES, POINTS, RECEIVERS, TEXELS, MATERIALS = (
+    70,
+    300,
+    40,
+    900,
+    4,
+)  # more points and texels than a workgroup has threads
 
 
 def room(groups: int, seed: int = 3) -> Answer:
@@ -28,11 +34,13 @@ def room(groups: int, seed: int = 3) -> Answer:
     weight[:, :, ::5] = 0
     weight[:, 7] = 0  # a point that sees nothing
     rays = Rays.of(packed_rays(rng.integers(0, POINTS, (POINTS, 33)), weight))
+    more = rng.integers(0, POINTS, (RECEIVERS, 9)), rng.random((groups, RECEIVERS, 9))
+    rays = rays.followed_by(Rays.of(packed_rays(*more)))
     light = (0.2 + rng.random((groups, POINTS, 3))).astype(np.float32)
     of_patch = rng.integers(0, PATCHES, POINTS)
     points = Points(of_patch, patches.material[of_patch], other, np.float32(0.4) * light, light)
     shares = rng.integers(1, 256, (TEXELS, 8)).astype(np.uint8)
-    near = Neighbours(rng.integers(0, POINTS, (TEXELS, 8)).astype(np.uint32), shares)
+    near = Neighbours(rng.integers(0, POINTS + RECEIVERS, (TEXELS, 8)).astype(np.uint32), shares)
     baked = (0.2 + rng.random((groups, TEXELS, 3)) ** 4 * 5).astype(np.float32)
     return Answer(patches, points, rays, near, np.float32(0.3) * baked, baked, colours(5))
 

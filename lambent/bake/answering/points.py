@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,15 +11,18 @@ from numpy.typing import NDArray
 from lambent.bake.answering.spots import Spots
 from lambent.core.answer import BYTE, MOST_POINTS, Neighbours
 from lambent.core.arrays import Floats, Indices
+from lambent.core.colour import luminance
 
 NEAR = 8
 SPREAD = 0.7  # of a block's size: distance at which a point counts by 1/e
 NORMAL_M = 0.5  # metres that a unit of the normal counts for in the search
 BENT = 4  # power of the cosine between normals
 LEAST = 1e-6
+BLIND = 0.05  # of the baked indirect light, that a few rays see
 POINTS_OF_PATCH = 4  # at least: fewer would know less of where light is than patches do
 CLOSE = 4.0  # sides of a block to the surfaces around: nearer ones make blocks smaller
 MORE = 1.5  # times as many points, at most, where surfaces are close
+MORE_RECEIVERS, CLOSE_RECEIVERS = 4.0, 8.0  # the same with those that gather and do not send
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +32,15 @@ class GatherPoints:
     side: NDArray[np.integer]
     texel: Indices
     block: Indices
+
+    def __getitem__(self, some: Any) -> GatherPoints:
+        return GatherPoints(self.side[some], self.texel[some], self.block[some])
+
+    def followed_by(self, other: GatherPoints) -> GatherPoints:
+        """These points, and others after them."""
+        both = zip((self.side, self.texel, self.block), (other.side, other.texel, other.block), strict=True)
+        side, texel, block = (np.concatenate(one) for one in both)
+        return GatherPoints(side, texel, block)
 
 
 def gather_points(spots: Spots, width: int, block: int) -> GatherPoints:
@@ -68,9 +81,45 @@ def refined_points(spots: Spots, width: int, points: GatherPoints, distance: Flo
     It does by the distance to these (Ward, Rubinstein and Clear 1988), so that blocks are halved in the order of
     `distance` (K,) over their size, up to MORE times as many points. Distances are harmonic means, in texels.
     """
-    block = int(points.block[0]) if len(points.block) else 1
-    if block == 1:
+    if not len(points.block) or points.block[0] == 1:
         return points
+    most = min(int(MORE * len(points.texel)), MOST_POINTS)
+    return _in_blocks(spots, width, *_halved(spots, width, points, distance, most, CLOSE))
+
+
+def receiving_points(
+    spots: Spots, width: int, points: GatherPoints, distance: Floats, senders: GatherPoints
+) -> GatherPoints:
+    """Points that gather alone, in still smaller blocks than `senders`, which `refined_points` gave.
+
+    Together they are up to MORE_RECEIVERS times as many as `points`.
+    """
+    if not len(points.block) or points.block[0] == 1:
+        return senders[:0]
+    most = int(MORE_RECEIVERS * len(points.texel))
+    found = _in_blocks(spots, width, *_halved(spots, width, points, distance, most, CLOSE_RECEIVERS))
+    taken = np.zeros((2, len(spots.area)), bool)
+    taken[senders.side, senders.texel] = True
+    return found[~taken[found.side, found.texel]]
+
+
+def seeing(spots: Spots, points: GatherPoints, seen: Floats) -> GatherPoints:
+    """Points but for blind ones, which lie within or behind other surfaces: their neighbours stand for them.
+
+    Those are blind that have `seen` (n,) less than BLIND of the indirect light of the light map, both in luminance. An
+    object keeps them on a side where all are blind.
+    """
+    indirect = luminance((spots.irradiance - spots.direct).sum(axis=0))[points.side, points.texel]
+    sees = seen >= BLIND * indirect
+    owner = 2 * spots.object[points.texel] + points.side
+    return points[sees | ~np.isin(owner, owner[sees])]
+
+
+def _halved(
+    spots: Spots, width: int, points: GatherPoints, distance: Floats, most: int, close: float
+) -> tuple[Indices, Indices, Indices]:
+    """Side and number of all lit texels, and sizes of their blocks: up to `most`, halved where surfaces are `close`."""
+    block = int(points.block[0])
     levels = [block >> step for step in range(1, block.bit_length())]
     lit = [np.flatnonzero(spots.lit[side]) for side in range(2)]
     side, texel = np.repeat([0, 1], [len(mine) for mine in lit]), np.concatenate(lit)
@@ -82,13 +131,13 @@ def refined_points(spots: Spots, width: int, points: GatherPoints, distance: Flo
     sizes = np.array([block, *levels[:-1]])[:, None]
     closeness, added = distance / sizes, np.diff(np.array(counts), axis=0)
     order = np.argsort(closeness, axis=None, kind="stable")
-    room = min(int(MORE * len(points.texel)), MOST_POINTS) - len(points.texel)
+    room = most - len(points.texel)
     halved = np.zeros(closeness.size, bool)
-    fits = np.less_equal(np.cumsum(added.reshape(-1)[order]), room) & (closeness.reshape(-1)[order] < CLOSE)
+    fits = np.less_equal(np.cumsum(added.reshape(-1)[order]), room) & (closeness.reshape(-1)[order] < close)
     halved[order[fits]] = True
     steps = np.logical_and.accumulate(halved.reshape(closeness.shape), axis=0).sum(axis=0)
     size = np.array([block, *levels])[steps]
-    return _in_blocks(spots, width, side, texel, size[owner])
+    return side, texel, size[owner]
 
 
 def _owners(spots: Spots, width: int, points: GatherPoints, side: Indices, texel: Indices) -> Indices:

@@ -27,10 +27,11 @@ class Between:
         points: GatherPoints, exitance: Floats,
     ) -> None:  # fmt: skip
         size = sides[0].texels.width * sides[0].texels.height
-        self._ends, self._spots, self._sides, self._clusters, self._points = ends, spots, sides, clusters, points
+        self._ends, self._spots, self._sides, self._clusters = ends, spots, sides, clusters
         means = patch_means(spots, clusters, np.moveaxis(exitance, 0, -1)).T
         self._patches = senders_of(spots, clusters.of, means, exitance, size)
-        self._near = senders_of(spots, near, exitance[:, points.side, points.texel], exitance, size)
+        self._sent = exitance[:, points.side, points.texel]
+        self._near = senders_of(spots, near, self._sent, exitance, size)
 
     def transfer_rows(self, first: int, last: int, rays: int, seed: int) -> NDArray[np.float32]:
         """Rows [first, last) of F (., G, P): means over `rays` from each patch, spread over its texels by area."""
@@ -65,16 +66,50 @@ class Between:
         nothing: Indices = np.zeros(0, np.int64)
         return np.concatenate([nothing, *texels]), np.concatenate([nothing, *patches])
 
-    def gathered_rays(self, part: slice, count: int, seed: int) -> NDArray[np.uint8]:
-        """`packed_rays` (n, count, 2 + G) from some of the points."""
-        side, texel = self._points.side[part], self._points.texel[part]
-        found = np.zeros((len(texel), count, 2 + len(self._near.relative)), np.uint8)
+    def gathered_rays(self, points: GatherPoints, part: slice, count: int, kept: int, seed: int) -> NDArray[np.uint8]:
+        """`packed_rays` (n, kept, 2 + G), chosen of `count` from some of the points, which send light or do not."""
+        side, texel = points.side[part], points.texel[part]
+        found = np.zeros((len(texel), kept, 2 + len(self._near.relative)), np.uint8)
         for one in range(2):
             mine = np.flatnonzero(side == one)
             if len(mine):
                 ends = self._ends.from_texels(self._sides[one], texel[mine], count, seed_of(seed, "gather", one))
-                found[mine] = packed_rays(*self._near.met(*ends))
+                met, weight = self._near.met(*ends)
+                if kept < count:
+                    light = np.einsum("gnr,gnr->nr", weight, self._sent[:, np.maximum(met, 0)])
+                    shift = np.random.default_rng((seed, one)).random(len(mine))
+                    chosen, scale = chosen_rays(met, weight.sum(axis=0), light, kept, shift)
+                    met = np.take_along_axis(met, chosen, axis=1)
+                    weight = np.take_along_axis(weight, chosen[None], axis=2) * scale
+                found[mine] = packed_rays(met, weight)
         return found
+
+
+def chosen_rays(met: Indices, weight: Floats, light: Floats, kept: int, shift: Floats) -> tuple[Indices, Floats]:
+    """Rays (n, kept) of all R of each point that stand for these, and factors (n, kept) of their weights.
+
+    Chances are half by the light that rays bring and half by their weights, so that a few rays to spots of sun have not
+    all the noise, and none of a dark surface counts for many. Choices are systematic, in the order of
+    what rays have `met` (n, R): rays to one surface are chosen as often as they should be, but for one.
+
+    Parameters
+    ----------
+    weight, light : (n, R)
+        Of each ray, and times the exitance that it met.
+    shift : (n,)
+        Random numbers in [0, 1).
+    """
+    order = np.argsort(met, axis=1, kind="stable")
+    chance = sum(0.5 * one / np.maximum(one.sum(axis=1, keepdims=True), 1e-30) for one in (weight, light))
+    sums = np.cumsum(np.take_along_axis(np.asarray(chance), order, axis=1), axis=1)
+    total = sums[:, -1:]
+    at = (np.arange(kept) + shift[:, None]) / kept * total
+    rows = 2 * np.arange(len(met))[:, None]  # chances of a row sum to 1 at most
+    place = np.searchsorted((sums + rows).reshape(-1), (at + rows).reshape(-1), side="right").reshape(at.shape)
+    place = np.minimum(place - np.arange(len(met))[:, None] * met.shape[1], met.shape[1] - 1)
+    chosen = np.take_along_axis(order, place, axis=1)
+    of_chosen = np.take_along_axis(np.asarray(chance), chosen, axis=1)
+    return chosen, np.where(of_chosen > 0, total / np.maximum(of_chosen, 1e-30) / met.shape[1], 0.0)
 
 
 def _runs(keys: Indices, values: Indices) -> list[tuple[int, Indices]]:
@@ -99,6 +134,24 @@ def patch_means(spots: Spots, clusters: Clusters, values: Floats) -> Floats:
     means = total / np.maximum(area, 1e-30)[:, None]
     lit = lit_total / np.maximum(lit_area, 1e-30)[:, None]
     return np.where((lit_area > 0)[:, None], lit, means)
+
+
+def light_seen(
+    ends: RayEnds, spots: Spots, sides: list[Sides], points: GatherPoints, exitance: Floats, rays: int, seed: int
+) -> Floats:
+    """(n,) irradiance that some points gather by a few rays from exitance (G, 2, K) of the spots."""
+    size = sides[0].texels.width * sides[0].texels.height
+    sent = np.zeros(2 * size)
+    for side in range(2):
+        sent[spots.index * 2 + side] = exitance[:, side].sum(axis=0)
+    found = np.zeros(len(points.texel))
+    for side, of_side in enumerate(sides):
+        mine = np.flatnonzero(points.side == side)
+        if len(mine):
+            spot, weight = ends.from_texels(of_side, points.texel[mine], rays, seed_of(seed, "seen", side))
+            met = np.where(spot == NOWHERE, 0, spot).astype(np.int64)
+            found[mine] = np.where(spot == NOWHERE, 0.0, weight * sent[met]).mean(axis=1)
+    return found
 
 
 def hits_from_viewed(ends: RayEnds, spots: Spots, sides: list[Sides], rays: int, seed: int) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -24,16 +25,17 @@ from lambent.store.store import Writer
 
 if TYPE_CHECKING:
     from lambent.bake.answering.patches import Clusters
+    from lambent.bake.answering.points import GatherPoints
     from lambent.bake.answering.rays import RayEnds
     from lambent.bake.answering.spots import Spots
 
 KIND = "answer"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 6
+REVISION = 8
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
-BETWEEN = ("transfer", "rays", "points", "point_sun", "texels", "near", "shares")
+BETWEEN = ("transfer", "rays", "receiver_rays", "points", "point_sun", "point_other", "texels", "near", "shares")
 SEEN = ("spots", "tint", "sun")
 TILES = 16  # of transfer and of rays
 
@@ -43,12 +45,14 @@ class Settings:
     """Patches, rays from each, and what light is gathered with.
 
     Where the light map keeps no direct light, texels get `direct_samples` of it; where that is sorted, what lobes have
-    sent on takes `lobe_samples`. One texel of each block of `block` x `block` texels gathers by `gather_rays`.
+    sent on takes `lobe_samples`. One texel of each block of `block` x `block` texels gathers by `gather_rays`; those
+    beside contacts that do not send keep `receiver_rays` of these.
     """
 
     patches: int = 1000
     patch_rays: int = 4096
     gather_rays: int = 256
+    receiver_rays: int = 64
     block: int = 4
     direct_samples: int = 32
     lobe_samples: int = 8
@@ -58,7 +62,9 @@ class Settings:
 SETTINGS = {
     QualityName.preview: Settings(),
     QualityName.normal: Settings(patch_rays=8192, block=8, direct_samples=64, lobe_samples=16),
-    QualityName.final: Settings(patch_rays=16384, gather_rays=512, block=12, direct_samples=256, lobe_samples=64),
+    QualityName.final: Settings(
+        patch_rays=16384, gather_rays=512, receiver_rays=128, block=12, direct_samples=256, lobe_samples=64
+    ),
 }
 
 
@@ -68,7 +74,9 @@ def keys(context: BakeContext) -> dict[str, str]:
     light = [of_map[name] for name in (IRRADIANCE[0], group_name(SIDES[0], direct=True)) if name in of_map]
     count = 2 if any(context.two_sided) else 1
     samples = 0 if ready else how.lobe_samples if sorts_light(context.methods) else how.direct_samples
-    effort = [how.patches, how.patch_rays, how.gather_rays, how.block, samples, how.importance_rays]
+    effort = [
+        how.patches, how.patch_rays, how.gather_rays, how.receiver_rays, how.block, samples, how.importance_rays,
+    ]  # fmt: skip
     key = key_of(KIND, REVISION, light, effort, context.seed)
     sampled = () if ready else TRACED[:count]
     by_group = map(_by_group, sampled) if sorts_light(context.methods) else ()
@@ -220,9 +228,9 @@ def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
 
 def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Clusters) -> None:
     """Transfer between patches, and rays between points."""
-    from lambent.bake.answering.points import bounded_points, neighbours, refined_points
+    from lambent.bake.answering.points import bounded_points, neighbours, receiving_points, refined_points, seeing
     from lambent.bake.answering.senders import points_near
-    from lambent.bake.answering.transfer import Between
+    from lambent.bake.answering.transfer import Between, light_seen
 
     how: Settings = context.settings(KIND)
     width, count = context.traced.texels.width, clusters.count
@@ -232,31 +240,46 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     for side, of_side in enumerate(sides):
         mine = np.flatnonzero(coarse.side == side)
         distance[mine] = ends.distance_in_texels(of_side, coarse.texel[mine], how.importance_rays, context.seed)
-    points = refined_points(spots, width, coarse, distance)
-    codes, near = neighbours(spots, points)
-    closest = points_near(spots, codes, near)
-    between = Between(ends, spots, sides, clusters, closest, points, spots.exitance(context.scene))
+    exitance = spots.exitance(context.scene)
+
+    def sighted(of: GatherPoints) -> GatherPoints:
+        return seeing(spots, of, light_seen(ends, spots, sides, of, exitance, how.importance_rays, context.seed))
+
+    points = sighted(refined_points(spots, width, coarse, distance))
+    receivers = sighted(receiving_points(spots, width, coarse, distance, points))
+    everyone = points.followed_by(receivers)
+    closest = points_near(spots, *neighbours(spots, points))
+    codes, near = neighbours(spots, everyone)
+    across = closest[1 - points.side, points.texel]
+    other = np.where(across >= 0, across, np.arange(len(across)))
+    between = Between(ends, spots, sides, clusters, closest, points, exitance)
 
     def rows(region: tuple[slice, ...], seed: int) -> Floats:
         found = between.transfer_rows(region[0].start, region[0].stop, how.patch_rays, seed)
         return found.astype(np.float16).reshape(len(found), -1)
 
-    def rays(region: tuple[slice, ...], seed: int) -> NDArray[np.uint8]:
-        return between.gathered_rays(region[0], how.gather_rays, seed)
+    def rays(of: GatherPoints, kept: int) -> Callable[[tuple[slice, ...], int], NDArray[np.uint8]]:
+        def tile(region: tuple[slice, ...], seed: int) -> NDArray[np.uint8]:
+            return np.moveaxis(between.gathered_rays(of, region[1], how.gather_rays, kept, seed), -1, 0)
+
+        return tile
 
     key = context.keys(KIND)[answer_name("transfer")]
     groups = len(spots.irradiance)
-    arrays = (("transfer", (count, groups * count), "float16", rows, "light between patches"),
-              ("rays", (len(points.texel), how.gather_rays, 2 + groups), "uint8", rays, "gathering"))  # fmt: skip
-    for part, shape, dtype, tile, what in arrays:
-        chunk = (max(1, -(-shape[0] // TILES)), *shape[1:])
+    sizes = (points, how.gather_rays), (receivers, how.receiver_rays)
+    of_points, of_receivers = ((2 + groups, len(of.texel), count) for of, count in sizes)
+    arrays = (("transfer", (count, groups * count), 0, "float16", rows, "light between patches"),
+              ("rays", of_points, 1, "uint8", rays(*sizes[0]), "gathering"),
+              ("receiver_rays", of_receivers, 1, "uint8", rays(*sizes[1]), "gathering beside contacts"))  # fmt: skip
+    for part, shape, axis, dtype, tile, what in arrays:
+        chunk = tuple(max(1, -(-size // TILES)) if at == axis else max(1, size) for at, size in enumerate(shape))
         writer = context.store.begin(answer_name(part), KIND, shape, chunk, dtype, key=key, meta=context.provenance())
         run_tiles(writer, tile, seed=context.seed, progress=context.progress, what=what)
         writer.finish()
-    numbers = (spots.index[points.texel] * 2 + points.side).astype(np.uint32)
-    own_sun = spots.sun[points.side, points.texel]
-    values = (numbers, own_sun, codes, near.points, near.shares)
-    for part, array in zip(BETWEEN[2:], values, strict=True):
+    numbers = (spots.index[everyone.texel] * 2 + everyone.side).astype(np.uint32)
+    own_sun = spots.sun[everyone.side, everyone.texel]
+    values = (numbers, own_sun, other.astype(np.uint32), codes, near.points, near.shares)
+    for part, array in zip(BETWEEN[3:], values, strict=True):
         context.put(KIND, answer_name(part), array, context.provenance())
 
 

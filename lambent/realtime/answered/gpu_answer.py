@@ -183,15 +183,18 @@ class _Group:
     ) -> None:  # fmt: skip
         self._stages, self._shared = stages, shared
         points, rays = answer.points, answer.rays
-        self._points, self._texels = len(points.other), len(reference)
+        self._points, self._gathering, self._texels = len(points.other), len(rays.most), len(reference)
         self._sent = stages.empty(self._points * LIGHT_BYTES)
-        self._found = stages.empty(self._points * LIGHT_BYTES)
+        self._found = stages.empty(self._gathering * LIGHT_BYTES)
         lights = stages.buffer(np.concatenate([points.direct[group], points.light[group]], axis=1).astype(np.float32))
         self._first = self._exitance(lights, True, solver.indirect, solver.light())
-        self._next = self._exitance(lights, False, self._found, gathered)
+        self._next = self._exitance(lights, False, self._found, gathered[: self._points])
         weights, most = stages.buffer(rays.weights[:, group]), stages.buffer(rays.most[:, group])
         given = shared.ray_starts, shared.ray_ends, weights, most, self._sent, self._found
-        self._gather = stages.call("gather", (self._points, rays.count), *given, threads=self._points)
+        self._gathers, self._gathers_last = (
+            stages.call("gather", (count, rays.count), *given, threads=count)
+            for count in (self._points, self._gathering)
+        )
         arrays = reference, answer.direct[group], answer.baked[group]
         self._of_texels = [stages.buffer(np.asarray(one, np.float32)) for one in arrays]
         self._least = _least(reference)
@@ -200,7 +203,7 @@ class _Group:
         """Stages in order, the last of which writes the irradiance of texels to `found`."""
         for step in range(PASSES):
             yield self._first if step == 0 else self._next
-            yield self._gather
+            yield self._gathers_last if step == PASSES - 1 else self._gathers
         given = self._shared.near, self._found, *self._of_texels, found
         yield self._stages.call("texels", (self._texels, self._least), *given, threads=self._texels)
 
@@ -218,11 +221,11 @@ def _least(light: Floats) -> float:
 
 
 def packed_near(near: Neighbours) -> NDArray[np.uint32]:
-    """(T, 6) words: eight points of 16 bits, then their eight shares of 8 bits."""
+    """(T, 10) words: eight points, then their eight shares of 8 bits."""
     missing = NEAR - near.points.shape[1]
     if missing < 0:
         raise NoRoom
-    points = np.pad(near.points, ((0, 0), (0, missing))).astype("<u2").view("<u4")
+    points = np.pad(near.points, ((0, 0), (0, missing))).astype("<u4")
     shares = np.pad(near.shares, ((0, 0), (0, missing))).astype(np.uint8).view("<u4")
     return np.concatenate([points, shares], axis=1)
 

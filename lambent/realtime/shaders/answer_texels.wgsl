@@ -3,7 +3,7 @@
 #include "answer.wgsl"
 
 const NEAR = 8u;  // points of a texel
-const WORDS = 6u;  // of a texel: eight points, then their eight shares
+const WORDS = 10u;  // of a texel: eight points, then their eight shares
 
 struct Texels {
     texels: u32,
@@ -24,8 +24,8 @@ struct Texels {
     var sum = vec3f(0.0);
     var shares = 0.0;
     for (var n = 0u; n < NEAR; n++) {
-        let at = 3u * extractBits(near[WORDS * texel + n / 2u], 16u * (n % 2u), 16u);
-        let share = f32(extractBits(near[WORDS * texel + NEAR / 2u + n / 4u], 8u * (n % 4u), 8u));
+        let at = 3u * near[WORDS * texel + n];
+        let share = f32(extractBits(near[WORDS * texel + NEAR + n / 4u], 8u * (n % 4u), 8u));
         sum += share * vec3f(indirect[at], indirect[at + 1u], indirect[at + 2u]);
         shares += share;
     }
