@@ -38,6 +38,9 @@ class PathTraced(Images):
         if settings.planar != "auto":
             got = settings.planar
             raise UserError("the path tracer traces reflectors", field="--planar", got=got, expected="auto")
+        if settings.lookup != "auto":
+            got = settings.lookup
+            raise UserError("the path tracer traces reflected rays", field="--lookup", got=got, expected="auto")
         baked = scene_of(store, scene)
         self._baked, self._note = with_replacements(baked, settings.replacements), note
         self.wear(variant_named(variants_of(store), settings.variant) if settings.variant else Variant("as baked"))

@@ -139,6 +139,7 @@ def test_saved_views_can_be_rendered(lambent, refused, store, tmp_path):
         (("-o", "a.png", "--planar", "marchd"), "did you mean 'marched'?"),
         (("-o", "a.png", "--planar", "thesis"), "does not draw reflectors so"),
         (("-o", "a.png", "--integrator", "path", "--planar", "off"), "the path tracer traces reflectors"),
+        (("-o", "a.png", "--integrator", "path", "--lookup", "plain"), "the path tracer traces reflected rays"),
         (("-o", "a.png", "--samples", "0"), "--samples"),
         (("-o", "a.png", "--integrator", "path"), "name it with --scene"),
     ],

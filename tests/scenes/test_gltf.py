@@ -23,6 +23,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.scenes import load_scene, validate
 from lambent.scenes.geometry import signed_volume
+from lambent.scenes.loaders.contents import DAYLIGHT
 from lambent.scenes.loaders.surfaces.made_materials import masking
 from lambent.scenes.scene import DirectionalLight, PointLight, Scene
 
@@ -158,6 +159,7 @@ def test_lights_and_cameras(tmp_path: Path) -> None:
     )
     scene = loaded(tmp_path, content)
     sun, spot = scene.lights
+    assert scene.environment == replace(DAYLIGHT, sun_direction=pytest.approx((0, 1, 0)), sun_scale=0), "one sun alone"
     assert isinstance(sun, DirectionalLight) and isinstance(spot, PointLight) and spot.direction is not None
     assert sun.direction == pytest.approx((0, -1, 0)) and photometric(
         np.array(sun.irradiance), ILLUMINANCE

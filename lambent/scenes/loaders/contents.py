@@ -11,7 +11,7 @@ from lambent.core.camera import Camera
 from lambent.core.plain import Triple
 from lambent.materials.document import Material
 from lambent.scenes.first_view import first_views
-from lambent.scenes.scene import Environment, Light, MaterialTextures, Scene, SceneObject, SunSky
+from lambent.scenes.scene import DirectionalLight, Environment, Light, MaterialTextures, Scene, SceneObject, SunSky
 from lambent.scenes.variants import Dressed, looks_as_loaded, with_variants
 
 DAYLIGHT = SunSky(sun_direction=(0.4558, 0.7597, 0.4637))
@@ -47,7 +47,7 @@ class Contents:
             name=name,
             objects=self.objects,
             materials=self.materials,
-            environment=self.environment if own_light else DAYLIGHT,
+            environment=self.environment if own_light else daylight_beside(self.lights),
             lights=self.lights,
             cameras=self.cameras or first_views(self.objects),
             sources=self.sources,
@@ -64,6 +64,15 @@ class Contents:
         worn = {} if variant is None else self.variants.get(variant, {})
         found = ((o, *worn.get(o.name, (o.material, o.emission))) for o in self.objects)
         return tuple(replace(o, material=material, emission=emission) for o, material, emission in found)
+
+
+def daylight_beside(lights: Sequence[Light]) -> SunSky:
+    """Daylight, without its sun where a directional light comes from above: the brightest such light is the sun."""
+    suns = [light for light in lights if isinstance(light, DirectionalLight) and light.direction[1] < 0]
+    if not suns:
+        return DAYLIGHT
+    x, y, z = max(suns, key=lambda light: sum(light.irradiance)).direction
+    return replace(DAYLIGHT, sun_direction=(-x, -y, -z), sun_scale=0.0)
 
 
 def lights_that_stay(objects: Sequence[SceneObject], variants: Mapping[str, Sequence[SceneObject]]) -> Iterator[str]:
