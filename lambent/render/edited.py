@@ -24,7 +24,7 @@ from lambent.store.contract import transport_lights
 from lambent.store.source import SOURCE
 from lambent.store.store import Store
 
-EDITED = "edited"  # in the place of an integrator
+EDITED = "edited"  # where others say their integrator
 
 
 class Edited(Images):
@@ -67,7 +67,7 @@ def edited_still(
     opened = store if isinstance(store, Store) else Store.open(Path(store))
     wanted = Session.open(Path(session))
     width, height = wanted.document.size
-    settings = exposed(replace(settings, width=width, height=height, integrator=EDITED), opened)
+    settings = exposed(replace(settings, width=width, height=height), opened)
     try:
         picture = whole_picture(opened, wanted, hits=surfaces)
     except NotBaked as error:

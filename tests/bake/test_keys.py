@@ -258,6 +258,7 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
         "patches": (8, ANSWER),
         "patch_rays": (64, ANSWER),
         "gather_rays": (32, ANSWER),
+        "receiver_rays": (8, ANSWER),
         "block": (2, ANSWER),
         "direct_samples": (16, ANSWER),
         "lobe_samples": (16, NOTHING),  # where light is sorted alone
