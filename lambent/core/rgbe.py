@@ -21,7 +21,8 @@ from lambent.core.plain import is_number
 
 MAGICS = (b"#?RADIANCE", b"#?RGBE")
 REC_709 = ".64 .33 .30 .60 .15 .06 .3127 .3290"  # x and y of red, green, blue and white
-_RESOLUTION = re.compile(rb"([-+])Y (\d{1,9}) ([-+])X (\d{1,9})\n")
+_RESOLUTION = re.compile(rb"([-+])([XY]) (\d{1,9}) ([-+])([XY]) (\d{1,9})\n")
+FORWARD = {b"Y": b"-", b"X": b"+"}  # signs of rows from the top and columns from the left
 _MIN_RUN_WIDTH, _MAX_RUN_WIDTH = 8, 0x7FFF  # widths outside are never run-length encoded per channel
 
 
@@ -29,9 +30,9 @@ def decode(data: bytes, file: Path) -> Image:
     """Linear RGB (H, W, 3) of a whole file's bytes; `file` is named in errors."""
     header_end = data.find(b"\n\n", 0, 1 << 16)
     match = _RESOLUTION.match(data, header_end + 2) if header_end >= 0 else None
-    if match is None:
+    if match is None or match[2] == match[5]:
         raise UserError("Radiance header has no '-Y height +X width' line", file=file)
-    height, width = int(match[2]), int(match[4])
+    height, width = int(match[3]), int(match[6])  # of scanlines, which are columns where X comes first
     PIXELS.check(width * height, file=file, got=f"{width} x {height}")
     if width * height == 0:
         raise UserError("picture has no pixels", file=file, got=f"{width} x {height}")
@@ -47,7 +48,9 @@ def decode(data: bytes, file: Path) -> Image:
         image /= float(exposure)
     if b"32-bit_rle_xyze" in header:
         image = xyz_to_rgb(image).astype(np.float32)
-    return np.ascontiguousarray(image[:: 1 if match[1] == b"-" else -1, :: 1 if match[3] == b"+" else -1])
+    steps = {match[2]: 1 if match[1] == FORWARD[match[2]] else -1, match[5]: 1 if match[4] == FORWARD[match[5]] else -1}
+    upright = image if match[2] == b"Y" else image.transpose(1, 0, 2)
+    return np.ascontiguousarray(upright[:: steps[b"Y"], :: steps[b"X"]])
 
 
 def header_lines(data: bytes) -> list[str]:

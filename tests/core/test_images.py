@@ -71,6 +71,10 @@ def test_rgbe_run_lengths_new_and_old() -> None:
 def test_rgbe_rows_from_below_and_exposure() -> None:
     data = b"#?RADIANCE\nEXPOSURE=2\n\n+Y 2 +X 1\n" + bytes([128, 0, 0, 129, 0, 128, 0, 129])
     np.testing.assert_array_equal(rgbe.decode(data, Path("x")), [[[0, 0.5, 0]], [[0.5, 0, 0]]])
+    columns = b"#?RADIANCE\n\n{}X 2 {}Y 3\n" + b"".join(bytes([n, 0, 0, 136]) for n in (1, 2, 3, 4, 5, 6))
+    for x, y in (("+", "-"), ("+", "+"), ("-", "-"), ("-", "+")):  # a scanline is a column
+        turned = rgbe.decode(columns.replace(b"{}X", f"{x}X".encode()).replace(b"{}Y", f"{y}Y".encode()), Path("x"))
+        assert turned[:: 1 if y == "-" else -1, :: 1 if x == "+" else -1, 0].tolist() == [[1, 4], [2, 5], [3, 6]]
     from_the_right = data.replace(b"EXPOSURE=2\n", b"").replace(b"+Y 2 +X 1", b"-Y 1 -X 2")
     np.testing.assert_array_equal(rgbe.decode(from_the_right, Path("x")), [[[0, 1, 0], [1, 0, 0]]])
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lambent.materials.document import Material
 from lambent.scenes import load_scene
 from lambent.scenes.scene import SUN_RADIUS_DEG, PointLight, SunSky
 from tests.scenes.test_gltf import _png as png
@@ -102,3 +103,24 @@ def test_instances_are_turned_with_their_scene(tmp_path: Path) -> None:
           <transform name="to_world"><translate x="1" y="2" z="5"/></transform></shape>"""
     (thing,) = load_scene(written(tmp_path, body)).objects
     assert np.mean(thing.mesh.bounds, axis=0) == pytest.approx((1, 5, -2), abs=1e-4)
+
+
+def test_shapes_without_area_are_left_out(tmp_path: Path) -> None:
+    shapes = "".join(
+        f'<shape type="{kind}" id="{kind}_0"><float name="radius" value="0"/></shape>'
+        for kind in ("sphere", "cylinder")
+    )
+    scene = load_scene(written(tmp_path, shapes + BALL))
+    assert [o.name for o in scene.objects] == ["ball"]
+    assert [w for w in scene.warnings if "no triangle with an area" in w] == [
+        f"{kind}_0: left out, it has no triangle with an area" for kind in ("sphere", "cylinder")
+    ]
+
+
+def test_parameters_of_principled_are_kept_within_their_ranges(tmp_path: Path) -> None:
+    def mirror(metallic: float, roughness: float) -> Material:
+        made = f"""<bsdf type="principled" id="m"><rgb name="base_color" value="1 .5 .2"/>
+            <float name="metallic" value="{metallic}"/><float name="roughness" value="{roughness}"/></bsdf>"""
+        return load_scene(written(tmp_path, f'{made}<shape type="sphere"><ref id="m"/></shape>')).materials["m"]
+
+    assert mirror(2.0, 3.0) == mirror(1.0, 1.0) and mirror(-1.0, -2.0) == mirror(0.0, 0.0)

@@ -18,6 +18,7 @@ from lambent.viewer.modes.walk.comparison import Figures
 from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.panels.widgets import press
 from tests.viewer import panel_driver
 from tests.viewer.edited_view import lit_state, until
 from tests.viewer.measured_specimens import BRASS, write_measurement
@@ -45,7 +46,8 @@ class Walked(PanelDriver):
         monkeypatch.setattr(panel_driver, "RECORDED", (*panel_driver.RECORDED, *MORE))
         mode.panels = [replace(panel, opened=True) for panel in mode.panels]
         self.said = []
-        monkeypatch.setattr(imgui, "set_tooltip", self.said.append)
+        shown = imgui.set_tooltip
+        monkeypatch.setattr(imgui, "set_tooltip", lambda text: (self.said.append(text), shown(text)))
         super().__init__(monkeypatch, mode, TALL)
         style = imgui.get_style()
         style.hover_stationary_delay = style.hover_delay_short = style.hover_delay_normal = 0.0
@@ -176,3 +178,42 @@ def test_editing_in_place(monkeypatch, screen, tmp_path):
     driver.close()
     state.close()
     assert {"tray##edited", "fit scale", "snapshot", "hand over", "##base x", "collapse"} <= set(seen)
+
+
+def test_a_tooltip_covers_no_line_of_the_panel(monkeypatch):
+    """It ends where the panel begins, and is where Dear ImGui puts it where there is no room for that."""
+    places = []
+
+    class Panel(panel_driver.Frames):
+        left = 700.0
+
+        def draw(self):
+            imgui.set_next_window_pos((self.left, 10))
+            imgui.begin("panel")
+            press("first", "what the first one does")
+            press("second", "what the second one does")
+            imgui.end()
+
+    monkeypatch.setattr(imgui, "set_next_window_pos", watched(imgui.set_next_window_pos, places))
+    panel = Panel(monkeypatch, (1000, 400))
+    style = imgui.get_style()
+    style.hover_stationary_delay = style.hover_delay_short = style.hover_delay_normal = 0.0
+    panel.move(*panel.point("first"))
+    panel.frame(3)
+    left, top = panel.rects["first"][0:2]
+    (x, y), options = places[-1]
+    assert options == {"pivot": (1, 0)} and x < Panel.left <= left and abs(y - top) < 1
+    Panel.left = 5.0
+    panel.frame(2)
+    panel.move(*panel.point("first"))
+    panel.frame(3)
+    assert places[-1][1] == {}  # that of the panel itself
+    panel.close()
+
+
+def watched(call, places):
+    def wrapped(at, *args, **options):
+        places.append((at, options))
+        return call(at, *args, **options)
+
+    return wrapped

@@ -17,6 +17,7 @@ from lambent.core.plain import Triple, triple
 Colour = tuple[float, float, float, float]
 Word = TypeVar("Word", bound=str)
 THREE_PX = 150.0  # of three sliders that have room for three digits
+TOOLTIP_GAP_PX = 4.0
 AMBER, DIM = (1.0, 0.75, 0.35, 1.0), (0.62, 0.65, 0.70, 1.0)
 
 
@@ -111,8 +112,14 @@ def typed_field(label: str, typed: dict[str, str], button: str, hint: str, meani
 
 
 def explain(text: str) -> None:
-    """Help that appears while the mouse rests on the control before; not in a drag, where it would cover the next."""
+    """Help that appears while the mouse rests on the control before, but not in a drag.
+
+    It stands left of the panel, where there is room, so that it covers none of the lines.
+    """
     if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip) and not imgui.is_any_item_active():
+        left = imgui.get_window_pos().x - TOOLTIP_GAP_PX
+        if left > imgui.calc_text_size(text).x + 2 * imgui.get_style().window_padding.x:
+            imgui.set_next_window_pos((left, imgui.get_item_rect_min().y), pivot=(1, 0))
         imgui.set_tooltip(text)
 
 

@@ -81,6 +81,11 @@ class Gltf:
             array[places[:, 0]] = values
         return array
 
+    def is_stored(self, index: int) -> bool:
+        """Whether the file has an accessor's numbers, uncompressed."""
+        a = self.pick(self.document.accessors, index, "accessors")
+        return a.bufferView is not None or a.sparse is not None
+
     def _ask(self, what: str, ceiling: Ceiling, count: int, field: str) -> None:
         self.asked[what] += count
         ceiling.check(self.asked[what], file=self.path, field=field)
@@ -111,7 +116,7 @@ class Gltf:
 
     def is_missing(self, uri: str, field: str) -> bool:
         """Whether a uri names a file that is not there."""
-        return not uri.startswith("data:") and "://" not in uri and not self._file(uri, field).exists()
+        return not uri.startswith("data:") and not is_remote(uri) and not self._file(uri, field).exists()
 
     def resource(self, uri: str, field: str) -> bytes:
         """Bytes of a uri: data within it, or a file in the scene's folder or below."""
@@ -120,13 +125,18 @@ class Gltf:
                 return base64.b64decode(uri.partition(",")[2], validate=True)
             except binascii.Error as error:
                 raise UserError(f"its base64 data is damaged ({error})", file=self.path, field=field) from error
-        if "://" in uri:
+        if is_remote(uri):
             hint = "put the file beside the scene"
             raise UserError("is on the network", file=self.path, field=field, got=uri, hint=hint)
         return self.files.read(self._file(uri, field), GLTF_BYTES)
 
     def _file(self, uri: str, field: str) -> Path:
         return self.files.path(unquote(uri), self.path, field)
+
+
+def is_remote(uri: str) -> bool:
+    """Whether a uri names something on the network."""
+    return not uri.startswith("data:") and "://" in uri
 
 
 def read(path: Path, root: Path | None = None) -> Gltf:

@@ -21,13 +21,14 @@ from lambent.scenes.loaders.contents import Contents, UniqueNames
 from lambent.scenes.loaders.gltf.container import Gltf, read
 from lambent.scenes.loaders.gltf.luminaires import Luminaires
 from lambent.scenes.loaders.gltf.materials import surface_of
-from lambent.scenes.loaders.gltf.schema import MaterialDocument, Node, Primitive
+from lambent.scenes.loaders.gltf.schema import READ_EXTENSIONS, MaterialDocument, Node, Primitive
 from lambent.scenes.loaders.gltf.textures import Textures, main_uv_set
 from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
 from lambent.scenes.scene import DirectionalLight, Light, Mesh, PointLight, SceneObject
 
 FAR = 1e9  # metres
+DRACO = "KHR_draco_mesh_compression"
 
 
 def load(path: Path, root: Path | None = None) -> Contents:
@@ -93,10 +94,17 @@ class _Reading:
             tuple(self._lights),
             tuple(self._cameras),
             tuple(self._gltf.files.sources),
-            (*self._warnings, *self._renamings(), *made.notes, *images.notes, *self._gltf.files.notes),
+            (*self._unread(), *self._warnings, *self._renamings(), *made.notes, *images.notes, *self._gltf.files.notes),
             made.textures,
             variants=self._variants,
         )
+
+    def _unread(self) -> Iterator[str]:
+        """Extensions of anything but materials that are not read; materials name their own."""
+        document = self._gltf.document
+        of_materials = {name for material in document.materials for name in material.extensions}
+        for name in sorted(set(document.extensionsUsed) - READ_EXTENSIONS - of_materials):
+            yield f"extension {name} is not read"
 
     def _renamings(self) -> Iterator[str]:
         for name, others in self._renamed.items():
@@ -124,6 +132,8 @@ class _Reading:
             seen.add(index)
             node = gltf.pick(document.nodes, index, "nodes")
             world = parent @ _local(node)
+            if np.abs(world[3] - (0, 0, 0, 1)).max() > 1e-6:
+                raise gltf.error("not an affine matrix", f"{field}.matrix", world[3].tolist(), "a last row of 0 0 0 1")
             if not (np.abs(world) < FAR).all():
                 raise UserError("transform is not finite, or leads absurdly far", file=gltf.path, field=field)
             self._visit(node, world)
@@ -235,6 +245,8 @@ def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int) -> tupl
         return None, [f"{name}: left out, it has no positions"]
     if primitive.mode not in (4, 5, 6):
         return None, [f"{name}: left out, it is points or lines"]
+    if DRACO in primitive.extensions and not gltf.is_stored(attributes["POSITION"]):
+        return None, [f"{name}: left out, it is compressed ({DRACO}): export without compression"]
     positions = gltf.floats(attributes["POSITION"], 3, f"{name} POSITION")
     if primitive.indices is None:
         order = np.arange(len(positions))

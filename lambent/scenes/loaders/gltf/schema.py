@@ -267,3 +267,4 @@ class GltfDocument(_Extended):
     profiles: list[ProfileDocument] = _extension("EXT_lights_ies", "lights", default=[])
     variants: list[Variant] = _extension("KHR_materials_variants", "variants", default=[])
     extensionsRequired: list[str] = []
+    extensionsUsed: list[str] = []

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from lambent.core.errors import UserError
-from lambent.scenes.loaders.gltf.container import Gltf
+from lambent.scenes.loaders.gltf.container import Gltf, is_remote
 from lambent.scenes.loaders.gltf.schema import MaterialDocument, TextureReference
 from lambent.scenes.loaders.surfaces.texture_images import TextureImage, TextureImages
 from lambent.scenes.loaders.surfaces.textured import Textured, flipped_uv
@@ -58,6 +58,11 @@ class Textures:
         """An image; None, and a note, if its file is not there."""
         gltf, field = self._gltf, f"images.{number}"
         document = gltf.pick(gltf.document.images, number, "images")
+        if document.uri is not None and is_remote(document.uri):
+            notes.append(
+                f"picture {document.uri} is on the network: only its factor counts; put the file beside the scene"
+            )
+            return None
         if document.uri is not None and gltf.is_missing(document.uri, field):
             notes.append(f"picture {document.uri} is not there: only its factor counts")
             return None

@@ -22,7 +22,7 @@ def principled(plugin: Plugin, thin: bool = False) -> Surface:
     """The surface of `principled`, or, `thin`, of `principledthin`."""
     notes: list[str] = []
     base = colour(plugin, "base_color", GREY)
-    metallic = number(plugin, "metallic", 0.0)
+    metallic = combined(lambda m: np.clip(m, 0, 1), number(plugin, "metallic", 0.0), notes=notes)
     roughness = number(plugin, "roughness", 0.5)
     anisotropic = _share(plugin, "anisotropic")
     aspect = math.sqrt(1 - 0.9 * anisotropic)

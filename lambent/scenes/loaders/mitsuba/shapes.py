@@ -53,6 +53,8 @@ def mesh_of_shape(plugin: Plugin, name: str, world: Floats, known: dict[int, Mad
         return None, notes
     if abs(np.linalg.det(to_world[:3, :3])) < UNSCALED:
         return None, [*notes, f"{name}: left out, its transform is flat"]
+    if not len(local.faces):
+        return None, [*notes, f"{name}: left out, it has no triangle with an area"]
     mesh = transformed(local, to_world)
     # Mitsuba makes missing normals of faces that a mirroring transform has turned; given ones are moved as ours are.
     turned = from_faces and np.linalg.det(to_world[:3, :3]) < 0
@@ -163,7 +165,7 @@ def _cylinder(plugin: Plugin, name: str) -> Made:
     """Open at both ends."""
     p0, p1 = plugin.vector("p0"), plugin.vector("p1")
     p0, p1 = np.zeros(3) if p0 is None else p0, np.array([0.0, 0.0, 1.0]) if p1 is None else p1
-    radius, length = plugin.number("radius", 1.0), float(np.linalg.norm(p1 - p0))
+    radius, length = abs(plugin.number("radius", 1.0)), float(np.linalg.norm(p1 - p0))
     if length == 0:
         return None, [f"{name}: left out, its ends are one point"], False
     z = np.linspace(0, 1, 2)[:, None]
