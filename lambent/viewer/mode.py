@@ -7,11 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.errors import UserError
+from lambent.scenes.loaders.load import BUILTIN_PREFIX
 from lambent.viewer.input import Input
 from lambent.viewer.screen import Rect, Screen
 
@@ -147,3 +150,9 @@ class Mode:
 
     def close(self) -> None:
         """The window was closed in order: end the work in the background, and name unsaved materials on stderr."""
+
+
+def check_there(path: Path) -> None:
+    """`UserError` where `path` names neither a file or folder nor a built-in scene."""
+    if not path.exists() and not str(path).startswith(BUILTIN_PREFIX):
+        raise UserError("cannot be read (no such file or folder)", file=path)

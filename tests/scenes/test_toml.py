@@ -353,3 +353,16 @@ def test_of_two_rules_that_fit_the_later_wins() -> None:
     rules, materials = {"chair_*": "oak", "chair_2": "ash"}, dict.fromkeys(("oak", "ash"), Material())
     found, warnings = assigned(rules, objects, materials, Path("scene.toml"))
     assert [o.material for o in found] == ["oak", "ash"] and not warnings
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", r'format: is missing; write format = "lambent-scene" above the first \[table\]'),
+        ('format = "lambent-scene"\n', r"version: is missing; write version = 1 above the first"),
+        ('format = "lambent-scene"\nversion = 1\n', r'geometry: is missing; write geometry = "model.glb" above'),
+    ],
+)
+def test_a_missing_head_says_what_to_write(tmp_path: Path, text: str, says: str) -> None:
+    with pytest.raises(UserError, match=says):
+        load_scene(written(tmp_path, "", head=text))

@@ -157,6 +157,18 @@ def test_without_a_display(store):
     assert "UserError: no display; use `lambent render`" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("mode", "says"), [("walk", "not a store"), ("material", "no such file"), ("edit", "no such file")]
+)
+def test_a_missing_file_is_said_before_a_missing_display(tmp_path, monkeypatch, mode, says):
+    from lambent.viewer.app import run
+
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(UserError, match=says):
+        run(tmp_path / "gone", mode)
+
+
 def test_an_unknown_mode_is_said(store):
     from lambent.viewer.app import run
 

@@ -49,6 +49,8 @@ from lambent.scenes.scene import (
 )
 from lambent.scenes.variants import with_variants
 
+# What every scene.toml begins with.
+HEAD = {"format": 'format = "lambent-scene"', "version": "version = 1", "geometry": 'geometry = "model.glb"'}
 ReadGeometry = Callable[[str, Path, SceneFiles], Contents]  # name as written, the scene.toml, files below its folder
 
 
@@ -130,8 +132,11 @@ def _there(document: SceneDocument, path: Path, files: SceneFiles) -> tuple[list
 
 
 def _parse(path: Path) -> SceneDocument:
+    written = toml_of(path)
+    if missing := next((key for key in HEAD if key not in written), None):
+        raise UserError("is missing", file=path, field=missing, hint=f"write {HEAD[missing]} above the first [table]")
     try:
-        return SceneDocument.model_validate(toml_of(path))
+        return SceneDocument.model_validate(written)
     except ValidationError as error:
         raise invalid(error, path, known_keys()) from error
 

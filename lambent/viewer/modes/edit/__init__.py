@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from lambent.viewer.mode import Mode
+from lambent.viewer.mode import Mode, check_there
 from lambent.viewer.screen import Screen
 
+check = check_there  # before a window is opened
 STARTS = ("edit",)
 NO_DISPLAY = "editing in place needs one: use `lambent.editing` from Python, as docs/editing.md shows"
 

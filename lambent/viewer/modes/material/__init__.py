@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from lambent.viewer.mode import Mode
+from lambent.viewer.mode import Mode, check_there
 from lambent.viewer.screen import Screen
 
+check = check_there  # before a window is opened
 STARTS = ("material",)
 NO_DISPLAY = "the editor needs one: use `lambent fit --plot`"
 

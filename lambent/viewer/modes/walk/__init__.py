@@ -5,11 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 from lambent.core.map_cache import LEAST_RECENT
+from lambent.store.store import Store
 from lambent.viewer.mode import Mode
 from lambent.viewer.screen import Screen
 
 STARTS = ("walk", "view")
 NO_DISPLAY = "use `lambent render`, or `lambent demo --headless`"
+
+
+def check(path: Path) -> None:
+    """`UserError` where there is no store at `path`; asked before a window is opened."""
+    Store.open(path).close()
 
 
 def start(
