@@ -34,6 +34,7 @@ class FrameContext:
     timer: PassTimer
     target: Target  # that light is drawn into
     draws: list[Draw]
+    panes: list[Draw]  # clear glass, which is laid over all else
     views: list[PlanarView]  # of the planar reflectors that have a buffer in this frame
     counts: Counter[str]  # draw_calls
     waits: bool = True  # for what is drawn once and takes seconds
