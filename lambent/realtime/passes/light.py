@@ -114,10 +114,14 @@ class Glazing:
     def __init__(self, layouts: Layouts, front_face: str = "ccw") -> None:
         passing = Stage("pass_main", "glazing.wgsl", front_face, blend="tinted")
         mirroring = Stage("mirror_main", "glazing.wgsl", front_face, blend="added", mixes_parts=True)
+        self._layouts = layouts
         self._passing, self._mirroring = (Shading(layouts, stage, layouts.light) for stage in (passing, mirroring))
 
-    def draw(self, render: Any, context: FrameContext, seen: Seen, formats: tuple[str, ...], light: Any) -> None:
+    def draw(self, render: Any, context: FrameContext, seen: Seen, formats: tuple[str, ...]) -> None:
         """Encode into a render pass of `formats` that has the depth and the light of all else."""
+        if not context.panes:
+            return
+        light = self._layouts.group(self._layouts.light, *context.pane_light)
         eye = context.data["eye"][:3]
 
         def distance(pane: Draw) -> float:
@@ -156,7 +160,7 @@ class LightPass:
             if is_whole:  # sky and fringes are there already, and fringes cannot be laid over themselves
                 self._draw_sky(render, context, format)
                 self._fringe.draw(render, context, fringes, seen, (format,), light)
-                self._glazing.draw(render, context, seen, (format,), light)
+                self._glazing.draw(render, context, seen, (format,))
             render.end()
             yield
         context.radiance = context.target.radiance
@@ -170,7 +174,7 @@ class LightPass:
             render = context.begin("missed light", [context.target.radiance.create_view()], load_op, band=band)
             self._shade.draw(render, context, context.draws, context.thin(band.shares), (format,), light)
             self._draw_sky(render, context, format)
-            self._glazing.draw(render, context, context.seen(band.shares), (format,), light)
+            self._glazing.draw(render, context, context.seen(band.shares), (format,))
             render.end()
             yield
 

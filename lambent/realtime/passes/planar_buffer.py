@@ -210,7 +210,7 @@ class PlanarBufferPass:
             render.set_bind_group(1, resources.mirrored_sky_group)
             render.draw(3)
             context.counts["draw_calls"] += 1
-            self._glazing.draw(render, context, seen, FORMATS, light)
+            self._glazing.draw(render, context, seen, FORMATS)
             render.end()
             yield
         if lamps is not None:
