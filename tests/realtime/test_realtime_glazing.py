@@ -69,12 +69,11 @@ def test_a_solid_has_two_faces(device: Any) -> None:
 
 
 def test_glass_hides_nothing_and_what_stands_before_it_hides_it(device: Any) -> None:
-    stone = placed(box((0.6, 0.2, 0.6)), (0.0, 1.5, 0.0)), "grey"
+    stone = placed(box((0.4, 0.1, 0.4)), (DOWN.position[0], 1.4, DOWN.position[2])), "grey"
     alone = shown(device, glowing({"stone": stone}))
-    np.testing.assert_array_equal(
-        middle(shown(device, glowing({"stone": stone, "pane": (pane_at(1.0), "red")}))), middle(alone)
-    )
-    behind = shown(device, glowing({"stone": stone, "pane": (pane_at(2.0), "red")}))
+    below = shown(device, glowing({"stone": stone, "pane": (pane_at(1.0), "red")}))
+    np.testing.assert_allclose(middle(below), middle(alone), rtol=1e-3)  # the picture is in half floats
+    behind = shown(device, glowing({"stone": stone, "pane": (pane_at(1.6), "red")}))
     np.testing.assert_allclose(middle(behind), middle(alone) * passed(RED, 1.0), rtol=0.01, atol=1e-4)
 
 
@@ -110,8 +109,8 @@ def test_a_mirror_shows_what_is_behind_glass(device: Any) -> None:
     """A mirror on the floor, looked at from the side, a glowing wall behind it, and glass between both."""
     wall = patch((-3, 0, -2), (6, 0, 0), (0, 4, 0))
     sheet = patch((-3, 0.01, -1), (6, 0, 0), (0, 4, 0))
-    camera = Camera("over the mirror", (0.0, 1.0, 2.0), (0.0, 0.0, 0.5), 30.0)
-    mirror = Material(name="grey", lobes=(Lobe(mx=0.003, my=0.003, r0=0.9),))
+    camera = Camera("over the mirror", (0.0, 1.0, 2.0), (0.0, 0.0, 0.5), fov_y_deg=30.0)
+    mirror = Material(name="grey", lobes=(Lobe(mx=0.003, my=0.003, r0=(0.9, 0.9, 0.9)),))
 
     def mirrored(parts: dict[str, tuple[Mesh, str]], planar: str) -> Floats:
         baked = glowing({"stone": (wall, "grey"), **parts})
