@@ -34,6 +34,7 @@ class FrameContext:
     timer: PassTimer
     target: Target  # that light is drawn into
     draws: list[Draw]
+    panes: list[Draw]  # clear glass, which is laid over all else
     views: list[PlanarView]  # of the planar reflectors that have a buffer in this frame
     counts: Counter[str]  # draw_calls
     waits: bool = True  # for what is drawn once and takes seconds
@@ -43,6 +44,7 @@ class FrameContext:
     base: Any = None  # texture of the last frame of few samples, where this one is drawn over it
     redrawn: frozenset[str] | None = None  # materials whose objects alone are drawn over `base`
     light: tuple[Any, ...] = ()  # of group 3: light maps, the sun, and what pixels see of it
+    pane_light: tuple[Any, ...] = ()  # the same of panes
     reflections: Any = None  # group 3 of draws that have pixels on planar reflectors
 
     @property

@@ -6,6 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from lambent.materials.clear import clear_terms
 from lambent.materials.document import Material
 from lambent.realtime.clusters import Ranges
 from lambent.realtime.frame_state import SHOW, FrameState
@@ -33,6 +34,8 @@ class Draw:
     planar_n: int = 0  # samples per lobe where it has pixels on planar reflectors; 0 where it has none
     is_beyond: bool = False  # the light of a part, added to its neighbours
     is_dark: bool = False  # drawn without what it emits
+    is_pane: bool = False  # clear glass: what is behind it is seen straight through it
+    has_holes: bool = False
 
     def by(self, how: Integrator, resources: SceneResources, n: int) -> Draw:
         """The same object by another integrator that does not aim, for a pass that does not read reflections."""
@@ -96,6 +99,7 @@ class Draw:
             **self.integrator.constants,
             **self._layers,
             **self._part,
+            **({"STRAIGHT": 1, "MASKED": self.has_holes} if self.is_pane else {}),
         }
 
 
@@ -109,8 +113,32 @@ def lamp_use(how: Integrator, light: ProbeLight, look_up: LookUp, material: Mate
     return "lamps" if how.lamps and light.lamps.serve(material, widened) else ""
 
 
-def draws_of(state: FrameState, resources: SceneResources, reflecting: Collection[str] = ()) -> list[Draw]:
-    """What a frame draws; objects whose names are in `reflecting` have pixels on planar reflectors."""
+def panes_of(state: FrameState, resources: SceneResources) -> frozenset[str]:
+    """Names of the objects of clear glass (`materials.clear`), if the frame shows specular light.
+
+    Glass with maps of a light field that refract has these instead.
+    """
+    if SHOW[state.show][3] or not INTEGRATORS[state.integrator].specular:
+        return frozenset()
+    given = resources.scene.record.materials
+    clear = {
+        name for name, buffers in resources.materials.items()
+        if not buffers.textures.bits & WIDENING and clear_terms(state.materials.get(name, given[name])) is not None
+    }  # fmt: skip
+    items = (item for item in resources.objects if item.record.material in clear)
+    return frozenset(item.record.name for item in items if not _refracts(state, item))
+
+
+def _refracts(state: FrameState, item: ObjectResources) -> bool:
+    look_up = item.light.look_up(state.lookups.get(item.record.name, state.lookup))
+    field = item.light.probe.light_field
+    return brings_light(look_up) and field is not None and field.glass is not None
+
+
+def draws_of(
+    state: FrameState, resources: SceneResources, reflecting: Collection[str] = (), panes: Collection[str] = ()
+) -> list[Draw]:
+    """What a frame draws; objects in `reflecting` are on planar reflectors, those in `panes` are of clear glass."""
     wanted = INTEGRATORS["diffuse" if SHOW[state.show][3] else state.integrator]
     found = {}
     for name, buffers in resources.materials.items():
@@ -130,7 +158,13 @@ def draws_of(state: FrameState, resources: SceneResources, reflecting: Collectio
         alone = table == "lamps" and light.lamps.all_out(material, bool(bits & WIDENING))
         rough = buffers.textures.rough
         n = how.rows or (state.samples(material, rough, alone) if how.specular else 1)
-        on_planes = state.planar_samples(material, rough) if how.specular and item.record.name in reflecting else 0
+        is_pane, has_holes = item.record.name in panes, item.record.name in resources.masked
+        mirrors = how.specular and item.record.name in reflecting and not is_pane
+        on_planes = state.planar_samples(material, rough) if mirrors else 0
         group = buffers.group(material, how, n)
-        draws.append(Draw(item, material, how, n, look_up, group, bits, table, on_planes))
+        draws.append(
+            Draw(
+                item, material, how, n, look_up, group, bits, table, on_planes, is_pane=is_pane, has_holes=has_holes
+            )
+        )  # fmt: skip
     return draws

@@ -34,9 +34,10 @@ class Outline(Overlay):
         super().__init__(layouts, resources, clusters)
         device = self._device
         module = device.create_shader_module(code=assemble("silhouette.wgsl"))
-        self._silhouette = pipeline(
-            device, module, "silhouette_main", [layouts.frame], [SEEN_FORMAT], compare="equal"
-        )  # fmt: skip
+        self._silhouette, self._glass = (
+            pipeline(device, module, "silhouette_main", [layouts.frame], [SEEN_FORMAT], compare=compare)
+            for compare in ("equal", "greater")
+        )
         self._read = layouts.of("exact")
         self._line = screen_pipeline(device, "outline", [self._read], [DISPLAY_FORMAT])
 
@@ -53,7 +54,8 @@ class Outline(Overlay):
         render = context.begin("silhouette", [seen], "clear")
         render.set_scissor_rect(*place)
         set_geometry(render, self._resources)
-        render.set_pipeline(self._silhouette)
+        is_pane = any(draw.item.record.name == record.name for draw in context.panes)
+        render.set_pipeline(self._glass if is_pane else self._silhouette)
         draw_seen(render, context.seen(), record.first_face, record.face_count)
         render.end()
         line = target_texture(self._device, (*state.size, 1), DISPLAY_FORMAT).create_view()

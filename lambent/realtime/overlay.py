@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from lambent.realtime.clusters import Clusters
 from lambent.realtime.context import FrameContext
-from lambent.realtime.draws import draws_of
+from lambent.realtime.draws import draws_of, panes_of
 from lambent.realtime.frame_state import FrameState, frame_data
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.depth import DepthPass
@@ -34,8 +34,9 @@ class Overlay:
         state = replace(state, accumulate=None, jitter_px=(0.0, 0.0), planar=OFF)
         data = frame_data(state, self._resources.scene.record.bounds)
         self._device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
-        draws = draws_of(state, self._resources) if self._resources.masked else []  # for their holes alone
+        draws = draws_of(state, self._resources, panes=panes_of(state, self._resources))
         return FrameContext(
             Whole(self._device.create_command_encoder()), state, data, self._frame_group, self._resources,
-            self._clusters, self._targets, self._timer, self._targets.fit(state.size, format), draws, [], Counter(),
+            self._clusters, self._targets, self._timer, self._targets.fit(state.size, format),
+            [draw for draw in draws if not draw.is_pane], [draw for draw in draws if draw.is_pane], [], Counter(),
         )  # fmt: skip

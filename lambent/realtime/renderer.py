@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Collection, Generator, Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -26,7 +26,7 @@ from lambent.realtime.baked import BakedScene, read_baked
 from lambent.realtime.clusters import Clusters
 from lambent.realtime.context import FrameContext, Pass
 from lambent.realtime.discs import Discs
-from lambent.realtime.draws import draws_of
+from lambent.realtime.draws import draws_of, panes_of
 from lambent.realtime.frame_state import LIGHT_MAP_NOISE, QMC_N, SHOW, FrameState, frame_data
 from lambent.realtime.given import Given
 from lambent.realtime.integrators import integrator
@@ -173,6 +173,8 @@ class Renderer:
         before = self._few_state
         if before is None or replace(state, **_redrawable(before)) != replace(before, over=state.over):
             return None
+        if panes_of(before, self.resources) or panes_of(state, self.resources):
+            return None  # laid over what may be drawn anew
         given = self.scene.record.materials
         return frozenset(
             name for name in given if state.materials.get(name, given[name]) != before.materials.get(name, given[name])
@@ -266,16 +268,18 @@ class Renderer:
         self.device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
         self.mixer.follow(state.light, waits=self.waits)
         self.resources.reflector_lamps.follow()
-        views = self._planar_views(state, data)
+        panes = panes_of(state, self.resources)
+        views = self._planar_views(state, data, panes)
         reflecting = {part.object for view in views for part in view.reflector.parts}
-        draws = draws_of(state, self.resources, reflecting)
+        draws = draws_of(state, self.resources, reflecting, panes)
         self.streaming.follow(draws, data, self._clusters, waits=self.waits)
         passing = target_view is not None and state.accumulate is None  # seen once, so half floats do
-        halves = passing or self.resources.mixes_parts  # single precision cannot be blended everywhere
+        halves = passing or self.resources.mixes_parts or panes  # single precision cannot be blended everywhere
         target = self._targets.fit(state.size, "rgba16float" if halves else "rgba32float", passing=passing)
         context = FrameContext(
             slicing, state, data, self._frame_group, self.resources, self._clusters, self._targets, self._timer, target,
-            draws, views, Counter(), waits=self.waits, shown=target_view,
+            [draw for draw in draws if not draw.is_pane], [draw for draw in draws if draw.is_pane], views, Counter(),
+            waits=self.waits, shown=target_view,
         )  # fmt: skip
         if state.accumulate is not None and state.prior > 0 and self._few and self._few.size == target.radiance.size:
             context.prior = self._few
@@ -283,8 +287,8 @@ class Renderer:
             context.base, context.redrawn = self._few, self.redrawn(state)
         return context
 
-    def _planar_views(self, state: FrameState, data: Record) -> list[PlanarView]:
-        """Mirrored views of the planar reflectors that have a buffer in this frame."""
+    def _planar_views(self, state: FrameState, data: Record, panes: Collection[str]) -> list[PlanarView]:
+        """Mirrored views of the planar reflectors that have a buffer in this frame; `panes` have their probes."""
         if planar_integrator(state.integrator, state.planar) is None or not SHOW[state.show][1]:
             return []
         record, shown = self.scene.record, {**self.scene.record.materials, **state.materials}
@@ -293,7 +297,8 @@ class Renderer:
             for o in record.objects
         }
         whole = integrator(state.integrator).progressive
-        return planar_views(data, record.reflectors, state.width, state.height, MOST_REFLECTORS, widest, whole)
+        reflectors = [r for r in record.reflectors if any(part.object not in panes for part in r.parts)]
+        return planar_views(data, reflectors, state.width, state.height, MOST_REFLECTORS, widest, whole)
 
 
 def _subframes(state: FrameState, count: int) -> Iterator[FrameState]:

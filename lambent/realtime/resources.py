@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -138,9 +138,13 @@ class SceneResources:
         self.materials = {**own, **{name: self._textured[look.textures] for name, look in looks.items()}}
         records = self.scene.record.objects
         self.masked = {record.name for record in records if self.materials[record.material].textures.masked}
-        whole = (r for r in records if r.name not in self.masked)
-        self.whole_ranges = merged(((r.first_face, r.first_face + r.face_count) for r in whole), gap=1)
+        self.whole_ranges = lru_cache(8)(self._whole_ranges)
         self.light_version += 1
+
+    def _whole_ranges(self, panes: frozenset[str] = frozenset()) -> Ranges:
+        """(first, count) of the faces of all objects without holes but `panes`."""
+        whole = (r for r in self.scene.record.objects if r.name not in self.masked and r.name not in panes)
+        return merged(((r.first_face, r.first_face + r.face_count) for r in whole), gap=1)
 
     def show_light_map(self, sides: Sequence[NDArray[np.float16] | None]) -> None:
         """Show other light maps (H, W, 4) on the front and the back; None of a side that stays.

@@ -14,7 +14,7 @@ from lambent.realtime.slices import Steps
 
 
 class DepthPass:
-    """Draws the depth (reversed: near/z) of all objects, and behind the holes of masked surfaces of what is there."""
+    """Draws the depth (reversed: near/z) of all objects but panes, and behind holes of masked ones of what is there."""
 
     def __init__(self, layouts: Layouts) -> None:
         device, groups = layouts.device, [layouts.frame, layouts.material]
@@ -40,7 +40,8 @@ class DepthPass:
         seen, resources = context.seen(), context.resources
         set_geometry(render, resources)
         render.set_pipeline(self._whole)
-        calls = sum(draw_seen(render, seen, *faces) for faces in resources.whole_ranges)
+        panes = frozenset(draw.item.record.name for draw in context.panes)
+        calls = sum(draw_seen(render, seen, *faces) for faces in resources.whole_ranges(panes))
         if resources.masked:
             render.set_pipeline(self._solid if context.blends_masks else self._masked)
         for draw in context.draws:

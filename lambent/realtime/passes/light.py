@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from lambent.realtime.clusters import Seen
 from lambent.realtime.context import FrameContext
 from lambent.realtime.draws import Draw
@@ -26,7 +28,7 @@ class Stage:
     entry: str
     shader: str = ""
     front_face: str = "ccw"
-    blended: bool = False  # laid over what is behind by its alpha, in no order, instead of standing for it
+    blend: str = ""  # of `_BLENDS`: how it is laid over what is behind, instead of standing for it
     mixes_parts: bool = False  # draws with the light of an object's parts, mixed near their borders
 
     def shaders(self, draw: Draw) -> tuple[str, ...]:
@@ -37,14 +39,16 @@ class Stage:
 
 
 SHADE = Stage("shade_main", "shade.wgsl", mixes_parts=True)
-FRINGE = Stage("fringe_main", "fringe.wgsl", blended=True)  # of masked surfaces, after what is whole
-_OVER, _ADDED = (
-    {
+FRINGE = Stage("fringe_main", "fringe.wgsl", blend="over")  # of masked surfaces, after what is whole
+_BLENDS = {
+    name: {
         "color": {"src_factor": source, "dst_factor": behind, "operation": "add"},
         "alpha": {"src_factor": "zero", "dst_factor": "one", "operation": "add"},
     }
-    for source, behind in (("src-alpha", "one-minus-src-alpha"), ("one", "one"))
-)
+    for name, source, behind in (
+        ("over", "src-alpha", "one-minus-src-alpha"), ("added", "one", "one"), ("tinted", "zero", "src"),
+    )
+}  # fmt: skip
 
 
 class Shading:
@@ -93,11 +97,39 @@ class Shading:
             groups = [layouts.frame, layouts.material, layouts.object(draw.look_up.BINDINGS, kind_of(draw.cube)), light]
             self._pipelines[key] = pipeline(
                 layouts.device, self._modules[shaders], stage.entry, groups, formats, constants=constants,
-                compare="greater" if stage.blended else "equal",
-                blend=_OVER if stage.blended else _ADDED if draw.is_beyond else None,
+                compare="greater" if stage.blend else "equal",
+                blend=_BLENDS.get(stage.blend or ("added" if draw.is_beyond else "")),
                 front_face=stage.front_face,
             )  # fmt: skip
         return self._pipelines[key]
+
+
+class Glazing:
+    """Lays clear glass over what stands behind it, which has no depth and so is drawn as if there were none.
+
+    Panes follow from the farthest to the nearest. Of each, all faces take from the light behind what they absorb before
+    any adds what it mirrors.
+    """
+
+    def __init__(self, layouts: Layouts, front_face: str = "ccw") -> None:
+        passing = Stage("pass_main", "glazing.wgsl", front_face, blend="tinted")
+        mirroring = Stage("mirror_main", "glazing.wgsl", front_face, blend="added", mixes_parts=True)
+        self._layouts = layouts
+        self._passing, self._mirroring = (Shading(layouts, stage, layouts.light) for stage in (passing, mirroring))
+
+    def draw(self, render: Any, context: FrameContext, seen: Seen, formats: tuple[str, ...]) -> None:
+        """Encode into a render pass of `formats` that has the depth and the light of all else."""
+        if not context.panes:
+            return
+        light = self._layouts.group(self._layouts.light, *context.pane_light)
+        eye = context.data["eye"][:3]
+
+        def distance(pane: Draw) -> float:
+            return float(np.linalg.norm(np.mean(pane.item.record.bounds, axis=0) - eye))
+
+        for pane in sorted(context.panes, key=distance, reverse=True):
+            for shading in (self._passing, self._mirroring):
+                shading.draw(render, context, [pane], seen, formats, light)
 
 
 class LightPass:
@@ -105,7 +137,7 @@ class LightPass:
 
     def __init__(self, layouts: Layouts, reflections: Any) -> None:
         """`reflections` is the layout of group 3 for draws that have pixels on planar reflectors."""
-        self._layouts = layouts
+        self._layouts, self._glazing = layouts, Glazing(layouts)
         self._shade, self._fringe = (Shading(layouts, stage, layouts.light, reflections) for stage in (SHADE, FRINGE))
         self._sky: dict[str, Any] = {}
 
@@ -128,6 +160,7 @@ class LightPass:
             if is_whole:  # sky and fringes are there already, and fringes cannot be laid over themselves
                 self._draw_sky(render, context, format)
                 self._fringe.draw(render, context, fringes, seen, (format,), light)
+                self._glazing.draw(render, context, seen, (format,))
             render.end()
             yield
         context.radiance = context.target.radiance
@@ -141,6 +174,7 @@ class LightPass:
             render = context.begin("missed light", [context.target.radiance.create_view()], load_op, band=band)
             self._shade.draw(render, context, context.draws, context.thin(band.shares), (format,), light)
             self._draw_sky(render, context, format)
+            self._glazing.draw(render, context, context.seen(band.shares), (format,))
             render.end()
             yield
 

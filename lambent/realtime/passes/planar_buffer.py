@@ -15,7 +15,7 @@ from lambent.realtime.context import FrameContext
 from lambent.realtime.integrators import INTEGRATORS
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.depth import DepthPass, draw_seen, set_geometry
-from lambent.realtime.passes.light import Shading, Stage
+from lambent.realtime.passes.light import Glazing, Shading, Stage
 from lambent.realtime.passes.sun import SunPass
 from lambent.realtime.pipelines import pipeline, screen_pipeline
 from lambent.realtime.planar_view import MOST_REFLECTORS, PlanarView, levels_of
@@ -156,7 +156,7 @@ class PlanarBufferPass:
         self._sun = SunPass(layouts, "cw")
         self._shading, self._walls = Shading(layouts, STAGE, layouts.light), PlanarWalls(layouts)
         self.buffer = lru_cache(MOST_REFLECTORS)(lambda size, lamps: PlanarBuffer.of(device, size, lamps))
-        self._lamps = PlanarLampsShown(layouts)
+        self._lamps, self._glazing = PlanarLampsShown(layouts), Glazing(layouts, STAGE.front_face)
         self.uniform = cache(lambda index: layouts.uniform(MIRRORED_VIEW_DTYPE.itemsize))
         self._frame = cache(lambda index: layouts.uniform(FRAME_DTYPE.itemsize))
         groups = [layouts.frame, layouts.cube]
@@ -174,7 +174,10 @@ class PlanarBufferPass:
         wanted = INTEGRATORS[context.state.integrator]
         few = INTEGRATORS["lamps" if wanted.lamps or wanted.progressive else "rings"]  # published ones, as they were
         diffuse = INTEGRATORS["diffuse"]
-        draws = [d.by(few if d.material.lobes else diffuse, context.resources, MIRRORED_N) for d in context.draws]
+        draws, panes = (
+            [d.by(few if d.material.lobes else diffuse, context.resources, MIRRORED_N) for d in of]
+            for of in (context.draws, context.panes)
+        )
         for index, (view, gone) in enumerate(zip(context.views, lamps, strict=True)):
             write(self._frame(index), 0, view.frame.tobytes())
             write(self.uniform(index), 0, view.uniform.tobytes())
@@ -183,7 +186,8 @@ class PlanarBufferPass:
             names = gone.objects if gone else ()
             shown = [replace(d, is_dark=True) if d.item.record.name in names else d for d in draws]
             frame = replace(
-                context, data=view.frame, frame_group=group, draws=shown, target=buffer.target, shown=None
+                context, data=view.frame, frame_group=group, draws=shown, panes=panes, target=buffer.target,
+                shown=None,
             )  # fmt: skip
             yield frame, buffer
 
@@ -206,6 +210,7 @@ class PlanarBufferPass:
             render.set_bind_group(1, resources.mirrored_sky_group)
             render.draw(3)
             context.counts["draw_calls"] += 1
+            self._glazing.draw(render, context, seen, FORMATS)
             render.end()
             yield
         if lamps is not None:

@@ -6,8 +6,10 @@ In the shaders of light its loops would cost an adapter in software half a frame
 from __future__ import annotations
 
 from functools import cache, lru_cache
+from typing import Any
 
 from lambent.realtime.context import FrameContext
+from lambent.realtime.draws import Draw
 from lambent.realtime.layouts import SHADOW_MAP, Layouts
 from lambent.realtime.passes.depth import draw_seen, set_geometry
 from lambent.realtime.pipelines import pipeline
@@ -20,37 +22,47 @@ FORMAT = "rgb10a2unorm"
 
 
 class SunPass:
-    """Draws what a frame's pixels see of the sun, where its depth is, and leaves `context.light`."""
+    """Draws what a frame's pixels see of the sun, where its depth is, and leaves `context.light`.
+
+    Panes have no depth. What they see is in a texture of its own, `context.pane_light`; of several in a pixel, one.
+    """
 
     def __init__(self, layouts: Layouts, front_face: str = "ccw") -> None:
         self._layouts = layouts
         module = layouts.device.create_shader_module(code=assemble("sun.wgsl"))
         groups = [layouts.frame, layouts.of(*SHADOW_MAP)]
         self._pipeline = cache(
-            lambda transmits, panes: pipeline(
-                layouts.device, module, "sun_main", groups, [FORMAT], compare="equal", front_face=front_face,
-                constants={"TRANSMITS": transmits, "PANES": panes},
+            lambda is_pane, transmits, panes: pipeline(
+                layouts.device, module, "sun_main", groups, [FORMAT], compare="greater" if is_pane else "equal",
+                front_face=front_face, constants={"TRANSMITS": transmits, "PANES": panes},
             )
         )  # fmt: skip
-        self._texture = lru_cache(MOST_REFLECTORS)(lambda size: target_texture(layouts.device, size, FORMAT))
+        self._texture = lru_cache(2 * MOST_REFLECTORS)(
+            lambda size, is_pane: target_texture(layouts.device, size, FORMAT)
+        )
 
     def encode(self, context: FrameContext) -> Steps:
         """Draw band by band; nothing where there is no sun."""
-        resources, size = context.resources, context.target.depth.size[:2]
-        sun = resources.sun
-        if not sun.exists:
-            context.light = resources.light_view, sun.uniform, sun.nowhere
-            return
-        view = self._texture(size).create_view()
-        for band in context.slicing.bands("sun", size):
+        resources, sun = context.resources, context.resources.sun
+        views = [sun.nowhere, sun.nowhere]
+        if sun.exists:
+            size = context.target.depth.size[:2]
+            for index, draws in enumerate((context.draws, context.panes)):
+                if draws:
+                    views[index] = self._texture(size, index).create_view()
+                    yield from self._encode(context, draws, views[index])
+        context.light, context.pane_light = ((resources.light_view, sun.uniform, view) for view in views)
+
+    def _encode(self, context: FrameContext, draws: list[Draw], view: Any) -> Steps:
+        sun = context.resources.sun
+        for band in context.slicing.bands("sun", context.target.depth.size[:2]):
             render = context.begin("sun", [view], band.load_op, band=band)
             render.set_bind_group(1, sun.group)
-            set_geometry(render, resources)
+            set_geometry(render, context.resources)
             seen = context.seen(band.shares)
-            for draw in context.draws:
+            for draw in draws:
                 record = draw.item.record
-                render.set_pipeline(self._pipeline(draw.material.transmits, sun.pane_layers))
+                render.set_pipeline(self._pipeline(draw.is_pane, draw.material.transmits, sun.pane_layers))
                 context.counts["draw_calls"] += draw_seen(render, seen, record.first_face, record.face_count)
             render.end()
             yield
-        context.light = resources.light_view, sun.uniform, view

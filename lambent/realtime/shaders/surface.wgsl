@@ -10,6 +10,7 @@
 
 override SAMPLES: u32 = 7u; // n per lobe
 override LOBES: u32 = 1u;
+override STRAIGHT: bool = false; // what lobes transmit passes straight on and is there already (glazing.wgsl)
 
 struct PlacedLobe {
     lobe: LambentLobe,
@@ -124,6 +125,11 @@ fn diffuse_light(cos_o: f32, e_here: vec3f, e_beyond: vec3f, painted: Painted) -
 // surface, retro-reflection is reflection mirrored about n.
 fn on_side(lobe: LambentLobe, w: vec3f) -> vec3f {
     return vec3f(select(w.xy, -w.xy, lobe.retro == 1u), select(w.z, -w.z, lobe.side == LAMBENT_TRANSMISSION));
+}
+
+// Whether the light of a lobe is summed.
+fn lobe_adds(lobe: LambentLobe) -> bool {
+    return !STRAIGHT || lobe.side == LAMBENT_REFLECTION;
 }
 
 // Whether what a planar reflector shows is what the lobe reflects; other lobes have the probe's light.
