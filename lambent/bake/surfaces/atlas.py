@@ -50,7 +50,7 @@ def unwrap(
     progress(0, 1, "unwrapping")
     pieces = pieces_of(scene.objects, longest_m)
     sizes_m = (sizes or even)(scene, pieces, resolution**2)
-    charts = charts_of(scene.objects, pieces, sizes_m)
+    charts = charts_of(scene.objects, pieces, sizes_m, progress)
     local, measures = zip(*(snapped(chart.corners) for chart in charts), strict=True)
     places, (width, height) = packed(list(local), list(measures))
     placed = [(corners + place) / (width, height) for corners, place in zip(local, places, strict=True)]

@@ -20,6 +20,7 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import normalize
 from lambent.core.errors import UserError
 from lambent.core.geometry import area_vectors, cross_2d, triangle_areas, triangle_normals
+from lambent.core.progress import Progress, silent
 from lambent.scenes.scene import Mesh, SceneObject
 
 PIECE_FACES = 1500  # more per piece is slower, fewer cost seams
@@ -72,7 +73,9 @@ def pieces_of(objects: tuple[SceneObject, ...], longest_m: float = np.inf) -> li
     return pieces
 
 
-def charts_of(objects: tuple[SceneObject, ...], pieces: list[Piece], sizes_m: Floats) -> list[Chart]:
+def charts_of(
+    objects: tuple[SceneObject, ...], pieces: list[Piece], sizes_m: Floats, progress: Progress = silent
+) -> list[Chart]:
     """Charts of all faces; `sizes_m` (N,) is the size of a texel on each piece, in metres."""
     unwrapped = _unwrapped(objects, pieces)
     charts = []
@@ -80,6 +83,7 @@ def charts_of(objects: tuple[SceneObject, ...], pieces: list[Piece], sizes_m: Fl
     for i, piece in enumerate(pieces):
         pieces_of_each[piece.owner].append(i)
     for owner, (o, mine) in enumerate(zip(objects, pieces_of_each, strict=True)):
+        progress(owner, len(objects), "unwrapping")
         size = np.zeros(len(o.mesh.faces))
         for i in mine:
             size[pieces[i].faces] = sizes_m[i]

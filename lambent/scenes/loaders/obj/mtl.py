@@ -22,7 +22,15 @@ from lambent.core.plain import Triple, is_number
 from lambent.materials.fresnel import r0_of
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
-from lambent.scenes.loaders.surfaces.surface import GREY, ROUGHNESS_MIN, SpecularLobe, Surface, metallic_roughness, rgb
+from lambent.scenes.loaders.surfaces.surface import (
+    GREY,
+    ROUGHNESS_MIN,
+    UNDESCRIBED,
+    SpecularLobe,
+    Surface,
+    metallic_roughness,
+    rgb,
+)
 from lambent.scenes.loaders.surfaces.texture_images import TextureImage, TextureImages
 from lambent.scenes.loaders.surfaces.textured import Textured, absolute, combined, constant, scaled
 from lambent.scenes.scene import Texture, UvTransform
@@ -90,7 +98,7 @@ class Library:
         if entry is not None:
             return _Reading(entry, self._images, notes).surface()
         if name != DEFAULT:
-            notes.append("is not described: it is grey")
+            notes.append(UNDESCRIBED)
         return Surface.grey()
 
 

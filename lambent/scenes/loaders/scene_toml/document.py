@@ -35,6 +35,7 @@ from lambent.scenes.loaders.scene_toml.schema import (
 )
 from lambent.scenes.loaders.scene_toml.text import toml_of
 from lambent.scenes.loaders.scene_toml.variants import variants_told
+from lambent.scenes.loaders.surfaces.surface import UNDESCRIBED
 from lambent.scenes.scene import (
     Environment,
     ImageEnvironment,
@@ -84,7 +85,13 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         files.use(environment.file)
     cameras = tuple(c.camera(c.name) for c in document.cameras) or tuple(v for c in contents for v in c.cameras)
     lights = (*(light for c in contents for light in c.lights), *_lights(document, path, files))
-    notes = (*whole.warnings, *unfit, *missing, *lights_that_stay(objects, dressings))
+    needless = {f"material {name}: {UNDESCRIBED}" for name in described}
+    notes = (
+        *(note for note in whole.warnings if note not in needless),
+        *unfit,
+        *missing,
+        *lights_that_stay(objects, dressings),
+    )
     if environment is None and not lights and not any(any(o.emission) for o in objects):
         environment, notes = DAYLIGHT, (*notes, "nothing in it emits light: it gets daylight")
     _check_names([c.name for c in cameras], path, "cameras")

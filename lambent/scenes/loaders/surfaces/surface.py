@@ -16,6 +16,7 @@ from lambent.scenes.scene import Texture
 ROUGHNESS_MIN = 0.003  # slope; below, single precision loses the lobe
 BLACK = np.zeros(3)
 GREY = 0.5  # of surfaces that are not described
+UNDESCRIBED = "is not described: it is grey"
 
 
 @dataclass(frozen=True)
