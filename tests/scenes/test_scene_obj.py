@@ -314,8 +314,7 @@ def test_a_material_that_the_scene_describes_is_not_called_grey(tmp_path: Path) 
     (tmp_path / "two.obj").write_text(
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl red\nf 1 2 3\nusemtl plain\nf 1 2 4\n"
     )
-    (tmp_path / "scene.toml").write_text(
-        'format = "lambent-scene"\nversion = 1\nname = "two"\ngeometry = "two.obj"\n[materials.red]\nkd = [0.5, 0.1, 0.1]'
-    )
+    head = 'format = "lambent-scene"\nversion = 1\nname = "two"\ngeometry = "two.obj"\n'
+    (tmp_path / "scene.toml").write_text(head + "[materials.red]\nkd = [0.5, 0.1, 0.1]\n")
     scene = load_scene(tmp_path / "scene.toml")
     assert [w for w in scene.warnings if "it is grey" in w] == ["material plain: is not described: it is grey"]
