@@ -172,7 +172,7 @@ def _interval(editor: Editor, parameter: str, model: Parameter) -> None:
     log = model.scale == "log"
     changed, low, high = imgui.drag_float_range2(
         f"sought##{parameter}", *interval, 0.002 * (model.high - model.low), model.low, model.high,
-        "%.4f" if log else "%.3f", None, imgui.SliderFlags_.always_clamp,
+        "%.4g" if log else "%.3f", None, imgui.SliderFlags_.always_clamp,
     )  # fmt: skip
     explain(f"the interval where a fit may seek {parameter}")
     if changed and low < high:

@@ -58,7 +58,7 @@ def slider(
     flags = imgui.SliderFlags_.always_clamp
     if log:
         flags |= imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
-    changed, moved = imgui.slider_float(label, value, low, high, ("%.4f" if log else "%.3f") + unit, flags)
+    changed, moved = imgui.slider_float(label, value, low, high, ("%.4g" if log else "%.3f") + unit, flags)
     explain(meaning)
     return min(max(moved, low), high) if changed else value
 
