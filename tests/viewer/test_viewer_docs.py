@@ -28,8 +28,9 @@ def test_the_numbers_are_those_of_the_code():
     assert f"{measurement.FEW:,} tuples".replace(",", " ") in TEXT
     assert f"{1 / pacing.BUDGET_S:.0f} frames a second" in TEXT
     assert f"{100 * walls.STEP_M:.0f} cm" in TEXT
-    assert "Edits\nbegin with {} lights; when {} are there".format(*baking.LIGHTS) in TEXT
-    assert painter.FADE_S == 0.5 and "in half a second" in TEXT
+    sentences = " ".join(TEXT.split())
+    assert "Edits begin with {} lights; when {} are there".format(*baking.LIGHTS) in sentences
+    assert painter.FADE_S == 0.5 and "in half a second" in sentences
 
 
 def test_every_documented_key_is_one_of_the_window():
