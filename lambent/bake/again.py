@@ -65,9 +65,9 @@ def bake_again(
     """
     store = Store.open(folder)
     if not isinstance(store.documents.get(SOURCE), str):
-        raise UserError("the store does not say where its scene is", file=folder, hint="bake the scene from its file")
+        raise UserError("store has no path of its scene file", file=folder, hint="bake the scene again from its file")
     if LIGHT not in store:
-        raise UserError("the store has no light map that could be baked again", file=folder, field=LIGHT)
+        raise UserError("store has no light map", file=folder, field=LIGHT)
     made_with = store.artefact(LIGHT).meta
     scene = scene_of(store)
     worn = {name: Look(scene.materials[name], of) for name, of in (textures or {}).items()}
@@ -82,8 +82,8 @@ def bake_again(
     effort, seed = quality or str(made_with.get("quality")), int(made_with.get("seed", 0))
     with bake(scene, copy, only={"geometry"}, quality=effort, seed=seed, progress=progress) as copied:
         if not _same_geometry(store, copied):
-            hint = "`lambent bake` of the scene with these materials shows it"
-            raise UserError("these materials need probes or parts that the store does not have", file=folder, hint=hint)
+            hint = "bake the scene with these materials"
+            raise UserError("these materials need probes or parts that the store lacks", file=folder, hint=hint)
     return bake(scene, copy, only=set(KINDS), quality=effort, seed=seed, progress=progress, watch=watch)
 
 
@@ -105,15 +105,15 @@ def _check_parts(store: Store, scene: Scene, materials: Mapping[str, Material]) 
         if wanted.transmits and not given.transmits and BACK not in store:
             lacks = "a light map of its far side"
         if lacks:
-            hint = f"a [[variants]] of the scene with {name} so makes `lambent bake` bake it"
-            hint = hint if lacks == "a probe" else f"bake the scene with {name} so"
-            raise UserError(f"as it is now it needs {lacks}, which the store lacks", field=name, hint=hint)
+            hint = f"add a [[variants]] with this {name} to the scene, and bake it"
+            hint = hint if lacks == "a probe" else f"bake the scene with this {name}"
+            raise UserError(f"needs {lacks}, which the store lacks", field=name, hint=hint)
 
 
 def _prepare(store: Store, folder: Path) -> None:
     """Make the copy with the geometry and the notes of the store, where it is not there yet."""
     if (folder / MANIFEST).exists() and Store.open(folder).documents.get(COPY_OF) != store.folder.name:
-        raise UserError("is another store", file=folder, hint="move it: the light of edited materials is baked there")
+        raise UserError("is another store", file=folder, hint="move it: edited materials are baked into this folder")
     with Store.create(folder, store.inputs) as copy:
         for name, document in store.documents.items():
             if name not in (TIMINGS, LAST_RUN):

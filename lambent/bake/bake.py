@@ -117,7 +117,7 @@ def bake(
     order = in_order(kinds, usual if only is None else only)
     of_views = [kind for kind in only or () if getattr(kinds[kind], "OF_VIEWS", False)]
     if of_views and not views:
-        raise UserError("is baked for views alone", field=of_views[0], hint="name them with --view CAMERA")
+        raise UserError("is baked for views only", field=of_views[0], hint="name them with --view CAMERA")
     if not scene.objects:
         raise UserError("scene has no objects", field=scene.name)
     check_memory(scene)

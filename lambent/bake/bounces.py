@@ -37,9 +37,13 @@ class Bounces:
     def __post_init__(self) -> None:
         said = ",".join(map(str, self.series))
         if not 2 <= len(self.series) <= MOST_HITS:
-            raise UserError("not a series of bounces", field="series", got=said, expected=f"2 to {MOST_HITS} numbers")
+            raise UserError(
+                "cannot be read as a series of bands", field="series", got=said, expected=f"2 to {MOST_HITS} numbers"
+            )
         if any(n < 1 or n > 256 or n & (n - 1) for n in self.series):
-            raise UserError("not a series of bounces", field="series", got=said, expected="powers of two up to 256")
+            raise UserError(
+                "cannot be read as a series of bands", field="series", got=said, expected="powers of two up to 256"
+            )
         if any(n > 1 for n in self.series[2:]):
             raise UserError(
                 "bands beyond the second surface", field="series", got=said, expected="1 from the third number on"
@@ -61,4 +65,6 @@ class Bounces:
         try:
             return tuple(int(part) for part in text.split(","))
         except ValueError:
-            raise UserError("not a series of bounces", field="series", got=text, expected="as in 64,1,1,1") from None
+            raise UserError(
+                "cannot be read as a series of bands", field="series", got=text, expected="numbers, as in 64,1,1,1"
+            ) from None

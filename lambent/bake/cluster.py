@@ -51,7 +51,7 @@ def opened(count: int | None = None, address: str | None = None) -> Iterator[Das
     except ImportError as error:
         raise UserError("Dask is not installed", field="workers", hint="pip install 'lambent[cluster]'") from error
     if (count is None) == (address is None):
-        raise UserError("workers are counted or have an address", field="workers", expected="one of both")
+        raise UserError("workers and cluster exclude each other", field="workers", expected="one of both")
     if count is not None and count < 1:
         raise UserError("no workers", field="workers", got=count, expected="at least 1")
     warnings.filterwarnings("ignore", "Sending large graph")  # tiles go with their jobs on purpose
@@ -72,7 +72,7 @@ def opened(count: int | None = None, address: str | None = None) -> Iterator[Das
             client.wait_for_workers(1, timeout=SECONDS)
         except (OSError, TimeoutError, ValueError) as error:
             hint = "start a scheduler with `dask scheduler` and workers with `dask worker ADDRESS --nthreads 1`"
-            raise UserError("no workers answer", field="cluster", got=address, hint=hint) from error
+            raise UserError("no worker answered", field="cluster", got=address, hint=hint) from error
         yield DaskWorkers(client, threads)
 
 
@@ -130,8 +130,8 @@ class DaskWorkers:
                 try:
                     done = wait(list(waiting), return_when="FIRST_COMPLETED").done
                 except asyncio.CancelledError as error:
-                    hint = "what is finished stays; bake again to go on"
-                    raise UserError("the scheduler is gone", field="cluster", hint=hint) from error
+                    hint = "finished work is kept; run the same command to continue"
+                    raise UserError("lost the connection to the scheduler", field="cluster", hint=hint) from error
                 for future in done:
                     yield waiting.pop(future), _result(future)
         finally:
@@ -149,8 +149,8 @@ def _result(future: Any) -> Any:
     try:
         return future.result()
     except KilledWorker as error:
-        hint = "their logs say why; where memory is short, fewer workers have more of it each"
-        raise UserError("a tile was with several workers that died", field="workers", hint=hint) from error
+        hint = "see their logs; where memory is short, use fewer workers"
+        raise UserError("several workers died while tracing the same tile", field="workers", hint=hint) from error
 
 
 def _same(work: bytes) -> bytes:
@@ -164,7 +164,7 @@ def _do(work: bytes, job: bytes, makers: dict[str, str], threads: int | None) ->
         mine = made_with()
         for name, wanted in makers.items():
             if mine[name] != wanted:
-                raise UserError(f"a worker has another {name}", field="workers", got=mine[name], expected=wanted)
+                raise UserError(f"a worker has a different {name}", field="workers", got=mine[name], expected=wanted)
         if threads is not None:
             _limit(threads)
         return _loaded(work)(pickle.loads(job))

@@ -56,7 +56,7 @@ def check_groups(methods: Mapping[str, str]) -> None:
     """`UserError` where light is to be sorted by a method that cannot."""
     if sorts_light(methods) and methods["light_map"] == LightMapMethod.photons:
         hint = "bake with --light-map paths, or with --light-groups none"
-        raise UserError("photons are not sorted by group", field="--light-groups", got="scene", hint=hint)
+        raise UserError("photons cannot be stored by light group", field="--light-groups", got="scene", hint=hint)
 
 
 def sorts_light(methods: Mapping[str, str]) -> bool:

@@ -65,8 +65,8 @@ def run(
     `reference`: finished pictures of the only input's first camera, each of equally many samples and another seed.
     """
     if reference and len(inputs) != 1:
-        got, expected = f"{len(inputs)} inputs", "one baked store, whose first camera it shows"
-        raise UserError("a reference is of one store", field="--reference", got=got, expected=expected)
+        got, expected = f"{len(inputs)} inputs", "one store, of whose first camera it is a picture"
+        raise UserError("a reference belongs to one store", field="--reference", got=got, expected=expected)
     pictures = finished(reference)
     with given_or_baked(inputs, effort.scene, progress) as stores:
         parts = [part_of(progress, k, k + 1, s.folder.name) for k, s in enumerate(stores)]

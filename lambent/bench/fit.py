@@ -77,7 +77,7 @@ def run(
     """Rows per file, metric, model, number of lobes and method."""
     published = {path.stem: read_fits(path) for path in against}
     if published and not inputs:
-        raise UserError("published fits have to be held against a measurement", field="--against", hint="add --input")
+        raise UserError("published fits are compared with a measurement", field="--against", hint="add --input")
     rows: list[dict[str, Any]] = []
     sources: Sequence[Path | Material] = inputs or effort.known
     for done, source in enumerate(sources):

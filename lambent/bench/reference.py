@@ -58,7 +58,7 @@ def finished(paths: Sequence[Path]) -> list[Floats]:
     for path in paths:
         if path.suffix.lower() not in HDR_SUFFIXES:
             hint = "lambent render STORE --integrator path -o reference.exr"
-            raise UserError("a reference holds radiance", file=path, expected=".exr or .hdr", hint=hint)
+            raise UserError("a reference must hold radiance", file=path, expected=".exr or .hdr", hint=hint)
         picture = read_image(path)
         if found and picture.shape != found[0].shape:
             size, first = (f"{shape[1]}x{shape[0]}" for shape in (picture.shape, found[0].shape))

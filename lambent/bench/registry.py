@@ -62,13 +62,13 @@ def run_bench(
     options |= {"settings": settings} if settings is not None else {}
     refused = options.keys() - inspect.signature(module.run).parameters.keys()
     if "inputs" in refused:
-        raise UserError("this bench reads no inputs", got=inputs[0])
+        raise UserError("this bench takes no inputs", got=inputs[0])
     if "reference" in refused:
-        raise UserError("this bench takes no finished reference", field="--reference", got=name)
+        raise UserError("this bench takes no reference", field="--reference", got=name)
     if "settings" in refused:
-        raise UserError("this bench draws no settings at random", field="--settings", got=name)
+        raise UserError("this bench has no random settings", field="--settings", got=name)
     if refused:
-        raise UserError("this bench compares with nothing published", field="--against", got=name)
+        raise UserError("this bench takes no published fits", field="--against", got=name)
     if isinstance(effort, str):
         effort = {"full": module.FULL, "quick": module.QUICK}[effort]
     measured = module.run(effort, progress=progress, **options)

@@ -28,5 +28,5 @@ def given_or_baked(inputs: Sequence[Path], scene: str, progress: Progress) -> It
 def first_camera(store: Store, record: SceneRecord) -> Camera:
     """The camera whose view is measured; a `UserError` where a store has none."""
     if not record.cameras:
-        raise UserError("store has no camera", file=store.folder, expected="one whose view is compared")
+        raise UserError("store has no camera", file=store.folder, expected="a camera whose view is compared")
     return record.cameras[0]

@@ -39,73 +39,85 @@ MOST_WARNINGS = 12  # lines on stderr; --json and `lambent inspect` have all
 
 def command(
     scene: Annotated[str, typer.Argument(help="scene.toml, glTF, OBJ, Mitsuba XML, or builtin:room.")],
-    output: Annotated[Path | None, typer.Option("-o", help="Folder of the store.")] = None,
-    only: Annotated[list[Kind] | None, typer.Option(help="Bake this kind and what it needs. Repeatable.")] = None,
-    quality: Annotated[QualityName, typer.Option(help="How much work to put in.")] = QualityName.preview,
-    resume: Annotated[bool, typer.Option("--resume/--anew", help="Keep what is up to date, or bake it all.")] = True,
+    output: Annotated[Path | None, typer.Option("-o", help="Folder of the store to write.")] = None,
+    only: Annotated[list[Kind] | None, typer.Option(help="Bake this kind and the kinds it needs. Repeatable.")] = None,
+    quality: Annotated[QualityName, typer.Option(help="Resolution and sample counts.")] = QualityName.preview,
+    resume: Annotated[
+        bool, typer.Option("--resume/--anew", help="Keep what is up to date, or bake everything again.")
+    ] = True,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same store.")] = 0,
     light_map: Annotated[
         LightMapMethod | None,
-        typer.Option(help="What integrates the light map. [default: as in the store, else paths]"),
+        typer.Option(help="Method for the light map. [default: as in the store, else paths]"),
     ] = None,
     probes: Annotated[
         ProbeMethod | None,
-        typer.Option(help="Probes from the light map, or path traced. [default: as in the store, else cached]"),
+        typer.Option(
+            help="Light in probes: read from the light map, or path traced. [default: as in the store, else cached]"
+        ),
     ] = None,
     light_groups: Annotated[
         LightGroupMethod | None,
-        typer.Option(help="Keep light by group of lamps, to be dimmed later. [default: as in the store, else none]"),
+        typer.Option(
+            help="Store the light of each light group, to dim it later. [default: as in the store, else none]"
+        ),
     ] = None,
     light_fields: Annotated[
         str | None,
         typer.Option(
-            help="Objects that get a light field: NAME,... with * and ?; scene, those it names; auto, chosen; or none. "
+            help="Objects that get a light field: NAME,... (with * and ?), scene (as its file says), auto or none. "
             "[default: as in the store, else scene]"
         ),
     ] = None,
     light_field_mb: Annotated[
         float | None,
-        typer.Option(min=1, help="Memory of light fields chosen by auto. [default: as in the store, else 256]"),
+        typer.Option(min=1, help="Memory budget of auto, in MB. [default: as in the store, else 256]"),
     ] = None,
     view: Annotated[
         list[str] | None,
-        typer.Option(help="CAMERA[:WIDTHxHEIGHT] whose materials are to be edited, 512x512 by default. Repeatable."),
+        typer.Option(
+            help="CAMERA[:WIDTHxHEIGHT]: a view whose materials you will edit, 512x512 by default. Repeatable."
+        ),
     ] = None,
     edit: Annotated[
-        Path | None, typer.Option(help="Session of edits: its view, with its materials and its environment.")
+        Path | None,
+        typer.Option(help="Session of edits (.edits.json): bake its view, with its materials and its environment."),
     ] = None,
     series: Annotated[
-        str, typer.Option(help="Of interreflections: bands of sharp curves at the first surface, the second, ...")
+        str, typer.Option(help="Interreflections: bands per curve at the first surface, the second, ...")
     ] = "64,1,1,1",
     samples: Annotated[
-        int, typer.Option(min=1, help="Of interreflections: paths per pixel, added to those there.")
+        int, typer.Option(min=1, help="Interreflections: paths per pixel; paths in the store count.")
     ] = 1024,
     fixed: Annotated[
         list[str] | None,
-        typer.Option(help="Of interreflections: a material that is not edited, beside those proposed. Repeatable."),
+        typer.Option(help="Interreflections: a material that you will not edit. Repeatable."),
     ] = None,
     diffuse_seen: Annotated[
-        bool, typer.Option("--diffuse-seen", help="Of interreflections: surfaces seen in others are diffuse.")
+        bool, typer.Option("--diffuse-seen", help="Interreflections: treat surfaces seen in others as diffuse.")
     ] = False,
     editable: Annotated[
         list[str] | None,
-        typer.Option(help="Of interreflections: a material that is edited, whatever is proposed. Repeatable."),
+        typer.Option(help="Interreflections: a material that you will edit, proposed or not. Repeatable."),
     ] = None,
     merge: Annotated[
-        bool, typer.Option("--merge", help="Of interreflections: merge materials that look the same, to need less.")
+        bool, typer.Option("--merge", help="Interreflections: merge materials that look the same, to save memory.")
     ] = False,
     propose: Annotated[
         bool,
-        typer.Option("--propose", help="Say what would be edited in interreflections and what it takes; bake nothing."),
+        typer.Option(
+            "--propose",
+            help="Print the materials that interreflections would cover, with time and memory; bake nothing.",
+        ),
     ] = False,
     workers: Annotated[
-        int | None, typer.Option(min=1, help="Of interreflections: processes of this machine that share the work.")
+        int | None, typer.Option(min=1, help="Interreflections: number of processes on this machine.")
     ] = None,
-    cluster: Annotated[str | None, typer.Option(help="Of interreflections: address of a Dask scheduler.")] = None,
+    cluster: Annotated[str | None, typer.Option(help="Interreflections: address of a Dask scheduler.")] = None,
     crease_angle: CreaseAngle = None,
     json: Json = False,
 ) -> None:
-    """Bake light maps, environment and probes of a scene. Ctrl-C keeps what is finished; run it again to go on.
+    """Bake the light map, environment and probes of a scene. Ctrl-C keeps finished work; the same command continues.
 
     Example: lambent bake builtin:room -o room.store --quality preview
 
@@ -124,7 +136,7 @@ def command(
     from lambent.store.contract import LAST_RUN, TIMINGS
 
     if output is None and not propose:
-        raise UserError("no folder for the store", field="-o", hint="name one, or ask with --propose what it takes")
+        raise UserError("no output folder", field="-o", hint="add -o STORE, or --propose to see what a bake takes")
     start = time.perf_counter()
     session = Session.open(edit) if edit is not None else None
     if session is not None and crease_angle is None:
@@ -138,7 +150,7 @@ def command(
         _check_session(session.document, what, edit)
         what = what.merged(session.document.merged)
     if edited["views"] and only is not None and not set(only) & set(modules_in(artefacts, having="OF_VIEWS")):
-        raise UserError("views are baked for editing", field="--only", got=", ".join(only), expected="transport")
+        raise UserError("no kind uses the given view", field="--only", got=", ".join(only), expected="transport")
     bounced = propose or INTERREFLECTION in (only or ())
     _check_choice(what, fixed or [], editable or [], merge, bounced)
     bounces = Bounces(Bounces.of_text(series), samples, frozenset(fixed or ()), diffuse_seen)
@@ -184,23 +196,23 @@ def _light_fields_in_words(fields: list[dict[str, Any]]) -> str:
         )
         for one in fields
     ]  # fmt: skip
-    return table([("light field of", "points", "MB", "seconds", "error of its probe", "and its own"), *rows])
+    return table([("light field of", "points", "MB", "seconds", "error with probe", "with light field"), *rows])
 
 
 def _check_lit(scene: Scene) -> None:
-    """`UserError` where no picture of the scene could show anything: after its bake that is too late."""
+    """Raise `UserError` before the bake where every picture of the scene would be black or impossible."""
     shines = scene.environment is not None or scene.lights or any(any(o.emission) for o in scene.objects)
     if not shines or not scene.cameras:
-        lacks, section = ("nothing gives light", "[environment]") if not shines else ("no camera", "[[cameras]]")
+        lacks, section = ("has no light", "[environment]") if not shines else ("has no camera", "[[cameras]]")
         raise UserError(lacks, field=scene.name, hint=f"add {section} to its scene.toml")
 
 
 def _say_warnings(warnings: Sequence[str]) -> None:
-    """What the scene's loader left out or changed, before the time of a bake is spent on it."""
+    """Say what the scene's loader left out or changed, before the bake takes its time."""
     for text in warnings[:MOST_WARNINGS]:
         say(f"warning: {text}")
     if (more := len(warnings) - MOST_WARNINGS) > 0:
-        say(f"and {more} more warnings, which `lambent inspect` lists")
+        say(f"and {more} more warnings; `lambent inspect` lists all")
 
 
 def _check_session(document: SessionDocument, scene: Scene, file: Path | None) -> None:
@@ -213,12 +225,14 @@ def _check_session(document: SessionDocument, scene: Scene, file: Path | None) -
 def _check_choice(scene: Scene, fixed: list[str], editable: list[str], merge: bool, bounced: bool) -> None:
     options = {"--fixed": fixed, "--editable": editable, "--merge": merge}
     if not bounced and (given := [option for option, value in options.items() if value]):
-        raise UserError("is for interreflections", field=given[0], hint="add --only interreflection")
+        raise UserError("applies to interreflections only", field=given[0], hint="add --only interreflection")
     for option, names in (("--fixed", fixed), ("--editable", editable)):
         for name in names:
             known("material", name, scene.materials, field=option)
     if both := sorted({*fixed} & {*editable}):
-        raise UserError("a material is fixed or edited", field="--editable", got=both[0], hint="leave out --fixed")
+        raise UserError(
+            "material is both --fixed and --editable", field="--editable", got=both[0], hint="leave out one"
+        )
 
 
 def _proposed(
@@ -231,7 +245,7 @@ def _proposed(
     edited: dict[str, Any],
     progress: Progress,
 ) -> tuple[Scene, Bounces, list[Proposal]]:
-    """The scene and the bounces as proposed, which stderr says before the bake; or as the store has them."""
+    """Scene and bounces as the store has them, or as proposed; a proposal is printed on stderr before the bake."""
     from dataclasses import replace
 
     from lambent.bake.interreflection.proposal import held_by, propose_all
@@ -239,12 +253,12 @@ def _proposed(
 
     views, light = edited["views"], edited.get("environment")
     if not views:
-        raise UserError("no view", field="--view", hint="name a camera, or a session with --edit")
+        raise UserError("is missing", field="--view", hint="name a camera, or a session with --edit")
     chosen = bool(bounces.fixed or editable or merge)
     if store is not None and not chosen:
         held = [held_by(store, scene, view, bounces.series) for view in views]
         if (first := held[0]) is not None and all(one == first for one in held):
-            say(f"goes on with the materials that the store edits: {', '.join(sorted(first.edited))}")
+            say(f"continuing with the materials that the store has: {', '.join(sorted(first.edited))}")
             scene = first.merged(scene)
             return scene, replace(bounces, fixed=frozenset(worn(scene)) - first.edited), []
     found = propose_all(
@@ -258,7 +272,7 @@ def _proposed(
 
 
 def _watch(scene: Scene, store: Path, bounces: Bounces, edited: dict[str, Any], progress: Progress) -> PassNoise:
-    """What notes in the store how noisy its interreflections are."""
+    """The recorder of the noise of interreflections in the store."""
     from lambent.bake.interreflection.series import worn
     from lambent.editing.interreflection.noise import PassNoise
     from lambent.materials.factored.of_lobes import of_material
@@ -270,9 +284,9 @@ def _watch(scene: Scene, store: Path, bounces: Bounces, edited: dict[str, Any], 
 
 
 def _workers(count: int | None, address: str | None, unused: bool) -> AbstractContextManager[Workers | None]:
-    """Who does the work of interreflections; None: this process."""
+    """The workers that trace interreflections; None stands for this process."""
     if count is not None and address is not None:
-        raise UserError("workers are counted or have an address", field="--cluster", hint="leave out --workers")
+        raise UserError("--workers and --cluster exclude each other", field="--cluster", hint="leave out one")
     if unused or (count is None and address is None):
         return nullcontext()
     from lambent.bake.cluster import opened
@@ -283,7 +297,7 @@ def _workers(count: int | None, address: str | None, unused: bool) -> AbstractCo
 def _edited(
     scene: Scene, store: Path | None, names: list[str], session: Session | None
 ) -> tuple[dict[str, Any], frozenset[str]]:
-    """What `bake` gets for views of these names, cameras or saved views, or of a session, and what it edits."""
+    """Arguments of `bake` for the named views or a session's view, and the names of the edited materials."""
     from lambent.bake.view import View, view_named
     from lambent.store.views import read_views
 

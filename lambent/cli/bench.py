@@ -11,22 +11,24 @@ from lambent.cli.console import Json, progress_bar, show, table, words
 
 
 def command(
-    name: Annotated[str, typer.Argument(help="Which one; an unknown name lists them.")],
+    name: Annotated[str, typer.Argument(help="Name of the bench; an unknown name lists all.")],
     quick: Annotated[bool, typer.Option("--quick", help="The same rows at a smaller size, under a minute.")] = False,
-    input_: Annotated[list[Path] | None, typer.Option("--input", help="Run it on your own file. Repeatable.")] = None,
+    input_: Annotated[list[Path] | None, typer.Option("--input", help="Measure your own file. Repeatable.")] = None,
     against: Annotated[
-        list[Path] | None, typer.Option(help="Published parameters (.fit) to compare with (fit). Repeatable.")
+        list[Path] | None, typer.Option(help="Bench fit: published parameters (.fit) to compare with. Repeatable.")
     ] = None,
     settings: Annotated[
-        int | None, typer.Option(help="Random settings of materials in each row (gi-edit), 20 unless --quick.")
+        int | None, typer.Option(help="Bench gi-edit: random material settings per row, 20 unless --quick.")
     ] = None,
     reference: Annotated[
         list[Path] | None,
-        typer.Option(help="Path traced pictures (.exr) of the input's first camera, equal in samples (equal-time)."),
+        typer.Option(
+            help="Bench equal-time: path traced pictures (.exr) of the input's first camera, equal in samples."
+        ),
     ] = None,
     json: Json = False,
 ) -> None:
-    """Measure, and print the rows with the machine they were measured on.
+    """Run a bench and print its rows and the machine.
 
     Example: lambent bench fit --quick --json
     """

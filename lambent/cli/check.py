@@ -22,23 +22,25 @@ if TYPE_CHECKING:
 def command(
     subject: Annotated[str, typer.Argument(help="Material document, measured file, or the name of a model.")],
     values: Annotated[
-        list[str] | None, typer.Option("--set", help="Parameter of a model: NAME=VALUE or NAME=R,G,B; repeatable.")
+        list[str] | None, typer.Option("--set", help="Parameter of a model: NAME=VALUE or NAME=R,G,B. Repeatable.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same report.")] = 0,
     normalise: Annotated[
-        bool, typer.Option("--normalise", help="Write a document's energy-safe version instead: alpha lowered, then k.")
+        bool, typer.Option("--normalise", help="Write an energy-conserving version of a document: lower alpha, then k.")
     ] = False,
-    output: Annotated[Path | None, typer.Option("-o", help="With --normalise: document to write (.json).")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", help="With --normalise: material document to write (.json).")
+    ] = None,
     reconstruction: Between = "auto",
     force: Force = False,
     json: Json = False,
 ) -> None:
     """Check reciprocity, energy, and the sampler by chi-square and hemisphere integrals.
 
-    For a measured table it reports percentages, and fails only faults that no device explains.
+    A measured table fails only for faults that no measuring device explains; other deviations are reported in per cent.
     The exit code is 1 when the check fails.
 
-    --normalise says what changed and by how much; where no direction returns more than arrives, nothing is written.
+    --normalise prints what changed and by how much; it writes nothing where the material already conserves energy.
 
     Example: lambent check brushed.json
 
@@ -77,14 +79,14 @@ def _normalise(
 
     if not asked or output is None:
         lacking = "-o" if output is None else "--normalise"
-        raise UserError("--normalise and -o go together", hint=f"{lacking} is missing: --normalise -o OUT.json")
+        raise UserError("is missing", field=lacking, hint="use both: --normalise -o OUT.json")
     check_output(output, (".json",), force=force, inputs=[subject])
     found = _subject(subject, values)
     if isinstance(found, Model):
-        raise UserError("only material documents can be normalised, not a model", got=subject)
+        raise UserError("is a model; only a material document can be normalised", got=subject)
     if not isinstance(found, Material):
         hint = f"fit it first: lambent fit {subject} -o material.json"
-        raise UserError("only material documents can be normalised, not a table", file=subject, hint=hint)
+        raise UserError("is a measured table; only a material document can be normalised", file=subject, hint=hint)
     with progress_bar() as progress:
         done = normalisation(found, seed, progress)
     if done.needed:
@@ -100,12 +102,12 @@ def _subject(name: str, values: list[str], reconstruction: Between = "auto") -> 
 
     if Path(name).exists():
         if values:
-            raise UserError("only models take --set", file=name, got=values[0])
+            raise UserError("only a model takes parameters", file=name, field="--set", got=values[0])
         return subject_of(Path(name), reconstruction)
     found = models()
     if name not in found:
         expected = f"a file, or a model: {', '.join(found)}"
-        raise UserError("neither a file nor a model", got=name, expected=expected, hint=did_you_mean(name, found))
+        raise UserError("is neither a file nor a model", got=name, expected=expected, hint=did_you_mean(name, found))
     return found[name](**dict(_value(text) for text in values))
 
 
@@ -117,7 +119,7 @@ def _value(text: str) -> tuple[str, object]:
     except ValueError:
         value = []
     if not (name and equals and value):
-        raise UserError("not a parameter", field="--set", got=text, expected="NAME=VALUE or NAME=R,G,B")
+        raise UserError("cannot be read as a parameter", field="--set", got=text, expected="NAME=VALUE or NAME=R,G,B")
     return name.strip(), value if len(value) > 1 else value[0]
 
 
@@ -132,14 +134,17 @@ def describe(report: CheckReport | TableReport) -> str:
     else:
         rows = [
             ("reciprocity", f"swapping wi and wo changes {report.reciprocity_share:.1%} of the light"),
-            ("in the path tracer", f"what it looks up deviates by {report.resampling_share:.1%} of the light"),
+            (
+                "in the path tracer",
+                f"its look-up deviates from the table by {report.resampling_share:.1%} of the light",
+            ),
         ]
         integrals = [
-            (f"albedo at {i.theta_deg:g} deg", f"{i.from_table:.4f} by the table, {i.quadrature:.4f} by quadrature")
+            (f"albedo at {i.theta_deg:g} deg", f"{i.from_table:.4f} from the table, {i.quadrature:.4f} by quadrature")
             for i in report.integrals
         ]
         if report.negative_readings:
-            rows.append(("readings below zero", f"{report.negative_readings}; they are drawn as 0"))
+            rows.append(("readings below zero", f"{report.negative_readings}; drawn as 0"))
     sampler = [
         (f"sampler at {one.theta_deg:g} deg", f"chi-square p {one.p_value:.3f}, density integrates to "
          f"{one.pdf_integral:.4f}, albedo {one.albedo_sampled:.4f} (quadrature {one.albedo_quadrature:.4f})")
@@ -152,14 +157,14 @@ def describe(report: CheckReport | TableReport) -> str:
         *sampler,
     ]
     faults = [*(f"warning: {text}" for text in report.warnings), *(f"FAILED: {text}" for text in report.failures)]
-    return "\n".join([table(rows), *faults, "passed" if report.passed else "not passed"])
+    return "\n".join([table(rows), *faults, "passed" if report.passed else "failed"])
 
 
 def describe_normalisation(done: Normalisation, output: Path) -> str:
-    """The changes, their size under the metrics, and the file written."""
+    """The changes, their errors under every metric, and the written file."""
     if not done.needed:
         where = "highest albedo {:.4f} at theta {:g} deg, phi {:g} deg".format(*done.highest[0])
-        return f"{where}: nothing exceeds 1, nothing written"
+        return f"{where}: no albedo exceeds 1, nothing written"
     rows = [
         ("changed", "before", "after"),
         *((name, _numbers(was), _numbers(now)) for name, (was, now) in done.changed.items()),

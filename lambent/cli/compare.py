@@ -12,16 +12,16 @@ from lambent.core.errors import UserError
 
 
 def command(
-    reference: Annotated[Path, typer.Argument(help="Image taken as the truth: EXR, HDR, PNG or JPEG.")],
-    test: Annotated[Path, typer.Argument(help="Image to judge, of the same size.")],
+    reference: Annotated[Path, typer.Argument(help="Reference image: EXR, HDR, PNG or JPEG.")],
+    test: Annotated[Path, typer.Argument(help="Image to compare with it, of the same size.")],
     output: Annotated[Path | None, typer.Option("-o", help="Write the FLIP difference as an image (.png).")] = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
     """Compare two images: PSNR, RMSE in RGB and L*a*b*, FLIP with its worst 16x16 tile.
 
-    Where both are EXR or HDR, PSNR and FLIP are taken of clip(e L)^(1/2.2), with e such that the reference has a mean
-    of .3, and RMSE of the radiance itself. Otherwise both are taken as a display shows them.
+    Where both are EXR or HDR, PSNR and FLIP compare clip(e L)^(1/2.2), with e such that the reference has a mean of .3,
+    and RMSE compares radiance. Otherwise all compare the pictures as a display shows them.
 
     Example: lambent compare reference.exr frame.exr -o difference.png
     """
@@ -35,7 +35,7 @@ def command(
     images = read_image(reference), read_image(test)
     if images[0].shape != images[1].shape:
         sizes = ["{1}x{0}".format(*image.shape) for image in images]
-        raise UserError("pictures differ in size", file=test, got=sizes[1], expected=f"{sizes[0]} as {reference}")
+        raise UserError("differs in size", file=test, got=sizes[1], expected=f"{sizes[0]}, the size of {reference}")
     radiance = all(path.suffix.lower() in HDR_SUFFIXES for path in (reference, test))
     result, difference = compare(*images, radiance=radiance)
     if output is not None:

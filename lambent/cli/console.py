@@ -1,4 +1,4 @@
-"""What commands share: the result on stdout, the progress bar on stderr, sizes as a user types them."""
+"""Shared by all commands: the result on stdout, the progress bar on stderr, sizes as a user types them."""
 
 from __future__ import annotations
 
@@ -19,17 +19,23 @@ from lambent.core.progress import Progress
 
 Between = Annotated[
     Literal["auto", "half_vector", "back_vector", "quadrilinear"],
-    typer.Option("--reconstruction", help="Between a gonio table's incident directions; auto measures which is best."),
+    typer.Option(
+        "--reconstruction",
+        help="How a gonio table is interpolated between incident directions; auto measures which is best.",
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
 
 CreaseAngle = Annotated[
     float | None,
     typer.Option(
-        "--crease-angle", min=0, max=180, help="Of a scene: edges of more degrees are hard where normals lean."
+        "--crease-angle",
+        min=0,
+        max=180,
+        help="Scenes: an edge above this angle in degrees is hard where smooth normals lean too far.",
     ),
 ]
-Force = Annotated[bool, typer.Option("--force", help="Replace files that exist, even the input.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace existing files, even the input.")]
 
 
 def _version(value: bool) -> None:
@@ -60,16 +66,16 @@ def table(lines: Iterable[Iterable[str]]) -> str:
 
 
 def words(value: object) -> str:
-    """A number with four digits; anything else as it is."""
+    """A float with four digits, anything else as text."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def metric_errors(errors: Mapping[str, float], share: Mapping[str, float]) -> str:
-    """Table of errors under the metrics, with their units and as shares of the subject's own size."""
+    """Table of errors under every metric: absolute, with unit, and as a share of the subject's norm."""
     from lambent.materials.measured.metrics import METRICS
 
     rows = ((name, f"{value:.3g}", METRICS[name].unit, f"{share[name]:.2%}") for name, value in errors.items())
-    return table([("error", "absolute", "unit", "of its size"), *rows])
+    return table([("error", "absolute", "unit", "relative"), *rows])
 
 
 @contextmanager
@@ -104,7 +110,7 @@ def progress_bar() -> Iterator[Progress]:
 
 
 class _StepLines:
-    """A line on stderr for each step that took over half a second, and one a minute while a step goes on."""
+    """Prints a line on stderr for each step longer than half a second, and one a minute while a step goes on."""
 
     SHORTEST_S = 0.5
     STILL_S = 60.0
@@ -123,7 +129,7 @@ class _StepLines:
             say(f"{what}: {min(done / max(total, 1e-9), 1):.0%} after {now - self.begun:.0f} s")
 
     def end(self, outcome: str = "") -> None:
-        """Say how long the step took that is under way, if there is one."""
+        """Print the time of the current step, if there is one."""
         seconds = time.monotonic() - self.begun
         if self.step and seconds >= self.SHORTEST_S:
             say(f"{self.step}: {outcome}{seconds:.1f} s")
@@ -134,7 +140,9 @@ def parse_size(text: str, option: str = "--size") -> tuple[int, int]:
     """(width, height) in pixels of "1280x720", the value of an option."""
     width, _, height = text.lower().partition("x")
     if not (width.isdecimal() and height.isdecimal() and 0 < int(width) <= 16384 and 0 < int(height) <= 16384):
-        raise UserError("not a picture size", field=option, got=text, expected="WIDTHxHEIGHT, each 1 to 16384")
+        raise UserError(
+            "cannot be read as a picture size", field=option, got=text, expected="WIDTHxHEIGHT, each 1 to 16384"
+        )
     return int(width), int(height)
 
 

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 def command(
     file: Annotated[Path, typer.Argument(help="Measured table in any format, or material document (.json).")],
-    output: Annotated[Path, typer.Argument(help="File to write; its ending says the format.")],
-    as_: Annotated[str | None, typer.Option("--as", help="Format, where the ending does not say it.")] = None,
+    output: Annotated[Path, typer.Argument(help="File to write; its ending selects the format.")],
+    as_: Annotated[str | None, typer.Option("--as", help="Format, where the ending fits several.")] = None,
     reconstruction: Between = "auto",
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Write a measurement or material in another format, and say what was lost and how large the errors are.
+    """Write a measurement or material in another format; print what is lost and how large the errors are.
 
     Example: lambent convert chrome.binary chrome.bsdf --as rgl
     """
@@ -53,7 +53,7 @@ def subject_of(file: Path, reconstruction: Between = "auto") -> Subject:
     if not is_document(read_head(file, 64)):
         return measured.load(file, reconstruction)
     if reconstruction != "auto":
-        raise UserError("only a measured table is looked up so", file=file, field="--reconstruction")
+        raise UserError("applies to measured tables only", file=file, field="--reconstruction")
     return load_material(file)
 
 
@@ -68,12 +68,12 @@ def _check_kind(subject: Subject, writer: Writer, file: Path) -> None:
     kind = "material" if isinstance(subject, Material) else "table"
     if kind not in writer.TAKES:
         hint = f"fit it first: lambent fit {file} -o material.json" if kind == "table" else None
-        raise UserError(f"{writer.NAME} takes no {kind}", file=file, hint=hint)
+        raise UserError(f"is a {kind}, which {writer.NAME} cannot hold", file=file, hint=hint)
 
 
 def describe(output: Path, writer: Writer, cost: Cost) -> str:
-    """The file, its losses, its errors, absolute and as shares of the subject's own size, and the verdict."""
-    losses = cost.lost or ("nothing but what the errors say",)
+    """The file, its losses, its errors (absolute and relative), and the verdict."""
+    losses = cost.lost or ("nothing beyond the errors below",)
     lines = [f"{output}: {writer.NAME}", *(f"lost: {loss}" for loss in losses)]
     if cost.errors:
         lines += ["", metric_errors(cost.errors, cost.share)]

@@ -12,15 +12,15 @@ from lambent.core.machine import has_display
 
 
 def command(
-    out: Annotated[Path, typer.Option(help="Folder for everything the demo makes.")] = Path("out/demo"),
-    headless: Annotated[bool, typer.Option("--headless", help="Write images and a film, open no window.")] = False,
-    quick: Annotated[bool, typer.Option("--quick", help="A coarser bake, a smaller film.")] = False,
+    out: Annotated[Path, typer.Option(help="Output folder.")] = Path("out/demo"),
+    headless: Annotated[bool, typer.Option("--headless", help="Write images and a film; open no window.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Coarser bake, smaller film.")] = False,
     json: Json = False,
 ) -> None:
     """Measure four materials, fit them, place them in a room, bake it and walk through it.
 
     Opens the window where there is a display; otherwise, or with --headless, writes stills, a film, a comparison with
-    the path tracer and demo.json. Started again after an interruption, it goes on where it was.
+    the path tracer and demo.json. After an interruption, the same command continues.
 
     Example: lambent demo --headless --quick
     """
@@ -39,5 +39,5 @@ def command(
     if not windowless:
         from lambent.viewer.app import run
 
-        say(f"opening the window; later: lambent walk {flow.store_path}")
+        say(f"opening the window; to open it again: lambent walk {flow.store_path}")
         run(flow.store_path, "walk")

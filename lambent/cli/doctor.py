@@ -1,4 +1,4 @@
-"""`lambent doctor`: what Lambent can use of this machine, what is missing, and the one command that mends it."""
+"""`lambent doctor`: what Lambent can use on this machine, what is missing, and the one command that installs it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from lambent.core.machine import core_count, memory_bytes
 MEMORY_NEEDED_GB = 4
 PROBE_SECONDS = 120
 
-# Package manager -> its command. The command to mend is for the first that is found.
+# Package manager -> its command. The first manager found is used.
 MANAGERS = {
     "apt-get": "apt-get install -y",
     "dnf": "dnf install -y",
@@ -74,9 +74,9 @@ class Check:
 
 
 def command(json: Json = False) -> None:
-    """Look at this machine: path tracer, graphics adapter, window, memory, film; and say how to mend what is missing.
+    """Check this machine: path tracer, graphics adapter, window, memory, film; print how to install what is missing.
 
-    The exit code is 1 when something essential is missing.
+    The exit code is 1 where something essential is missing.
 
     Example: lambent doctor
     """
@@ -95,7 +95,7 @@ def command(json: Json = False) -> None:
     }
     rows = [("ok" if check.ok else "NO" if check.essential else "- ", check.name, check.found) for check in checks]
     text = table([("  ", "python", f"{result['python']} on {result['system']}"), *rows])
-    show(result, f"{text}\n\nTo mend: {mend}" if mend else text, json)
+    show(result, f"{text}\n\nTo install what is missing: {mend}" if mend else text, json)
     if not ok:
         raise typer.Exit(1)
 
@@ -120,7 +120,7 @@ def _graphics() -> tuple[bool, str]:
     answer, reason = _ask(_ASK_GRAPHICS)
     if not isinstance(answer, dict):
         return False, reason
-    software = " (software: works, slowly)" if answer["type"] == "CPU" else ""
+    software = " (software: slow)" if answer["type"] == "CPU" else ""
     return True, f"{answer['name']}, {answer['backend']}{software}"
 
 
@@ -128,7 +128,7 @@ def _window() -> tuple[bool, str]:
     answer, reason = _ask(_ASK_WINDOW)
     if answer is None:
         return False, reason
-    return True, "display found" if answer else "no display here: pictures and films only"
+    return True, "display found" if answer else "no display: pictures and films only"
 
 
 def _memory() -> tuple[bool, str]:
@@ -145,7 +145,7 @@ def _film() -> tuple[bool, str]:
         return False, f"no ffmpeg: pictures only ({error})"
 
 
-# Name, whether Lambent cannot do without, and the function that looks: whether all is well, and what is there.
+# Name, whether it is essential, and the check: returns whether it works, and a description.
 CHECKS: tuple[tuple[str, bool, Callable[[], tuple[bool, str]]], ...] = (
     ("path tracer", True, _path_tracer), ("denoiser", True, _denoiser), ("graphics", True, _graphics),
     ("window", False, _window), ("memory", False, _memory), ("film", False, _film),
@@ -159,7 +159,7 @@ def missing_packages(checks: list[Check]) -> list[str]:
 
 
 def mending_command(packages: list[str]) -> str | None:
-    """The one command that installs `packages`, or None without packages or a package manager."""
+    """The command that installs `packages`; None without packages or a package manager."""
     manager = _manager()
     if not packages or manager is None:
         return None
@@ -185,9 +185,9 @@ def _ask(program: str) -> tuple[object, str]:
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=PROBE_SECONDS, check=False)
     except subprocess.TimeoutExpired:
-        return None, f"no answer within {PROBE_SECONDS} s"
+        return None, f"test program gave no answer within {PROBE_SECONDS} s"
     answer = next((line for line in done.stdout.splitlines() if line.startswith("answer ")), None)
     if done.returncode == 0 and answer is not None:
         return jsonlib.loads(answer.removeprefix("answer ")), ""
     lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
-    return None, lines[-1] if lines else f"ended with code {done.returncode}"
+    return None, lines[-1] if lines else f"test program ended with code {done.returncode}"

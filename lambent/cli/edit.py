@@ -15,32 +15,31 @@ def command(
     what: Annotated[
         Path,
         typer.Argument(
-            help="Measured table in any known format, or a material document; or a scene, a store or a session "
-            "(.edits.json), whose materials are edited in place."
+            help="Measured table in any known format, or material document; or a scene, store or session (.edits.json) "
+            "whose materials are edited in place."
         ),
     ],
     material: Annotated[
-        Path | None, typer.Argument(help="Material document to start from; with two documents, the one to compare.")
+        Path | None,
+        typer.Argument(help="Material document to start from; beside another document, the one to compare with."),
     ] = None,
     environment: Annotated[
         list[Path] | None,
         typer.Option(
-            help="Lat-long .hdr or .exr to light the preview with. Repeatable. Of a scene: its only light far away."
+            help="Lat-long .hdr or .exr that lights the preview. Repeatable. Scenes: replaces the environment."
         ),
     ] = None,
     camera: Annotated[
-        str | None, typer.Option(help="Of a scene: camera or saved view by name. [default: the first]")
+        str | None, typer.Option(help="Scenes: camera or saved view by name. [default: the first]")
     ] = None,
-    picture: Annotated[
-        str | None, typer.Option(help="Of a scene: WIDTHxHEIGHT of the picture. [default: 512x512]")
-    ] = None,
+    picture: Annotated[str | None, typer.Option(help="Scenes: WIDTHxHEIGHT of the picture. [default: 512x512]")] = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Of a scene: folder of the store that keeps its transport.")
+        Path | None, typer.Option("-o", "--output", help="Scenes: folder of the store that keeps the baked transport.")
     ] = None,
     crease_angle: CreaseAngle = None,
     size: Size = SIZE,
 ) -> None:
-    """Edit a material beside its measurement; or pull the curves of a scene's materials, and the picture follows.
+    """Edit a material beside its measurement, or pull the curves of a scene's materials while the picture follows.
 
     Example: lambent edit brushed.bsdf brushed.json --environment studio.hdr
     """

@@ -21,38 +21,48 @@ UNITS = {"mx": "slope", "my": "slope", "r0": "reflectance at normal incidence", 
 
 def command(
     file: Annotated[Path, typer.Argument(help="Measured table, in any format `lambent inspect` knows.")],
-    lobes: Annotated[str, typer.Option(help="Lobes per side, 1 to 4, or auto: while each takes --gain off.")] = "1",
+    lobes: Annotated[
+        str,
+        typer.Option(
+            help="Lobes per side: 1 to 4, or auto, which adds lobes as long as each cuts the error by --gain."
+        ),
+    ] = "1",
     method: Annotated[
         Literal["gradient", "grid"],
         typer.Option(help="Least squares from several starts, or the hierarchical grid search (slower)."),
     ] = "gradient",
     metric: Annotated[str, typer.Option(help="Error to minimise: l1, l2_ngan, cuberoot or log.")] = "cuberoot",
     distribution: Annotated[
-        DistributionChoice, typer.Option(help="Of the microfacets: ggx has long tails; best tries both.")
+        DistributionChoice, typer.Option(help="Microfacet distribution: ggx has long tails; best tries both.")
     ] = DISTRIBUTION,
-    coupled: Annotated[bool, typer.Option("--coupled", help="Diffuse reflection falls as Fresnel rises.")] = False,
+    coupled: Annotated[
+        bool, typer.Option("--coupled", help="Diffuse reflection falls as Fresnel reflection rises.")
+    ] = False,
     keep_albedo: Annotated[
-        bool, typer.Option("--keep-albedo", help="Hold the albedo over the angle of incidence to the table's.")
+        bool, typer.Option("--keep-albedo", help="Constrain the albedo at every angle of incidence to the table's.")
     ] = False,
     retro: Annotated[
         bool | None,
-        typer.Option("--retro/--no-retro", help="A lobe about the light; by default where the table shows one."),
+        typer.Option("--retro/--no-retro", help="Fit a retro-reflective lobe; by default where the table shows one."),
     ] = None,
-    gain: Annotated[float, typer.Option(help="Share of the error that one more lobe has to take off (auto).")] = 0.05,
-    grid_n: Annotated[int, typer.Option(min=3, max=30, help="Values per parameter and level of the grid.")] = 9,
-    grid_levels: Annotated[int, typer.Option(min=1, max=12, help="Levels of the grid.")] = 5,
-    fix: Annotated[list[str] | None, typer.Option(help="Keep a parameter: r0=.05 or kd=.1,.2,.3. Repeatable.")] = None,
+    gain: Annotated[float, typer.Option(help="Least share of the error that another lobe must remove (auto).")] = 0.05,
+    grid_n: Annotated[int, typer.Option(min=3, max=30, help="Grid search: values per parameter and level.")] = 9,
+    grid_levels: Annotated[int, typer.Option(min=1, max=12, help="Grid search: levels.")] = 5,
+    fix: Annotated[list[str] | None, typer.Option(help="Fix a parameter: r0=.05 or kd=.1,.2,.3. Repeatable.")] = None,
     range_: Annotated[
-        list[str] | None, typer.Option("--range", help="Seek a parameter within lo:hi: mx=.05:.3. Repeatable.")
+        list[str] | None, typer.Option("--range", help="Bound a parameter to lo:hi, as in mx=.05:.3. Repeatable.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same material.")] = 0,
     output: Annotated[Path | None, typer.Option("-o", help="Write the material document (.json).")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Draw both: X.png gives X_polar, X_in_plane, X_albedo.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Plot table and fit: X.png gives X_polar.png, X_in_plane.png and X_albedo.png.")
+    ] = None,
     report: Annotated[
-        Path | None, typer.Option(help="Write all that is known of the fit as one page (.html), previews included.")
+        Path | None, typer.Option(help="Write a full report of the fit as one page (.html), with previews.")
     ] = None,
     environment: Annotated[
-        Path | None, typer.Option(help="Lat-long image (.hdr, .exr) around the report's previews; else daylight.")
+        Path | None,
+        typer.Option(help="Lat-long image (.hdr, .exr) that lights the report's previews. [default: daylight]"),
     ] = None,
     reconstruction: Between = "auto",
     force: Force = False,
@@ -113,11 +123,11 @@ def command(
 
 
 def _check_environment(file: Path, report: Path | None) -> None:
-    """Find out before the fit that the image cannot be used."""
+    """Reject an unusable image before the fit."""
     from lambent.core.images import read_image
 
     if report is None:
-        raise UserError("is for the previews of a report", field="--environment", hint="add --report PAGE.html")
+        raise UserError("lights the previews of a report only", field="--environment", hint="add --report PAGE.html")
     read_image(file)
 
 
@@ -125,7 +135,7 @@ def _count(lobes: str) -> int | Literal["auto"]:
     if lobes == "auto":
         return "auto"
     if not lobes.isdecimal():
-        raise UserError("number of lobes", field="--lobes", got=lobes, expected="1 to 4, or auto")
+        raise UserError("cannot be read as a number of lobes", field="--lobes", got=lobes, expected="1 to 4, or auto")
     return int(lobes)
 
 
@@ -147,7 +157,7 @@ def left_out(measurement: MeasuredTable, samples: MeasuredSamples) -> dict[str, 
 
     counts = {why: getattr(samples.left_out, name) for name, why in REASONS.items()}
     if isinstance(measurement, LbnlTable):
-        counts["of light from -z, the other side of the sheet"] = measurement.tuples_from_behind
+        counts["light from -z, the other side of the sheet"] = measurement.tuples_from_behind
     return {why: count for why, count in counts.items() if count}
 
 

@@ -1,4 +1,4 @@
-"""`lambent glare`: discomfort glare of a view, by a picture of Radiance's or a baked store."""
+"""`lambent glare`: discomfort glare of a view, from a Radiance picture or a baked store."""
 
 from __future__ import annotations
 
@@ -15,13 +15,15 @@ SIDE_PX = 800
 
 
 def command(
-    what: Annotated[Path, typer.Argument(help="Radiance picture (.hdr) of a fisheye, or folder of a baked store.")],
-    output: Annotated[Path | None, typer.Option("-o", help="Picture with the sources marked (.png).")] = None,
-    camera: Annotated[str | None, typer.Option(help="Of a store: camera or saved view. [default: the first]")] = None,
-    integrator: Annotated[
-        str, typer.Option(help="Of a store: how it is drawn, as `lambent render` names it.")
-    ] = "rings",
-    threshold: Annotated[float, typer.Option(min=1, help="Luminance of a source of glare, cd/m2.")] = 2000.0,
+    what: Annotated[Path, typer.Argument(help="Radiance fisheye picture (.hdr), or folder of a baked store.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", help="Write a picture with the glare sources marked (.png).")
+    ] = None,
+    camera: Annotated[
+        str | None, typer.Option(help="Stores: camera or saved view by name. [default: the first]")
+    ] = None,
+    integrator: Annotated[str, typer.Option(help="Stores: integrator, as of `lambent render`.")] = "rings",
+    threshold: Annotated[float, typer.Option(min=1, help="Least luminance of a glare source, cd/m2.")] = 2000.0,
     force: Force = False,
     json: Json = False,
 ) -> None:
@@ -48,7 +50,7 @@ def command(
             )
         view = settings.view_of(seen)
     elif camera is not None:
-        raise UserError("is of stores", field="--camera", got=camera, hint="a picture says its own view")
+        raise UserError("applies to stores only", field="--camera", got=camera, hint="a picture has its own view")
     else:
         view, radiance = read_view(what), read_image(what)
     found = glare(radiance, view, threshold)
@@ -66,4 +68,4 @@ def command(
     ]
     columns = ("cd/m2", "sr", "position index", "right, deg", "up, deg")
     rows = [tuple(f"{value:.4g}" for value in asdict(source).values()) for source in found.sources]
-    show(facts, "\n\n".join([table(lines), table([columns, *rows]) if rows else "nothing glares"]), json)
+    show(facts, "\n\n".join([table(lines), table([columns, *rows]) if rows else "no glare sources"]), json)

@@ -1,4 +1,4 @@
-"""`lambent inspect`: the kind of a file, and its contents in short."""
+"""`lambent inspect`: the kind of a file, and a summary of its contents."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ Facts = dict[str, Any]
 
 def command(
     file: Annotated[str, typer.Argument(help="Measured table, material, scene, store, image; or builtin:room.")],
-    plot: Annotated[Path | None, typer.Option(help="Draw a table or material (.png, .pdf, .svg).")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Plot a table or material (.png, .pdf, .svg).")] = None,
     reconstruction: Between = "auto",
     crease_angle: CreaseAngle = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Describe any file of ours or of other tools: format, dimensions, symmetry, albedo, faults.
+    """Describe a file of Lambent or of another tool: format, dimensions, symmetry, albedo, faults.
 
     Example: lambent inspect brushed.bsdf --plot brushed.png
     """
@@ -38,9 +38,9 @@ def command(
         check_output(plot, (".png", ".pdf", ".svg"), force=force, inputs=[file])
     inspect = inspector_of(file)
     if reconstruction != "auto" and inspect is not inspect_table:
-        raise UserError("only a measured table is looked up so", file=file, field="--reconstruction")
+        raise UserError("applies to measured tables only", file=file, field="--reconstruction")
     if crease_angle is not None and inspect is not inspect_scene:
-        raise UserError("only a scene has creases", file=file, field="--crease-angle")
+        raise UserError("applies to scenes only", file=file, field="--crease-angle")
     if crease_angle is not None and plot is None:
         facts = plain(inspect_scene(file, crease_angle))
     elif inspect is inspect_table:
@@ -50,7 +50,7 @@ def command(
     elif inspect is inspect_material:
         facts = plain(inspect(file, plot))
     else:
-        raise UserError("only tables and materials are plotted", file=file, field="--plot")
+        raise UserError("applies to tables and materials only", file=file, field="--plot")
     prose = ["\n- ".join([f"\n\n{name}", *value]) for name, value in facts.items() if _is_prose(value)]
     show(facts, table(_rows(facts)) + "".join(prose), json)
 

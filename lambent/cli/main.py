@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 AGAIN_S = 0.02
-INTERRUPTION = "lambent: interrupted; what was finished is kept\n"
-NO_ROOM = "failed to map segment"  # of the ImportError where a library does not fit
-MEMORY = "memory is used up; close other programs, raise its limit (ulimit -v), or ask for less"
+INTERRUPTION = "lambent: interrupted; finished work is kept\n"
+NO_ROOM = "failed to map segment"  # message of the ImportError where a library does not fit into memory
+MEMORY = "out of memory; close other programs, raise the limit (ulimit -v), or ask for less"
 FAULTS_OF_THE_DISK = {
     errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR,
     errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.EIO,
@@ -38,7 +38,7 @@ def main() -> None:
         code = run(sys.argv[1:])
     except KeyboardInterrupt:  # while the end of the command was reported
         code = INTERRUPTED
-    signal.signal(signal.SIGINT, lambda *_: os._exit(code))  # all is said; what the libraries close can wait
+    signal.signal(signal.SIGINT, lambda *_: os._exit(code))  # the result is out; skip the libraries' clean-up
     sys.exit(code)
 
 

@@ -17,21 +17,21 @@ if TYPE_CHECKING:
 
 
 def command(
-    store: Annotated[Path, typer.Argument(help="Folder of a store with relighting of a view.")],
-    output: Annotated[Path, typer.Option("-o", help="Image: .exr, .hdr or .png.")],
+    store: Annotated[Path, typer.Argument(help="Folder of a store with a view baked for relighting.")],
+    output: Annotated[Path, typer.Option("-o", help="Image to write (.exr, .hdr, .png).")],
     camera: Annotated[str | None, typer.Option(help="Camera by name. [default: the first]")] = None,
     environment: Annotated[
         Path | None, typer.Option(help="Picture that lights the scene. [default: the scene's own environment]")
     ] = None,
-    layout: Annotated[Layout | None, typer.Option(help="Of the picture. [default: recognised]")] = None,
-    up: Annotated[Axis, typer.Option(help="Axis of the world that the picture's up points along.")] = "+y",
-    scale: Annotated[float, typer.Option(min=0.0, help="Times the picture's radiance.")] = 1.0,
-    turn: Annotated[float, typer.Option(help="Degrees about +y that the environment is turned by.")] = 0.0,
-    exposure: Annotated[float | None, typer.Option(help="In EV, of PNG. [default: metered]")] = None,
+    layout: Annotated[Layout | None, typer.Option(help="Layout of the picture. [default: recognised]")] = None,
+    up: Annotated[Axis, typer.Option(help="World axis of the picture's up direction.")] = "+y",
+    scale: Annotated[float, typer.Option(min=0.0, help="Factor on the picture's radiance.")] = 1.0,
+    turn: Annotated[float, typer.Option(help="Rotation of the environment about +y, degrees.")] = 0.0,
+    exposure: Annotated[float | None, typer.Option(help="Exposure of a PNG, in EV. [default: metered]")] = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Draw a view under a turned or another environment, materials as they are: direct light, with shadows.
+    """Draw a view under a turned or another environment: direct light with shadows, original materials.
 
     Example: lambent relight room.store --environment grace.hdr --turn 90 -o grace.png
     """
@@ -68,5 +68,5 @@ def _chosen(store: Store, camera: str | None) -> ViewRecord:
 
     views = views_for_relighting(store)
     if not views:
-        raise UserError("no view was baked for relighting", file=store.folder, hint="see docs/editing.md, Relighting")
+        raise UserError("has no view baked for relighting", file=store.folder, hint="see docs/editing.md, Relighting")
     return views[known("camera", camera, views, field="--camera") if camera is not None else next(iter(views))]

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from lambent.core.false_colour import Range
     from lambent.render import Settings
 
-SHEET_SIZE = "640x360"  # of each of the variants
-MEASURED = {"luminance": "full", "illuminance": "light-map"}  # the part of the light that has it
+SHEET_SIZE = "640x360"  # of each picture in a sheet
+MEASURED = {"luminance": "full", "illuminance": "light-map"}  # quantity -> the part of the light that is shown
 SHOWN_BY = (
     "store",
     "output",
@@ -29,7 +29,7 @@ SHOWN_BY = (
     "linear",
     "force",
     "json",
-)  # edited views
+)  # options of edited views
 
 
 def command(
@@ -47,116 +47,114 @@ def command(
     integrator: Annotated[
         str,
         typer.Option(
-            help="lamps, rings, lobe-4.24, lobe-4.25, fis, split-sum, qmc, oslf, oslf-points, diffuse, or path: the "
-            "path tracer."
+            help="lamps, rings, lobe-4.24, lobe-4.25, fis, split-sum, qmc, oslf, oslf-points, diffuse, or path (the "
+            "path tracer)."
         ),
     ] = "lamps",
-    samples: Annotated[int | None, typer.Option(min=1, help="Per pixel (path, qmc) or per lobe.")] = None,
+    samples: Annotated[int | None, typer.Option(min=1, help="Samples per pixel (path, qmc) or per lobe.")] = None,
     exposure: Annotated[
         str | None,
         typer.Option(
-            help="In EV: stops on radiance. [default: the scene's, else metered] With --variants also light: variants "
-            "in the same light share one, other light is metered [default]; each: every picture is; one: that of the "
-            "first for all. Captions say EV100 where it differs."
+            help="Exposure in EV (stops on radiance). [default: the scene's, else metered] With --variants also: light "
+            "(meter once per mix of light) [default], each (meter every picture), one (the first picture's for all). "
+            "Captions show EV100 where it differs."
         ),
     ] = None,
     ev100: Annotated[
-        float | None, typer.Option("--ev100", help="The same as EV100, 15 in the sun, 8 in a room by night.")
+        float | None, typer.Option("--ev100", help="Exposure as EV100: 15 in the sun, 8 in a room by night.")
     ] = None,
     view: Annotated[
-        str, typer.Option(help="How PNG and MP4 show light: filmic, neutral, linear, or false-colour (cd/m2).")
+        str, typer.Option(help="View transform of PNG and MP4: filmic, neutral, linear, or false-colour (cd/m2).")
     ] = "filmic",
     false_range: Annotated[
         str | None,
-        typer.Option("--range", help="LOW:HIGH of false colours, cd/m2 or lx. [default: by the first image]"),
+        typer.Option("--range", help="LOW:HIGH of false colours, cd/m2 or lx. [default: fitted to the first image]"),
     ] = None,
-    linear: Annotated[bool, typer.Option("--linear", help="False colours at even steps, not decades.")] = False,
+    linear: Annotated[bool, typer.Option("--linear", help="Linear false colours. [default: logarithmic]")] = False,
     part: Annotated[
         str,
         typer.Option(
             "--show",
-            help="full, diffuse, specular, light-map: irradiance, or noise: its standard error, %. In false colours: "
-            "luminance (cd/m2) or illuminance of surfaces (lx).",
+            help="full, diffuse, specular, light-map (irradiance) or noise (of the light map, standard error in %); "
+            "in false colours luminance (cd/m2) or illuminance of surfaces (lx).",
         ),
     ] = "full",
     planar: Annotated[
         str,
         typer.Option(
-            help="How flat mirrors and floors are drawn: auto, off (from their probes), or as the integrator knows: "
+            help="How planar reflectors are drawn: auto, off (from their probes), or by a method of the integrator: "
             "interleaved, marched or fixed (lamps, rings), thesis (lobe-4.24, lobe-4.25), fis."
         ),
     ] = "auto",
     lookup: Annotated[
         str,
         typer.Option(
-            help="Where reflected rays find their light: auto, planes, distance or plain (of probes), or light_field, "
-            "light_field-1, -bn, -br, -average, -angle, -nearest; -surface shows the object itself from it, too; "
-            "-choice, which point answers."
+            help="Look-up of reflected light: auto; in probes: planes, distance, plain; in light fields: light_field, "
+            "light_field-1, -bn, -br, -average, -angle, -nearest, -surface (shows the object itself too), -choice "
+            "(shows which point is used)."
         ),
     ] = "auto",
     light_field_mb: Annotated[
-        float | None, typer.Option(min=0, help="GPU memory for the maps of light fields. [default: all of them]")
+        float | None, typer.Option(min=0, help="GPU memory for light fields, MB. [default: enough for all]")
     ] = None,
     light: Annotated[
         list[str] | None,
         typer.Option(
-            help="NAME=VALUE of a light group: an intensity, off, 2700K, #rrggbb, or several with commas; in a film "
-            "with @SECONDS. Repeatable. [default: as saved with the view, else as baked]"
+            help="NAME=VALUE of a light group: an intensity, off, 2700K, #rrggbb, or several joined by commas; "
+            "@SECONDS makes it a keyframe of a film. Repeatable. [default: as saved with the view, else as baked]"
         ),
     ] = None,
     light_field_cache: Annotated[
-        str, typer.Option(help="Which maps go where not all have room: least-recent or adaptive.")
+        str, typer.Option(help="Which maps are dropped first where memory is short: least-recent or adaptive.")
     ] = "least-recent",
     sky_turn: Annotated[
         float,
         typer.Option(
-            help="Degrees by which the sky, its sun and what light fields see of both turn about the vertical; "
-            "light on surfaces stays as baked."
+            help="Rotation of sky and sun about the vertical, degrees; changes what is seen and mirrored of them, "
+            "not the baked light on surfaces."
         ),
     ] = 0.0,
     projection: Annotated[
         Literal["perspective", "fisheye", "hemispherical", "cylinder"],
-        typer.Option(help="How directions lie in the picture; fisheyes are square."),
+        typer.Option(help="Projection of the picture; fisheyes are square."),
     ] = "perspective",
     field: Annotated[
-        float | None, typer.Option(help="Degrees across a fisheye or a cylinder. [default: 180, 360]")
+        float | None, typer.Option(help="Field of view of a fisheye or a cylinder, degrees. [default: 180, 360]")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="For path: another seed has independent noise.")] = 0,
-    scene: Annotated[str | None, typer.Option(help="For path: the scene, where the store's is not found.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="For path: seed of the noise.")] = 0,
+    scene: Annotated[
+        str | None, typer.Option(help="For path: the scene file, where it has moved since the bake.")
+    ] = None,
     edit: Annotated[
-        Path | None, typer.Option(help="Session of edits: draws its view as edited, from the store's transport.")
+        Path | None,
+        typer.Option(help="Session of edits (.edits.json): draw its view as edited, from the store's transport."),
     ] = None,
     surfaces: Annotated[
         str | None,
         typer.Option(
-            help="MOST or LEAST:MOST surfaces on the paths that --edit shows; 1 is direct light. [default: all]"
+            help="MOST or LEAST:MOST surfaces on the light paths that --edit shows; 1 is direct light. [default: all]"
         ),
     ] = None,
     recolour: Annotated[
         list[str] | None,
-        typer.Option(
-            help="MATERIAL=#rrggbb: another diffuse colour, which the baked light answers; path traces it. Repeatable."
-        ),
+        typer.Option(help="MATERIAL=#rrggbb: another diffuse colour; the light in the room follows. Repeatable."),
     ] = None,
     variant: Annotated[
         str,
-        typer.Option(
-            help="Variant of the scene, or a state that was stored in the window (saved: as the window was left): its "
-            "materials and its mix of the light, which answers."
-        ),
+        typer.Option(help="Variant of the scene, or a state stored in the window (saved: the last session)."),
     ] = "",
     variants: Annotated[
         bool,
-        typer.Option("--variants", help="All variants in one picture, each of --size, with their names. [640x360]"),
+        typer.Option("--variants", help="Draw all variants into one contact sheet, each at --size. [640x360]"),
     ] = False,
     keyframes: Annotated[
-        Path | None, typer.Option(help="File of states of materials and light over the time of a film (.toml).")
+        Path | None, typer.Option(help="Films: file of materials and light over time (.toml).")
     ] = None,
     replace: Annotated[
         list[str] | None,
         typer.Option(
-            help="OBJECT=FILE or OBJECT=FILE,MATERIAL: the mesh of a file in the place of an object whose light field "
-            "is of a volume; path traces it. Repeatable."
+            help="OBJECT=FILE or OBJECT=FILE,MATERIAL: show another mesh in place of an object that has a light field "
+            "of a volume. Repeatable."
         ),
     ] = None,
     fps: Annotated[int, typer.Option(min=1, max=240, help="Frames per second of a film.")] = 30,
@@ -195,7 +193,7 @@ def command(
         exposure_ev = _exposure_of(ev100, exposure)
     if part in MEASURED:
         if view not in ("filmic", "false-colour"):
-            raise UserError("is shown in false colours", field="--show", got=part, hint="leave out --view")
+            raise UserError("needs false colours", field="--show", got=part, hint="leave out --view")
         part, view = MEASURED[part], "false-colour"
     scale = parse_range(false_range, log=not linear) if false_range is not None else None
     if variants and not _is_said(context, "size"):
@@ -210,7 +208,7 @@ def command(
     for option in ("false_range", "linear"):
         if _is_said(context, option) and not settings.is_false_coloured:
             name = "--range" if option == "false_range" else "--linear"
-            raise UserError("is of false colours", field=name, hint="add --view false-colour")
+            raise UserError("applies to false colours only", field=name, hint="add --view false-colour")
     if edit is not None:
         _check_edit(context, edit)
         check_output(output, WRITABLE, force=force)
@@ -218,22 +216,23 @@ def command(
         show(asdict(done), f"{output}: {done.width}x{done.height}, edited, {done.seconds:.1f} s", json)
         return
     if surfaces is not None:
-        raise UserError("says what an edited view shows", field="--surfaces", hint="name a session with --edit")
+        raise UserError("applies to edited views only", field="--surfaces", hint="add --edit SESSION")
     if variants and (variant or replace):
-        raise UserError("says one variant and all of them", field="--variant", hint="leave out one of both")
+        option = "--variant" if variant else "--replace"
+        raise UserError("excludes --variants", field=option, hint="leave out one")
     if variants and path is not None:
-        raise UserError("a sheet is of one view", field="--path", hint="name it with --camera")
+        raise UserError("excludes --variants", field="--path", hint="a sheet shows one view: name it with --camera")
     suffix = output.suffix.lower()
     moves = not variants and (suffix == FILM or (path is not None and suffix in SEQUENCES))
     check_output(output, (".png",) if variants else (*WRITABLE, FILM), force=force or moves)
     if keyframes is not None and not moves:
-        raise UserError("keyframes are of films", field="--keyframes", hint="write to .mp4, or name a --path")
+        raise UserError("applies to films only", field="--keyframes", hint="write to .mp4, or add --path NAME")
     if not moves:
         _check_still(context, settings)
     if moves and camera is not None:
-        raise UserError("a film needs a path", field="--camera", hint="name a path with --path")
+        raise UserError("applies to stills only", field="--camera", hint="a film follows a path: --path NAME")
     if path is not None and not moves:
-        raise UserError("a path makes a film", field="--path", hint="write to .mp4, .png or .exr")
+        raise UserError("applies to films only", field="--path", got=suffix, expected=".mp4, .png or .exr")
     if moves:
         check_pictures(output, force=force)
 
@@ -258,32 +257,34 @@ def command(
 
 
 def _check_still(context: typer.Context, settings: Settings) -> None:
-    """Refuse options that only a film has."""
+    """Reject options that apply to films only."""
     if _is_said(context, "fps"):
-        raise UserError("is of films", field="--fps", hint="write to .mp4, or name a --path")
+        raise UserError("applies to films only", field="--fps", hint="write to .mp4, or add --path NAME")
     for name, keys in settings.light.groups.items() if settings.light is not None else ():
         if len(keys) > 1 or keys[0][0] > 0:
             got = f"{name} at {keys[-1][0]:g} s"
             raise UserError(
-                "a still has no time", field="--light", got=got, hint="leave out @SECONDS, or write to .mp4"
+                "keyframes apply to films only", field="--light", got=got, hint="leave out @SECONDS, or write to .mp4"
             )
 
 
 def parse_exposure(text: str | None, *, variants: bool) -> tuple[float | None, str]:
-    """Stops, if they are said, and how the pictures of a sheet of `variants` are exposed, of "-1.5" or "each"."""
+    """The value of --exposure: EV or None, and how the pictures of a contact sheet share an exposure."""
     from lambent.render.sheet import BY_LIGHT, EXPOSURES
 
     if text is None:
         return None, BY_LIGHT
     if text in EXPOSURES:
         if not variants:
-            raise UserError("is of a sheet", field="--exposure", got=text, expected="EV", hint="or add --variants")
+            raise UserError(
+                "applies to contact sheets only", field="--exposure", got=text, expected="EV", hint="or add --variants"
+            )
         return None, text
     try:
         return float(text), BY_LIGHT
     except ValueError:
         expected = "EV, such as -1.5" + (f", or {', '.join(EXPOSURES)}" if variants else "")
-        raise UserError("not an exposure", field="--exposure", got=text, expected=expected) from None
+        raise UserError("cannot be read as an exposure", field="--exposure", got=text, expected=expected) from None
 
 
 def _exposure_of(ev100: float, exposure: str | None) -> float:
@@ -292,11 +293,11 @@ def _exposure_of(ev100: float, exposure: str | None) -> float:
     from lambent.render.images import MOST_EV
 
     if exposure is not None:
-        raise UserError("says the exposure twice", field="--ev100", hint="leave out --exposure")
+        raise UserError("excludes --exposure", field="--ev100", hint="leave out one")
     found = exposure_of(ev100)
     if not -MOST_EV <= found <= MOST_EV:
         expected = f"{ev100_of(MOST_EV):.0f} to {ev100_of(-MOST_EV):.0f}"
-        raise UserError("exposure is out of range", field="--ev100", got=ev100, expected=expected)
+        raise UserError("is out of range", field="--ev100", got=ev100, expected=expected)
     return found
 
 
@@ -308,7 +309,9 @@ def parse_range(text: str, *, log: bool) -> Range:
     try:
         return Range(float(low), float(high), log)
     except ValueError:
-        raise UserError("not a range", field="--range", got=text, expected="LOW:HIGH, as in 10:500") from None
+        raise UserError(
+            "cannot be read as a range", field="--range", got=text, expected="LOW:HIGH, as in 10:500"
+        ) from None
 
 
 def parse_surfaces(text: str) -> tuple[int, int]:
@@ -319,19 +322,20 @@ def parse_surfaces(text: str) -> tuple[int, int]:
     except ValueError:
         found = (0, 0)
     if not 1 <= found[0] <= found[1]:
-        raise UserError("not a range of surfaces", field="--surfaces", got=text, expected="MOST or LEAST:MOST, from 1")
+        raise UserError(
+            "cannot be read as a range of surfaces", field="--surfaces", got=text, expected="MOST or LEAST:MOST, from 1"
+        )
     return found
 
 
 def _is_said(context: typer.Context, name: str) -> bool:
-    """Whether an option was given, and is not by default."""
+    """Whether an option was given on the command line."""
     source = context.get_parameter_source(name)
     return source is not None and source.name == "COMMANDLINE"
 
 
 def _check_edit(context: typer.Context, session: Path) -> None:
-    """Refuse options of which a session leaves no choice."""
+    """Reject options that the session fixes."""
     for parameter in context.command.params:
         if parameter.name not in SHOWN_BY and _is_said(context, parameter.name or ""):
-            what = "an edited view has its own camera, size and light"
-            raise UserError(what, field=parameter.opts[0], hint=f"leave it out, or --edit {session}")
+            raise UserError("excludes --edit", field=parameter.opts[0], hint=f"{session} fixes camera, size and light")

@@ -1,4 +1,4 @@
-"""`lambent view`: the window, turning about what a camera looks at."""
+"""`lambent view`: the window, orbiting a camera's target."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ def command(
     store: Store, size: Size = SIZE, light_field_mb: Memory = None, light_field_cache: Cache = LEAST_RECENT,
     sky_turn: Turn = 0.0, replace: Replace = None,
 ) -> None:  # fmt: skip
-    """Turn about an object of a baked scene: drag to orbit, wheel to come nearer; the same window as `walk`.
+    """Orbit an object of a baked scene: drag to turn, scroll to come nearer; the same window as `walk`.
 
     Example: lambent view room.store
     """

@@ -11,12 +11,15 @@ from lambent.cli.console import parse_size
 
 Store = Annotated[Path, typer.Argument(help="Folder of a baked store.")]
 Size = Annotated[str, typer.Option(help="WIDTHxHEIGHT of the window.")]
-Memory = Annotated[float | None, typer.Option(min=0, help="GPU memory for light fields, MB. [default: all of them]")]
-Cache = Annotated[str, typer.Option(help="Which maps go where not all have room: least-recent or adaptive.")]
-Replace = Annotated[
-    list[str] | None, typer.Option(help="OBJECT=FILE[,MATERIAL]: a mesh in the place of an object; as of `render`.")
+Memory = Annotated[float | None, typer.Option(min=0, help="GPU memory for light fields, MB. [default: enough for all]")]
+Cache = Annotated[
+    str, typer.Option(help="Which maps are dropped first where memory is short: least-recent or adaptive.")
 ]
-Turn = Annotated[float, typer.Option(help="Degrees by which the sky and what light fields see of it turn.")]
+Replace = Annotated[
+    list[str] | None,
+    typer.Option(help="OBJECT=FILE[,MATERIAL]: show another mesh in place of an object, as in `render`."),
+]
+Turn = Annotated[float, typer.Option(help="Rotation of the sky about the vertical, degrees; see `render`.")]
 SIZE = "1680x1050"
 LEAST_RECENT = "least-recent"
 
@@ -25,7 +28,7 @@ def command(
     store: Store, size: Size = SIZE, light_field_mb: Memory = None, light_field_cache: Cache = LEAST_RECENT,
     sky_turn: Turn = 0.0, replace: Replace = None,
 ) -> None:  # fmt: skip
-    """Walk through a baked scene: WASD and the mouse; standing still converges to the exact answer for the baked light.
+    """Walk through a baked scene: WASD and the mouse; at rest it converges to the exact answer for the baked light.
 
     Example: lambent walk room.store
     """

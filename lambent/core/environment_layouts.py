@@ -33,14 +33,14 @@ CELLS = {
     (3, 4): ((1, 2), (1, 0), (0, 1), (2, 1), (1, 1), (1, 3)),
     (4, 3): ((1, 2), (1, 0), (0, 1), (2, 1), (1, 1), (3, 1)),
 }
-HINT = 'say layout = "lat-long", "angular", "cross" or "strip"'
+HINT = 'set layout = "lat-long", "angular", "cross" or "strip"'
 
 
 def layout_of(picture: Image, file: Path | None = None) -> Layout:
-    """The layout of a picture (H, W, 3), by its proportions and by the parts that a layout leaves black.
+    """Find the layout of a picture (H, W, 3) from its proportions and from the parts that a layout leaves black.
 
-    1:6 and 6:1 are strips, 3:4 and 4:3 crosses where their empty cells are black, squares angular maps where the
-    corners are; all else is lat-long.
+    1:6 and 6:1 are strips; 3:4 and 4:3 are crosses where the empty cells are black; squares are angular maps where
+    the corners are black; everything else is lat-long.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def layout_of(picture: Image, file: Path | None = None) -> Layout:
         return "lat-long"
     x, y = np.meshgrid(*[(np.arange(width) + 0.5) / width * 2 - 1] * 2)
     if not _is_black(picture, np.hypot(x, y) > 1 + 2 / width):
-        what = "not clear: the picture is square, but its corners are not black, as those of an angular map"
+        what = "is ambiguous: the picture is square, but its corners are not black as in an angular map"
         raise UserError(what, file=file, field="layout", got=f"{width} x {height}", hint=HINT)
     return "angular"
 
@@ -92,7 +92,9 @@ def as_lat_long(picture: Image, layout: Layout, file: Path | None = None) -> Ima
 def _check(fits: bool, layout: str, expected: str, picture: Image, file: Path | None) -> None:
     if not fits:
         got = f"{picture.shape[1]} x {picture.shape[0]}"
-        raise UserError(f"picture has not the proportions of layout {layout}", file=file, got=got, expected=expected)
+        raise UserError(
+            f"picture does not have the proportions of layout {layout}", file=file, got=got, expected=expected
+        )
 
 
 def _cross(height: int, width: int) -> tuple[int, int] | None:

@@ -58,7 +58,7 @@ EXPECTED_TYPES = {
     "dataclass_type": TABLE,
     "list_type": LIST,
     "tuple_type": LIST,
-    "string_type": "a text",
+    "string_type": "text",
     "bool_type": "true or false",
     "float_type": NUMBER,
     "int_type": "a whole number",
@@ -76,7 +76,7 @@ def invalid(error: Any, file: str | Path, known: Iterable[str] = ()) -> UserErro
     got = None if isinstance(first["input"], dict) else first["input"]  # a table is too long to be shown
     if first["type"] in EXPECTED_TYPES:
         expected = EXPECTED_TYPES[first["type"]]
-        return UserError("is of another type", file=file, field=field, got=got, expected=expected)
+        return UserError("has the wrong type", file=file, field=field, got=got, expected=expected)
     return UserError(first["msg"].removeprefix("Value error, "), file=file, field=field, got=got)
 
 

@@ -40,7 +40,7 @@ def decode(file: Path) -> Image:
         height, width, channels = y1 - y0 + 1, x1 - x0 + 1, len(header["channels"])
         flat = len(exr.parts) == 1 and "deep" not in str(header["type"])
     if not flat:
-        raise UserError("deep and multi-part EXR files are not read", file=file, hint="save it as one flat part")
+        raise UserError("deep and multi-part EXR files are not supported", file=file, hint="save it as one flat part")
     said = f"{width} x {height}, {channels} channels"
     if not (height > 0 and width > 0):
         raise UserError("picture has no pixels", file=file, got=said)
@@ -49,7 +49,9 @@ def decode(file: Path) -> Image:
         planes = {name: np.asarray(channel.pixels) for name, channel in exr.channels().items()}
     names = "RGB" if all(c in planes for c in "RGB") else "YYY"
     if names[0] not in planes:
-        raise UserError("no picture in the EXR", file=file, got=", ".join(sorted(planes)), expected="R, G, B or Y")
+        raise UserError(
+            "EXR has no picture channels", file=file, got=", ".join(sorted(planes)), expected="R, G, B or Y"
+        )
     if {planes[c].shape for c in names} != {(height, width)}:
         raise UserError("channels differ in size", file=file)
     image = np.empty((height, width, 3), np.float32)

@@ -49,7 +49,7 @@ class Range:
         least = LEAST if self.log else 0.0
         if not (least <= self.low < self.high <= MOST):
             expected = f"{least:g} <= LOW < HIGH <= {MOST:g}"
-            raise UserError("not a range of luminance", got=f"{self.low:g}:{self.high:g}", expected=expected)
+            raise UserError("is not a luminance range", got=f"{self.low:g}:{self.high:g}", expected=expected)
 
     def share(self, values: Floats) -> Floats:
         """Places of values on the scale: 0 at `low`, 1 at `high`."""

@@ -31,9 +31,9 @@ _cleared: set[Path] = set()
 def atomic_path(path: Path) -> Iterator[Path]:
     """Path to write beside `path`; on leaving without an error it is flushed to disk and renamed into place.
 
-    A reader sees the old file or the new one, never a part; a crash leaves the old one. The folder is made where there
-    is none. A symbolic link is followed: its target is replaced, and it stays. A new file has the mode that the umask
-    says, a replaced one keeps its mode. What a killed process left beside goes.
+    A reader sees the old file or the new one, never a part; a crash leaves the old one. A missing folder is made. A
+    symbolic link stays and its target is replaced. A new file gets its mode from the umask; a replaced file keeps its
+    mode. Temporary files of killed processes are removed.
 
     Raises
     ------
@@ -79,9 +79,9 @@ def real_file(path: Path) -> Path:
     except OSError as error:
         raise _unwritable(path, error) from error
     if stat.S_ISDIR(mode):
-        raise UserError("is a folder", file=path, expected="a name for a file")
+        raise UserError("is a folder", file=path, expected="a file name")
     if not stat.S_ISREG(mode):
-        raise UserError("is a device or a pipe", file=path, expected="a name for a file")
+        raise UserError("is a device or a pipe", file=path, expected="a file name")
     return target
 
 

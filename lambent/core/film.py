@@ -103,7 +103,9 @@ def sequence_file(path: Path, number: int) -> Path:
     """Name of a sequence's picture: `number` replaces the # signs of `path`, or is added with four digits."""
     stem, signs, rest = re.fullmatch(r"([^#]*)(#*)(.*)", path.stem, re.DOTALL).groups()  # type: ignore[union-attr]
     if "#" in rest:
-        raise UserError("name of a picture sequence", file=path, expected="one run of # signs, as in tour-####.png")
+        raise UserError(
+            "is not a name for an image sequence", file=path, expected="one run of # signs, as in tour-####.png"
+        )
     return path.with_name(f"{stem}{number:0{len(signs)}}{rest}{path.suffix}" if signs else
                           f"{path.stem}-{number:04}{path.suffix}")  # fmt: skip
 

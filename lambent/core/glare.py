@@ -96,8 +96,8 @@ def glare(radiance: Floats, view: View, threshold: float = THRESHOLD_CD_M2) -> G
     seen = ahead > 0
     if (covered := float(solid_angle[seen].sum())) < COVERED_SR:
         raise UserError(
-            "picture shows too little for glare", got=f"{covered:.2f} sr", expected="the half space ahead, 6.28 sr",
-            hint="draw it with --projection fisheye",
+            "picture shows too little of the surroundings for glare", got=f"{covered:.2f} sr",
+            expected="the half space ahead, 6.28 sr", hint="render it with --projection fisheye",
         )  # fmt: skip
     shown = np.where(seen, photometric(radiance), 0.0)
     numbers = _numbered(shown, rays, threshold)

@@ -45,10 +45,10 @@ def read_image(path: Path) -> Image:
     elif data.startswith((b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")):
         image = _linear(_stored(path))
     else:
-        raise UserError("not a picture Lambent reads", file=path, got=repr(data[:4]), expected="EXR, HDR, PNG or JPEG")
+        raise UserError("unknown picture format", file=path, got=repr(data[:4]), expected="EXR, HDR, PNG or JPEG")
     bad = image.size - np.count_nonzero(np.isfinite(image))
     if bad:
-        raise UserError("picture holds values that are not finite", file=path, got=f"{bad} of {image.size} values")
+        raise UserError("picture has values that are not finite", file=path, got=f"{bad} of {image.size} values")
     return image
 
 

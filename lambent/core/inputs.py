@@ -21,10 +21,10 @@ _LONGEST_FAULT = 120
 
 @contextmanager
 def open_input(path: Path) -> Iterator[BufferedReader]:
-    """A user's file, open for reading; a `UserError` where it is missing, unreadable or no regular file.
+    """Open a user's file for reading; raise `UserError` where it is missing, unreadable or no regular file.
 
-    Every file of a user is opened here: a pipe would block for ever, a device may never end, and opening one may do
-    something.
+    Every file of a user is opened here: a pipe would block for ever, a device may never end, and opening a device may
+    have effects.
     """
     path = Path(path)
     try:
@@ -54,9 +54,9 @@ def _check_regular(mode: int, path: Path) -> None:
 
 @contextmanager
 def foreign_bytes(reader: str, path: Path) -> Iterator[None]:
-    """Turns whatever a reader raises over a file's bytes into a `UserError` with the reader's name.
+    """Turn any exception of a reader into a `UserError` with the reader's name.
 
-    It is a net below readers, which refuse by themselves what they foresee.
+    Readers reject known faults themselves; this catches the rest.
     """
     try:
         yield
@@ -81,11 +81,11 @@ def read_head(path: Path, size: int) -> bytes:
 
 
 def read_bytes(path: Path, limit_bytes: int) -> bytes:
-    """Content of a user's file, or a `UserError` where `open_input` refuses it or it is over `limit_bytes`."""
+    """Content of a user's file; raise `UserError` where `open_input` rejects it or it exceeds `limit_bytes`."""
     with open_input(path) as file:
         size = os.fstat(file.fileno()).st_size
         parts, read = [], 0
-        # What the system says of the size is a hint: files of the system have none, others grow while they are read.
+        # The reported size is a hint: files of /proc report 0, others grow while they are read.
         while size <= limit_bytes and (part := file.read(max(size - read, 1 << 16))):
             parts.append(part)
             read += len(part)
@@ -99,14 +99,14 @@ _HALF_CHARACTER = re.compile(rb"\\u[dD][89a-fA-F]")
 
 
 def parse_json(text: bytes, file: Path) -> Any:
-    """The value of a JSON text, or a `UserError`; every text in it can be written as UTF-8."""
+    """The value of a JSON text, whose strings can all be encoded as UTF-8; else raise `UserError`."""
     try:
         value = json.loads(text.decode("utf-8-sig"))
         if _HALF_CHARACTER.search(text):
             json.dumps(value, ensure_ascii=False).encode("utf-8")
     except UnicodeEncodeError as error:
         half = error.object[error.start : error.end]
-        raise UserError("a text holds half of a character", file=file, got=ascii(half)[:20]) from error
+        raise UserError("text has an unpaired surrogate", file=file, got=ascii(half)[:20]) from error
     except (ValueError, RecursionError) as error:
-        raise UserError(f"its JSON cannot be read ({error})", file=file) from error
+        raise UserError(f"JSON cannot be read ({error})", file=file) from error
     return value

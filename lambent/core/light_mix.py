@@ -19,7 +19,7 @@ from lambent.core.plain import Triple, triple
 WHITE: Triple = (1.0, 1.0, 1.0)
 LEAST_K, MOST_K = 1667.0, 25000.0  # of the fit to the Planckian locus
 MOST_INTENSITY = 1000.0
-EXPECTED = "NAME=VALUE, VALUE an intensity, off, a temperature as 2700K, #rrggbb, or several with commas"
+EXPECTED = "NAME=VALUE, with VALUE an intensity, off, 2700K, #rrggbb, or several joined by commas"
 Factors = Mapping[str, Triple]  # by group; a group that is left out stays as it was baked
 
 
@@ -47,11 +47,13 @@ class GroupMix:
             expected = f"{LEAST_K:g} to {MOST_K:g} K"
             raise UserError("temperature is out of range", field="light", got=self.temperature_k, expected=expected)
         if not (all(0 <= value <= 1e6 for value in self.colour) and any(self.colour)):
-            raise UserError("not the colour of a light", field="light", got=self.colour, expected="not black")
+            raise UserError(
+                "light colour is out of range", field="light", got=self.colour, expected="0 to 1e6, not black"
+            )
 
     @property
     def factor(self) -> Triple:
-        """By which the group's light is multiplied, by channel."""
+        """Factor on the group's light, by channel."""
         if not self.on:
             return 0.0, 0.0, 0.0
         tint = np.array(self.colour, float)
@@ -67,7 +69,7 @@ AS_BAKED = GroupMix()
 
 @dataclass(frozen=True)
 class LightMix:
-    """The mixes of groups by name; others are as baked."""
+    """The mixes of groups by name; other groups are as baked."""
 
     groups: Mapping[str, GroupMix] = field(default_factory=dict)
 
@@ -77,22 +79,22 @@ class LightMix:
         return self.groups.get(name, AS_BAKED)
 
     def changed(self, name: str, mix: GroupMix) -> LightMix:
-        """The same with another mix of one group."""
+        """A copy with another mix for one group."""
         others = {key: value for key, value in self.groups.items() if key != name}
         return LightMix(others if mix == AS_BAKED else {**others, name: mix})
 
     @property
     def factors(self) -> dict[str, Triple]:
-        """Of the groups that are not as baked."""
+        """Factors of the groups that are not as baked."""
         found = {name: mix.factor for name, mix in self.groups.items()}
         return {name: factor for name, factor in found.items() if factor != WHITE}
 
 
 @dataclass(frozen=True)
 class MixTrack:
-    """Mixes of groups over time: by name, times in seconds, rising, each with a mix.
+    """Mixes of groups over time: by name, increasing times in seconds, each with a mix.
 
-    Between two times a group's factor changes evenly; before the first and after the last these hold.
+    A group's factor is interpolated linearly, and constant before the first and after the last time.
     """
 
     groups: Mapping[str, tuple[tuple[float, GroupMix], ...]] = field(default_factory=dict)
@@ -102,7 +104,7 @@ class MixTrack:
     def __post_init__(self) -> None:
         for name, keys in self.groups.items():
             if not keys or any(b[0] <= a[0] for a, b in pairwise(keys)):
-                raise UserError("times of a track of light grow", field=name, got=[time_s for time_s, _ in keys])
+                raise UserError("times do not increase", field=name, got=[time_s for time_s, _ in keys])
 
     @classmethod
     def of(cls, mix: LightMix) -> MixTrack:
@@ -110,7 +112,7 @@ class MixTrack:
         return cls({name: ((0.0, one),) for name, one in mix.groups.items()})
 
     def factors_at(self, time_s: float) -> dict[str, Triple]:
-        """Of the groups that are not as baked at a time."""
+        """Factors at a time, for the groups that are not as baked."""
         found = {}
         for name, keys in self.groups.items():
             times, factors = [key[0] for key in keys], np.array([mix.factor for _, mix in keys])
@@ -139,9 +141,9 @@ def black_body(temperature_k: float) -> np.ndarray:
 
 
 def parse_light(texts: Iterable[str]) -> MixTrack:
-    """The track of texts such as "lamp=off", "lamp=0.3", "lamp=2700K", "lamp=0.5,#ffd0a0" and "lamp=0.5@4".
+    """The track given by texts such as "lamp=off", "lamp=0.3", "lamp=2700K", "lamp=0.5,#ffd0a0" and "lamp=0.5@4".
 
-    The number after @ is a time in seconds, 0 without it. A group that is said at several times changes evenly.
+    The number after @ is a time in seconds, by default 0. Values between two times are interpolated.
     """
     said: dict[str, dict[float, GroupMix]] = {}
     for text in texts:
@@ -149,16 +151,16 @@ def parse_light(texts: Iterable[str]) -> MixTrack:
         name, (value, _, at) = name.strip(), value.partition("@")
         time_s = _number(at, text) if at else 0.0
         if not name or not value:
-            raise UserError("not a light", field="--light", got=text, expected=EXPECTED)
+            raise UserError("cannot be read as light", field="--light", got=text, expected=EXPECTED)
         of_name = said.setdefault(name, {})
         if time_s in of_name:
-            raise UserError("says a light twice", field="--light", got=text, hint="join the values with a comma")
+            raise UserError("names a light twice", field="--light", got=text, hint="join its values with a comma")
         of_name[time_s] = mix_of(value, text)
     return MixTrack({name: tuple(sorted(keys.items(), key=lambda key: key[0])) for name, keys in said.items()})
 
 
 def mix_of(value: str, text: str) -> GroupMix:
-    """The mix of a value such as "0.5,2700K"; errors show the `text` that it is from."""
+    """The mix given by a value such as "0.5,2700K"; errors show `text`, of which it is a part."""
     mix, said = AS_BAKED, set[str]()
     for word in (part.strip() for part in value.split(",")):
         if word.lower() in ("on", "off"):
@@ -166,7 +168,7 @@ def mix_of(value: str, text: str) -> GroupMix:
         elif re.fullmatch(r"#[0-9a-fA-F]{6}", word):
             kind = "colour"
             if word == "#000000":
-                raise UserError("a light cannot be black", field="--light", got=text, hint="say off")
+                raise UserError("light colour cannot be black", field="--light", got=text, hint="use off")
             encoded = np.array([int(word[i : i + 2], 16) for i in (1, 3, 5)]) / 255
             mix = replace(mix, colour=triple(srgb_decode(encoded)))
         elif re.fullmatch(r"[\d.]+[kK]", word):
@@ -174,7 +176,7 @@ def mix_of(value: str, text: str) -> GroupMix:
         else:
             kind, mix = "intensity", replace(mix, intensity=_number(word, text))
         if kind in said:
-            raise UserError(f"says its {kind} twice", field="--light", got=text)
+            raise UserError(f"has two values for {kind}", field="--light", got=text)
         said.add(kind)
     return mix
 
@@ -185,5 +187,5 @@ def _number(word: str, text: str) -> float:
     except ValueError:
         value = -1.0
     if not 0 <= value < 1e9:
-        raise UserError("not a light", field="--light", got=text, expected=EXPECTED)
+        raise UserError("cannot be read as light", field="--light", got=text, expected=EXPECTED)
     return value

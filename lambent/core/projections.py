@@ -130,7 +130,9 @@ class View:
             wide = 360.0 if field_deg is None else field_deg
             return cls(camera, projection, wide, _twice_atan_deg(math.radians(wide) / 2 * shape))
         if width != height:
-            raise UserError("a fisheye is square", field="--size", got=f"{width}x{height}", expected=f"{width}x{width}")
+            raise UserError(
+                "a fisheye picture must be square", field="--size", got=f"{width}x{height}", expected=f"{width}x{width}"
+            )
         wide = 180.0 if field_deg is None else field_deg
         return cls(camera, projection, wide, wide)
 

@@ -32,7 +32,7 @@ def read_view(path: Path) -> View:
     said = [line for line in lines if line.startswith(_PROGRAMS) and " -v" in line]
     if not said:
         expected = "a Radiance picture (.hdr) with a VIEW line"
-        raise UserError("picture does not say what it shows", file=path, expected=expected)
+        raise UserError("picture has no view", file=path, expected=expected)
     return view_of(said[-1], path)
 
 
@@ -51,15 +51,15 @@ def view_of(line: str, file: Path) -> View:
             values = words[at + 1 : at + 1 + count]
             if len(values) < count or not all(map(is_number, values)):
                 raise UserError(
-                    "view is damaged", file=file, field=word, got=" ".join(values), expected=f"{count} numbers"
+                    "VIEW line is damaged", file=file, field=word, got=" ".join(values), expected=f"{count} numbers"
                 )
             found[word[2:]] = [float(value) for value in values]
     if kind not in kinds:
         raise UserError(
-            "view is of an unknown type", file=file, got=f"-vt{kind}", expected=", ".join(map("-vt{}".format, kinds))
+            "unknown view type", file=file, got=f"-vt{kind}", expected=", ".join(map("-vt{}".format, kinds))
         )
     if any(found.get(shifted, [0.0]) != [0.0] for shifted in "sl"):
-        raise UserError("view is shifted off its middle", file=file, field="-vs, -vl", expected="0")
+        raise UserError("shifted views are not supported", file=file, field="-vs, -vl", expected="0")
     if not (np.any(found["d"]) and np.all(np.isfinite([*found["p"], *found["d"], *found["u"]]))):
         raise UserError("view has no direction", file=file, field="-vd", got=" ".join(map(str, found["d"])))
     eye = np.array(found["p"])

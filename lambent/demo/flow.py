@@ -110,7 +110,7 @@ class Flow:
         self._plotted: list[Future[list[Path]]] = []
         if not (self.out / "measured").is_dir() and (self.out.is_file() or list(self.out.glob("*"))):
             hint = "choose another folder with --out"
-            raise UserError("is no folder of a demo, nor empty", file=self.out, hint=hint)
+            raise UserError("is neither a demo folder nor empty", file=self.out, hint=hint)
         (self.out / "measured").mkdir(parents=True, exist_ok=True)
 
     @property
@@ -238,7 +238,7 @@ class Flow:
     def finish(self) -> dict[str, Any]:
         """Write demo.json and return its contents."""
         seconds = self.report["seconds"]
-        seconds["in all"] = sum(seconds.values())
+        seconds["total"] = sum(seconds.values())
         write_text(self.out / "demo.json", json.dumps(plain(self.report), indent=1, allow_nan=False) + "\n")
         return self.report
 

@@ -178,7 +178,7 @@ def load_document(path: Path) -> SessionDocument:
     if (version := data.get("version", VERSION)) != VERSION:
         hint = "use the Lambent that wrote it, or a later one"
         raise UserError(
-            "session of another version", file=path, field="version", got=version, expected=VERSION, hint=hint
+            "unsupported session version", file=path, field="version", got=version, expected=VERSION, hint=hint
         )
     try:
         return SessionDocument.model_validate(data)

@@ -43,7 +43,7 @@ class RelitView:
             return view_artefact_name(camera, width, height, kind, part)
 
         if not all(name(part) in store for part in ("spans", "points", "values", "errors", "lamps", "light")):
-            what = f"no relighting of camera {camera.name}, {width} x {height}"
+            what = f"no relighting for camera {camera.name}, {width} x {height}"
             raise UserError(what, file=store.folder, field="view", hint="bake the view for relighting first")
         self._pixel = store.read(name("pixel", "view_points")).astype(np.int64)
         self._backdrop = store.read(name("backdrop", "view_points")).astype(np.float32).reshape(-1, 3)

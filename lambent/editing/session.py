@@ -191,7 +191,7 @@ class Session:
         """Take one layer (0 is the lowest) out."""
         layers = self._curve(material, curve).layers
         if not 0 <= layer < len(layers):
-            raise UserError("no such layer", field=curve, got=layer, expected=f"0 to {len(layers) - 1}")
+            raise UserError("layer index out of range", field=curve, got=layer, expected=f"0 to {len(layers) - 1}")
         self._change_curve(material, curve, layers=layers[:layer] + layers[layer + 1 :])
 
     def draw(self, material: str, curve: str, drawn: Curve | Drawn) -> None:
@@ -299,7 +299,7 @@ class Session:
             return editable(model_named(source.model)(**source.parameters))
         file = self.path(source.file)
         if not file.is_file():
-            raise UserError("no such file", file=file, field="source.file")
+            raise UserError("file does not exist", file=file, field="source.file")
         if sha256_of(file) != source.sha256:
             raise UserError("the table has changed since it was edited", file=file, field="source.sha256")
         return self._factorise(file)
@@ -329,7 +329,7 @@ def _source(start: Start) -> OfDocument | OfModel | OfTable:
         made = _checked(OfModel, model=start.name, parameters=start.values)
         return made
     if not start.is_file():
-        raise UserError("no such file", file=start, expected="a measured table")
+        raise UserError("file does not exist", file=start, expected="a measured table")
     made = _checked(OfTable, file=str(start.resolve()), sha256=sha256_of(start))
     return made
 

@@ -72,7 +72,7 @@ def edited_picture(
     lights = max(counts, default=None) if lights is None else lights
     if lights is None or lights not in counts:
         found = ", ".join(map(str, counts)) or "none"
-        what = f"no transport of camera {view.camera.name}, {view.size[0]} x {view.size[1]}"
+        what = f"no transport for camera {view.camera.name}, {view.size[0]} x {view.size[1]}"
         raise NotBaked(
             what, file=store.folder, field="lights", got=lights or found, expected=found if counts else None,
             hint="bake the view for editing first",
@@ -81,7 +81,7 @@ def edited_picture(
     scene = {name: of_material(material) for name, material in scene_record(store).materials.items()}
     parts = parts_of(store, session, {**scene, **{name: session.original(name) for name in view.materials}}, lights)
     if apart := sorted(parts.keys() & view.merged.keys()):
-        what = f"transport has a material of its own that the session merges with {view.merged[apart[0]]}"
+        what = f"transport has a separate material that the session merges with {view.merged[apart[0]]}"
         raise NotBaked(what, file=store.folder, field=apart[0], hint="bake the view for editing again")
     backdrop = store.read(view_artefact_name(view.camera, *view.size, "view_points", "backdrop"))
     picture = EditedPicture(backdrop.astype(np.float32), parts, canvas)
@@ -97,7 +97,7 @@ def _check_environment(store: Store, session: Session, lights: int) -> None:
     view, wanted = session.document, environment_note(session.environment)
     terms = view_artefact_name(view.camera, *view.size, "transport", f"{lights}/terms")
     if store.artefact(terms).meta.get("environment") != wanted:
-        what = "transport is of another environment than the session's"
+        what = "transport was baked for another environment"
         raise NotBaked(what, file=store.folder, hint="bake the view for editing again")
 
 
@@ -119,7 +119,7 @@ def parts_of(store: Store, session: Session, materials: Mapping[str, Editable], 
     worn = np.array([material for _, material in store.artefact(name("view_points", "object")).meta["objects"]])[number]
     said = store.artefact(name("transport", f"{lights}/terms")).meta["terms"]
     if any(one.get("basis") != TRANSPORT_BASIS for one in said):
-        what = "transport was baked by an earlier version, which counted curves by steps"
+        what = "transport was baked by an earlier version of Lambent"
         raise NotBaked(what, file=store.folder, hint="bake the view for editing again")
     parts = {}
     for material, start in materials.items():
@@ -129,7 +129,7 @@ def parts_of(store: Store, session: Session, materials: Mapping[str, Editable], 
         baked = {one["term"]: one for one in said if one["material"] == material}
         if {k: one.get("fixed") for k, one in baked.items()} != {k: t.fixed for k, t in enumerate(start.terms)}:
             raise NotBaked(
-                "transport is of other terms than the material has", file=store.folder, field=material,
+                "transport was baked for other terms of the material", file=store.folder, field=material,
                 hint="bake the view for editing again",
             )  # fmt: skip
         arrays = name("transport", f"{lights}/{material}")

@@ -146,7 +146,7 @@ def check_samplers(bsdf: Scatters, seed: int, step: Callable[[str], None]) -> tu
 def energy_failures(energy: Furnace, limit: float) -> list[str]:
     """A line where the mean albedo exceeds `limit`, else none."""
     highest = max(energy.mean_albedo)
-    return [f"mean albedo {highest:.3f}: light between such walls grows without bound"] if highest > limit else []
+    return [f"mean albedo {highest:.3f}: interreflections grow without bound"] if highest > limit else []
 
 
 def sampler_failures(sampler: tuple[SamplerCheck, ...]) -> list[str]:
@@ -159,7 +159,10 @@ def sampler_failures(sampler: tuple[SamplerCheck, ...]) -> list[str]:
             found.append(f"samples do not follow the density {where} (chi-square p {one.p_value:.2g})")
         if abs(one.pdf_integral + one.rejected_share - 1) > INTEGRAL_LIMIT:
             kept = 1 - one.rejected_share
-            found.append(f"the density integrates to {one.pdf_integral:.4f} {where}, the sampler keeps {kept:.4f}")
+            found.append(
+                f"the density integrates to {one.pdf_integral:.4f} {where}, but the sampler accepts {kept:.4f} of "
+                "its samples"
+            )
         tolerance = 5 * one.albedo_error + INTEGRAL_LIMIT * one.albedo_quadrature
         if abs(one.albedo_sampled - one.albedo_quadrature) > tolerance:
             both = f"{one.albedo_sampled:.4f} by sampling, {one.albedo_quadrature:.4f} by quadrature"

@@ -64,7 +64,7 @@ class Lobe(_Strict):
         if self.retro and self.side == "transmission":
             raise ValueError("a lobe of transmission cannot be retro")
         if self.alpha < 0 and not self.retro:
-            raise ValueError("alpha: only a retro lobe has one below 0")
+            raise ValueError("alpha: only a retro lobe can have a negative alpha")
         return self
 
     @property
@@ -155,6 +155,6 @@ def material_from(data: Any, file: Path | str) -> Material:
         known = [*Lobe.model_fields, *Material.model_fields, *Provenance.model_fields]
         raise invalid(error, file, known) from error
     if not data.keys() & SCATTERING:
-        hint = "a black surface says so: kd = 0"
+        hint = "for a black surface set kd = 0"
         raise UserError("has no scattering term", file=file, expected="kd, kt_d or lobes", hint=hint)
     return material

@@ -23,7 +23,9 @@ def parse_recolours(texts: Sequence[str]) -> dict[str, Triple]:
         name, _, written = text.rpartition("=")
         colour = hex_colour(written.strip())
         if not name.strip() or colour is None:
-            raise UserError("not a colour of a material", field=FIELD, got=text, expected="MATERIAL=#rrggbb")
+            raise UserError(
+                "cannot be read as a recoloured material", field=FIELD, got=text, expected="MATERIAL=#rrggbb"
+            )
         if name.strip() in found:
             raise UserError("names a material twice", field=FIELD, got=name.strip())
         found[name.strip()] = colour

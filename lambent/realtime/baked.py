@@ -160,7 +160,7 @@ def read_baked(store: Store, light_field_mb: float | None = None, policy: str = 
     for obj in (o for o in record.objects if o.name not in shared):
         name = contract.probe_name(obj.name, "radiance")
         wanted = obj.probe and contract.needs_probe(record.materials[obj.material])
-        radiance = light(name, "the nearest probe or the environment stands in" if wanted else None)
+        radiance = light(name, "the nearest probe or the environment is used" if wanted else None)
         if radiance is not None:
             probes[obj.name] = _probe(store, obj.name, radiance)
     back = "light through two-sided sheets is black" if two_sided else None

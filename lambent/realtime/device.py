@@ -130,7 +130,10 @@ def open_device(needs: Mapping[str, int] | None = None, adapter: Any = None) -> 
     for name, value in (needs or {}).items():
         if value > adapter.limits[name]:
             raise UserError(
-                "scene needs more than this adapter grants", field=name, got=adapter.limits[name], expected=value
+                "scene exceeds the limits of this graphics adapter",
+                field=name,
+                got=adapter.limits[name],
+                expected=value,
             )
         limits[name] = max(limits.get(name, 0), value)
     features = [name for name in OPTIONAL_FEATURES if name in adapter.features]

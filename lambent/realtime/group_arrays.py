@@ -17,9 +17,9 @@ from lambent.store.contract import SIDES
 from lambent.store.light_groups import LightGroupRecord, group_name, light_groups
 from lambent.store.store import Store
 
-NO_GROUPS = "the store holds no light by group"
+NO_GROUPS = "the store has no light groups"
 BAKE_GROUPS = "`lambent bake` of the same scene with --light-groups scene adds it"
-FIELDS_FOLLOW = "light fields are as baked, times the change of light that their objects' probes see"
+FIELDS_FOLLOW = "light fields follow approximately: scaled by the change of light at their objects' probes"
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ class GroupArrays:
             if name not in names:
                 hint = did_you_mean(name, names)
                 expected = ", ".join(names)
-                raise UserError("no light group of this name", field="light", got=name, expected=expected, hint=hint)
+                raise UserError("unknown light group", field="light", got=name, expected=expected, hint=hint)
         return np.array([light.get(name, WHITE) for name in names], np.float32)
 
 

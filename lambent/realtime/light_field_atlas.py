@@ -107,8 +107,8 @@ class Atlas:
             self.places = min(self.places, int(most_bytes / self.map_bytes))
         if self.places < 1:
             raise UserError(
-                "no map of the light field fits", field="--light-field-mb", got=f"{(most_bytes or 0) / 1e6:.3g} for it",
-                expected=f"{self.map_bytes / 1e6:.2g} MB or more",
+                "is too small for one light field map", field="--light-field-mb",
+                got=f"{(most_bytes or 0) / 1e6:.3g} MB", expected=f"{self.map_bytes / 1e6:.2g} MB or more",
             )  # fmt: skip
         self.grid = Grid.of(self.places, self.tiles.tile)
         self._device = device

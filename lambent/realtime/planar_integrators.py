@@ -106,4 +106,4 @@ def check_planar(integrator: str, method: str) -> None:
     choices = (AUTO, OFF, *PLANAR.get(integrator, {}))
     if method not in choices:
         expected = ", ".join(choices)
-        raise UserError(f"{integrator} does not draw reflectors so", field="--planar", got=method, expected=expected)
+        raise UserError(f"not supported by {integrator}", field="--planar", got=method, expected=expected)

@@ -24,18 +24,18 @@ from lambent.store.contract import transport_lights
 from lambent.store.source import SOURCE
 from lambent.store.store import Store
 
-EDITED = "edited"  # where others say their integrator
+EDITED = "edited"  # stands for the integrator in `Rendered`
 
 
 class Edited(Images):
-    """Images of an edited picture, by the camera of its session alone."""
+    """Images of an edited picture, through the camera of its session only."""
 
     def __init__(self, picture: WholePicture, settings: Settings) -> None:
         super().__init__(settings)
         self._picture = picture
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Image:
-        return np.maximum(self._picture.image(), 0)  # in the dark, half floats of wavelets leave a little less
+        return np.maximum(self._picture.image(), 0)  # half floats of wavelets round below 0 where it is dark
 
 
 def edited_still(
@@ -45,22 +45,22 @@ def edited_still(
     settings: Settings = DEFAULT,
     surfaces: tuple[int, int] = ALL_HITS,
 ) -> Rendered:
-    """Draw the view of a session as it has edited it, by the transport and the interreflections in a store.
+    """Draw the view of a session with its edits, from the transport and the interreflections in a store.
 
     Parameters
     ----------
     session : path
-        A session's file: it has the camera and the size, whatever `settings` say.
+        A session's file; its camera and size replace those of `settings`.
     file, settings
         As of `output.still`: exposure, view transform and false colours.
     surfaces
-        Least and most surfaces on the paths that are shown.
+        Least and most surfaces on the shown light paths.
 
     Raises
     ------
     UserError
-        Where the session or the store cannot be used, or the store lacks the transport: then with the command that
-        bakes it.
+        Where the session or the store cannot be used, or the store lacks the transport; the hint then is the command
+        that bakes it.
     """
     began, file = time.perf_counter(), Path(file)
     check_writable(file, WRITABLE)
@@ -81,7 +81,7 @@ def edited_still(
 
 
 def _bake_command(store: Store, wanted: Session, session: Path) -> str:
-    """The command that bakes what a session needs: for as many lights as the store has of the view."""
+    """The command that bakes what a session needs, with as many lights as the store has for the view."""
     place = store.documents.get(SOURCE)
     scene = "SCENE" if not isinstance(place, str) else place if place.startswith("builtin:") else store.folder / place
     view = wanted.document

@@ -1,4 +1,4 @@
-"""Images of a store, by whatever renderer: their settings, and how radiance is displayed."""
+"""Images of a store, whichever renderer draws them: their settings, and the display of radiance."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ from lambent.scenes.scene import Variant
 PATH_TRACER = "path"
 FALSE_COLOUR, NOISE = "false-colour", "noise"
 ANYWHERE = Camera("anywhere", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
-MOST_EV = 64  # of an exposure, either way: 2^64 times is still a number
+MOST_EV = 64  # largest exposure in stops, up or down; 2^64 fits into float32
 VIEWS = ("filmic", "neutral", "linear", FALSE_COLOUR)
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How images are rendered. Errors name the options of `lambent render` that stand for the fields.
+    """How images are rendered. Errors name the matching options of `lambent render`.
 
     Attributes
     ----------
@@ -120,32 +120,34 @@ class Settings:
         return self.view == FALSE_COLOUR or self.show == NOISE
 
     def view_of(self, camera: Camera) -> View:
-        """What images show around a camera's eye."""
+        """The projected view of a camera."""
         return View.of(camera, self.projection, self.width, self.height, self.field_deg)
 
     def check(self) -> None:
-        """Raise `UserError` for a view transform or an exposure that cannot be; renderers check the rest."""
+        """Raise `UserError` for an impossible view transform, exposure or field of view; renderers check the rest."""
         known("integrator", self.integrator, (*INTEGRATORS, PATH_TRACER), field="--integrator")
         known("view transform", self.view, VIEWS, field="--view")
         if self.scale is not None:
             self.scale.check()
         if self.exposure_ev is not None and not -MOST_EV <= self.exposure_ev <= MOST_EV:  # also refuses nan
             got, expected = self.exposure_ev, f"-{MOST_EV} to {MOST_EV} EV"
-            raise UserError("exposure is out of range", field="--exposure", got=got, expected=expected)
+            raise UserError("is out of range", field="--exposure", got=got, expected=expected)
         if not -360 <= self.sky_turn_deg <= 360:  # also refuses nan
             got, expected = self.sky_turn_deg, "-360 to 360 degrees"
-            raise UserError("the sky turns by less", field="--sky-turn", got=got, expected=expected)
+            raise UserError("is out of range", field="--sky-turn", got=got, expected=expected)
         if self.projection is not Projection.perspective:
             self.view_of(ANYWHERE).check()
         elif self.field_deg is not None:
-            raise UserError("is of fisheyes and cylinders", field="--field", hint="a camera has its own field of view")
+            raise UserError(
+                "applies to fisheyes and cylinders only", field="--field", hint="a camera has its own field of view"
+            )
 
 
 class Images(ABC):
     """Images of a store; `quantity` is measured by their false colours."""
 
     quantity: Quantity = LUMINANCE
-    time_s: float = 0.0  # of the film whose image is drawn next
+    time_s: float = 0.0  # time within the film of the next image
 
     def __init__(self, settings: Settings) -> None:
         self.settings, self.scale = settings, settings.scale  # None until an image in false colours was displayed
@@ -153,18 +155,18 @@ class Images(ABC):
 
     @property
     def light_fields(self) -> dict[str, Any]:
-        """Of light fields that have a budget: `realtime.streaming.Streaming.statistics`."""
+        """`realtime.streaming.Streaming.statistics` of light fields with a memory budget, else empty."""
         return {}
 
     def wear(self, variant: Variant) -> None:
-        """Show a variant from the next image on; the mix of the settings, where they have one, stands before its own.
+        """Show a variant from the next image on; a light mix of the settings goes before the variant's.
 
         Raises
         ------
         UserError
-            Where the renderer has one state of materials alone.
+            Where the renderer has one state of materials only.
         """
-        raise UserError("an edited view has no variants", field="--variants")
+        raise UserError("excludes --edit", field="--variants")
 
     @abstractmethod
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:

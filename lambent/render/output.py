@@ -38,11 +38,11 @@ DEFAULT = Settings()
 
 @dataclass(frozen=True)
 class Rendered:
-    """The written file, its size in pixels, its frames, the time that it took, and the exposure it is displayed with.
+    """The written file, its size in pixels, its frames, the time taken in seconds, and its exposure.
 
-    `exposure_ev` in stops on radiance and `ev100` are None of files of radiance, and of false colours; of these `scale`
-    says what they mean: low, high, log, unit. Of a sheet they are those of its first picture; `ev100_by_name` has
-    all where they differ. `light_fields` is of those that do not fit `Settings.light_field_mb`.
+    `exposure_ev` (stops on radiance) and `ev100` are None for radiance files and for false colours, which have `scale`:
+    low, high, log, unit. For a contact sheet they describe the first picture; `ev100_by_name` has all where they
+    differ. `light_fields` has the statistics of light fields under the budget `Settings.light_field_mb`.
     """
 
     file: Path
@@ -81,18 +81,18 @@ def still(
     file : path
         .exr and .hdr hold linear radiance in W/(sr m^2), .png displayed light.
     camera : Camera or str, optional
-        A camera, or the name of one of the scene or of a saved view; by default the scene's first.
+        A camera, or the name of a camera or saved view; by default the scene's first camera.
     settings : Settings
         Size, integrator, exposure, view transform.
     scene : str, optional
-        For the path tracer: the scene, where it is no longer where the store says.
+        For the path tracer: the scene file, where it has moved since the bake.
     note : callable
-        Gets a sentence for everything that the store lacks, or that has changed since it was baked.
+        Called with a sentence for everything that the store lacks, or that has changed since the bake.
 
     Raises
     ------
     UserError
-        Where the file cannot be written, the store not be read, or a name or value is unknown.
+        Where the file cannot be written, the store cannot be read, or a name or value is unknown.
     """
     began, file = time.perf_counter(), Path(file)
     check_writable(file, WRITABLE)
@@ -108,7 +108,7 @@ def still(
 
 
 def displayed_as(file: Path, drawn: Images) -> dict[str, Any]:
-    """How what is in a file is displayed, and how it was drawn: the last fields of `Rendered`."""
+    """Exposure or scale of a file, and light field statistics: the last fields of `Rendered`."""
     streamed = {"light_fields": drawn.light_fields} if drawn.light_fields else {}
     if file.suffix.lower() not in (".png", FILM):
         return streamed
@@ -121,7 +121,7 @@ def displayed_as(file: Path, drawn: Images) -> dict[str, Any]:
 
 
 def write_still(drawn: Images, file: Path, view: Camera, progress: Progress = silent) -> None:
-    """Draw one image into a file: displayed light as .png, else radiance."""
+    """Draw one image into a file: displayed light for .png, else radiance."""
     if file.suffix.lower() == ".png":
         write_shown(file, drawn.displayed(view, progress))
     else:
@@ -159,13 +159,13 @@ def film(
     Parameters
     ----------
     file : path
-        .mp4 is a film, its size cut to even numbers; .png and .exr are sequences, numbered where the name has # signs.
+        .mp4 is a film, its size cut to even numbers; .png and .exr are sequences, numbered at the # signs of the name.
     path : CameraPath or str, optional
-        A path, or the name of one of the scene or of a recorded walk; by default the scene's first.
+        A path, or the name of a camera path or recorded walk; by default the scene's first path.
     fps : int
         Frames per second.
     keyframes : path, optional
-        A file of states of materials and light over time (`scenes.loaders.keyframes`).
+        A file of materials and light over time (`scenes.loaders.keyframes`).
 
     The other parameters and the errors are those of `still`.
     """
@@ -213,7 +213,7 @@ def write_frames(
 def images(
     store: Store, settings: Settings = DEFAULT, *, moving: bool = False, scene: str | None = None, note: Note = ignore
 ) -> Images:
-    """Renderer of a store's images as arrays; `moving` for those of a film, the other parameters as of `still`."""
+    """Renderer of a store's images as arrays; `moving` for a film, other parameters as of `still`."""
     settings = exposed(settings, store)
     mix = _mix_of_variant(settings, store)
     if settings.light is None and mix.groups and settings.integrator != PATH_TRACER:
@@ -230,35 +230,35 @@ def images(
 
 
 def _with_keyframes(settings: Settings, store: Store, record: SceneRecord, file: Path) -> Settings:
-    """Settings with what a file says of materials and light over time."""
+    """Settings with the materials and light of a keyframe file."""
     looks = looks_as_loaded(record.materials, record.textures)
     found = read_keyframes(file, Known(looks, variants_of(store), read_views(store.folder).lights))
     if not found.light.groups:
         return replace(settings, looks=found.looks)
     if settings.light is not None:
-        raise UserError("the keyframes say the light", field="--light", hint="leave it out, or out of the file")
+        raise UserError("light is also in the keyframes", field="--light", hint="leave out one")
     return replace(settings, looks=found.looks, light=found.light)
 
 
 def _mix_of_variant(settings: Settings, store: Store) -> LightMix:
-    """The mix of the light that the settings' variant has."""
+    """The light mix of the settings' variant."""
     return variant_named(variants_of(store), settings.variant).light if settings.variant else LightMix()
 
 
 def _lit(settings: Settings, store: Store, light: MixTrack, whose: str, note: Note) -> Settings:
-    """Settings with a mix that was not asked for by name, where the store can show it and the integrator does."""
+    """Settings with a mix that came with a view, walk or variant, where store and integrator can show it."""
     if settings.integrator == PATH_TRACER:
-        note(f"the path tracer traces the light of the scene, not the mix {whose}")
+        note(f"the path tracer ignores the light mix {whose}: it traces the light of the scene")
         return settings
     missing = sorted(set(light.groups) - {group.name for group in light_groups(store)})
     if missing:
-        note(f"the mix {whose} is left out: the store has no light group {', '.join(missing)}")
+        note(f"light mix {whose} not applied: the store has no light group {', '.join(missing)}")
         return settings
     return replace(settings, light=light)
 
 
 def exposed(settings: Settings, store: Store) -> Settings:
-    """Settings that can be, with the exposure of the store's scene where they have none."""
+    """Checked settings, with the exposure of the store's scene where they have none."""
     settings.check()
     if settings.exposure_ev is None:
         settings = replace(settings, exposure_ev=scene_record(store).exposure_ev)
@@ -273,17 +273,17 @@ def opened_with_views(store: Store | Path | str) -> tuple[Store, SceneRecord]:
 
 
 def view_of(record: SceneRecord, camera: Camera | str | None) -> Camera:
-    """A camera itself, or that of a name; by default the first of the scene."""
+    """The camera itself or by name; by default the scene's first."""
     return camera if isinstance(camera, Camera) else _named("camera", record.cameras, camera)
 
 
 def _named(kind: str, choices: Iterable[Named], name: str | None) -> Named:
     found = {choice.name: choice for choice in choices}
     if not found:
-        raise UserError(f"scene has no {kind}", hint=f"add one to the scene, [[{kind}s]]")
+        raise UserError(f"scene has no {kind}", hint=f"add [[{kind}s]] to its scene.toml")
     if name is None:
         return next(iter(found.values()))
     if name not in found:
         hint = did_you_mean(name, found)
-        raise UserError(f"no {kind} of this name", field=f"--{kind}", got=name, expected=", ".join(found), hint=hint)
+        raise UserError(f"unknown {kind}", field=f"--{kind}", got=name, expected=", ".join(found), hint=hint)
     return found[name]

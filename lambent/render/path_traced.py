@@ -37,21 +37,21 @@ class PathTraced(Images):
             raise UserError("the path tracer traces the light of the scene", field="--light", hint=hint)
         if settings.planar != "auto":
             got = settings.planar
-            raise UserError("the path tracer traces reflectors", field="--planar", got=got, expected="auto")
+            raise UserError("the path tracer has no such choice", field="--planar", got=got, expected="auto")
         if settings.lookup != "auto":
             got = settings.lookup
-            raise UserError("the path tracer traces reflected rays", field="--lookup", got=got, expected="auto")
+            raise UserError("the path tracer has no such choice", field="--lookup", got=got, expected="auto")
         baked = scene_of(store, scene)
         self._baked, self._note = with_replacements(baked, settings.replacements), note
         self.wear(variant_named(variants_of(store), settings.variant) if settings.variant else Variant("as baked"))
         for name in changed_inputs(store, baked):
-            note(f"{name} has changed since the store was baked")
+            note(f"{name} has changed since the bake")
         engine()
 
     def wear(self, variant: Variant) -> None:
         self._variant = variant
         if variant.light.groups:
-            self._note(f"the path tracer traces the light of the scene, not the mix of {variant.name}")
+            self._note(f"the path tracer ignores the light mix of {variant.name}: it traces the light of the scene")
 
     def _scene_now(self) -> Scene:
         """The scene with the materials of the next image."""

@@ -1,4 +1,4 @@
-"""Images in projections that no pinhole camera has, from faces that another renderer draws."""
+"""Images in fisheye and cylindrical projections, resampled from cube faces that another renderer draws."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def faces_settings(settings: Settings) -> Settings:
 
 
 class Projected(Images):
-    """Images from faces that another renderer draws, whose settings are `faces_settings`."""
+    """Images resampled from cube faces; `faces` is a renderer with the settings `faces_settings`."""
 
     def __init__(self, faces: Images, settings: Settings) -> None:
         super().__init__(settings)

@@ -36,22 +36,22 @@ from lambent.store.contract import SIDES, noise_name
 from lambent.store.states import variants_of
 from lambent.store.store import Store
 
-METERED_PX = 256  # the longer side of what sets an exposure
-FILM_SUPERSAMPLES = 4  # of the radiance in an image sequence
+METERED_PX = 256  # longer side of the picture that is metered
+FILM_SUPERSAMPLES = 4  # per pixel of an image sequence that holds radiance
 
 
 class RealTime(Images):
     """Images by an integrator of `realtime.integrators`.
 
-    Displayed images of a film (`moving`) are single frames, as the window shows them in motion, thin things whole;
-    a still is the mean of many frames that look at other places of each pixel.
+    Displayed images of a film (`moving`) are single frames with coverage, as the window shows them in motion; a still
+    is the mean of many frames with different subpixel offsets.
     """
 
     def __init__(self, store: Store, settings: Settings, moving: bool, note: Callable[[str], None]) -> None:
         super().__init__(settings)
         if settings.show == NOISE and noise_name(SIDES[0]) not in store:
             hint = "`lambent bake` of the same scene adds it from the samples that the store keeps"
-            raise UserError("the store does not say how exact its light map is", field="--show", got=NOISE, hint=hint)
+            raise UserError("the store has no noise of its light map", field="--show", got=NOISE, hint=hint)
         self._progressive, self._moving = integrator(settings.integrator).progressive, moving
         check_planar(settings.integrator, settings.planar)
         self.quantity = quantity_of(settings.show)
@@ -66,10 +66,10 @@ class RealTime(Images):
         baked = read_baked(store, settings.light_field_mb, settings.light_field_cache)
         if settings.replacements:
             if settings.recolour or settings.variant or settings.looks or settings.light:
-                hint = "leave out other materials and mixes of the light"
-                raise UserError("a replaced object is lit as baked", field="--replace", hint=hint)
+                hint = "leave out --recolour, --variant, --keyframes and --light"
+                raise UserError("cannot be combined with --replace", field="--replace", hint=hint)
             baked = with_replacements(baked, settings.replacements)
-            note("other objects keep the shadows and reflections of what was replaced")
+            note("shadows and reflections of the replaced object remain on other objects")
         baked = under_turned_sky(baked, settings.sky_turn_deg)
         check_serves(baked, lookup, store.folder.name)
         self._renderer = Renderer(open_device(), baked)
@@ -77,14 +77,14 @@ class RealTime(Images):
             note(text)
         self._wearing, self._light = Wearing(store, self._renderer, note), settings.light or MixTrack()
         if settings.recolour and not self._wearing.answers:
-            read_answer(store)  # which says what is missing
+            read_answer(store)  # raises the error that names what is missing
         self._check_light(self._light, note)
         self._looks: Mapping[str, Look] = {}
         if settings.variant:
             self._looks = variant_named(variants_of(store), settings.variant).looks
 
     def _check_light(self, light: MixTrack, note: Callable[[str], None]) -> None:
-        """`UserError` where the store lacks the groups of a mix; a note of what does not follow it."""
+        """Raise `UserError` where the store lacks a group of the mix; note what the mix does not change."""
         scene = self._renderer.scene
         if not light.groups:
             return
@@ -98,7 +98,7 @@ class RealTime(Images):
         self._light, self._looks = self.settings.light or MixTrack.of(variant.light), variant.looks
 
     def _state(self, camera: Camera) -> FrameState:
-        """The next frame's, its materials and their light on the GPU."""
+        """State of the next frame, once its materials and light are on the GPU."""
         track = self.settings.looks
         looks = {**self._looks, **(track.looks_at(self.time_s) if track else {})}
         self._wearing.wear(looks, self.settings.recolour)

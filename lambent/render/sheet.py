@@ -1,4 +1,4 @@
-"""Contact sheets: all variants of a scene from one view, with their names beneath."""
+"""Contact sheets: all variants of a scene from one view, with captions."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from lambent.store.store import Store
 from lambent.store.views import read_views
 
 AS_BAKED = "as baked"
-MOST_PIXELS = 1 << 27  # of a sheet
+MOST_PIXELS = 1 << 27  # per sheet
 LEAST_INK_PX = 14  # height of the letters
 PAPER, INK = (255, 255, 255), (30, 30, 30)
 STAYS = "light as baked"
@@ -48,18 +48,18 @@ def sheet(
     note: Note = ignore,
     progress: Progress = silent,
 ) -> Rendered:
-    """Draw every variant of a store's scene from one view into one picture.
+    """Draw every variant of a store's scene from one view into one contact sheet.
 
     Parameters
     ----------
     file : path
         .png.
     settings : Settings
-        As of a still; the size is that of each picture. Its exposure, where it has one, is that of all pictures.
+        As of a still. The size is that of each picture; an exposure, if set, applies to all.
     exposures : {"light", "each", "one"}
-        Whether pictures that show the same mix of light share an exposure, each is metered by itself, or all have that
-        of the first. Where they differ, captions have them as EV100. The exposure of the scene is that of its light as
-        baked; another mix is metered.
+        "light": pictures with the same light mix share an exposure; "each": every picture is metered; "one": all have
+        the exposure of the first. Captions show EV100 where exposures differ. The scene's exposure is that of its light
+        as baked; other mixes are metered.
 
     The other parameters are those of `output.still`.
 
@@ -74,13 +74,13 @@ def sheet(
     opened, record = opened_with_views(store)
     found = variants_of(opened, saved=False)
     if not found:
-        variant_named((), "all of them", "--variants")
+        variant_named((), "any", "--variants")
     variants = with_the_baked_state(found)
     columns, rows = shape_of(len(variants), settings.width / settings.height)
     pixels = columns * rows * settings.width * settings.height
     if pixels > MOST_PIXELS:
-        got, hint = f"{len(variants)} of {settings.width}x{settings.height}", "choose a smaller --size"
-        raise UserError("the sheet is too large", field="--variants", got=got, hint=hint)
+        got, hint = f"{len(variants)} pictures of {settings.width}x{settings.height}", "choose a smaller --size"
+        raise UserError("contact sheet is too large", field="--variants", got=got, hint=hint)
     view = view_of(record, camera)
     saved = read_views(opened.folder).lights.get(view.name, LightMix()) if camera is not None else LightMix()
     drawn = images(opened, replace(settings, variant=""), scene=scene, note=note)
@@ -109,7 +109,7 @@ def sheet(
 
 
 class Exposures:
-    """Exposures of the pictures of a sheet, in EV, in the order in which they are drawn.
+    """Exposures of the pictures of a sheet, in EV, in drawing order.
 
     `how` is one of EXPOSURES, `of_scene` the exposure that was chosen for the light as baked, if any.
     """
@@ -121,14 +121,14 @@ class Exposures:
         self._light: object = ()
 
     def wanted(self, light: LightMix) -> float | None:
-        """The exposure of the next picture, in this mix; None where it is to be metered."""
+        """The exposure of the next picture, lit by this mix; None where it must be metered."""
         self._light = () if self._how == ONE else tuple(sorted(light.factors.items()))
         if self._how == EACH:
             return None
         return self._by_light.get(self._light, None if self._light else self._of_scene)
 
     def take(self, exposure_ev: float | None) -> None:
-        """What the picture was displayed with; None of false colours."""
+        """Record the exposure of the drawn picture; None for false colours."""
         self.used.append(exposure_ev)
         if exposure_ev is not None:
             self._by_light[self._light] = exposure_ev
@@ -139,33 +139,30 @@ class Exposures:
 
     @property
     def notes(self) -> list[str]:
-        """What captions say of each."""
+        """The note in each caption."""
         return [f", EV100 {ev100_of(ev):.1f}" if self.differ and ev is not None else "" for ev in self.used]
 
 
 def with_the_baked_state(variants: Sequence[Variant]) -> list[Variant]:
-    """The variants, and before them the scene as it was baked, unless one of them is that."""
+    """The variants, preceded by the scene as baked unless one of them is that."""
     is_there = any(not one.looks and not one.light.groups for one in variants)
     return [*variants] if is_there else [Variant(AS_BAKED), *variants]
 
 
 def _as_possible(variant: Variant, store: Store, settings: Settings, note: Note) -> tuple[Variant, bool]:
-    """The variant as the store can show it, and whether light that it asks for stays as baked."""
+    """The variant without what the store cannot show, and whether light stays as baked where it should change."""
     if settings.integrator == PATH_TRACER:
         return variant, bool(variant.light.groups)
     stays = bool(variant.looks) and not has_answer(store)
     missing = sorted(set(variant.light.groups) - {group.name for group in light_groups(store)})
     if settings.light is None and missing:
-        note(f"{variant.name}: its mix is left out: the store has no light group {', '.join(missing)}")
+        note(f"{variant.name}: light mix not applied: the store has no light group {', '.join(missing)}")
         return replace(variant, light=LightMix()), True
     return variant, stays
 
 
 def shape_of(count: int, aspect: float) -> tuple[int, int]:
-    """Columns and rows of `count` pictures, so that the sheet is about as wide as a page, 4:3, with few empty places.
-
-    `aspect` is width over height of each.
-    """
+    """Columns and rows for `count` pictures of `aspect` (width / height): a sheet near 4:3 with few empty cells."""
     fits = [(columns, math.ceil(count / columns)) for columns in range(1, count + 1)]
     return min(fits, key=lambda c: abs(math.log(c[0] * aspect / c[1] * 3 / 4)) + 0.5 * (c[0] * c[1] / count - 1))
 
@@ -173,10 +170,7 @@ def shape_of(count: int, aspect: float) -> tuple[int, int]:
 def laid_out(
     pictures: Sequence[NDArray[np.uint8]], names: Sequence[str], columns: int, notes: Sequence[str] = ()
 ) -> NDArray[np.uint8]:
-    """One picture of pictures (H, W, 3) of one size, row by row, with names beneath them, cut where they are long.
-
-    Behind a name comes its note, if there are `notes`, which is not cut.
-    """
+    """Pictures (H, W, 3) of one size, laid out row by row, with captions: a name, cut where it is long, and a note."""
     from PIL import Image, ImageDraw, ImageFont
 
     height, width = pictures[0].shape[:2]

@@ -1,4 +1,4 @@
-"""Other materials and their light in images of one renderer: variants, colours, and what these change with time."""
+"""Changed materials in a renderer's images: variants, colours and keyframes, and the light that follows them."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from lambent.store.answer import NO_ANSWER, has_answer, read_answer
 from lambent.store.contract import needs_probe
 from lambent.store.store import Store
 
-ESTIMATED = "light and probes of other materials are estimated from the bake, not baked again"
+ESTIMATED = "light and probes are estimated for the changed materials, not baked again"
 
 
 class Wearing:
-    """What a renderer's scene wears: `materials` in the place of the store's, by name, for the states of frames.
+    """The changed materials of a renderer's scene: `materials` replace the store's, by name, in frame states.
 
     Attributes
     ----------
     answers : bool
-        Whether light follows other materials; where it does not, a note says so once.
+        Whether light follows the changed materials; where it does not, a note says so once.
     """
 
     def __init__(self, store: Store, renderer: Renderer, note: Callable[[str], None]) -> None:
@@ -39,10 +39,7 @@ class Wearing:
         self._looks: dict[str, Look] = {}
 
     def wear(self, looks: Mapping[str, Look], colours: Mapping[str, Triple]) -> None:
-        """Show materials with these looks, then with these diffuse colours, and the light that answers them.
-
-        All that are left out are as baked.
-        """
+        """Apply looks, then diffuse colours, and the light that follows; materials left out stay as baked."""
         scene = self._renderer.scene
         loaded = looks_as_loaded(scene.record.materials, scene.textures)
         worn = {name: look for name, look in looks.items() if look != loaded[name]}
@@ -66,7 +63,7 @@ class Wearing:
         return answer, AnswerShown(self._renderer, answer)
 
     def _tell(self, materials: Mapping[str, Material]) -> None:
-        """Note what is estimated, and what is not known of these materials."""
+        """Note what is estimated for these materials, and what the bake lacks for them."""
         scene = self._renderer.scene
         self._once(ESTIMATED if self.answers else f"light and probes stay as baked: {NO_ANSWER}")
         if scene.light_fields:
@@ -76,9 +73,9 @@ class Wearing:
         for name, material in materials.items():
             given = scene.record.materials[name]
             if needs_probe(material) and not needs_probe(given) and name not in has_probe:
-                self._once(f"{name} was matte in the bake: what it mirrors now is from the nearest probe")
+                self._once(f"{name} was matte in the bake: its reflections come from the nearest probe")
             if material.transmits and not given.transmits and scene.irradiance_back is None:
-                self._once(f"{name} let no light through in the bake: its far side stays dark")
+                self._once(f"{name} was opaque in the bake: its far side stays dark")
 
     def _once(self, text: str) -> None:
         if text not in self._noted:

@@ -41,7 +41,7 @@ MEANINGS = (
     ("mx", "roughness along the brushing direction", "slope"),
     ("my", "roughness across it", "slope"),
     ("r0", "Fresnel reflectance at normal incidence", "1"),
-    ("alpha", "exponent of the cosines: how much grazing light gains", "1"),
+    ("alpha", "exponent of the cosines: increase at grazing angles", "1"),
 )
 DISTRIBUTIONS = {"beckmann": "Beckmann", "ggx": "GGX"}
 EYE_LIKE = ("cuberoot", "log")
@@ -102,8 +102,8 @@ def _lead(result: FitResult, metric: Metric) -> str:
     )
     parts = [_counted(lobes, side) for side, lobes, _ in sides if lobes]
     parts += [f"diffuse {side}" for side, _, rgb in sides if any(rgb)]
-    found = " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts) or "nothing that scatters"
-    share = f"{_share(result, metric.name):.2f} of that of the best Lambertian surface"
+    found = " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts) or "no scattering"
+    share = f"{_share(result, metric.name):.2f} of the best Lambertian surface's"
     return f"Fitted with {found}. Its error under the {metric.name} metric is {share}."
 
 
@@ -192,11 +192,13 @@ def _measurement(table: MeasuredTable, samples: MeasuredSamples, source: Path | 
     ]
     if gone:
         head = ("Left out", "tuples", "share", "why")
-        body.append(page.table(head, gone, numbers=(1, 2), caption="Each tuple is counted once, by the first reason."))
+        body.append(
+            page.table(head, gone, numbers=(1, 2), caption="Each tuple is counted once, under the first reason.")
+        )
     else:
         body.append(page.paragraph("Nothing was left out."))
     if negative := negative_readings(samples):
-        body.append(page.paragraph(f"{negative}. The fit keeps them; what is drawn takes them as 0."))
+        body.append(page.paragraph(f"{negative}. The fit keeps them; pictures use 0."))
     return [*body, page.bullets(info.notes)] if info.notes else body
 
 
@@ -255,9 +257,7 @@ def _albedos(result: FitResult) -> list[str]:
             ratio = f"{fit / table:.2f}" if table > 0 else "n/a"
             rows.append((one.side, f"{theta:g}°", f"{table:.3f}", f"{fit:.3f}", ratio))
     head = ("side", "angle of incidence", "table", "this fit", "ratio")
-    caption = (
-        "Of the whole table, gaps filled as it is drawn, as far as it was measured; means over channels and phi_i."
-    )
+    caption = "Of the whole table with its gaps filled, as far as it was measured; means over channels and phi_i."
     body = [page.heading("Albedo"), page.table(head, rows, numbers=(1, 2, 3, 4), caption=caption)]
     return [*body, *(page.paragraph(f"{str(one).capitalize()}.") for one in result.albedos)]
 
@@ -266,15 +266,17 @@ def _judgement(samples: MeasuredSamples, result: FitResult, metric: Metric) -> l
     """Known traits of fits of this kind, and their size in this one."""
     peak = peak_share(samples, evaluate(result.material, samples))
     reached = f"model reaches {peak:.2f} of the measured peak (the brightest {PEAK_SHARE:.1%} of the tuples)."
-    undershoots = "Fits under the cube root weigh what eyes see and undershoot peaks: here"
+    undershoots = "Fits under the cube root weigh errors as eyes do and undershoot peaks: here"
     lines = [f"{undershoots} the {reached}" if metric.name == "cuberoot" else f"The {reached}"]
     if metric.name not in EYE_LIKE:
         shares = " and ".join(f"{_share(result, name):.2f} under {name}" for name in EYE_LIKE)
         lines.append(
-            f"A fit that minimises {metric.name} follows the peaks and is often poor by metrics that weigh what eyes "
-            f"see: here it keeps {shares} of the Lambertian surface's error."
+            f"A fit that minimises {metric.name} follows the peaks and is often poor by perceptual metrics: "
+            f"here it keeps {shares} of the Lambertian surface's error."
         )
-    compare = "Compare errors, not parameters, between fits: r0, alpha and the coefficient stand in for one another."
+    compare = (
+        "Compare errors, not parameters, between fits: r0, alpha and the coefficient can compensate for one another."
+    )
     return [*lines, compare]
 
 
@@ -287,7 +289,7 @@ def _plots(samples: MeasuredSamples, material: Material, metric: Metric, progres
     if material.lobes:
         words = (
             "The error around the fit, over two parameters of a lobe. A round pit: the measurement determines both. "
-            "A valley: it determines a combination of them, and any point along it looks much the same."
+            "A valley: it determines a combination of them, and all points along the valley look much the same."
         )
         body += [page.heading("How well the parameters are determined"), page.paragraph(words)]
     for index, lobe in enumerate(material.lobes):
@@ -314,7 +316,7 @@ def _direction_plots(samples: MeasuredSamples, material: Material, gathered: lis
         _figure(
             plot.albedo(gathered, material),
             "Albedo over the angle of incidence, measured and model.",
-            "Light returned of all that arrives. Above 1 a material would give more than it gets.",
+            "Returned light as a share of the incident light. Above 1 a material would return more than it receives.",
         ),
     ]
 

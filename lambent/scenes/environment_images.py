@@ -67,8 +67,8 @@ def environment_picture(environment: Environment) -> Image:
         return lat_long_image(environment.name)
     if isinstance(environment, ConstantEnvironment):
         return np.full((2, 4, 3), environment.radiance, np.float32)
-    hint = "bake the scene under it, or give a picture of it"
-    raise UserError("daylight is computed by bakes alone", field="environment", got="sunsky", hint=hint)
+    hint = "bake the scene with it, or use a picture"
+    raise UserError("daylight is computed only in a bake", field="environment", got="sunsky", hint=hint)
 
 
 def seen_at(picture: Image, w: Floats) -> Image:

@@ -125,22 +125,22 @@ class _Reading:
         if kind != 1:
             found = f"type {_TYPES.get(kind, kind)}"
             hint = "ask for the type C file of the luminaire"
-            raise self._error("photometric type", "its angles are not of type C", found, "type C (1)", hint)
+            raise self._error("photometric type", "photometry is not of type C", found, "type C (1)", hint)
         for name, count in (("vertical angles", verticals), ("horizontal angles", horizontals)):
             IES_ANGLES.check(count, file=self._path, field=name)
             if count < 1:
-                raise self._error(name, "there are none", str(count), "1 or more")
+                raise self._error(name, "is empty", str(count), "1 or more")
         opening = [x * (FEET_M if units == 1 else 1.0) for x in self._take(3, "opening")]
         ballast, ballast_lamp, _ = self._take(3, "ballast factors and watts")
         scale = multiplier * ballast * (1.0 if self._first.upper() in FULL else ballast_lamp)
         if not 0 <= scale <= MOST_CD:
-            raise self._error("multiplier", "intensities are impossible", f"{scale:g}", "0 or more")
+            raise self._error("multiplier", "intensities are out of range", f"{scale:g}", "0 or more")
         vertical = self._angles("vertical angles", verticals)
         horizontal = self._angles("horizontal angles", horizontals)
         values = scale * np.reshape(self._take(verticals * horizontals, "candela"), (horizontals, verticals))
         most = float(np.abs(values).max())
         if not most <= MOST_CD:
-            raise self._error("candela", "intensities are impossible", f"{most:g}", f"up to {MOST_CD:g}")
+            raise self._error("candela", "intensities are out of range", f"{most:g}", f"up to {MOST_CD:g}")
         made = self._whole_sphere(vertical, horizontal, np.maximum(values, 0))
         return replace(made, opening_m=tuple(opening), tilt_deg=tilt[0], tilt_factors=tilt[1])
 
@@ -148,9 +148,9 @@ class _Reading:
         """All around, from the symmetry that the horizontal angles say."""
         field = "vertical angles"
         if not (vertical[0] >= 0 and vertical[-1] <= 180):
-            raise self._error(field, "of type C they lie between 0 and 180", f"{vertical[0]:g} to {vertical[-1]:g}")
+            raise self._error(field, "are outside 0 to 180 degrees", f"{vertical[0]:g} to {vertical[-1]:g}")
         if len(vertical) == 1:
-            raise self._error(field, "one is no distribution", "1", "2 or more")
+            raise self._error(field, "too few for a distribution", "1", "2 or more")
         if len(horizontal) == 1:
             horizontal, values = np.array([0.0, 360.0]), np.repeat(values, 2, axis=0)
         else:
@@ -159,7 +159,7 @@ class _Reading:
                 turned, index = np.unique(np.concatenate([horizontal, (180 - horizontal) % 360]), return_index=True)
                 horizontal, values = _closed(turned, np.concatenate([values, values])[index])
             elif first != 0:
-                raise self._error("horizontal angles", "they begin elsewhere", f"{first:g}", "0, or 90 to 270")
+                raise self._error("horizontal angles", "start at an unsupported angle", f"{first:g}", "0, or 90 to 270")
             elif last == 90.0:
                 horizontal, values = _mirrored(*_mirrored(horizontal, values, 90.0), 180.0)
             elif last == 180.0:
@@ -167,21 +167,21 @@ class _Reading:
             elif 180 < last <= 360:
                 horizontal, values = _closed(horizontal, values)
             else:
-                raise self._error("horizontal angles", "they end elsewhere", f"{last:g}", "0, 90, 180 or 360")
+                raise self._error("horizontal angles", "end at an unsupported angle", f"{last:g}", "0, 90, 180 or 360")
         return Photometry(tuple(vertical.tolist()), tuple(horizontal.tolist()), tuple(map(tuple, values.tolist())))
 
     def _tilts(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         if self._tilt.upper() == "NONE":
             return (0.0,), (1.0,)
         if self._tilt.upper() != "INCLUDE":
-            raise self._error("TILT", "its tilt is in another file", self._tilt[:40], "NONE or INCLUDE")
+            raise self._error("TILT", "a tilt file is not supported", self._tilt[:40], "NONE or INCLUDE")
         geometry, pairs = self._whole("geometry"), self._whole("tilt angles")
         IES_ANGLES.check(pairs, file=self._path, field="tilt angles")
         if pairs < 1:
-            raise self._error("tilt angles", "there are none", str(pairs), "1 or more")
+            raise self._error("tilt angles", "is empty", str(pairs), "1 or more")
         angles, factors = self._angles("tilt angles", pairs), self._take(pairs, "tilt factors")
         if min(factors) < 0 or max(factors) > MOST_CD:
-            raise self._error("tilt factors", "a factor is impossible", f"{min(factors):g}", "0 or more")
+            raise self._error("tilt factors", "factors are out of range", f"{min(factors):g}", "0 or more")
         if geometry == STAYS_LEVEL:
             return (0.0,), (float(factors[0]),)
         return tuple(angles.tolist()), tuple(factors)
@@ -189,7 +189,7 @@ class _Reading:
     def _angles(self, field: str, count: int) -> Floats:
         angles = np.array(self._take(count, field))
         if any(b <= a for a, b in pairwise(angles.tolist())) or np.abs(angles).max() > 360:
-            raise self._error(field, "angles do not rise", expected="rising angles in degrees")
+            raise self._error(field, "angles do not increase", expected="increasing angles in degrees")
         return angles
 
     def _whole(self, field: str) -> int:
@@ -201,7 +201,7 @@ class _Reading:
     def _take(self, count: int, field: str) -> Sequence[float]:
         taken = self._numbers[:count]
         if len(taken) < count:
-            raise self._error(field, "the file ends too soon", f"{len(taken)} numbers", f"{count} numbers")
+            raise self._error(field, "file is truncated", f"{len(taken)} numbers", f"{count} numbers")
         self._numbers = self._numbers[count:]
         return taken
 
@@ -212,7 +212,7 @@ class _Reading:
             except ValueError:
                 return  # text after the data; where it is too early, numbers are missing
             if not np.isfinite(number):
-                raise self._error(None, "a number is not finite", word[:20])
+                raise self._error(None, "numbers are not finite", word[:20])
             yield number
 
     def _error(

@@ -25,7 +25,7 @@ class LookTrack:
     def __post_init__(self) -> None:
         for name, keys in self.materials.items():
             if not keys or any(b[0] <= a[0] for a, b in pairwise(keys)):
-                raise UserError("times of a track of materials grow", field=name, got=[time_s for time_s, _ in keys])
+                raise UserError("times do not increase", field=name, got=[time_s for time_s, _ in keys])
 
     def looks_at(self, time_s: float) -> dict[str, Look]:
         """The look of each material that changes, at a time."""

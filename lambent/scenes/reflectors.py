@@ -112,7 +112,7 @@ def _largest(found: list[Reflector], forced: Collection[str]) -> list[Reflector]
     """MOST of the reflectors, those with `forced` objects and then the largest, in their order."""
     first = sorted(found, key=lambda r: (not any(part.object in forced for part in r.parts), -r.area_m2))[:MOST]
     if len(first) < len(found):
-        log.warning("more than %d planar reflectors: the largest are kept, probes show the others", MOST)
+        log.warning("more than %d planar reflectors: the largest are kept, the others use probes", MOST)
     kept = set(map(id, first))
     return [r for r in found if id(r) in kept]
 

@@ -42,7 +42,7 @@ def parse_replacements(texts: Sequence[str]) -> tuple[Replacement, ...]:
         if "," in rest and not Path(rest).is_file():
             file, material = (part.strip() for part in rest.rsplit(",", 1))
         if not name or not file or material == "":
-            raise UserError("not a mesh for an object", field=FIELD, got=text, expected=FORM)
+            raise UserError("cannot be read as a replacement", field=FIELD, got=text, expected=FORM)
         if any(one.object == name for one in found):
             raise UserError("names an object twice", field=FIELD, got=name)
         found.append(Replacement(name, mesh_of(file), material))

@@ -48,7 +48,9 @@ def _turned(environment: Environment | None, degrees: float, folder: Path) -> En
         environment = ImageEnvironment(file, layout="lat-long")
     if isinstance(environment, ImageEnvironment):
         if environment.up != VERTICAL:
-            said = f"an image whose up is {VERTICAL}"
-            raise UserError("a sky that lies cannot be turned", field="--sky-turn", got=environment.up, expected=said)
+            said = f"an image with up = {VERTICAL}"
+            raise UserError(
+                "sky image is not upright and cannot be rotated", field="--sky-turn", got=environment.up, expected=said
+            )
         return replace(environment, rotation_deg=environment.rotation_deg + degrees)
     return environment

@@ -18,14 +18,16 @@ def validate(scene: Scene) -> list[str]:
     for o in scene.objects:
         notes += [f"{o.name}: {what}" for what in mesh_faults(o.mesh)]
         if o.material not in scene.materials:
-            notes.append(f"{o.name}: its material {o.material} is not described")
+            notes.append(f"{o.name}: its material {o.material} is not defined")
         textures = scene.textures.get(o.material)
         if textures is not None and (textures.normal is not None or textures.direction is not None):
             mirrored = mirrored_share(o.mesh)
             if mirrored > 0.01:
-                notes.append(f"{o.name}: uv are mirrored on {mirrored:.0%} of its area: its normal map is turned there")
+                notes.append(
+                    f"{o.name}: uv are mirrored on {mirrored:.0%} of its area: its normal map is flipped there"
+                )
     if scene.environment is None and not scene.lights and not any(any(o.emission) for o in scene.objects):
-        notes.append("nothing gives light")
+        notes.append("no light")
     if not scene.cameras:
         notes.append("no camera")
     return notes
@@ -56,12 +58,12 @@ def mesh_faults(mesh: Mesh) -> list[str]:
         notes.append(f"{int((area <= 0).sum())} triangles have no area")
     n, t = mesh.normals.astype(float), mesh.tangents.astype(float)
     if np.abs(np.linalg.norm(n, axis=-1) - 1).max() > 1e-3:
-        notes.append("normals are not unit")
+        notes.append("normals do not have unit length")
     if np.abs(np.linalg.norm(t, axis=-1) - 1).max() > 1e-3 or np.abs(np.sum(n * t, axis=-1)).max() > 1e-3:
-        notes.append("tangents are not unit or not at right angles to the normals")
+        notes.append("tangents do not have unit length or are not perpendicular to the normals")
     flipped = float(area[_facing(mesh) < 0].sum() / max(area.sum(), 1e-30))
     if flipped > 0.01:
-        notes.append(f"{flipped:.0%} of its area is turned against its normals")
+        notes.append(f"{flipped:.0%} of its area faces away from its normals")
     shared = int((_edge_uses(mesh) > 2).sum())
     if shared:
         notes.append(f"non-manifold: {shared} edges belong to more than two triangles")

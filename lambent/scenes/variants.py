@@ -46,7 +46,7 @@ def with_variants(scene: Scene, told: Sequence[Dressed]) -> Scene:
     whole = replace(
         scene, objects=tuple(objects), materials={**scene.materials, **renamed},
         textures=_copied(scene.textures, copies), measured=_copied(scene.measured, copies),
-        warnings=(*scene.warnings, *(f"material {of}: variants part its objects, others are of {own}" for own, of in
+        warnings=(*scene.warnings, *(f"material {of}: variants split its objects; the others get {own}" for own, of in
                                      copies.items())),
     )  # fmt: skip
     return replace(whole, variants=tuple(Variant(one.name, _changed(whole, one), one.light) for one in told))
@@ -95,7 +95,7 @@ def variant_named(variants: Iterable[Variant], name: str, field: str = FIELD) ->
     """The variant of this name; a `UserError` that lists all of them where there is none."""
     found = {variant.name: variant for variant in variants}
     if not found:
-        hint = "describe them in the scene's [[variants]] and bake it again, or store states in the window"
+        hint = "add [[variants]] to the scene and bake it again, or store states in the window"
         raise UserError("the store has no variants", field=field, got=name, hint=hint)
     return found[known("variant", name, found, field=field)]
 

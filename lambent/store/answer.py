@@ -44,7 +44,7 @@ from lambent.store.store import Store
 NO_PATCH = 0xFFFF
 NO_SPOT = 0xFFFFFFFF
 DIRECT = ("direct", "direct_back")  # by side
-NO_ANSWER = "the store has no light that answers them (`lambent bake --only answer`)"
+NO_ANSWER = "the store has no answer data (`lambent bake --only answer`)"
 LAST = "answer/shares"  # written last but for probes
 
 
@@ -122,8 +122,8 @@ def read_answer(store: Store) -> StoredAnswer:
         Where the store has none, or its arrays contradict one another.
     """
     if not has_answer(store):
-        hint = "bake the scene again with `lambent bake --only answer`"
-        raise UserError("store has no light that answers other colours", file=store.folder, field="answer", hint=hint)
+        hint = "run `lambent bake --only answer` for its scene"
+        raise UserError("store has no answer data for changed materials", file=store.folder, field="answer", hint=hint)
     record = scene_record(store)
     material, paired, direct, transfer, rays, more_rays, points, point_sun, across, texels, near, shares, patch = (
         store.read(answer_name(part))
@@ -157,7 +157,7 @@ def read_answer(store: Store) -> StoredAnswer:
         and all(not one.size or int(points_of_rays(one).max()) < max(senders, 1) for one in (rays, more_rays))
     )
     if not fits:
-        raise UserError("broken store", file=store.folder, field="answer", got="arrays that do not fit together")
+        raise UserError("broken store", file=store.folder, field="answer", got="arrays that match")
     sorted_light = bool(light_groups(store))
     maps = [group_name(side) if sorted_light else f"light_map/{side}" for side in SIDES]
     lights = maps, [answer_name(part) for part in DIRECT]

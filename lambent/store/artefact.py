@@ -110,14 +110,14 @@ class Artefact:
         said = {chunk: v if isinstance(v, list) else [v] for chunk, v in e["done"].items()}
         done = {chunk: Version(*map(_count, v)) for chunk, v in said.items()}
         if not (isinstance(e["dtype"], str) and all(isinstance(e[text], str) for text in ("kind", "key"))):
-            raise ValueError(f"{name}: kind, key and dtype are texts")
+            raise ValueError(f"{name}: kind, key and dtype must be text")
         if np.dtype(e["dtype"]).kind not in "biuf":
-            raise ValueError(f"{name}: no array of numbers, but of {e['dtype']}")
+            raise ValueError(f"{name}: unknown dtype {e['dtype']}")
         a = cls(name, e["kind"], shape, chunks, e["dtype"], e["key"], dict(e["meta"]), done, e["complete"] is True)
         a.check(store)
         unknown = next((chunk for chunk in done if not a.has(chunk)), None)
         if unknown is not None:
-            raise ValueError(f"{name}: there is no chunk {unknown}")
+            raise ValueError(f"{name}: unknown chunk {unknown}")
         if a.complete and len(a.done) != math.prod(a.chunk_counts):
             raise ValueError(f"{name}: complete with {len(a.done)} chunks")
         return a

@@ -121,7 +121,7 @@ class ChunkFiles:
             if a.has(name):
                 a.done[name] = Version(crc, number)
             elif len(name.split(".") if name else ()) != len(a.shape):
-                raise ValueError(f"{a.name}: the journal has a chunk {name}")
+                raise ValueError(f"{a.name}: the journal names an unknown chunk {name}")
 
     def _lines(self) -> list[tuple[bytes, bytes, bytes]]:
         """Name, number and checksum of every whole line of the journal."""

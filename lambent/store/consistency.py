@@ -49,48 +49,48 @@ def check_record(store: Store, record: SceneRecord) -> None:
                 cube = wanted[:3] != CUBE or (len(shape) > 2 and shape[1] == shape[2] > 0)
                 if not (fits and cube and np.dtype(artefact.dtype).kind in kinds):
                     got, expected = f"{shape} {artefact.dtype}", " x ".join("n" if w is ANY else str(w) for w in wanted)
-                    raise _broken(store, artefact.name, "array of another shape", got, expected)
+                    raise _broken(store, artefact.name, "array has the wrong shape or type", got, expected)
     _check_names(store, record)
     for field, camera in _cameras(record):
         if not is_usable(camera):
-            raise _broken(store, field, "a camera is not within 1e9 m, or sees no angle")
+            raise _broken(store, field, "a camera is beyond 1e9 m or has an impossible field of view")
     numbers = [record.exposure_ev or 0.0, *_flat(record.bounds)]
     numbers += [x for o in record.objects for x in (*o.emission, *_flat(o.bounds), *_flat(o.borders))]
     numbers += [path.seconds for path in record.paths] + [s for path in record.paths for s in path.times_s or ()]
     numbers += [x for r in record.reflectors for x in (*r.plane, *_flat(r.outline), *(p.area_m2 for p in r.parts))]
     numbers += [x for t in record.textures.values() for x in (t.cutoff, *_flat(_flat(t.parts.values())))]
     if not all(map(math.isfinite, numbers)):
-        raise _broken(store, "scene", "a number of the scene record is not finite")
+        raise _broken(store, "scene", "the scene record has a number that is not finite")
 
 
 def _check_names(store: Store, record: SceneRecord) -> None:
     """Whether what names something names what is there, and each range of faces lies within them."""
     objects = {o.name: o for o in record.objects}
     if len(objects) != len(record.objects):
-        raise _broken(store, "objects", "two objects have one name")
+        raise _broken(store, "objects", "two objects have the same name")
     faces = store.artefact("geometry/faces").shape[0] if "geometry/faces" in store else math.inf
     for o in record.objects:
         if o.material not in record.materials:
-            raise _broken(store, f"objects.{o.name}", "no such material", o.material)
+            raise _broken(store, f"objects.{o.name}", "unknown material", o.material)
         if o.first_face < 0 or o.face_count < 0 or o.first_face + o.face_count > faces:
             got = f"{o.face_count} from {o.first_face}"
-            raise _broken(store, f"objects.{o.name}", "no such faces", got, f"within {faces}")
+            raise _broken(store, f"objects.{o.name}", "face index out of range", got, f"within {faces}")
     for material in record.textures:
         if material not in record.materials:
-            raise _broken(store, "textures", "no such material", material)
+            raise _broken(store, "textures", "unknown material", material)
     if len({variant.name for variant in record.variants}) != len(record.variants):
-        raise _broken(store, "variants", "two variants have one name")
+        raise _broken(store, "variants", "two variants have the same name")
     for variant in record.variants:
         worn = {*variant.looks, *(look.textures for look in variant.looks.values() if look.textures)}
         if strange := sorted(worn - set(record.materials)):
-            raise _broken(store, f"variants.{variant.name}", "no such material", strange[0])
+            raise _broken(store, f"variants.{variant.name}", "unknown material", strange[0])
     for number, reflector in enumerate(record.reflectors):
         for part in reflector.parts:
             field = f"reflectors.{number}"
             if part.object not in objects:
-                raise _broken(store, field, "no such object", part.object)
+                raise _broken(store, field, "unknown object", part.object)
             if part.faces and not 0 <= min(part.faces) <= max(part.faces) < objects[part.object].face_count:
-                raise _broken(store, field, "no such faces", max(part.faces))
+                raise _broken(store, field, "face index out of range", max(part.faces))
 
 
 def read_geometry(store: Store) -> dict[str, Array]:
@@ -99,11 +99,11 @@ def read_geometry(store: Store) -> dict[str, Array]:
     count = len(arrays["positions"])
     if any(len(arrays[name]) != count for name in _PER_VERTEX):
         got = ", ".join(f"{len(arrays[name])} {name}" for name in _PER_VERTEX)
-        raise _broken(store, "geometry", "lengths differ", got)
+        raise _broken(store, "geometry", "arrays have different lengths", got)
     if arrays["faces"].size and not 0 <= int(arrays["faces"].min()) <= int(arrays["faces"].max()) < count:
-        raise _broken(store, "geometry/faces", "no such vertex", arrays["faces"].max(), f"below {count}")
+        raise _broken(store, "geometry/faces", "vertex index out of range", arrays["faces"].max(), f"below {count}")
     if not np.isfinite(arrays["positions"]).all():
-        raise _broken(store, "geometry/positions", "not all are finite")
+        raise _broken(store, "geometry/positions", "values are not finite")
     return arrays
 
 

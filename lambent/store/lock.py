@@ -63,8 +63,10 @@ class WriterLock:
         if not ours:
             who = f"process {os.read(self._handle, 20).decode('ascii', 'replace').strip()}"
             self.release()
-            hint = "wait until it ends, or end it"
-            raise UserError("is being written", file=folder, got=who, expected="one writer at a time", hint=hint)
+            hint = "wait until it ends, or stop it"
+            raise UserError(
+                "is locked by another writer", file=folder, got=who, expected="one writer at a time", hint=hint
+            )
         os.ftruncate(self._handle, 0)
         os.write(self._handle, f"{self._process}\n".encode("ascii"))
         _held[path] = self

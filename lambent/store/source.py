@@ -65,7 +65,7 @@ def scene_of(store: Store, given: str | None = None) -> Scene:
     """
     place = given or store.documents.get(SOURCE)
     if not isinstance(place, str):
-        raise UserError("store does not say where its scene is", file=store.folder, hint="name it with --scene")
+        raise UserError("store has no path of its scene file", file=store.folder, hint="name it with --scene")
     crease_deg = store.documents.get(CREASE_ANGLE)
     scene = load_scene(place if given or place.startswith("builtin:") else store.folder / place, crease_deg)
     if SCENE not in store.documents:  # baked for edited views alone
@@ -81,7 +81,7 @@ def scene_of(store: Store, given: str | None = None) -> Scene:
         _fits(parts, o.mesh.bounds, len(o.mesh.faces), cuts)
         for parts, o in zip(baked.values(), scene.objects, strict=True)
     ):
-        log.warning("%s: its scene %s has other geometry now than when it was baked", store.folder, place)
+        log.warning("%s: the geometry of its scene %s has changed since the bake", store.folder, place)
     objects = (
         replace(o, material=parts[0].material, emission=parts[0].emission) if (parts := baked[o.name]) else o
         for o in scene.objects

@@ -62,7 +62,7 @@ class Store:
         if not (store.folder / MANIFEST).exists() and store.folder.exists():
             names = [path.name for path in store.folder.iterdir()]
             if not all(name.startswith(".") for name in names):  # hidden: left by a process that died early
-                raise UserError("folder is not empty and not a store", file=folder, hint="choose another folder")
+                raise UserError("folder is neither empty nor a store", file=folder, hint="choose another folder")
         store._own()
         store.inputs = dict(inputs)
         store._save()
@@ -109,7 +109,7 @@ class Store:
     def artefact(self, name: str) -> Artefact:
         """The record of an array; `UserError` where the store holds none of this name."""
         if name not in self._artefacts:
-            raise self._error("store does not hold this", name, "bake it first")
+            raise self._error("array is not in the store", name, "bake it first")
         return self._artefacts[name]
 
     def set_document(self, name: str, document: Any) -> None:
@@ -178,7 +178,7 @@ class Store:
         """The whole array; `UserError` where it is absent, incomplete or damaged."""
         artefact = self.artefact(name)
         if not artefact.complete:
-            raise self._error(f"is {artefact.state}", name, "go on with `bake --resume`")
+            raise self._error(f"is {artefact.state}", name, "run `lambent bake` again to finish it")
         return self.read_region(name, ())
 
     def read_partial(self, name: str) -> tuple[Array, NDArray[np.bool_]]:
@@ -206,7 +206,7 @@ class Store:
         if size > memory_bytes() // 2:
             raise self._error(f"array of {size} bytes does not fit into memory", artefact.name, "use a larger machine")
         if size > SPARSE_BYTES and size > DENSEST * sum(map(files.size_bytes, chunks)):
-            raise self._error(f"array of {size} bytes has next to nothing in its files", artefact.name, "bake again")
+            raise self._error(f"array of {size} bytes has almost no data on disk", artefact.name, "bake again")
         gathered = np.zeros([max(0, part.stop - part.start) for part in region], artefact.dtype)
         for chunk in chunks:
             covered = artefact.region(chunk)
@@ -226,7 +226,7 @@ class Store:
             self.refresh()
             artefact = self.artefact(name)
             if not artefact.is_same(files.artefact, growing=True):
-                raise self._error("was begun anew while it was read", name, "read it again")
+                raise self._error("was rewritten while it was read", name, "read it again")
             if artefact.version(chunk) == version:
                 raise self._error("chunk is damaged", field, "bake again")
         raise self._error("chunk is not written", field, "bake it first")
@@ -273,7 +273,7 @@ class Store:
                     json.dumps(manifest, ensure_ascii=False).encode("utf-8")  # fails where a text has half a character
                 if manifest["format"] != FORMAT or manifest["version"] not in VERSIONS:
                     found, expected = f"{manifest['format']} {manifest['version']}", f"{FORMAT} 1 or 2"
-                    raise UserError("unknown store", file=path, got=found, expected=expected)
+                    raise UserError("unknown store version", file=path, got=found, expected=expected)
                 inputs, documents = dict(manifest["inputs"]), dict(manifest["documents"])
                 artefacts = {
                     name: Artefact.of_entry(name, entry, path) for name, entry in manifest["artefacts"].items()

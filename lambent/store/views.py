@@ -118,11 +118,13 @@ def checked_name(text: str, taken: set[str]) -> str:
     """The name that was typed, without blanks around it; `UserError` where a view cannot have it."""
     name = text.strip()
     if not name:
-        raise UserError("a name is missing", expected="a name like entrance")
+        raise UserError("name is empty", expected="a name, as in entrance")
     if len(name) > LONGEST_NAME or not name.isprintable():
-        raise UserError("not a name", got=name, expected=f"at most {LONGEST_NAME} characters that can be shown")
+        raise UserError(
+            "name cannot be used", got=name, expected=f"at most {LONGEST_NAME} characters that can be shown"
+        )
     if name in taken:
-        raise UserError("the name is taken", got=name)
+        raise UserError("name is already used", got=name)
     return name
 
 
@@ -136,11 +138,15 @@ def _check(views: Views, path: Path) -> None:
         for camera in cameras:
             if not is_usable(camera):
                 raise UserError(
-                    "a camera is not within 1e9 m, or sees no angle", file=path, field=f"{kind}.{camera.name}"
+                    "a camera is beyond 1e9 m or has an impossible field of view",
+                    file=path,
+                    field=f"{kind}.{camera.name}",
                 )
     for walk in views.paths:
         times = walk.times_s or ()
         if not walk.keys or len(times) != len(walk.keys):
-            raise UserError("a path needs one time per key", file=path, field=walk.name, got=len(times))
+            raise UserError("a path needs one time for each key", file=path, field=walk.name, got=len(times))
         if times[0] != 0 or times[-1] != walk.seconds or any(b <= a for a, b in pairwise(times)):
-            raise UserError("times of a path begin at 0, grow, and end with it", file=path, field=walk.name)
+            raise UserError(
+                "times of a path must start at 0, increase, and end at its duration", file=path, field=walk.name
+            )

@@ -1,4 +1,4 @@
-"""How a camera answers the mouse and the keys: pure functions from one camera to the next.
+"""Camera motion for mouse and keys: pure functions from one camera to the next.
 
 Two modes. Orbit turns the camera about its target. Walking stands on the floor: the eye is `EYE_HEIGHT_M` above what is
 under it, and never leaves the scene's bounds. In both the horizon stays level (up is +y) and the pitch stays short of
@@ -26,7 +26,7 @@ TURN_RAD_PX = math.radians(0.3)
 ZOOM_PER_STEP = 0.88
 NEAREST_M = 0.02
 WALL_M = 0.15  # the eye keeps this distance from the scene's bounds
-SETTLE_S = 0.12  # time constant with which the eye follows the floor
+SETTLE_S = 0.12  # time constant of the eye that follows the floor
 LONGEST_STEP_S = 0.25  # a stalled frame does not carry the walker across the room
 
 KEYS = {
@@ -43,7 +43,7 @@ def yaw_pitch(camera: Camera) -> tuple[float, float]:
 
 
 def orbit(camera: Camera, dx_px: float, dy_px: float, pivot: Triple | None = None) -> Camera:
-    """Turned about `pivot`, by default the target, which stays where it is in the picture: that follows the mouse."""
+    """Rotate the camera about `pivot` (default: the target), which keeps its place in the picture."""
     pivot = camera.target if pivot is None else pivot
     yaw, pitch = yaw_pitch(camera)
     before, after = _axes(yaw, pitch), _axes(yaw + TURN_RAD_PX * dx_px, pitch - TURN_RAD_PX * dy_px)
@@ -52,7 +52,7 @@ def orbit(camera: Camera, dx_px: float, dy_px: float, pivot: Triple | None = Non
 
 
 def pan(camera: Camera, dx_px: float, dy_px: float, height_px: float) -> Camera:
-    """Shifted in the picture plane, so that the target stays under the mouse."""
+    """Shift the camera in the picture plane, so that the target stays under the mouse."""
     yaw, pitch = yaw_pitch(camera)
     right = np.array([math.cos(yaw), 0, math.sin(yaw)])
     up = np.cross(right, direction(yaw, pitch))
@@ -62,9 +62,9 @@ def pan(camera: Camera, dx_px: float, dy_px: float, height_px: float) -> Camera:
 
 
 def zoom(camera: Camera, steps: float, bounds: Bounds, pivot: Triple | None = None) -> Camera:
-    """`steps` of the wheel nearer to `pivot`, by default the target (negative: away).
+    """Move `steps` of the wheel towards `pivot` (default: the target; negative: away).
 
-    Never past it nor out of sight of the scene.
+    The camera never passes the pivot and never loses sight of the scene.
     """
     pivot = camera.target if pivot is None else pivot
     before = max(math.dist(pivot, camera.position), NEAREST_M)
@@ -72,14 +72,14 @@ def zoom(camera: Camera, steps: float, bounds: Bounds, pivot: Triple | None = No
 
 
 def nearer(camera: Camera, pivot: Triple, share: float) -> Camera:
-    """At this share of the distance from `pivot`, which stays where it is in the picture."""
+    """Move to this share of the distance from `pivot`, which keeps its place in the picture."""
     eye = np.array(pivot) + share * np.subtract(camera.position, pivot)
     ahead = direction(*yaw_pitch(camera)) * max(share * _distance(camera), NEAREST_M)
     return _placed(camera, eye, pivot if pivot == camera.target else eye + ahead)
 
 
 def look(camera: Camera, dx_px: float, dy_px: float) -> Camera:
-    """Turned on the spot, in the direction the mouse is dragged."""
+    """Turn on the spot, in the direction of the drag."""
     yaw, pitch = yaw_pitch(camera)
     sight = direction(yaw + TURN_RAD_PX * dx_px, pitch - TURN_RAD_PX * dy_px)
     return _placed(camera, camera.position, np.array(camera.position) + sight * _distance(camera))
@@ -87,7 +87,7 @@ def look(camera: Camera, dx_px: float, dy_px: float) -> Camera:
 
 @dataclass
 class Walker:
-    """Pace of who walks, and height of the eye above the floor."""
+    """Walking speed in m/s and eye height above the floor in metres."""
 
     speed_m_s: float
     eye_height_m: float
@@ -112,9 +112,9 @@ def walk(
     fast: bool = False,
     allowed: Callable[[np.ndarray, np.ndarray], np.ndarray] = lambda eye, step: step,
 ) -> Camera:
-    """Moved for `dt_s` seconds by the held `keys` (names as in `KEYS`; others are ignored).
+    """Move for `dt_s` seconds by the held `keys` (names as in `KEYS`; others are ignored).
 
-    On foot the eye moves level, as far as `allowed(eye, step)` gives way, and settles at eye height above `floor_y`
+    On foot the eye moves level, as far as `allowed(eye, step)` permits, and settles at eye height above `floor_y`
     (the scene's lowest point where it is None). Flying, it moves along the line of sight, through everything, and up
     and down by the keys for it.
     """
@@ -143,13 +143,13 @@ def standing(camera: Camera, bounds: Bounds, floor_y: float | None, height_m: fl
 
 
 def lifted(camera: Camera, lift_m: float) -> Camera:
-    """The camera `lift_m` higher."""
+    """Raise the camera by `lift_m`."""
     (px, py, pz), (tx, ty, tz) = camera.position, camera.target
     return replace(camera, name="free", position=(px, py + lift_m, pz), target=(tx, ty + lift_m, tz))
 
 
 def confined(eye: np.ndarray, before: Triple, bounds: Bounds) -> np.ndarray:
-    """`eye` kept inside the bounds; where `before` was outside already, it gets no farther out."""
+    """Keep `eye` inside the bounds; where `before` was outside already, let it get no farther out."""
     low, high = np.array(bounds)
     margin = np.minimum(WALL_M, 0.1 * (high - low))
     return np.asarray(np.clip(eye, np.minimum(low + margin, before), np.maximum(high - margin, before)))
@@ -177,7 +177,7 @@ def _distance(camera: Camera) -> float:
 
 
 def direction(yaw: float, pitch: float) -> np.ndarray:
-    """Line of sight (3,) of a heading and an elevation, which stays short of the poles."""
+    """Line of sight (3,) for a heading and an elevation, clamped short of the poles."""
     pitch = min(max(pitch, -PITCH_LIMIT_RAD), PITCH_LIMIT_RAD)
     return np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), -math.cos(yaw) * math.cos(pitch)])
 

@@ -32,7 +32,7 @@ def run(
         A document: the material to start from, or, where `path` is one too, the material B to compare with.
     environments : sequence of Path
         Lat-long pictures to light the preview with; the .hdr files beside `path` are offered too. In place, at most
-        one, which lights the scene instead of its own environment.
+        one, which replaces the scene's environment.
     camera, picture, store, crease_deg : str, (width, height), Path, float, optional
         In place: the name of the camera, the size of the picture in pixels, the folder that keeps the transport, and
         above how many degrees edges are hard where normals lean.
@@ -46,10 +46,15 @@ def run(
         return
     if material is not None:
         raise UserError(
-            "a scene is edited by itself", file=path, got=material, hint="drop the document onto its window"
+            "a scene takes no material document",
+            file=path,
+            got=material,
+            hint="open the scene, then drop the document onto the window",
         )
     if len(environments) > 1:
-        raise UserError("a scene has one environment", field="--environment", got=f"{len(environments)} files")
+        raise UserError(
+            "more than one environment for a scene", field="--environment", got=f"{len(environments)} files"
+        )
     light = environments[0] if environments else None
     app.run(
         path, mode, camera=camera, picture=picture, store=store, environment=light, crease_deg=crease_deg, **window
@@ -60,7 +65,7 @@ def _refuse(path: Path, **options: object) -> None:
     for name, value in options.items():
         if value is not None:
             option = f"--{name.replace('_', '-')}"
-            raise UserError("is for scenes and stores", file=path, field=option, hint="leave it out")
+            raise UserError("applies to scenes and stores only", file=path, field=option, hint="leave it out")
 
 
 def editing_mode(path: Path) -> str:

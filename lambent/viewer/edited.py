@@ -1,4 +1,4 @@
-"""Where edited pictures are summed: on the GPU that shows them, or by the processor's cores.
+"""Choice of the backend that sums edited pictures: the GPU that shows them, or the CPU.
 
 picture = on_device(device, lambda canvas: edited_picture(store, session, canvas=canvas), say)
 picture.step(); picture.compose()          # a frame, in `texture_of(picture)`
@@ -29,7 +29,7 @@ Backend = Callable[[Image], Canvas]
 
 
 class _ShadedLayer(GpuLayer):
-    """A layer on the GPU that knows the transport of a store."""
+    """A layer on the GPU that reads the transport of a store."""
 
     def fold(self, pairs: PairTransport, idle: int, means: Floats) -> tuple[Products, float]:
         if not isinstance(pairs, StoredPairs):
@@ -41,14 +41,14 @@ class _ShadedLayer(GpuLayer):
 
 
 class ShadedCanvas(GpuCanvas):
-    """Compute shaders: `texture` is drawn where it is shown."""
+    """Canvas of compute shaders, which draw into `texture`."""
 
     def layer(self, pixel: Indices, theta_o: Floats, texture: Floats | None) -> _ShadedLayer:
         return _ShadedLayer(self._commands, self._texels(pixel), theta_o, texture, self._image)
 
 
 class SentCanvas(HostCanvas):
-    """The processor's cores: every composed picture is sent to `texture`."""
+    """Canvas on the CPU: every composed picture is uploaded to `texture`."""
 
     def __init__(self, device: Any, background: Image) -> None:
         super().__init__(background)
@@ -66,25 +66,25 @@ class SentCanvas(HostCanvas):
 
 
 def sums(device: Any) -> bool:
-    """Whether a device sums faster than the processor's cores: a real GPU does."""
+    """Whether a device sums faster than the CPU: a real GPU does."""
     return not adapter_info(device).is_software
 
 
 def backend(device: Any) -> Backend:
-    """What makes the canvas of a picture that a device shows.
+    """Factory of the canvas for a picture that a device shows.
 
-    A real GPU sums. A software adapter runs the same shaders on the same cores as numba, and takes longer
-    (docs/editing.md), so that numba sums there.
+    A real GPU sums by shaders. On a software adapter numba sums: both use the same cores, and numba is faster
+    (docs/editing.md).
     """
     return partial(ShadedCanvas if sums(device) else SentCanvas, device)
 
 
 def on_device(device: Any, make: Callable[[Backend], EditedPicture], say: Callable[[str], None]) -> EditedPicture:
-    """The picture that `make` makes with the device's backend, or with the cores where the GPU has no room; says so."""
+    """The picture made by `make` on the device's backend, or on the CPU, with a note, where the GPU lacks memory."""
     try:
         return make(backend(device))
     except OutOfGpuMemory as error:
-        say(f"{error.message}: the processor's cores draw the picture")
+        say(f"{error.message}: the CPU draws the picture")
         return make(partial(SentCanvas, device))
 
 

@@ -1,4 +1,4 @@
-"""What was changed in the window, materials and light: undo and redo; names of files; rescue when it is lost."""
+"""Edits of materials and light in the window: undo and redo, file names, rescue of unsaved work."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lambent.store.session import RoomState, WalkSession
 
 @dataclass(frozen=True)
 class _State:
-    """The room now, the one compared with it, stored ones, and what goes with materials besides numbers, by name."""
+    """The present room, the room it is compared with, stored rooms, and data kept with materials, by name."""
 
     room: RoomState = field(default_factory=RoomState)
     other: RoomState | None = None
@@ -27,16 +27,16 @@ class _State:
 
 
 class MaterialEdits:
-    """Materials that differ from the scene's, the mix of its light, and light along paths, with one undo and redo.
+    """Changed materials, light mix, and light along paths, with one shared undo and redo.
 
-    A stroke is what one drag of a slider does: any number of changes, then one `end_stroke`. It is undone as a whole.
+    A stroke is one drag of a slider: any number of changes, then one `end_stroke`. Undo takes it back as a whole.
 
     Attributes
     ----------
     scene
         The materials of the scene, by name.
     saved
-        Materials as they were saved last, as documents.
+        Materials as last saved as documents.
     """
 
     def __init__(self, scene: Mapping[str, Material]) -> None:
@@ -57,7 +57,7 @@ class MaterialEdits:
 
     @property
     def room(self) -> RoomState:
-        """All that was edited."""
+        """The present state of the room."""
         return self._history.now.room
 
     @property
@@ -72,70 +72,70 @@ class MaterialEdits:
 
     @property
     def session(self) -> WalkSession:
-        """All of it, as it is saved."""
+        """The whole session to save."""
         return WalkSession(now=self.room, beside=self.other, states=dict(self.stored))
 
     def current(self, name: str) -> Material:
         return self.edited.get(name, self.scene[name])
 
     def change(self, name: str, material: Material) -> None:
-        """One moment of the stroke that is under way, or the first of a new one."""
+        """Change a material within the present stroke, or begin a stroke."""
         self._go_on(room=self._room(self.room.model_copy(update={"materials": {**self.edited, name: material}})))
 
     def mix(self, light: LightMix) -> None:
-        """The same of the mix of light."""
+        """Change the light mix within the present stroke, or begin a stroke."""
         if light != self.light:
             self._go_on(room=self.room.model_copy(update={"light": light}))
 
     def take(self, room: RoomState) -> None:
-        """Another state of the whole room, as a stroke of its own; materials that the scene does not have stay out."""
+        """Set the state of the whole room as one stroke; ignore materials that the scene does not have."""
         self._step(room=self._room(room))
 
     def dress(self, materials: Mapping[str, Material]) -> None:
-        """Several materials at once with their own textures, as a stroke of its own."""
+        """Set several materials with their textures as one stroke."""
         textures = {name: of for name, of in self.room.textures.items() if name not in materials}
         update = {"materials": {**self.edited, **materials}, "textures": textures}
         self._step(room=self._room(self.room.model_copy(update=update)))
 
     def put_beside(self, other: RoomState | None) -> None:
-        """Compare the room with this state from now on, as a stroke of its own."""
+        """Compare the room with this state from now on, as one stroke."""
         self._step(other=other)
 
     def exchange(self) -> None:
-        """The present state and the one compared with it change places, as a stroke of its own."""
+        """Swap the present state with the one it is compared with, as one stroke."""
         if (other := self.other) is not None:
             self._step(room=self._room(other), other=self.room)
 
     def store(self, name: str) -> None:
-        """Store the present state under a name, in the place of one that had it, as a stroke of its own."""
+        """Store the present state under a name, replacing a state of that name, as one stroke."""
         self._step(stored={**self.stored, name: self.room})
 
     def forget(self, name: str) -> None:
-        """Drop a stored state, as a stroke of its own."""
+        """Delete a stored state, as one stroke."""
         self._step(stored={other: room for other, room in self.stored.items() if other != name})
 
     def _room(self, room: RoomState) -> RoomState:
-        """Of a state, what the scene has, and has otherwise."""
+        """The part of a state that the scene has and that differs from the scene."""
         known = room.only(self.scene)
         changed = {name: one for name, one in known.materials.items() if one != self.scene[name]}
         return known.model_copy(update={"materials": changed})
 
     @property
     def tracks(self) -> Mapping[str, MixTrack | None]:
-        """The light along each path whose light was changed, as it is now."""
+        """The present light along each path whose light was changed."""
         return {**self._first_tracks, **self._history.now.tracks}
 
     def light_path(self, path: str, before: MixTrack | None, track: MixTrack | None) -> None:
-        """Other light along a path than `before`, as a stroke of its own."""
+        """Change the light along a path from `before`, as one stroke."""
         self._first_tracks.setdefault(path, before)
         self._step(tracks={**self._history.now.tracks, path: track})
 
     def beside(self, name: str) -> Hashable:
-        """What was kept beside a material; None where nothing was."""
+        """Data kept with a material; None without."""
         return self._history.now.beside.get(name)
 
     def keep_beside(self, name: str, value: Hashable) -> None:
-        """Keep something beside a material, such as what a fit leaves alone: undo brings back what was there before."""
+        """Keep data with a material, such as restrictions of a fit; undo restores the data of before."""
         self._go_on(beside={**self._history.now.beside, name: value})
 
     def _step(self, **changes: Any) -> None:
@@ -152,11 +152,11 @@ class MaterialEdits:
         self._history.end_stroke()
 
     def begin_from(self, session: WalkSession) -> None:
-        """Begin a new history with a session that was saved: what was done before it cannot be undone."""
+        """Start a new history from a saved session; earlier steps cannot be undone."""
         self._history = History(replace(self._state_of(session), tracks=self.tracks))
 
     def go_to(self, session: WalkSession) -> None:
-        """Take all of a session, as a stroke of its own."""
+        """Take a whole session, as one stroke."""
         self.end_stroke()
         self._history.change(replace(self._state_of(session), beside=self._history.now.beside, tracks=self.tracks))
 
@@ -164,16 +164,16 @@ class MaterialEdits:
         return _State(self._room(session.now), session.beside, session.states)
 
     def reset(self, name: str) -> None:
-        """Back to the scene's material, as a stroke of its own."""
+        """Restore the scene's material, as one stroke."""
         self.dress({name: self.scene[name]})
 
     @property
     def in_stroke(self) -> bool:
-        """Whether something is being changed at this moment."""
+        """Whether a stroke is in progress."""
         return self._history.in_stroke
 
     def previous(self, name: str) -> Material | None:
-        """The material before the last stroke, or before the one under way; None where there was none."""
+        """The material before the last or present stroke; None without one."""
         before = self._history.previous
         return None if before is None else before.room.materials.get(name, self.scene[name])
 
@@ -193,7 +193,7 @@ class MaterialEdits:
 
 
 def rescue(edits: MaterialEdits, names: Iterable[str], folder: Path) -> Iterator[Path]:
-    """Write materials to files of new names, because the window is about to be lost."""
+    """Write materials to new files, because the window is about to be lost."""
     for name in names:
         material = edits.current(name)
         file = rescue_file(folder, material.name or name)
@@ -202,22 +202,22 @@ def rescue(edits: MaterialEdits, names: Iterable[str], folder: Path) -> Iterator
 
 
 def rescue_file(folder: Path, name: str) -> Path:
-    """A file that is not there yet, for unsaved work."""
+    """A new file name for unsaved work."""
     return folder / f"{unused(folder, f'{plain_name(name)}-rescued', '.json')}.json"
 
 
 def file_in(folder: Path, name: str) -> Path:
-    """The file of a name, in `folder` unless it says otherwise; `UserError` where no file can be there."""
+    """The file for a name or path, in `folder` if relative; raise `UserError` where no file can be written."""
     file = folder / Path(name).expanduser()
     if not file.parent.is_dir():
-        raise UserError("no such folder", file=file.parent)
+        raise UserError("folder does not exist", file=file.parent)
     if file.is_dir():
         raise UserError("is a folder", file=file)
     return file
 
 
 def unused(folder: Path, stem: str, *suffixes: str) -> str:
-    """`stem-001`, or with the first number that no file of these suffixes in `folder` has."""
+    """`stem-001`, or `stem` with the first number that no file of these suffixes in `folder` has."""
     number = 1
     while any((folder / f"{stem}-{number:03}{suffix}").exists() for suffix in suffixes):
         number += 1

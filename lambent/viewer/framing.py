@@ -1,4 +1,4 @@
-"""Where a camera stands to show an object: near enough to fill the picture, in the open, with nothing in between."""
+"""Camera position that frames an object: it fills the picture, and nothing stands in between."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lambent.core.camera import Camera
 from lambent.core.plain import triple
 from lambent.viewer.cameras import NEAREST_M, WALL_M, Bounds, direction, yaw_pitch
 
-FILLS = 0.75  # of the picture's width or height
+FILLS = 0.75  # share of the picture's width or height that the object fills
 TURNS_DEG = (0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180)  # from the present line of sight
 PITCHES_DEG = (-50.0, -5.0)  # steepest and flattest
 OTHER_PITCH_DEG = -25.0

@@ -1,6 +1,6 @@
 """Mouse and keys over the picture: the camera in orbit, and the keys that all modes share.
 
-A mode overrides what it answers differently. The panels are Dear ImGui's own business. Events are rendercanvas
+A mode overrides the methods whose behaviour differs. Dear ImGui handles the panels. Events are rendercanvas
 dictionaries, positions in logical pixels of the window.
 """
 
@@ -22,7 +22,7 @@ LEFT, RIGHT, MIDDLE = 1, 2, 3
 
 
 class Input:
-    """Carries events into a mode's state. A drag that begins over the interface belongs to it, wherever it ends."""
+    """Translates events into changes of a mode's state. A drag that begins over the interface belongs to it."""
 
     def __init__(self, screen: Screen, navigation: Navigation, edits: MaterialEdits) -> None:
         self.screen, self.navigation, self.edits = screen, navigation, edits
@@ -31,7 +31,7 @@ class Input:
         self._moved_px = 0.0
 
     def handle(self, event: Mapping[str, Any], *, ui_has_mouse: bool, ui_has_keys: bool) -> None:
-        """Answer one event."""
+        """Handle one event."""
         kind = event["event_type"]
         if kind.startswith("key_"):
             self.keys(event["key"].lower() if len(event["key"]) == 1 else event["key"], event, ui_has_keys)
@@ -66,11 +66,11 @@ class Input:
 
     @property
     def pivot(self) -> Triple:
-        """What orbit turns about and the wheel approaches."""
+        """Centre of orbit and wheel."""
         return self.navigation.camera.target
 
     def dragged(self, dx: float, dy: float) -> None:
-        """Turn about the pivot with the left button, shift the view with the others."""
+        """Orbit the pivot with the left button, pan with the others."""
         camera = self.navigation.camera
         if self._button == LEFT:
             self.navigation.move(self.turned(dx, dy))
@@ -82,7 +82,7 @@ class Input:
         return cameras.orbit(self.navigation.camera, dx, dy, self.pivot)
 
     def keys(self, key: str, event: Mapping[str, Any], ui_has_keys: bool) -> None:
-        """Answer a key that was pressed or released; letters are small."""
+        """Handle a pressed or released key; letters are lower case."""
         if event["event_type"] != "key_down" or ui_has_keys:
             return
         if "Control" in event["modifiers"] or "Meta" in event["modifiers"]:
@@ -101,10 +101,10 @@ class Input:
         else:
             self.pressed_key(key)
 
-    # Further events, which a mode may answer.
+    # Further events that a mode may handle.
 
     def pointed(self, at: tuple[float, float] | None) -> None:
-        """The mouse is at shares of the picture, or elsewhere."""
+        """The mouse moved to these shares of the picture; None outside of it."""
 
     def pressed(self, x: float) -> None:
         """A button went down over the picture, at x of the window."""

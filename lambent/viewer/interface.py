@@ -1,4 +1,4 @@
-"""Dear ImGui's renderer on a surface that shows colours as they are."""
+"""Dear ImGui's renderer without gamma, for a surface that shows encoded colours."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ POWER = "pow(color.rgb, vec3<f32>(uniforms.gamma))"
 def renderer(device: Any, canvas: Any) -> ImguiRenderer:
     """wgpu's renderer without its gamma.
 
-    Its shader takes every pixel of the window to a power. On a surface without sRGB that is the power of 1, and 29 %
-    of what a software adapter does for a frame.
+    Its shader raises every pixel of the window to a power. On a surface without sRGB the power is 1, and costs 29 % of
+    a frame on a software adapter.
     """
     source = imgui_backend.FRAGMENT_SHADER_SRC
-    assert POWER in source, "this version of wgpu has another shader"
+    assert POWER in source, "this version of wgpu has a different shader"
     imgui_backend.FRAGMENT_SHADER_SRC = source.replace(POWER, "color.rgb")
     try:
         return ImguiRenderer(device, canvas)

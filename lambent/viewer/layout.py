@@ -1,4 +1,4 @@
-"""Where things stand in the window: the picture on the left, one column of panels on the right.
+"""Layout of the window: the picture on the left, one column of panels on the right.
 
 A mode may show plots beside the picture and below it; the borders can be dragged.
 """
@@ -16,12 +16,12 @@ from lambent.viewer.panels import closing
 from lambent.viewer.panels.widgets import explain, shadowed
 from lambent.viewer.screen import Rect
 
-COLUMN_PX = 370  # logical
-MOST_SHARE = 1 / 3  # of a window's width that the column takes
+COLUMN_PX = 370  # logical pixels
+MOST_SHARE = 1 / 3  # largest share of a window's width for the column
 LEAST_FONT = 0.8  # size of letters where the column is narrow
 LABEL_PX = 88
 BORDER_PX = 6  # between picture, disks and curves
-LEAST_SHARE = 0.15  # of the window that a border leaves on either side
+LEAST_SHARE = 0.15  # least share of the window on either side of a border
 FONT = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "DroidSans.ttf"
 FONT_PX = 15.0
 COLOURS = {
@@ -74,7 +74,7 @@ def set_style() -> None:
 
 
 def regions(mode: Mode, width: float, height: float) -> Regions:
-    """How a window of that size is shared out."""
+    """Divide a window of this size into regions."""
     wide = min(COLUMN_PX, int(MOST_SHARE * width)) if mode.screen.panels_shown else 0
     left, down = max(1, round(width) - wide), max(1, round(height))
     column = Rect(round(width) - wide, 0, wide, down)
@@ -87,7 +87,7 @@ def regions(mode: Mode, width: float, height: float) -> Regions:
 
 
 def draw(mode: Mode, textures: Textures | None = None) -> bool:
-    """The whole interface of one frame; returns whether the mouse is the interface's, also over the picture."""
+    """Draw the interface of one frame; return whether it captures the mouse, also over the picture."""
     textures = textures or {}
     width, height = imgui.get_io().display_size
     imgui.get_style().font_scale_main = max(LEAST_FONT, min(1.0, MOST_SHARE * width / COLUMN_PX))
@@ -133,7 +133,7 @@ def _column(mode: Mode) -> None:
 
 
 def _scroll_to(top_y: float, bottom_y: float) -> None:
-    """Bring a panel that was opened into sight: its end, or, if it is too long, its beginning."""
+    """Scroll to a panel that was opened: to its end, or, if it is too long, to its beginning."""
     window_y, height = imgui.get_window_pos().y, imgui.get_window_height()
     if bottom_y - top_y > height:
         imgui.set_scroll_from_pos_y(top_y - window_y, 0.0)
@@ -142,7 +142,7 @@ def _scroll_to(top_y: float, bottom_y: float) -> None:
 
 
 def _pictures(drawing: Drawing, place: Rect, textures: Textures) -> bool:
-    """The picture, or A and B with the divider between them; returns whether the mouse is at the divider."""
+    """Draw the picture, or A and B with a divider; return whether the mouse is at the divider."""
     behind = imgui.get_background_draw_list()
     begin, end = place.point(0, 0), place.point(1, 1)
     a, b = textures.get("picture A"), textures.get("picture B")
@@ -175,7 +175,7 @@ def _beside(mode: Mode, beside: Beside, right: Rect, below: Rect, textures: Text
 
 
 def _border(name: str, begin: tuple[float, float], length: float, *, upright: bool) -> tuple[bool, float]:
-    """A line that can be dragged across; returns whether the mouse has it, and where it is now."""
+    """A border that can be dragged; returns whether the mouse holds it, and its position."""
     x, y = begin
     half = BORDER_PX / 2
     place, size = ((x - half, y), (BORDER_PX, length)) if upright else ((x, y - half), (length, BORDER_PX))
@@ -190,7 +190,7 @@ def _border(name: str, begin: tuple[float, float], length: float, *, upright: bo
     if held:
         mouse = imgui.get_io().mouse_pos
         at = mouse.x if upright else mouse.y
-    explain("drag to share the room between both sides")
+    explain("drag to resize both sides")
     if held or hovered:
         imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew if upright else imgui.MouseCursor_.resize_ns)
     shade = 0.55 if held else 0.4 if hovered else 0.24

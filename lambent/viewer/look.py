@@ -15,7 +15,7 @@ from lambent.realtime.incident import AUTO, look_ups
 from lambent.realtime.integrators import INTEGRATORS as ALL_INTEGRATORS
 from lambent.realtime.patterns import RINGS
 
-# What the panels offer; every choice starts at its first.
+# Choices of the panels; the first is the default.
 INTEGRATORS = tuple(name for name, how in ALL_INTEGRATORS.items() if how.specular)
 VIEW_TRANSFORMS = tuple(reversed(ALL_TRANSFORMS))
 SHOWS = tuple(SHOW)
@@ -37,13 +37,13 @@ class Look:
     lookups: dict[str, str] = field(default_factory=dict)  # by object, in place of `lookup`
     planar: str = "auto"
     n: int | None = None  # samples per lobe; None: chosen per material from its roughness
-    near_m: float | None = None  # nearer things are cut away; None: by the scene's size
+    near_m: float | None = None  # near clipping distance; None: by the scene's size
     scale: Range = field(default_factory=Range)
     noise_scale: Range = field(default_factory=lambda: Range(0.5, 50.0))
 
     @property
     def quantity(self) -> Quantity:
-        """Of the numbers that the picture shows: luminance, illuminance, or noise."""
+        """Quantity that the picture shows: luminance, illuminance, or noise."""
         return quantity_of(self.show)
 
     @property
@@ -57,12 +57,12 @@ class Look:
 
     @property
     def display_transform(self) -> str:
-        """The view transform of pictures that are never in false colours: filmic takes their place."""
+        """The view transform without false colours, which filmic replaces."""
         return "filmic" if self.view_transform == FALSE_COLOUR else self.view_transform
 
     @property
     def shown_scale(self) -> Range:
-        """The scale of the false colours that are shown."""
+        """The scale of the shown false colours."""
         return self.noise_scale if self.shows_noise else self.scale
 
     @shown_scale.setter
@@ -73,10 +73,10 @@ class Look:
             self.scale = scale
 
     def frame(self, camera: Camera, size: tuple[int, int], materials: Mapping[str, Material]) -> FrameState:
-        """The frame of `size` (width, height) in pixels that shows this."""
+        """The frame of `size` (width, height) in pixels with these settings."""
         settings = {name: getattr(self, name) for name in OF_FRAMES}
         scale = self.shown_scale if self.is_false_coloured else Range()
-        # Another name of the camera is no other picture.
+        # A renamed camera gives the same picture.
         return FrameState(
             replace(camera, name=""),
             *size,

@@ -1,4 +1,4 @@
-"""Keep unsaved work when the window is lost: by an error, a signal, or a display that goes away.
+"""Save unsaved work when the window is lost: by an error, a signal, or a lost display.
 
 An X server that dies ends the process from within Xlib, past every `finally` and `atexit` of Python; Xlib offers one
 call before it does. A process that is killed outright (SIGKILL), or dies in the graphics driver, keeps nothing.
@@ -24,17 +24,17 @@ _IoErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 
 
 def rescued(what: str, write: Callable[[], Iterable[object]]) -> None:
-    """Say on stderr where `write` put unsaved work, or why it could not."""
+    """Say on stderr where `write` saved unsaved work, or why it could not."""
     try:
         for place in write():
-            sys.stderr.write(f"lambent: note: {what} is in {place}\n")
+            sys.stderr.write(f"lambent: note: {what} was saved in {place}\n")
     except (UserError, OSError) as error:
-        sys.stderr.write(f"lambent: note: {what} could not be kept: {error}\n")
+        sys.stderr.write(f"lambent: note: {what} could not be saved: {error}\n")
 
 
 @contextmanager
 def kept(rescue: Callable[[], None]) -> Iterator[None]:
-    """While the window is open: call `rescue` once where it is lost.
+    """While the window is open, call `rescue` once if it is lost.
 
     Signals that end a process, and Xlib's error of the connection, are taken over inside and given back after.
     """
@@ -43,7 +43,7 @@ def kept(rescue: Callable[[], None]) -> Iterator[None]:
     def lost() -> None:
         nonlocal over
         if not over:
-            over = True  # the rescue may fail in its turn
+            over = True  # the rescue itself may fail
             rescue()
 
     def on_signal(number: int, _: FrameType | None) -> None:
@@ -80,7 +80,7 @@ def kept(rescue: Callable[[], None]) -> Iterator[None]:
 
 
 def _xlib() -> Any:
-    """Xlib, the one that the window uses; None where there is none."""
+    """The Xlib that the window uses; None where there is none."""
     if not sys.platform.startswith("linux") or not os.environ.get("DISPLAY"):
         return None
     try:

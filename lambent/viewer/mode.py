@@ -1,6 +1,6 @@
-"""The contract between the window and its modes: `Mode`, its panels, and the `Drawing` that fills the picture's place.
+"""The contract between the window and its modes: `Mode`, its panels, and the `Drawing` of the picture.
 
-A mode is a folder of `lambent.viewer.modes`, see there. The window knows nothing else of it.
+A mode is a folder of `lambent.viewer.modes`; the window uses nothing of it but this contract.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ Textures = Mapping[str, Any]  # imgui.ImTextureRef by name: "picture A", "pictur
 
 @dataclass
 class Divider:
-    """The line between the pictures A and B: `share` of the picture's width belongs to A."""
+    """The divider between the pictures A and B: `share` of the picture's width belongs to A."""
 
     share: float = 0.5
     a_label: str = "A"
     b_label: str = "B"
 
     def move(self, share: float) -> None:
-        """Put the line elsewhere; a strip of both pictures stays."""
+        """Move the divider; a strip of both pictures stays visible."""
         self.share = min(max(share, 0.02), 0.98)
 
 
 @dataclass(frozen=True)
 class Panel:
-    """A section of the column at the right, under a header that folds it; `meaning` says what it is for."""
+    """A collapsible section of the column; `meaning` is the tooltip of its header."""
 
     title: str
     draw: Callable[[], None]
     meaning: str
-    opened: bool = False  # at the start
+    opened: bool = False  # whether the panel starts open
 
 
 @dataclass(frozen=True)
 class Beside:
-    """Plots right of the picture and below it; `images` are the textures that they need besides the drawing's."""
+    """Plots right of the picture and below it; `images` are textures that they need beside the drawing's."""
 
     right: Callable[[Textures], None]
     below: Callable[[Textures], None]
@@ -68,7 +68,7 @@ class Drawing:
         raise NotImplementedError
 
     def update(self, place: Rect, pixel_ratio: float) -> None:
-        """Draw what is due into views of the size of `place`, or smaller."""
+        """Draw the due frames into views of the size of `place`, or smaller."""
         raise NotImplementedError
 
     @property
@@ -80,31 +80,31 @@ class Drawing:
         return None
 
     def within(self, place: Rect) -> Rect:
-        """Where in the picture's place the views lie: a picture of a shape of its own leaves borders."""
+        """Place of the views within the picture's place; a picture with another aspect leaves borders."""
         return place
 
     def wait_s(self) -> float | None:
-        """Seconds until something is due although nothing changes; None: never."""
+        """Seconds until something is due without an event; None: never."""
         return None
 
     @property
     def under_way(self) -> bool:
-        """Whether a frame is being drawn in parts: `work` goes on with it."""
+        """Whether a frame is being drawn in parts, which `work` continues."""
         return False
 
     def work(self) -> bool:
-        """Draw a part of the frame under way; whether there is a new picture to show."""
+        """Draw a part of the present frame; return whether there is a new picture to show."""
         return False
 
     def save(self) -> None:
-        """Write the picture into the screen's folder, and say so, or why not."""
+        """Write the picture into the screen's folder, and report success or failure."""
 
     def close(self) -> None:
-        """End work in the background; harmless when repeated."""
+        """Stop background work; may be called again."""
 
 
 class Mode:
-    """Content and behaviour of a window; a mode overrides the methods where it differs."""
+    """Content and behaviour of a window; a mode overrides methods."""
 
     head: Callable[[], None] | None = None  # draws the lines above the panels that do not scroll
 
@@ -121,38 +121,38 @@ class Mode:
 
     @property
     def moving(self) -> bool:
-        """Whether the next frame differs from this one although no event comes."""
+        """Whether the next frame differs without an event."""
         return False
 
     def advance(self, dt_s: float) -> None:
-        """Go on for `dt_s` seconds of motion (0 after a sleep), and take results of work in the background."""
+        """Advance motion by `dt_s` seconds (0 after a sleep), and take results of background work."""
 
     def wait_s(self) -> float | None:
-        """Seconds until `advance` has something to do although nothing moves; None: never."""
+        """Seconds until `advance` must be called although nothing moves; None: never."""
         return None
 
     def drop(self, path: str) -> None:
-        """Take a file that was dropped onto the window."""
+        """Open a file that was dropped onto the window."""
 
     @property
     def unsaved(self) -> tuple[str, ...]:
-        """What would be lost if the window closed now, in plain words."""
+        """Names of unsaved work, for people."""
         return ()
 
     def save(self) -> None:
-        """Save what is unsaved, and say so on the screen, or why not."""
+        """Save unsaved work, and report success or failure on the screen."""
 
     def discard(self) -> None:
-        """Closing keeps nothing of what is unsaved."""
+        """Discard unsaved work."""
 
     def rescue(self) -> None:
-        """The window is lost: write unsaved work to files of new names, and say where on stderr."""
+        """Write unsaved work to new files because the window is lost, and name them on stderr."""
 
     def close(self) -> None:
-        """The window was closed in order: end the work in the background, and name unsaved materials on stderr."""
+        """Stop background work after the window was closed, and name unsaved work on stderr."""
 
 
 def check_there(path: Path) -> None:
-    """`UserError` where `path` names neither a file or folder nor a built-in scene."""
+    """Raise `UserError` where `path` is neither a file or folder nor a built-in scene."""
     if not path.exists() and not str(path).startswith(BUILTIN_PREFIX):
-        raise UserError("cannot be read (no such file or folder)", file=path)
+        raise UserError("does not exist", file=path)

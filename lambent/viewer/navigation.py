@@ -1,4 +1,4 @@
-"""Where the viewer stands: the camera, how it moves, and the camera path that it follows."""
+"""Navigation: the camera, how it moves, and the played camera path."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Movement = Literal["orbit", "walk"]
 
 @dataclass
 class PathPlay:
-    """A camera path being shown."""
+    """The camera path being shown."""
 
     path: CameraPath
     time_s: float = 0.0
@@ -37,7 +37,7 @@ class Navigation:
 
     @classmethod
     def of(cls, scene: SceneRecord, movement: Movement) -> Navigation:
-        """Start at the scene's first camera, or, where it has none, at one that sees the whole scene."""
+        """Start at the scene's first camera, or at one that sees the whole scene."""
         camera = scene.cameras[0] if scene.cameras else overview(*scene.bounds)
         return cls(camera, scene.bounds, movement)
 
@@ -45,7 +45,7 @@ class Navigation:
         self.camera, self.path = camera, None
 
     def move(self, camera: Camera) -> None:
-        """Take a camera that the user moved; that ends a path being shown."""
+        """Set the camera moved by the user, and leave a shown path."""
         if camera != self.camera:
             self.jump(camera)
 
@@ -53,7 +53,7 @@ class Navigation:
         self.move(replace(self.camera, name="free", fov_y_deg=fov_y_deg))
 
     def set_eye_height(self, eye_height_m: float) -> None:
-        """Grow or shrink the walker; whoever stands is lifted at once."""
+        """Set the walker's eye height, and raise or lower a standing camera."""
         lift_m = eye_height_m - self.walker.eye_height_m
         self.walker.eye_height_m = eye_height_m
         if self.movement == "walk" and not self.flying and lift_m:
@@ -64,7 +64,7 @@ class Navigation:
         return self.path is not None and self.path.playing
 
     def play(self, dt_s: float) -> None:
-        """Go on along a path that is playing; it stops at its end."""
+        """Advance a playing path; it stops at its end."""
         if self.path is None or not self.path.playing:
             return
         self.path.time_s = min(self.path.time_s + dt_s, self.path.path.seconds)
@@ -72,11 +72,11 @@ class Navigation:
         self.camera = camera_at(self.path.path, self.path.time_s)
 
     def scrub(self, path: CameraPath, time_s: float) -> None:
-        """Stand where `path` leads at `time_s`."""
+        """Go to the camera of `path` at `time_s`."""
         self.path, self.camera = PathPlay(path, time_s, playing=False), camera_at(path, time_s)
 
     def toggle(self, path: CameraPath) -> None:
-        """Pause a path that plays; play one that is paused, from its start when it is over."""
+        """Pause a playing path, or play a paused one, from the start if it has ended."""
         if self.path is None or self.path.path != path or self.path.time_s >= path.seconds:
             self.path = PathPlay(path)
         else:

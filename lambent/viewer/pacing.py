@@ -1,6 +1,6 @@
 """When to draw the picture, how large, and with which integrator.
 
-A changed material is drawn over the last picture at full size, on its objects alone. In motion: the few-sample
+A changed material is drawn over the last picture at full size, on its objects only. In motion: the few-sample
 integrator, on fewer pixels where the adapter is too slow, and without the mirrored views of planar reflectors (which
 show their probes then) where even half of the width and height takes too long with them. `REST_S` after the last
 change: the same once more, whole and with everything; then every frame adds samples of `qmc` to the picture, up to a
@@ -13,13 +13,13 @@ import math
 from dataclasses import dataclass
 
 REST_S = 0.25
-BUDGET_S = 1 / 15  # a frame in motion should take no longer
+BUDGET_S = 1 / 15  # target time of a frame in motion
 SCALES = (1.0, 0.75, 0.5, 0.35, 0.25, 0.18)
 PROBE_FRAMES = 8
-FIXED_SHARE = 1.5  # a frame in motion may take this many times its cost without pixels
-LEAST_MIRRORED = 0.5  # in motion, mirrored views are not worth a smaller scale
-MIRROR_COST = 4.0  # of a frame with mirrored views, in frames without; measured in software: 3 to 4
-PRIOR_SAMPLES = 16  # of `qmc` that the last picture in motion counts for, while few are accumulated
+FIXED_SHARE = 1.5  # a frame in motion may take this multiple of its cost without pixels
+LEAST_MIRRORED = 0.5  # least scale in motion with mirrored views; below, they are left out
+MIRROR_COST = 4.0  # cost of a frame with mirrored views, relative to one without; measured in software: 3 to 4
+PRIOR_SAMPLES = 16  # weight of the last picture in motion, in `qmc` samples, while few are accumulated
 
 
 @dataclass(frozen=True)
@@ -37,40 +37,40 @@ WHOLE = Plan(1.0, None)
 
 
 class Beat:
-    """When frames begin: `period_s` apart. One that begins late shortens the wait for the next, by half at most."""
+    """Schedule of frames, `period_s` apart. A late frame shortens the wait for the next by at most half."""
 
     def __init__(self, period_s: float) -> None:
         self._period_s, self._due_s = period_s, -math.inf
 
     def wait_s(self, now_s: float) -> float:
-        """Seconds from a frame that begins now to the next one."""
+        """Seconds from a frame that starts now to the next one."""
         due_s = max(self._due_s, now_s - self._period_s / 2) + self._period_s
         self._due_s = min(due_s, now_s + self._period_s)
         return self._due_s - now_s
 
 
 class Resolution:
-    """Chooses the size of frames of one kind in motion from the times of those before."""
+    """Chooses the size of frames in motion of one kind from the times of earlier frames."""
 
     def __init__(self, scale: float) -> None:
         self.scale = scale
-        self._late = 0  # frames that took too long although no fewer pixels can be drawn
-        self._probe_at = PROBE_FRAMES  # of those
+        self._late = 0  # slow frames at the least size
+        self._probe_at = PROBE_FRAMES  # number of slow frames at which another size is tried
         self._times: dict[float, float] = {}  # seconds by scale
-        self._fixed_s = self._pixels_s = 0.0  # of a frame of no pixels, and of all pixels besides
+        self._fixed_s = self._pixels_s = 0.0  # time of a frame without pixels, and additional time of all pixels
 
     def seconds(self, scale: float) -> float:
         """Estimated time of a frame."""
         return self._fixed_s + self._pixels_s * scale * scale
 
     def learn(self, scale: float, seconds: float, budget_s: float) -> None:
-        """Take in the time of a frame, and choose the size of the next."""
+        """Learn the time of a frame, and choose the size of the next."""
         before = self._times.get(scale, seconds)
-        # A mean, but one that forgets a stall (a shader being compiled) at the next frame of this size.
+        # A running mean that forgets a stall (shader compilation) at the next frame of this size.
         self._times[scale] = min((before + seconds) / 2, 1.2 * seconds)
         self._fixed_s = min(self._without_pixels_s(), seconds)
         self._pixels_s = (seconds - self._fixed_s) / scale**2
-        # Fewer pixels save nothing of the cost that does not depend on pixels.
+        # Fewer pixels do not reduce the fixed cost.
         budget_s = max(budget_s, FIXED_SHARE * self._fixed_s)
         fits = next((s for s in SCALES if self.seconds(s) <= budget_s), SCALES[-1])
         fits_well = next((s for s in SCALES if self.seconds(s) <= 0.7 * budget_s), SCALES[-1])
@@ -80,8 +80,8 @@ class Resolution:
             self.scale = fits_well
         elif seconds > budget_s:
             self._late += 1
-            if self._late == self._probe_at:  # the cost of pixels may have been learnt from a stall
-                self._probe_at *= 4  # but each probe is seen: rarer from time to time
+            if self._late == self._probe_at:  # the learnt cost may come from a stall
+                self._probe_at *= 4  # each try is visible, so tries become rarer
                 self.scale = SCALES[max(0, SCALES.index(self.scale) - 1)]
                 self._times = {scale: time for scale, time in self._times.items() if scale < self.scale}
 
@@ -95,32 +95,32 @@ class Resolution:
 
 
 class Pacer:
-    """Decides what to draw next. It is told everything: the time, the wanted picture, the cost of a frame."""
+    """Decides what to draw next, from the given time, wanted picture and frame costs."""
 
     def __init__(self, *, accumulate_to: int, slow_adapter: bool) -> None:
         self.accumulate_to = accumulate_to
-        self._mirrors = not slow_adapter  # in motion
+        self._mirrors = not slow_adapter  # whether mirrored views are drawn in motion
         start = 0.5 if slow_adapter else 1.0
         self._sizes = {True: Resolution(start), False: Resolution(start)}  # with mirrored views, and without
         self.shown: object = None  # the picture that the window shows or is about to
-        self.accumulated = 0  # frames that it is the mean of; 0: it is one of motion
+        self.accumulated = 0  # accumulated frames; 0: a frame in motion
         self._changed_s = 0.0
         self._last: Plan | None = None
         self._budget_s = BUDGET_S
 
     @property
     def moving(self) -> Plan:
-        """The next frame in motion."""
+        """Plan of the next frame in motion."""
         return Plan(self._sizes[self._mirrors].scale, None, self._mirrors)
 
     def aim(self, seconds: float) -> None:
-        """A frame in motion should take no longer from now on."""
+        """Set the target time of a frame in motion."""
         self._budget_s = seconds
 
     def plan(self, picture: object, now_s: float, *, refine: bool, adaptive: bool, over: bool = False) -> Plan | None:
-        """Plan to draw at `now_s` so that the window shows `picture`; None when it is shown already, or not yet due.
+        """Plan for `now_s` to show `picture`; None when it is already shown, or not yet due.
 
-        `over`: in motion, what changed is drawn over the last picture, at full size.
+        `over`: in motion, draw the changes over the last picture, at full size.
         """
         if picture != self.shown:
             self.shown, self._changed_s, self.accumulated = picture, now_s, 0
@@ -134,7 +134,7 @@ class Pacer:
         return None if self._next(refine) is None else max(0.0, self._changed_s + REST_S - now_s)
 
     def _next(self, refine: bool) -> Plan | None:
-        """Next step of refinement for a resting camera."""
+        """Next step of refinement at rest."""
         if not (self.accumulated or self._last == WHOLE):
             return WHOLE
         return Plan(1.0, self.accumulated) if refine and self.accumulated < self.accumulate_to else None
@@ -144,7 +144,7 @@ class Pacer:
         self.accumulated = 0 if plan.accumulate is None else plan.accumulate + 1
 
     def cost(self, plan: Plan, seconds: float, mirrors: int = 0) -> None:
-        """Learn the time of a frame in motion with this many mirrored views, and choose the next."""
+        """Learn the time of a frame in motion with a number of mirrored views, and choose the next."""
         if plan.accumulate is not None or plan.over:
             return
         size = self._sizes[plan.mirrors]
@@ -153,7 +153,7 @@ class Pacer:
             self._mirrors = False
         elif not plan.mirrors and plan.scale == 1.0 and MIRROR_COST * seconds <= self._budget_s:
             self._mirrors = True
-            self._sizes[True] = Resolution(LEAST_MIRRORED)  # what was learnt before is forgotten
+            self._sizes[True] = Resolution(LEAST_MIRRORED)  # forget earlier times
 
 
 def prior_share(accumulated: int, accumulate_to: int, samples: int) -> float:

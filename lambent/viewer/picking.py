@@ -20,15 +20,15 @@ class Geometry:
         self.triangles = positions[faces].astype(np.float32)
 
     def pick(self, origin: ArrayLike, direction: Floats) -> ObjectRecord | None:
-        """The first object on a ray; None where it meets none."""
+        """The first object on a ray; None without a hit."""
         return self.hit(origin, direction)[0]
 
     def free_m(self, origin: ArrayLike, direction: Floats, but: str = "") -> float:
-        """Distance along a ray that no object stands in, apart from the one named `but`."""
+        """Free distance along a ray, ignoring the object named `but`."""
         return self.hit(origin, direction, but)[1]
 
     def hit(self, origin: ArrayLike, direction: Floats, but: str = "") -> tuple[ObjectRecord | None, float]:
-        """The first object on a ray but one, and its distance; None and inf where it meets none."""
+        """The first object on a ray, ignoring `but`, and its distance; None and inf without a hit."""
         start = np.asarray(origin, float)
         nearest, chosen = math.inf, None
         for item in self._objects:

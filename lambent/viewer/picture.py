@@ -1,4 +1,4 @@
-"""Pictures in the window: which frame is due, where it is drawn, what it cost, how it is saved."""
+"""Pictures in the window: choice of the next frame, drawing, timing, saving."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from lambent.viewer.screen import Rect, Screen, Statistics, least
 REST_FRAMES = 128
 LARGEST_PX = 8192  # of a texture, by WebGPU's default limits; a larger window shows a magnified picture
 SOFTWARE_N = 1
-LONGEST_OVER_S = 0.15  # of a frame over another one that is not drawn in parts
-QUIET_S = 0.5  # at most so long after an event, or as long as a part of a frame at rest takes, none is begun
+LONGEST_OVER_S = 0.15  # longest frame over another one that is not drawn in parts
+QUIET_S = 0.5  # longest pause of frames at rest after an event; else the time of a part of such a frame
 
 
 @dataclass
@@ -59,20 +59,20 @@ class Picture:
         self.pacer = Pacer(accumulate_to=REST_FRAMES, slow_adapter=adapter.is_software)
         self._refine = True
         self._part_s = 0.0  # longest part of the last frame at rest
-        self._whole_s = math.inf if adapter.is_software else 0.0  # the last frame at rest altogether
-        self._over_s = 0.0  # the last frame that was drawn over another
+        self._whole_s = math.inf if adapter.is_software else 0.0  # time of the last whole frame at rest
+        self._over_s = 0.0  # time of the last frame drawn over another
         self._cut = Cut()
         self._under_way: Job | None = None
         self.view: Any = None
         self.radiance: Any = None  # texture that `view` shows, linear
-        self.version = 0  # grows with every drawn frame
+        self.version = 0  # counts drawn frames
         self._size: tuple[int, int] = (0, 0)
-        self._spare: list[Any] = []  # views of that size, two at most
+        self._spare: list[Any] = []  # unused views of that size, at most two
 
     def update(self, wanted: FrameState, *, refine: bool | None = None, share: float = 1.0) -> None:
-        """Draw the next frame where one is due, so that the picture comes to show `wanted`.
+        """Draw the next due frame towards the picture `wanted`.
 
-        `refine` stands in for the user's choice; `share` of the frame time is for this picture.
+        `refine` overrides the user's choice; `share` is this picture's share of the frame time.
         """
         pace, now_s = self._screen.pace, self._screen.clock()
         self._refine = pace.refine if refine is None else refine
@@ -80,7 +80,7 @@ class Picture:
         rests = wanted == self.pacer.shown
         over = not rests and bool(self._renderer.redrawn(wanted))
         if not (rests or (over and self._under_way is not None and self._under_way.plan.over)):
-            self._under_way = None  # another frame is wanted: nobody will see this one
+            self._under_way = None  # another frame is wanted: drop this one
         if self._under_way is not None:
             return
         plan = self.pacer.plan(wanted, now_s, refine=self._refine, adaptive=pace.adaptive, over=over)
@@ -93,7 +93,7 @@ class Picture:
             return
         started = time.perf_counter()
         radiance = self._renderer.draw(frame, view)
-        # Waiting keeps the queue short, so that a frame shows the latest event, and tells what a frame costs.
+        # Waiting keeps the queue short, so that a frame shows the latest event, and measures its cost.
         self._renderer.finish()
         seconds = time.perf_counter() - started
         if rests:
@@ -114,20 +114,20 @@ class Picture:
 
     @property
     def accumulated(self) -> int:
-        """Frames of the progressive series that the picture is the mean of."""
+        """Accumulated frames of the progressive series."""
         return self.pacer.accumulated
 
     @property
     def readable(self) -> bool:
-        """Whether `radiance` is that of `view`: a frame under way may be drawn over it."""
+        """Whether `radiance` belongs to `view`: an unfinished frame may overwrite it."""
         over = self._under_way is not None and self._under_way.plan.accumulate is None
         return self.radiance is not None and not over
 
     def work(self) -> bool:
         """Draw a part of the frame under way; whether there is a new picture to show.
 
-        Slices take about `slices.SLICE_S`, so that events are answered in between. The last frame stays in `view`
-        until the frame is whole.
+        Slices take about `slices.SLICE_S`, so that events are handled in between. The last frame stays in `view` until
+        the new one is complete.
         """
         job = self._under_way
         if job is None:
@@ -148,7 +148,7 @@ class Picture:
         return False
 
     def _show(self, plan: Plan, view: Any, radiance: Any, seconds: float) -> None:
-        """Take a frame that is there."""
+        """Show a finished frame."""
         self.view, self.radiance = view, radiance
         self.version += 1
         self.pacer.drawn(plan)
@@ -159,20 +159,20 @@ class Picture:
     def wait_s(self) -> float | None:
         """Seconds until a frame is due although nothing changes; None: never."""
         if self._under_way is not None:
-            return None  # `work` goes on by itself
+            return None  # `work` continues by itself
         due = self.pacer.wait_s(self._screen.clock(), refine=self._refine)
         return None if due is None else max(due, self._quiet_for_s())
 
     def _quiet_for_s(self) -> float:
-        """Seconds that no frame of rest is begun: while a part of one is drawn nothing answers."""
+        """Seconds for which no frame at rest is started: events wait while a part of it is drawn."""
         return max(0.0, self._screen.pace.touched_s + min(self._part_s, QUIET_S) - self._screen.clock())
 
     def save(self, name: str) -> str | None:
         """Write the picture at full size, PNG as shown and EXR as linear radiance, called after the scene's `name`.
 
-        Returns the files' name without suffix, None where they could not be written.
+        Returns the files' common stem; None where they could not be written.
         """
-        self._under_way = None  # the renderer draws one frame at a time; this one is drawn again later
+        self._under_way = None  # the renderer draws one frame at a time; this one restarts later
         folder, say = self._screen.folder, self._screen.say
         stem = "".join(c if c.isalnum() or c in "._-" else "-" for c in name).strip(".-") or "picture"
         stem = unused(folder, stem, ".png", ".exr")
@@ -201,7 +201,7 @@ class Picture:
         return replace(frame, width=width, height=height, over=plan.over, covers=covers)
 
     def _view_of(self, width: int, height: int) -> Any:
-        """A target for the next frame: never the view that is shown, which a frame in parts must leave alone."""
+        """A target for the next frame, never the shown view, which must stay until the frame is complete."""
         if self._size != (width, height):
             self._size, self._spare = (width, height), []
         free = [view for view in self._spare if view is not self.view]
@@ -227,7 +227,7 @@ class Picture:
 
     @property
     def samples(self) -> int:
-        """Per pixel and lobe, of the progressive series that the picture is the mean of; 0: it is one of motion."""
+        """Accumulated samples per pixel and lobe; 0: a frame in motion."""
         return self.pacer.accumulated * self._rest_n
 
     def _statistics(self, drawn: Mapping[str, Any], seconds: float, plan: Plan) -> Statistics:
@@ -240,7 +240,7 @@ class Picture:
 
 
 class Shown(Protocol):
-    """A picture in the window, whoever makes it; members as those of `Picture`."""
+    """Protocol of pictures in the window; members as of `Picture`."""
 
     @property
     def view(self) -> Any: ...
@@ -282,7 +282,7 @@ def size_px(place: Rect, pixel_ratio: float) -> tuple[int, int]:
 
 
 def scaled(display: NDArray[np.uint8], frame: FrameState) -> NDArray[np.uint8]:
-    """The picture of a frame as it is saved: false colours with their scale."""
+    """The picture to save: false colours get their scale."""
     if not frame.is_false_coloured:
         return display
     return with_scale(display, frame.scale, quantity_of(frame.show).unit)

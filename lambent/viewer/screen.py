@@ -1,4 +1,4 @@
-"""The window itself, whatever its mode: the picture's place, messages, the pace of drawing, the cost of a frame."""
+"""State of the window, independent of its mode: place of the picture, messages, pacing, cost of a frame."""
 
 from __future__ import annotations
 
@@ -47,24 +47,24 @@ class Statistics:
     gpu_ms: Mapping[str, float] = field(default_factory=dict)
     draw_calls: int = 0
     resolution: tuple[int, int] = (0, 0)
-    samples: int = 0  # per pixel, of the frame
-    accumulated: int = 0  # per pixel, since the camera rests
+    samples: int = 0  # per pixel in the frame
+    accumulated: int = 0  # per pixel since the camera is at rest
     accumulate_to: int = 0
-    scale: float = 1.0  # of the picture's width and height, by the pacing
+    scale: float = 1.0  # scale of width and height, chosen by the pacing
     light_fields: Mapping[str, Any] = field(default_factory=dict)  # `Streaming.statistics`
-    mirrors: int | None = 0  # planar reflectors with a mirrored view; None: left out, by the pacing
+    mirrors: int | None = 0  # planar reflectors with a mirrored view; None: skipped by the pacing
 
 
 @dataclass
 class Pace:
-    """How frames are paced, as the user chose, and when the window last had to answer."""
+    """The user's pacing choices, and the time of the last event."""
 
-    refine: bool = True  # accumulate samples while nothing moves
-    adaptive: bool = True  # draw fewer pixels while something moves, where the adapter is slow
-    target_ms: float = 1e3 * BUDGET_S  # of a frame in motion
-    covers: bool | None = None  # means over places of each pixel in motion; None: as the adapter is fast enough
-    touched_s: float = -math.inf  # when the last event came
-    answering: bool = False  # an event was just seen: the interface answers before the picture is refined further
+    refine: bool = True  # accumulate samples at rest
+    adaptive: bool = True  # draw fewer pixels in motion where the adapter is slow
+    target_ms: float = 1e3 * BUDGET_S  # target time of a frame in motion
+    covers: bool | None = None  # several depth samples per pixel in motion; None: where the adapter is fast enough
+    touched_s: float = -math.inf  # time of the last event
+    answering: bool = False  # an event was just handled: draw the interface before refining the picture
 
 
 @dataclass
@@ -78,10 +78,10 @@ class Screen:
     statistics: Statistics = field(default_factory=Statistics)
     messages: list[Message] = field(default_factory=list)
     panels_shown: bool = True
-    save_wanted: bool = False  # of the picture
-    close_wanted: bool = False  # by a key
-    asks_to_close: bool = False  # what is to become of unsaved work
-    closes: bool = False  # that question was answered: the window closes now
+    save_wanted: bool = False  # whether to save the picture
+    close_wanted: bool = False  # whether a key asked to close the window
+    asks_to_close: bool = False  # whether the question about unsaved work is shown
+    closes: bool = False  # whether the question was answered and the window closes
 
     def say(self, text: str) -> None:
         """Show a message for `MESSAGE_S` seconds."""
@@ -93,5 +93,5 @@ class Screen:
 
 
 def least(*waits_s: float | None) -> float | None:
-    """The shortest of times to wait, where None is for ever."""
+    """The shortest waiting time; None means for ever."""
     return min((wait_s for wait_s in waits_s if wait_s is not None), default=None)

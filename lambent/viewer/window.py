@@ -1,4 +1,4 @@
-"""The window: carries events into a mode, draws what is due, sleeps when nothing changes.
+"""The window: passes events to a mode, draws due frames, sleeps when nothing changes.
 
 Importing this needs a display.
 """
@@ -21,7 +21,7 @@ from lambent.viewer.pacing import Beat
 from lambent.viewer.screen import least
 
 MAX_FPS = 60
-BEFORE_IMGUI = -100  # its handlers (order -99) stop the events they use, so that ours would not see a hover
+BEFORE_IMGUI = -100  # Dear ImGui's handlers (order -99) stop events, which would hide hovers from ours
 SETTLE_FRAMES = 3  # Dear ImGui shows what an event did one or two frames later
 FOR_IMGUI_ONLY = ("char", "resize")
 EVENTS = ("pointer_down", "pointer_move", "pointer_up", "pointer_leave", "wheel", "key_down", "key_up", *FOR_IMGUI_ONLY)
@@ -34,29 +34,29 @@ class Window:
         self.mode, self.screen, self._frames, self._device = mode, mode.screen, frames, mode.drawing.device
         self.canvas = RenderCanvas(size=size, title=f"Lambent: {mode.title}", max_fps=MAX_FPS)
         context = self.canvas.get_wgpu_context()
-        # Not an sRGB format: Dear ImGui's colours are meant to be blended as they are, and the picture comes encoded.
+        # Not an sRGB format: Dear ImGui blends encoded colours, and the picture is already encoded.
         surface = context.get_preferred_format(self._device.adapter).removesuffix("-srgb")
         context.configure(device=self._device, format=surface)
         self._imgui = renderer(self._device, self.canvas)
         self._imgui.set_gui(self._interface)
         layout.set_style()
         self._context = context
-        self._textures: dict[str, Any] = {}  # of Dear ImGui, by the names that the layout uses
-        self._made_of: dict[str, Any] = {}  # the view or the array that each of them shows
+        self._textures: dict[str, Any] = {}  # Dear ImGui textures, by the layout's names
+        self._made_of: dict[str, Any] = {}  # the view or array that each texture shows
         self._popup_open = False
         self._extra_frames = 0
         self._drawn_s = self.screen.clock()
         self._beat = Beat(1 / MAX_FPS)
-        self._moving = False  # between this frame and the next
+        self._moving = False  # whether something moves between this frame and the next
         self._wake_at_s: float | None = None
-        self._working = False  # between two parts of a frame at rest
+        self._working = False  # whether a frame at rest is drawn in parts
         self._error: Exception | None = None
         self.canvas.add_event_handler(self._on_event, *EVENTS, order=BEFORE_IMGUI)
         self._take_dropped_files()
         self._take_the_close_button()
 
     def run(self) -> None:
-        """Show the window until it is closed; raises what went wrong meanwhile."""
+        """Show the window until it is closed; raise the first error."""
         self.canvas.request_draw(self._draw)
         loop.run()
         if self._error is not None:
@@ -64,7 +64,7 @@ class Window:
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """Close at the first error, which `run` raises; the event loop would log it and go on."""
+        """Close at the first error, which `run` raises; the event loop would only log it."""
         try:
             yield
         except Exception as error:  # noqa: BLE001
@@ -83,24 +83,26 @@ class Window:
 
     def _draw(self) -> None:
         with self._watched():
-            # The canvas sleeps from one frame's begin, and wakes late: counted from there, lateness would add up.
+            # The canvas sleeps from the start of a frame and wakes late; without correction, delays add up.
             self.canvas.set_update_mode("ondemand", max_fps=1 / self._beat.wait_s(self.screen.clock()))
             self._advance()
             self._show()
             self._schedule()
 
     def _advance(self) -> None:
-        """Bring the mode to this moment."""
+        """Advance the mode to the present time."""
         now_s = self.screen.clock()
         since_last_s, self._drawn_s = now_s - self._drawn_s, now_s
-        self.mode.advance(since_last_s if self._moving else 0.0)  # the sleep before a first step is not walked through
+        self.mode.advance(
+            since_last_s if self._moving else 0.0
+        )  # a sleep before the first step must not count as walking
         if self.screen.close_wanted or self.screen.closes:
             self._want_close()
         self.screen.drop_old_messages()
         self._imgui.backend.io.delta_time = min(max(since_last_s, 1e-4), 1.0)
 
     def _show(self) -> None:
-        """Draw the picture where it is out of date, then the interface over it."""
+        """Draw an outdated picture, then the interface over it."""
         screen, drawing = self.screen, self.mode.drawing
         screen.pace.answering = self._extra_frames > 0
         screen.picture = layout.regions(self.mode, *self.canvas.get_logical_size()).picture
@@ -113,7 +115,7 @@ class Window:
         self._imgui.render()
 
     def _register(self) -> None:
-        """Tell Dear ImGui of the textures that the layout uses, where they are new ones."""
+        """Register new textures of the layout with Dear ImGui."""
         drawing, beside = self.mode.drawing, self.mode.beside
         wanted: dict[str, Any] = {f"picture {'AB'[i]}": view for i, view in enumerate(drawing.views)}
         wanted |= drawing.images
@@ -133,7 +135,7 @@ class Window:
         self._made_of = wanted
 
     def _uploaded(self, image: Image) -> Any:
-        """View of a texture that holds an RGBA picture (H, W, 4)."""
+        """View of a texture with an RGBA picture (H, W, 4)."""
         height, width = image.shape[:2]
         usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
         texture = self._device.create_texture(size=(width, height, 1), format="rgba8unorm", usage=usage)
@@ -142,7 +144,7 @@ class Window:
         return texture.create_view()
 
     def _take_dropped_files(self) -> None:
-        """Give files that are dropped onto the window to the mode; the canvas has no event for that."""
+        """Pass dropped files to the mode; the canvas has no event for them."""
 
         def dropped(_: object, paths: Any) -> None:
             with self._watched():
@@ -183,7 +185,7 @@ class Window:
         self._device.queue.submit([encoder.finish()])
 
     def _schedule(self) -> None:
-        """Ask for the next frame where there will be something new; otherwise sleep."""
+        """Request the next frame if something will change; otherwise sleep."""
         if self._frames is not None:
             self._frames -= 1
             if self._frames <= 0:
@@ -203,7 +205,7 @@ class Window:
             self._wake_in(max(0.0, due_s))
 
     def _work(self) -> None:
-        """Draw a part of a frame at rest; the loop looks at the events before the next one."""
+        """Draw a part of a frame at rest; the loop handles events before the next part."""
         self._working = False
         if self.canvas.get_closed():
             return
@@ -217,7 +219,7 @@ class Window:
     def _wake_in(self, seconds: float) -> None:
         at_s = self.screen.clock() + seconds
         if self._wake_at_s is not None and self._wake_at_s <= at_s:
-            return  # an earlier frame will look again
+            return  # an earlier frame will check again
         self._wake_at_s = at_s
 
         def wake() -> None:

@@ -1,4 +1,4 @@
-"""Long work in a thread beside the window: its progress, its end, its cancelling."""
+"""Long work in a background thread: progress, end, cancelling."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled, Progress
 
-POLL_S = 0.1  # between two looks at work in the background
+POLL_S = 0.1  # interval of polling for background work
 
 
 class Work:
-    """One piece of work in a thread of its own; `poll` brings its end back to the thread of the window.
+    """One task in a thread of its own; `poll` reports its end in the window's thread.
 
-    `run` gets a `Progress`, which raises `Cancelled` once `cancel` was called; `done` gets the result, `failed` the
-    `UserError` that `run` raised. Other errors are raised by `poll`.
+    `run` gets a `Progress`, which raises `Cancelled` after `cancel`; `done` gets the result, `failed` a `UserError` of
+    `run`. `poll` raises other errors.
     """
 
     def __init__(
@@ -34,7 +34,7 @@ class Work:
         self._thread.start()
 
     def cancel(self) -> None:
-        """Ask to stop; `run` decides what remains."""
+        """Ask the task to stop; `run` decides what remains."""
         self._cancelled.set()
 
     @property
@@ -42,7 +42,7 @@ class Work:
         return self._cancelled.is_set()
 
     def poll(self) -> bool:
-        """Whether it is over. Reports the end: call this until it says so, and not after."""
+        """Whether the task has ended. Reports the end once: do not call it again after True."""
         if self._thread.is_alive():
             return False
         if self._error is None:
@@ -54,7 +54,7 @@ class Work:
         return True
 
     def wait(self) -> None:
-        """Return when `run` has ended."""
+        """Wait until `run` has ended."""
         self._thread.join()
 
     def _work(self) -> None:
@@ -70,5 +70,5 @@ class Work:
 
 
 def pending(work: Work | None) -> Work | None:
-    """The work while it goes on; None once its end has been reported."""
+    """The running work; None once its end was reported."""
     return None if work is None or work.poll() else work

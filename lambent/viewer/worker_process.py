@@ -1,7 +1,7 @@
-"""A process beside the window that answers in lines: each line of its stdout is a JSON object.
+"""A background process that reports in lines: each line of its stdout is a JSON object.
 
-A thread reads them. The process may be asked in lines of JSON on its stdin, which ends with the window: a worker that
-reads it to the end cannot outlive the window, however that ended.
+A thread reads them. Requests are lines of JSON on its stdin, which closes with the window: a worker that reads to the
+end cannot outlive the window.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from lambent.core.errors import UserError
 from lambent.core.progress import Progress
 from lambent.viewer.work import Work, pending
 
-LAST_CHARACTERS = 300  # of what the process wrote before it died
+LAST_CHARACTERS = 300  # kept end of the output before the process died
 Take = Callable[[Mapping[str, Any], IO[bytes]], None]
 
 
@@ -27,16 +27,16 @@ class WorkerProcess:
     Parameters
     ----------
     name : str
-        What it does, for the line that says why it ended.
+        Name of its task, for error lines.
     take : callable
-        Called in the thread with each line and the stream that it came from; a line may be followed by bytes. Lines
-        with "error" are not passed on: they end the process, and are its `error`.
+        Called in the thread with each line and its stream; bytes may follow a line. A line with "error" is not passed
+        on: it ends the process and becomes its `error`.
     ends : bool
-        Whether it ends by itself when it is done; else its end is an error.
+        Whether it ends by itself when it is done; otherwise its end is an error.
     """
 
     def __init__(self, module: str, words: Sequence[str], name: str, take: Take, *, ends: bool) -> None:
-        self.error = ""  # why it ended, in a line; empty while it has not, or where it is done
+        self.error = ""  # why it failed, in one line; else empty
         self._name, self._take, self._ends = name, take, ends
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
         command = [sys.executable, "-m", module, *words]
@@ -45,22 +45,22 @@ class WorkerProcess:
 
     @property
     def running(self) -> bool:
-        """Whether it goes on; takes its end."""
+        """Whether the process runs; handles its end."""
         self._work = pending(self._work)
         return self._work is not None
 
     def ask(self, said: Mapping[str, Any]) -> bool:
-        """Send it a line; False where it has ended."""
+        """Send a line; return False where the process has ended."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(json.dumps(said).encode() + b"\n")
             self._process.stdin.flush()
         except BrokenPipeError:
-            return False  # `_listen` tells why
+            return False  # `_listen` reports why
         return True
 
     def close(self) -> None:
-        """End it at once, and return when it has ended."""
+        """Kill the process, and wait for its end."""
         if self._work is not None:
             self._work.cancel()
             self._process.kill()
@@ -71,7 +71,7 @@ class WorkerProcess:
         self.error = str(error)
 
     def _listen(self, progress: Progress) -> None:
-        """Take what the process writes, until it ends."""
+        """Read the output of the process until it ends."""
         process = self._process
         assert process.stdout is not None
         try:
@@ -85,9 +85,9 @@ class WorkerProcess:
         finally:
             process.kill()
             process.wait()
-        progress(1, 1, "")  # raises where it was cancelled
+        progress(1, 1, "")  # raises after a cancel
         if code == 0 and self._ends:
             return
         self._log.seek(0)
         words = self._log.read().decode(errors="replace").strip()[-LAST_CHARACTERS:].splitlines()
-        raise UserError(f"{self._name} ended with {code} ({words[-1] if words else 'no word'})")
+        raise UserError(f"{self._name} ended with {code} ({words[-1] if words else 'no message'})")

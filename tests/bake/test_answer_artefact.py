@@ -70,7 +70,7 @@ def test_light_through_a_sheet_follows_what_it_transmits(tmp_path: Path) -> None
 
 def test_an_interrupted_answer_goes_on_and_ends_the_same(tmp_path: Path) -> None:
     whole = bake(room_with_step(), tmp_path / "whole", quality=TINY, only=("answer",))
-    for at in ("direct light", "light between patches", "gathering", "what the probe of ball sees"):
+    for at in ("direct light", "light between patches", "gathering", "answer of the probe of ball sees"):
 
         def stop(done: float, total: float, what: str, at: str = at) -> None:
             if what == at and (done > 0 or total == 1):

@@ -136,7 +136,7 @@ def test_a_job_that_kills_its_workers_is_given_up() -> None:
     dask = pytest.importorskip("dask", reason="Dask is not installed")
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 0}), opened(count=1) as workers,
-        pytest.raises(UserError, match="workers that died"),
+        pytest.raises(UserError, match="several workers died"),
     ):  # fmt: skip
         list(workers.each(os._exit, [3]))
 
@@ -157,7 +157,7 @@ def test_workers_that_there_are_none_of(monkeypatch: pytest.MonkeyPatch) -> None
             pass
     monkeypatch.setattr("lambent.bake.cluster.SECONDS", 1.0)
     for nowhere in ("tcp://127.0.0.1:1", "nonsense", "smoke://a:1"):
-        with pytest.raises(UserError, match="no workers answer"), opened(address=nowhere):
+        with pytest.raises(UserError, match="no worker answered"), opened(address=nowhere):
             pass
 
 

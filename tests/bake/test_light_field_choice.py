@@ -83,7 +83,7 @@ def test_names_and_patterns_say_which() -> None:
     assert as_asked(scene, "none").light_fields == {}
     assert as_asked(scene, "b*").light_fields == {"ball": ball, "block": LightFieldWish()}
     assert as_asked(scene, "shell,lamp").light_fields.keys() == {"shell", "lamp"}
-    with pytest.raises(UserError, match=r"--light-fields: fits no object; found bal; .* did you mean 'ball'\?"):
+    with pytest.raises(UserError, match=r"--light-fields: matches no object; found bal; .* did you mean 'ball'\?"):
         as_asked(scene, "lamp,bal")
     assert noted({}, None, None) == {"light_fields": "scene", "light_field_mb": "256.0"}
     before = noted({}, "auto", 64.0)

@@ -138,7 +138,7 @@ def test_a_box_within_a_box_has_no_points_and_says_so(mi: Any) -> None:
     inner, outer = SceneObject("inner", box((0.5, 0.5, 0.5)), "m"), SceneObject("outer", box((1, 1, 1)), "d")
     placing = placing_of(inner, outer)
     assert len(placing.points(outer.mesh, 50, 0)) == 50
-    with pytest.raises(UserError, match="nothing of its surface is in the open"):
+    with pytest.raises(UserError, match="its surface is hidden everywhere"):
         placing.points(inner.mesh, 50, 0)
 
 

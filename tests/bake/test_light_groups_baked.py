@@ -233,5 +233,5 @@ def test_groups_are_named_by_the_scene_and_change_with_it(tmp_path: Path) -> Non
 
 
 def test_photons_have_no_groups(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="photons are not sorted by group"):
+    with pytest.raises(UserError, match="photons cannot be stored by light group"):
         bake(room_with_step(), tmp_path / "s", quality=TINY, light_map="photons", light_groups="scene")

@@ -79,7 +79,7 @@ def test_too_few_probes_are_told(tmp_path: Path, caplog: pytest.LogCaptureFixtur
     with caplog.at_level(logging.WARNING):
         store = bake(scene, tmp_path / "s", quality=TINY)
     assert "bar" in [o.name for o in scene_record(store).objects]
-    assert "bar: its probe has not seen" in caplog.text and "ball" not in caplog.text
+    assert "bar: its probe misses" in caplog.text and "ball" not in caplog.text
 
 
 def test_parts_of_a_solid_are_solid() -> None:

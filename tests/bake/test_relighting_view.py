@@ -196,7 +196,7 @@ def test_pixels_beside_surfaces_show_the_environment(folder: Path) -> None:
 
 
 def test_what_cannot_be_is_said(store: Store, view: RelitView) -> None:
-    with pytest.raises(UserError, match=r"no relighting of camera above, 5 x 5.*bake"):
+    with pytest.raises(UserError, match=r"no relighting for camera above, 5 x 5.*bake"):
         RelitView(store, CAMERA, 5, 5)
     shown = view.image()
     with pytest.raises(UserError, match="sunsky"):

@@ -221,7 +221,7 @@ def test_a_set_of_lights_can_be_forgotten(scene: Scene, tmp_path: Path) -> None:
 
 
 def test_transport_without_a_view_is_an_error(scene: Scene, tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="transport: is baked for views alone"):
+    with pytest.raises(UserError, match="transport: is baked for views only"):
         bake(scene, tmp_path / "s", only={"transport"})
 
 

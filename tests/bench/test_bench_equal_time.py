@@ -63,9 +63,9 @@ def test_references_that_cannot_be_used_are_named(store, tmp_path):
     small, large, shown = (tmp_path / name for name in ("small.exr", "large.exr", "shown.png"))
     with pytest.raises(UserError, match=r"large.exr: references differ in size; found 6x8; expected 6x4"):
         run_bench("equal-time", "quick", inputs=[store], reference=[small, large])
-    with pytest.raises(UserError, match=r"shown.png: a reference holds radiance; expected .exr or .hdr"):
+    with pytest.raises(UserError, match=r"shown.png: a reference must hold radiance; expected .exr or .hdr"):
         run_bench("equal-time", "quick", inputs=[store], reference=[shown])
-    with pytest.raises(UserError, match=r"--reference: a reference is of one store; found 0 inputs"):
+    with pytest.raises(UserError, match=r"--reference: a reference belongs to one store; found 0 inputs"):
         run_bench("equal-time", "quick", reference=[small])
-    with pytest.raises(UserError, match=r"--reference: this bench takes no finished reference; found flicker"):
+    with pytest.raises(UserError, match=r"--reference: this bench takes no reference; found flicker"):
         run_bench("flicker", "quick", inputs=[store], reference=[small])

@@ -57,7 +57,7 @@ def test_callers_file_is_fitted_and_held_against_what_was_published(tmp_path):
 def test_published_fits_need_a_measurement(tmp_path):
     published = tmp_path / "ward.fit"
     published.write_text(WARD)
-    with pytest.raises(UserError, match="held against a measurement"):
+    with pytest.raises(UserError, match="compared with a measurement"):
         run(QUICK, against=[published])
 
 

@@ -70,9 +70,9 @@ def test_unknown_bench_and_input(ruler, tmp_path):
 def test_files_that_a_bench_does_not_read(ruler, tmp_path):
     (tmp_path / "a").write_bytes(b"1")
     for name in ("walk-cube", "planar-quality"):
-        with pytest.raises(UserError, match="reads no inputs"):
+        with pytest.raises(UserError, match="takes no inputs"):
             run_bench(name, inputs=[tmp_path / "a"])
-    with pytest.raises(UserError, match="compares with nothing published"):
+    with pytest.raises(UserError, match="takes no published fits"):
         run_bench("ruler", against=[tmp_path / "a"])
 
 

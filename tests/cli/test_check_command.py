@@ -56,7 +56,7 @@ def test_nonsense(refused, arguments, complaint):
 
 def test_files_take_no_parameters(refused, tmp_path):
     Material(kd=0.5).save(tmp_path / "m.json")
-    assert "only models" in refused("check", tmp_path / "m.json", "--set", "kd=1")
+    assert "only a model" in refused("check", tmp_path / "m.json", "--set", "kd=1")
 
 
 def test_an_empty_document(refused, tmp_path):
@@ -95,7 +95,7 @@ def test_normalise_says_what_changed(lambent, tmp_path):
 
 def test_only_documents_are_normalised(refused, tmp_path):
     out = tmp_path / "out.json"
-    assert "not a model" in refused("check", "ward", "--normalise", "-o", out)
+    assert "is a model" in refused("check", "ward", "--normalise", "-o", out)
     setup = Setup((0.0, 30.0, 60.0), step_deg=20, fine_deg=10, noise=0.0, floor=0.0)
     write_gonio(tmp_path / "m.txt", synthesise(STEEP, setup))
     assert "fit it first" in refused("check", tmp_path / "m.txt", "--normalise", "-o", out)
@@ -104,7 +104,7 @@ def test_only_documents_are_normalised(refused, tmp_path):
 
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
-    [(["--normalise"], "-o is missing"), (["-o", "x.json"], "--normalise is missing"),
+    [(["--normalise"], "-o: is missing"), (["-o", "x.json"], "--normalise: is missing"),
      (["--normalise", "-o", "x.png"], "expected .json")],
 )  # fmt: skip
 def test_normalise_and_its_output_go_together(refused, tmp_path, monkeypatch, arguments, complaint):

@@ -27,7 +27,9 @@ def test_without_a_display(tmp_path):
     command = [sys.executable, "-m", "lambent.cli.main", "edit", str(tmp_path / "plain.json")]
     done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 2
-    assert done.stderr.splitlines() == ["lambent: error: no display; the editor needs one: use `lambent fit --plot`"]
+    assert done.stderr.splitlines() == [
+        "lambent: error: no display; the editor needs a display; without one, use `lambent fit --plot`"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -35,7 +37,7 @@ def test_without_a_display(tmp_path):
     [
         ("missing.bsdf", "cannot be read"),
         ("light.hdr", "is a picture"),
-        ("junk.txt", "not a measured material"),
+        ("junk.txt", "unknown format of measured material"),
         ("bad.json", "kd"),
     ],
 )
@@ -74,5 +76,5 @@ def test_environments_are_named_and_found(tmp_path):
     assert preview.environments[-2:] == ("beside", "beside'") and preview.environment == "beside'"
     with pytest.raises(UserError, match="the picture is square"):
         preview.light("beside")
-    with pytest.raises(UserError, match="no such file"):
+    with pytest.raises(UserError, match="file does not exist"):
         opened(tmp_path, tmp_path / "a.json", None, [tmp_path / "none.hdr"])

@@ -158,7 +158,7 @@ def test_check_passes_and_fails_by_exit_code(lambent, material):
     assert good.code == 0 and good.json["passed"]
     Material(name="bright", kd=1.5).save(material)
     bad = lambent("check", material)
-    assert bad.code == 1 and "not passed" in bad.out
+    assert bad.code == 1 and "failed" in bad.out
 
 
 def test_inspect_material_and_plot(lambent, material, tmp_path):
@@ -199,7 +199,7 @@ def test_an_interruption_is_one_line_and_130(lambent, monkeypatch, material):
     monkeypatch.setattr("lambent.materials.check.check", interrupt)
     outcome = lambent("check", material)
     assert (outcome.code, outcome.out) == (130, "")
-    assert outcome.err.splitlines()[-1] == "lambent: interrupted; what was finished is kept"
+    assert outcome.err.splitlines()[-1] == "lambent: interrupted; finished work is kept"
 
 
 def test_an_interrupted_import_is_an_interruption(lambent, monkeypatch, material):
@@ -227,7 +227,7 @@ def test_an_interrupted_fit_gives_the_best_so_far_and_130(lambent, monkeypatch, 
     monkeypatch.setattr("lambent.materials.fitting.gradient.fit_lobes", interrupt)
     outcome = lambent("fit", tmp_path / "m.txt", "-o", tmp_path / "m.json", "--json")
     assert outcome.code == 130 and outcome.json["partial"]
-    assert "cancelled" in outcome.err and outcome.err.endswith("lambent: interrupted; what was finished is kept\n")
+    assert "cancelled" in outcome.err and outcome.err.endswith("lambent: interrupted; finished work is kept\n")
     assert load_material(tmp_path / "m.json").kd[0] == pytest.approx(0.3, rel=0.01)
 
 

@@ -91,7 +91,7 @@ def test_an_error_names_the_command_that_bakes_what_is_missing(lambent, refused,
         return read_image(picture)[6:10, 8:16].mean(axis=(0, 1))
 
     assert lambent("bake", scene, "-o", store, "--only", "transport", "--view", "above:8x8").code == 0
-    plain = drawn_after(saved(scene, "plain.json"), "no transport of camera above, 24 x 16")
+    plain = drawn_after(saved(scene, "plain.json"), "no transport for camera above, 24 x 16")
     np.testing.assert_allclose(plain, [0.5, 0.5, 0.25], rtol=0.01)
     write_image(tmp_path / "sky.exr", np.full((8, 16, 3), 2.0, np.float32))
     sky = Surroundings(file=str(tmp_path / "sky.exr"), scale=3.0)
@@ -118,7 +118,7 @@ def test_an_error_names_the_command_that_bakes_what_is_missing(lambent, refused,
 def test_what_a_session_decides_is_no_option(refused, scene, tmp_path, option):
     session = saved(scene, "a.json")
     error = refused("render", tmp_path / "none", "--edit", session, "-o", tmp_path / "a.png", *option)
-    assert f"error: {option[0]}: " in error and "own camera, size and light" in error
+    assert f"error: {option[0]}: " in error and "fixes camera, size and light" in error
 
 
 def test_views_that_cannot_be_baked(refused, scene, tmp_path):
@@ -175,7 +175,7 @@ def test_interreflections_are_proposed_and_baked_as_the_user_wants(lambent, scen
     chosen = edited()
     assert "chrome" in chosen
     more = lambent("bake", scene, "-o", store, *BOUNCED[:-1], "8")
-    assert more.code == 0 and edited() == chosen and "that the store edits: chrome" in more.err, more.err
+    assert more.code == 0 and edited() == chosen and "that the store has: chrome" in more.err, more.err
     assert lambent("bake", scene, "-o", store, *BOUNCED, "--fixed", "chrome").code == 0 and edited() == {"paint"}
 
 
@@ -186,18 +186,18 @@ def test_interreflections_are_proposed_and_baked_as_the_user_wants(lambent, scen
         ("--view: no view", ("--propose",)),
         ("--view: no view", ("-o", "s", "--only", "interreflection")),
         ("expected 2 to 6 numbers", (*BOUNCED[2:], "--propose", "--series", "64")),
-        ("expected as in 64,1,1,1", (*BOUNCED[2:], "--propose", "--series", "a,b")),
+        ("expected numbers, as in 64,1,1,1", (*BOUNCED[2:], "--propose", "--series", "a,b")),
         ("expected powers of two", (*BOUNCED[2:], "--propose", "--series", "63,1")),
         ("bands beyond the second surface", (*BOUNCED[2:], "--propose", "--series", "64,1,2")),
         ("--samples", (*BOUNCED[2:], "--propose", "--samples", "0")),
         ("--fixed: unknown material", (*BOUNCED[2:], "--propose", "--fixed", "carpet")),
         ("--editable: unknown material", (*BOUNCED[2:], "--propose", "--editable", "carpet")),
-        ("fixed or edited; found paint", (*BOUNCED[2:], "--propose", "--fixed", "paint", "--editable", "paint")),
-        ("--only: views", (*BOUNCED[2:], "--propose", "--only", "light_map")),
-        ("--editable: is for interreflections", ("-o", "s", "--editable", "paint")),
-        ("--merge: is for interreflections", ("-o", "s", "--merge")),
-        ("--fixed: is for interreflections", ("-o", "s", "--only", "transport", "--view", "above", "--fixed", "paint")),
-        ("leave out --workers", ("-o", "s", *BOUNCED, "--workers", "2", "--cluster", "a:1")),
+        ("--fixed and --editable; found paint", (*BOUNCED[2:], "--propose", "--fixed", "paint", "--editable", "paint")),
+        ("--only: no kind uses", (*BOUNCED[2:], "--propose", "--only", "light_map")),
+        ("--editable: applies to interreflections only", ("-o", "s", "--editable", "paint")),
+        ("--merge: applies to interreflections", ("-o", "s", "--merge")),
+        ("--fixed: applies to", ("-o", "s", "--only", "transport", "--view", "above", "--fixed", "paint")),
+        ("exclude each other", ("-o", "s", *BOUNCED, "--workers", "2", "--cluster", "a:1")),
         ("cannot be read", ("--propose", "--edit", "nothing.edits.json")),
     ],
 )

@@ -41,7 +41,7 @@ def test_the_other_side_of_a_sheet_is_left_out_and_counted(lambent, tmp_path):
     blocks = [("Visible", f"Reflection {side}", values) for side in ("Front", "Back")]
     path.write_text(lbnl_xml("Columns", blocks, column=quarter))
     both = lambent("fit", path, "--json").json["tuples"]
-    behind = both["left_out"]["of light from -z, the other side of the sheet"]
+    behind = both["left_out"]["light from -z, the other side of the sheet"]
     assert (
         behind == both["used"] + both["left_out"]["theta_i or theta_o beyond 84°, where devices see their own errors"]
     )

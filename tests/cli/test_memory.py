@@ -18,7 +18,7 @@ def test_an_error_of_memory_is_one_line(refused, monkeypatch, tmp_path: Path, er
 
     Image.new("L", (8, 8)).save(tmp_path / "a.png")
     monkeypatch.setattr("lambent.core.images.read_image", fails)
-    assert "memory is used up" in refused("inspect", tmp_path / "a.png")
+    assert "out of memory" in refused("inspect", tmp_path / "a.png")
 
 
 def test_another_import_that_fails_is_a_bug(lambent, monkeypatch, tmp_path: Path) -> None:
@@ -40,5 +40,5 @@ def test_a_picture_larger_than_the_memory(tmp_path: Path) -> None:
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (900 << 20, 900 << 20)),
     )  # fmt: skip
     assert (done.returncode, done.stdout) == (2, ""), done
-    assert done.stderr.splitlines()[-1].startswith("lambent: error: memory is used up"), done.stderr
+    assert done.stderr.splitlines()[-1].startswith("lambent: error: out of memory"), done.stderr
     assert "Traceback" not in done.stderr

@@ -46,7 +46,7 @@ def test_colours_and_a_mix_go_together(lambent: Command, store: Path, tmp_path: 
         "dim": ("--recolour", "grey=#c83232", "--light", "lamp=0.5"),
     }.items():
         done = lambent("render", store, "-o", tmp_path / f"{name}.exr", *SMALL, *more)
-        assert done.code == 0 and ("estimated from the bake" in done.err) == (name != "plain")
+        assert done.code == 0 and ("are estimated for the changed materials" in done.err) == (name != "plain")
         pictures[name] = read_image(tmp_path / f"{name}.exr")
     assert pictures["dim"] == pytest.approx(pictures["red"] / 2, rel=6e-3, abs=2e-3)
     mean = {name: picture.mean(axis=(0, 1)) for name, picture in pictures.items()}
@@ -74,13 +74,16 @@ def test_a_variant_a_sheet_and_a_film(lambent: Command, store: Path, tmp_path: P
 
 WRONG = {
     ("--recolour", "gray=#ff0000"): "--recolour: unknown material; found gray; .*did you mean 'grey'",
-    ("--recolour", "grey=red"): "--recolour: not a colour of a material; found grey=red; expected MATERIAL=#rrggbb",
-    ("--recolour", "grey=#f00"): "--recolour: not a colour of a material",
+    (
+        "--recolour",
+        "grey=red",
+    ): "--recolour: cannot be read as a recoloured material; found grey=red; expected MATERIAL=#rrggbb",
+    ("--recolour", "grey=#f00"): "--recolour: cannot be read as a recoloured material",
     ("--recolour", "grey=#ff0000", "--recolour", "grey=#00ff00"): "--recolour: names a material twice; found grey",
     ("--variant", "blu"): "--variant: unknown variant; found blu; expected blue; did you mean 'blue'",
-    ("--variant", "blue", "--variants"): "--variant: says one variant and all of them; leave out one",
-    ("--light", "lomp=off"): "no light group of this name; found lomp; expected lamp",
-    ("--keyframes", "k.toml"): "--keyframes: keyframes are of films; write to .mp4, or name a --path",
+    ("--variant", "blue", "--variants"): "--variant: excludes --variants; leave out one",
+    ("--light", "lomp=off"): "unknown light group; found lomp; expected lamp",
+    ("--keyframes", "k.toml"): "--keyframes: applies to films only; write to .mp4, or add --path NAME",
 }
 
 

@@ -98,7 +98,7 @@ def test_long_errors_are_cut_and_their_hints_are_not():
 def test_a_demo_takes_no_folder_of_others(refused, tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     for place in (tmp_path, tmp_path / "notes.txt"):
-        assert "is no folder of a demo" in refused("demo", "--headless", "--out", place)
+        assert "is neither a demo folder nor empty" in refused("demo", "--headless", "--out", place)
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
 

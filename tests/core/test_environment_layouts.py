@@ -108,7 +108,7 @@ def test_layouts_are_recognised_by_their_pictures() -> None:
 
 
 def test_what_is_not_clear_is_an_error() -> None:
-    with pytest.raises(UserError, match=r"sky\.hdr: layout: not clear: .*square.*say layout"):
+    with pytest.raises(UserError, match=r"sky\.hdr: layout: is ambiguous: .*square.*set layout"):
         layout_of(filled(32, 32), Path("sky.hdr"))
     with pytest.raises(UserError, match=r"square"):
         layout_of(np.zeros((32, 32, 3), np.float32))

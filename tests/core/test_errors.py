@@ -40,10 +40,10 @@ def test_what_is_no_fault_of_the_bytes_passes() -> None:
 @pytest.mark.parametrize(
     ("kind", "value", "words"),
     [
-        (dict[str, dict[str, int]], {"red": "oak"}, "red: is of another type; found oak; expected a table of keys"),
-        (list[int], 3, "is of another type; found 3; expected a list"),
-        (dict[str, list[int]], {"a": {"b": 1}}, "a: is of another type; expected a list"),
-        (dict[str, str], {"a": 3}, "a: is of another type; found 3; expected a text"),
+        (dict[str, dict[str, int]], {"red": "oak"}, "red: has the wrong type; found oak; expected a table of keys"),
+        (list[int], 3, "has the wrong type; found 3; expected a list"),
+        (dict[str, list[int]], {"a": {"b": 1}}, "a: has the wrong type; expected a list"),
+        (dict[str, str], {"a": 3}, "a: has the wrong type; found 3; expected text"),
     ],
 )
 def test_a_value_of_another_type_is_said_in_the_words_of_files(kind: type, value: object, words: str) -> None:

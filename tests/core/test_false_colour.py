@@ -44,7 +44,7 @@ def test_a_range_fits_the_picture():
 
 @pytest.mark.parametrize("scale", [Range(0, 1), Range(5, 5), Range(9, 1), Range(math.nan, 1), Range(1, math.inf)])
 def test_impossible_ranges_are_refused(scale):
-    with pytest.raises(UserError, match="range of luminance"):
+    with pytest.raises(UserError, match="luminance range"):
         scale.check()
 
 

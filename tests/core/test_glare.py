@@ -86,7 +86,7 @@ def test_sources_are_sorted_and_numbered():
 
 def test_half_a_view_is_refused():
     narrow = View.of(EYE, Projection.fisheye, SIDE, SIDE, 120)
-    with pytest.raises(UserError, match="too little for glare"):
+    with pytest.raises(UserError, match="too little of the surroundings"):
         glare(picture([], 100, narrow), narrow)
 
 

@@ -56,11 +56,11 @@ def test_tracks_change_evenly_between_the_times_of_each_group():
 @pytest.mark.parametrize(
     ("texts", "message"),
     [
-        (["lamp"], "not a light"), (["=0.5"], "not a light"), (["lamp="], "not a light"),
-        (["lamp=bright"], "not a light"), (["lamp=-1"], "not a light"), (["lamp=nan"], "not a light"),
+        (["lamp"], "read as light"), (["=0.5"], "read as light"), (["lamp="], "read as light"),
+        (["lamp=bright"], "read as light"), (["lamp=-1"], "read as light"), (["lamp=nan"], "read as light"),
         (["lamp=1e6"], "out of range"), (["lamp=100K"], "temperature is out of range"),
-        (["lamp=#000000"], "cannot be black"), (["lamp=0.5,0.6"], "intensity twice"),
-        (["lamp=0.5", "lamp=off"], "a light twice"), (["lamp=1@x"], "not a light"),
+        (["lamp=#000000"], "cannot be black"), (["lamp=0.5,0.6"], "two values for intensity"),
+        (["lamp=0.5", "lamp=off"], "a light twice"), (["lamp=1@x"], "read as light"),
     ],
 )  # fmt: skip
 def test_what_is_no_light_is_refused_in_one_line(texts, message):
@@ -69,5 +69,5 @@ def test_what_is_no_light_is_refused_in_one_line(texts, message):
 
 
 def test_tracks_go_forwards():
-    with pytest.raises(UserError, match="times of a track"):
+    with pytest.raises(UserError, match="times do not increase"):
         MixTrack({"lamp": ((1.0, AS_BAKED), (1.0, AS_BAKED))})

@@ -87,7 +87,7 @@ def test_the_last_view_of_a_header_counts(tmp_path):
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("-vts -vh 180", "unknown type"),
+        ("-vts -vh 180", "unknown view type"),
         ("-vta -vh 180 -vs .5", "shifted"),
         ("-vta -vh 720 -vv 180", "out of range"),
         ("-vta -vp 1 2", "damaged"),
@@ -105,7 +105,7 @@ def test_pictures_without_a_view(tmp_path):
     (tmp_path / "a.hdr").write_bytes(rgbe.encode(np.ones((4, 4, 3), np.float32)))
     (tmp_path / "b.hdr").write_bytes(b"#?RADIANCE\nVIEW= -vta")
     for name in "ab":
-        with pytest.raises(UserError, match="does not say what it shows"):
+        with pytest.raises(UserError, match="picture has no view"):
             read_view(tmp_path / f"{name}.hdr")
 
 

@@ -81,7 +81,7 @@ def test_a_layer_is_taken_out() -> None:
     one.pull("tray", "highlight", HIGH, y=2)
     one.remove("tray", "highlight", 0)
     assert one.document.materials["tray"].curves["highlight"].layers == translation(HIGH, 0, 2, (0, 1, 2))
-    with pytest.raises(UserError, match="no such layer"):
+    with pytest.raises(UserError, match="layer index out of range"):
         one.remove("tray", "highlight", 1)
 
 
@@ -220,7 +220,7 @@ def test_a_table_is_made_into_curves_and_must_not_change(tmp_path: Path) -> None
     table.write_bytes(b"another")
     with pytest.raises(UserError, match="has changed"):
         Session.open(tmp_path / "edits.json", factorise=lambda file: factors)
-    with pytest.raises(UserError, match="no such file"):
+    with pytest.raises(UserError, match="file does not exist"):
         Session.new("room", CAMERA, {"paint": tmp_path / "none"})
 
 

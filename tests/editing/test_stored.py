@@ -115,7 +115,7 @@ def test_what_the_store_does_not_have_is_said(store: Store) -> None:
     with pytest.raises(UserError, match="200"):
         edited_picture(store, new_session(), lights=400)
     other = Session.new("room", CAMERA, {}, size=(9, 9))
-    with pytest.raises(UserError, match="no transport of camera view, 9 x 9"):
+    with pytest.raises(UserError, match="no transport for camera view, 9 x 9"):
         edited_picture(store, other)
     with pytest.raises(UserError, match="other terms"):
         edited_picture(store, new_session(tray=model_named("phong")()))

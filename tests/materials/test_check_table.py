@@ -135,4 +135,4 @@ def test_a_scattered_table_warns_where_nothing_was_measured(monkeypatch):
     wi, wo = (direction(np.arccos(random.uniform(0.5, 1, 800)), random.uniform(0, 2 * np.pi, 800)) for _ in range(2))
     table = ScatteredTable(wi, wo, MaterialBSDF(GLOSSY).eval(wi, wo), TableInfo("a", "test", True, False, 3, "f"))
     report = check_table(table, shape=GridShape(8, 1, 24, 12))
-    assert any("nothing was measured around" in line and "beyond theta 60 degrees" in line for line in report.warnings)
+    assert any("nothing was measured near" in line and "beyond theta 60 degrees" in line for line in report.warnings)

@@ -26,7 +26,7 @@ def test_a_fit_says_that_it_returns_more_than_arrives(kd: float, warned: bool) -
     theta = np.radians([0.0, 45.0, 80.0])
     highest = MaterialBSDF(result.material).albedo(direction(theta, 0.0)).max()
     assert 1.02 < highest < 1.5 if warned else highest < 0.99
-    assert any("scatters more than it receives" in line for line in result.warnings) is warned
+    assert any("scatters more light than it receives" in line for line in result.warnings) is warned
 
 
 @pytest.mark.parametrize(("kt_d", "warned"), [(0.4, False), (0.7, True)])

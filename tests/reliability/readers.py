@@ -232,7 +232,7 @@ def _check(scene: Scene) -> None:
         assert int(m.faces.max()) < len(m.positions), "a face leads nowhere"
     names = [*(o.name for o in scene.objects), *scene.materials, *(c.name for c in scene.cameras), *scene.warnings]
     "".join(names).encode()
-    assert len({o.name for o in scene.objects}) == len(scene.objects), "two objects have one name"
+    assert len({o.name for o in scene.objects}) == len(scene.objects), "two objects have the same name"
 
 
 def use_store(folder: Path) -> None:

@@ -109,7 +109,7 @@ def test_what_is_read_is_bounded_where_the_size_lies(tmp_path: Path) -> None:
 
 def test_texts_that_no_file_can_hold() -> None:
     assert parse_json(b'"\\ud83d\\ude00"', Path("a")) == "\U0001f600"
-    with pytest.raises(UserError, match="half of a character"):
+    with pytest.raises(UserError, match="unpaired surrogate"):
         parse_json(b'{"name": "\\ud800"}', Path("a"))
     for text in (b"[" + b"9" * 5000 + b"]", b"[" * 100_000, b"\xff", b"{"):
         with pytest.raises(UserError, match="JSON cannot be read"):
@@ -224,7 +224,7 @@ def test_time_of_nodes_is_linear(tmp_path: Path, chained: bool) -> None:
     names = [o.name for o in scene.objects]
     assert names[:2] == ["wheel", "wheel_2"] and names[-1] == "wheel_10000" and len(set(names)) == 10_000
     assert [w for w in scene.warnings if "name" in w] == [
-        "wheel: the name is used 10000 times, now also wheel_2 to wheel_10000"
+        "wheel: the name is used 10000 times; the others are renamed to wheel_2 ... wheel_10000"
     ]
     last = scene.objects[-1].mesh.positions[0]
     np.testing.assert_allclose(last, (10.0, 0, 0) if chained else (9999 % 300, 0, 33), atol=1e-4)
@@ -269,7 +269,7 @@ def test_accessors_without_a_buffer_view(tmp_path: Path) -> None:
         load_scene(_gltf(tmp_path, many))
     indices = {"bufferView": 3, "componentType": 5123}
     sparse = {"count": 10**6, "indices": indices, "values": {"bufferView": 0}}
-    with pytest.raises(UserError, match="more values than the accessor has"):
+    with pytest.raises(UserError, match="has more values than its accessor"):
         load_scene(_gltf(tmp_path, _zeros(3, sparse=sparse)))
 
 

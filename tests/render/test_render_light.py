@@ -60,7 +60,7 @@ def test_the_light_of_a_film_changes_with_its_time(adapter: None, store: Path, t
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        (Settings(8, 8, light=parse_light(["lomp=off"])), "no light group of this name.*lamp, sky, sun"),
+        (Settings(8, 8, light=parse_light(["lomp=off"])), "unknown light group.*lamp, sky, sun"),
         (Settings(8, 8, integrator="path", light=parse_light(["lamp=off"])), "--light: the path tracer"),
     ],
 )
@@ -73,7 +73,7 @@ def test_what_cannot_be_dimmed_is_said(
 
 def test_a_store_without_groups_says_what_to_bake(adapter: None, tmp_path: Path) -> None:
     bare = write_small_store(tmp_path / "s")
-    with pytest.raises(UserError, match=r"--light: the store holds no light by group.*--light-groups scene"):
+    with pytest.raises(UserError, match=r"--light: the store has no light groups.*--light-groups scene"):
         still(bare, tmp_path / "a.exr", "front", DIMMED)
 
 

@@ -154,7 +154,7 @@ def test_names_and_shapes_of_sheets() -> None:
 
 
 def test_a_sheet_that_cannot_be_is_said(adapter: None, store: Path, tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"--variants: the sheet is too large; found 3 of 10000x10000"):
+    with pytest.raises(UserError, match=r"--variants: contact sheet is too large; found 3 pictures of 10000x10000"):
         sheet(store, tmp_path / "a.png", None, Settings(10000, 10000))
     with pytest.raises(UserError, match=r"--variants: the store has no variants"):
         sheet(write_small_store(tmp_path / "bare"), tmp_path / "a.png")
@@ -176,7 +176,7 @@ def test_films_are_linear_in_the_mix_between_keyframes(adapter: None, store: Pat
     shown = frames(store, tmp_path / "shown", keys, SMALL, "tour")
     shares = [a.mean() / b.mean() for a, b in zip(shown, plain, strict=True)]
     assert shares == pytest.approx([1, 0.875, 0.75, 0.625, 0.5, 0.5], abs=0.01)
-    with pytest.raises(UserError, match=r"--light: the keyframes say the light"):
+    with pytest.raises(UserError, match=r"--light: light is also in the keyframes"):
         frames(store, tmp_path / "twice", keys, replace(SMALL, light=parse_light(["sun=off"])), "tour")
 
 

@@ -72,7 +72,7 @@ def test_without_an_engine_the_report_says_so(no_engine, tmp_path):
     for expected in (
         f"{len(samples):,} of {total:,} ({100 * len(samples) / total:.1f} %)",
         f"{samples.left_out.grazing:,}",
-        f"metric is {shares['cuberoot']:.2f} of that of the best Lambertian surface",
+        f"metric is {shares['cuberoot']:.2f} of the best Lambertian surface's",
         *(f"{share:.3f}" for share in shares.values()),
         f"lobe 1: {tilt:.1f}° x {tilt:.1f}°",
         "<paint>",
@@ -95,7 +95,7 @@ def test_without_an_engine_the_report_says_so(no_engine, tmp_path):
 def test_an_l2_fit_is_said_to_be_poor_to_the_eye(no_engine):
     table, samples, result = made(PAINT, replace(ISOTROPIC, **FEW), metric="l2_ngan")
     text = " ".join(check(report(table, samples, result)).text)
-    assert "often poor by metrics that weigh what eyes see" in text
+    assert "often poor by perceptual metrics" in text
     ratio = result.errors["cuberoot"] / result.lambertian_errors["cuberoot"]
     assert f"{ratio:.2f} under cuberoot" in text
 

@@ -39,7 +39,9 @@ def test_leaning_normals_are_told_once_and_a_crease_angle_mends_them(tmp_path: P
     path = shared_box(tmp_path)
     scene = load_scene(path)
     told = [warning for warning in scene.warnings if "crease" in warning]
-    assert len(told) == 1 and told[0].startswith("12 triangles of 1 objects (box) have normals over 40 degrees off")
+    assert len(told) == 1 and told[0].startswith(
+        "12 triangles of 1 objects (box) have normals over 40 degrees from the face"
+    )
     assert greatest_lean_deg(scene.objects[0].mesh) == pytest.approx(54.7, abs=0.1)
     mended = load_scene(path, crease_deg=40.0)
     mesh = mended.objects[0].mesh

@@ -30,8 +30,8 @@ def test_a_mesh_that_is_missing_is_left_out_with_a_warning(tmp_path: Path) -> No
     write(tmp_path, "models/here.obj", TRIANGLE)
     scene = load_scene(mitsuba(tmp_path, "models/here.obj", "models/gone.obj"))
     assert [o.name for o in scene.objects] == ["here"]
-    assert "gone: left out, its file models/gone.obj is not there" in scene.warnings
-    with pytest.raises(UserError, match=r"holds no triangles; .*gone\.obj is not there") as told:
+    assert "gone: left out, its file models/gone.obj was not found" in scene.warnings
+    with pytest.raises(UserError, match=r"holds no triangles; .*gone\.obj was not found") as told:
         load_scene(mitsuba(tmp_path, "models/gone.obj"))
     assert "found" not in str(told.value)
 
@@ -41,14 +41,11 @@ def test_a_file_in_other_case_is_used_and_named(tmp_path: Path) -> None:
     write(tmp_path, "Models/wood.mtl", "newmtl a\nKd .1 .2 .3\n")
     scene = load_scene(mitsuba(tmp_path, "models/chair.obj"))
     assert len(scene.objects) == 1
-    assert "models/chair.obj is Models/Chair.OBJ on this disk" in scene.warnings
+    assert "models/chair.obj is Models/Chair.OBJ on disk" in scene.warnings
     alone = load_scene(tmp_path / "Models/Chair.OBJ")
-    assert (
-        "WOOD.mtl is Models/wood.mtl on this disk" in alone.warnings
-        or "WOOD.mtl is wood.mtl on this disk" in alone.warnings
-    )
+    assert "WOOD.mtl is Models/wood.mtl on disk" in alone.warnings or "WOOD.mtl is wood.mtl on disk" in alone.warnings
     toml = write(tmp_path, "scene.toml", _toml('"models/CHAIR.obj"'))
-    assert "models/CHAIR.obj is Models/Chair.OBJ on this disk" in load_scene(toml).warnings
+    assert "models/CHAIR.obj is Models/Chair.OBJ on disk" in load_scene(toml).warnings
 
 
 def test_two_files_that_differ_in_case_alone_are_not_confused(tmp_path: Path) -> None:
@@ -57,7 +54,7 @@ def test_two_files_that_differ_in_case_alone_are_not_confused(tmp_path: Path) ->
     if len(list(tmp_path.iterdir())) < 2:
         pytest.skip("this disk does not tell case")
     scene = load_scene(mitsuba(tmp_path, "A.obj", "a.obj"))
-    assert len(scene.objects) == 1 and "a: left out, its file a.obj is not there" in scene.warnings
+    assert len(scene.objects) == 1 and "a: left out, its file a.obj was not found" in scene.warnings
 
 
 def _toml(geometry: str, more: str = "") -> str:
@@ -69,7 +66,7 @@ def test_a_scene_toml_without_light_or_camera_gets_what_its_geometry_alone_gets(
     alone, scene = load_scene(tmp_path / "a.obj"), load_scene(write(tmp_path, "scene.toml", _toml('"a.obj"')))
     assert scene.environment == alone.environment == DAYLIGHT
     assert scene.cameras == alone.cameras and scene.exposure_ev is alone.exposure_ev is None  # metered
-    assert "nothing in it emits light: it gets daylight" in scene.warnings
+    assert "it has no light: daylight is added" in scene.warnings
     own = load_scene(
         write(tmp_path, "own.toml", _toml('"a.obj"', 'exposure_ev = 5.0\n[objects."*"]\nemission = [1, 1, 1]\n'))
     )
@@ -79,8 +76,8 @@ def test_a_scene_toml_without_light_or_camera_gets_what_its_geometry_alone_gets(
 def test_geometry_that_is_missing_is_left_out_where_some_is_there(tmp_path: Path) -> None:
     write(tmp_path, "a.obj", TRIANGLE)
     scene = load_scene(write(tmp_path, "scene.toml", _toml('["a.obj", "b.glb"]')))
-    assert len(scene.objects) == 1 and "geometry b.glb is not there: left out" in scene.warnings
-    with pytest.raises(UserError, match=r"names no file that is there: b\.glb"):
+    assert len(scene.objects) == 1 and "geometry b.glb was not found: left out" in scene.warnings
+    with pytest.raises(UserError, match=r"no geometry file was found: b\.glb"):
         load_scene(write(tmp_path, "scene.toml", _toml('"b.glb"')))
 
 

@@ -222,7 +222,7 @@ def test_a_metals_picture_is_its_reflectance_and_never_more_than_arrives(tmp_pat
         np.array([[0, 0, 0], [0.96, 0, 0]]), abs=2e-3
     )
     assert lobe.mx * textures.roughness.texels[0, :, 0] == pytest.approx([1, (128 / 255) ** 2], abs=2e-3)
-    assert any("normal incidence alone" in w for w in scene.warnings)
+    assert any("normal incidence only" in w for w in scene.warnings)
 
 
 def _texel_at(texture: Any, uv: tuple[float, float]) -> Any:
@@ -255,7 +255,7 @@ def test_holes_and_what_shines_through(tmp_path: Path) -> None:
     assert textures.opacity is not None and textures.cutoff == 0.3
     assert textures.opacity.texels.ravel().tolist() == [1, 0]
     scene = loaded(tmp_path, _worn(look | {"alphaMode": "BLEND"}, ["leaf.png"]))
-    assert scene.textures["m"].opacity is not None and "cuts holes" in scene.warnings[0]
+    assert scene.textures["m"].opacity is not None and "becomes a cut-out" in scene.warnings[0]
     pane = {"name": "m", "alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}}
     scene = loaded(tmp_path, _worn(pane, []))
     (through,) = scene.materials["m"].transmission_lobes
@@ -360,7 +360,7 @@ def test_broken_triangles_go_and_that_is_said(tmp_path: Path) -> None:
     points = [*TRIANGLE.tolist(), (np.nan, 0, 0), (2, 0, 0)]
     scene = loaded(tmp_path, _with_positions(points, [(0, 1, 2), (0, 1, 3), (0, 1, 4)]))
     said = " ".join(scene.warnings)
-    assert "1 triangles dropped: a corner is not finite" in said and "1 triangles dropped: no area" in said
+    assert "1 triangles dropped: a vertex is not finite" in said and "1 triangles dropped: no area" in said
     assert len(scene.object("thing").mesh.faces) == 1 and validate(scene) == []
 
 
@@ -384,14 +384,14 @@ def _set(*path: Any) -> Callable[[dict[str, Any]], None]:
 
 BROKEN = {
     "index out of range": (_set("accessors", 0, "count", 2), "face index out of range|wrong length"),
-    "huge count": (_set("accessors", 0, "count", 10**12), "accessor ends after its buffer view"),
+    "huge count": (_set("accessors", 0, "count", 10**12), "accessor ends beyond its buffer view"),
     "huge buffer": (_set("buffers", 0, "byteLength", 10**13), "buffer is truncated"),
-    "view past its buffer": (_set("bufferViews", 0, "byteLength", 10**6), "buffer view ends after its buffer"),
+    "view past its buffer": (_set("bufferViews", 0, "byteLength", 10**6), "buffer view ends beyond its buffer"),
     "negative offset": (_set("bufferViews", 0, "byteOffset", -4), "greater than or equal to 0"),
     "no such mesh": (_set("nodes", 0, "mesh", 7), "index out of range"),
     "no such accessor": (_set("meshes", 0, "primitives", 0, "indices", 99), "index out of range"),
     "no such material": (_set("meshes", 0, "primitives", 0, "material", 3), "index out of range"),
-    "cycle": (_set("nodes", 0, "children", [0]), "reached twice"),
+    "cycle": (_set("nodes", 0, "children", [0]), "several parents"),
     "wrong type": (_set("meshes", "none"), "list"),
     "wrong accessor type": (_set("accessors", 0, "type", "VEC2"), "wrong accessor type"),
     "old version": (_set("asset", "version", "1.0"), "unknown glTF version"),
@@ -466,7 +466,7 @@ def test_variants_of_primitives_are_variants_of_the_scene(tmp_path: Path) -> Non
     scene = loaded(tmp_path, content)
     oak, night, bare = scene.variants
     assert oak.materials["plain"] == scene.materials["wood"] and not night.looks and not bare.looks
-    assert "variant night: thing would emit other light, which stays as baked" in scene.warnings
+    assert "variant night: thing would change emission, which is ignored" in scene.warnings
     head = 'format = "lambent-scene"\nversion = 1\ngeometry = "thing.gltf"\n'
     more = 'variant = "oak"\n[[variants]]\nname = "oak"\nlight.sun = "off"\n[[variants]]\nname = "red"\n'
     (tmp_path / "scene.toml").write_text(f'{head}{more}materials.wood.colour = "#ff0000"\n')

@@ -80,4 +80,4 @@ def test_missing_pictures_are_said(tmp_path: Path) -> None:
     pbr = {"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 0.4, 0.3, 1], "metallicFactor": 0}
     scene = loaded(tmp_path, worn({"name": "m", "pbrMetallicRoughness": pbr}, ["gone.png"]))
     assert scene.materials["m"].kd == pytest.approx((0.48, 0.384, 0.288))
-    assert any("gone.png is not there" in w for w in scene.warnings)
+    assert any("gone.png was not found" in w for w in scene.warnings)

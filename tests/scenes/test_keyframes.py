@@ -72,14 +72,14 @@ view = "dusk"
 
 WRONG = {
     "": r"keys: is missing",
-    "[[keys]]\nat = 1\n[[keys]]\nat = 1": r"keys.at: times do not grow; found 1, 1",
+    "[[keys]]\nat = 1\n[[keys]]\nat = 1": r"keys.at: times do not increase; found 1, 1",
     "[[keys]]\nat = -1": r"keys.0.at.*greater than or equal to 0",
     "[[keys]]\nat = nan": r"keys.0.at.*finite",
     "[[keys]]\nat = 0\nmaterials.wal.kd = 1": r"keys.0.materials.wal: unknown material; found wal; did you mean 'wall'",
     "[[keys]]\nat = 0\nmaterials.wall.colour = 'red'": r"keys.0.materials.wall.colour: not a colour; found red",
-    "[[keys]]\nat = 0\nlight.sun = 'dark'": r"keys.0.light.sun: not a light; found dark",
+    "[[keys]]\nat = 0\nlight.sun = 'dark'": r"keys.0.light.sun: cannot be read as light; found dark",
     "[[keys]]\nat = 0\nvariant = 'blu'": r"keys.0.variant: unknown variant; found blu; .*did you mean 'blue'",
-    "[[keys]]\nat = 0\nvariant = 'blue'\nas_baked = true": r"keys.0: is as baked, and a variant",
+    "[[keys]]\nat = 0\nvariant = 'blue'\nas_baked = true": r"keys.0: sets both as_baked and a variant",
     "[[keys]]\nat = 0\nview = 'dsk'": r"keys.0.view: unknown saved view; found dsk; .*did you mean 'dusk'",
     "[[keys]]\nat = 0\nlights.sun = 1": r"keys.0.lights: unknown key; did you mean 'light'",
     "keys = 3": r"keys",
@@ -96,7 +96,7 @@ def test_what_is_wrong_is_one_line_that_names_file_and_field(tmp_path: Path, tex
 
 def test_without_saved_mixes_a_view_is_refused(tmp_path: Path) -> None:
     (tmp_path / "k.toml").write_text(f'{HEAD}[[keys]]\nat = 0\nview = "dusk"\n')
-    with pytest.raises(UserError, match=r"keys.0.view: no view was saved with a mix"):
+    with pytest.raises(UserError, match=r"keys.0.view: no saved view has a light mix"):
         read_keyframes(tmp_path / "k.toml", Known(LOOKS))
 
 

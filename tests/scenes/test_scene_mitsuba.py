@@ -254,7 +254,7 @@ def test_sheets_masks_and_what_is_lost(tmp_path: Path) -> None:
     assert leaf.opacity is not None and leaf.opacity.texels.ravel().tolist() == [1, 0]
     assert m["leaf"].kd == pytest.approx((0, 1, 0))  # the mean of what is to be seen
     assert m["veil"].kd == pytest.approx((0.125,) * 3) and m["veil"].lobes[0].k == (0.75,) * 3
-    for words in ("light is not bent", "alpha channel", "bump map is not read", "fur (hair): unknown, it is grey",
+    for words in ("light is not refracted", "alpha channel", "bump map is ignored", "fur (hair): unknown, becomes grey",
                   "no surface (null)", "unknown kind", "not read: shine"):  # fmt: skip
         assert said.count(words) == 1, (words, said)
     assert len(scene.objects) == 7 and m["fur"].kd == (0.5,) * 3
@@ -300,7 +300,7 @@ def test_skies(tmp_path: Path) -> None:
     assert isinstance(scene.environment, SunSky) and scene.environment.sun_direction == pytest.approx((0, 0.6, 0.8))
     assert scene.environment.turbidity == 5
     dark = load_scene(written(tmp_path, BALL))
-    assert isinstance(dark.environment, SunSky) and "nothing in it emits light: it gets daylight" in dark.warnings
+    assert isinstance(dark.environment, SunSky) and "it has no light: daylight is added" in dark.warnings
 
 
 def test_the_living_room(shared_data: Path) -> None:

@@ -150,10 +150,10 @@ map_Kd gone.png
     gold = m["pbr"].lobes[0]
     assert gold.r0 == pytest.approx((1, 0.8, 0.3)) and m["pbr"].kd == (0, 0, 0)
     assert gold.mx * gold.my == pytest.approx(0.25**2) and gold.mx > gold.my
-    assert "material pbr: its bump map is not read" in notes
+    assert "material pbr: its bump map is ignored" in notes
     assert m["pane"].transmission_lobes[0].k == (0.75,) * 3 and "is transparent (75%)" in notes
     lamp = next(o for o in parts.objects if o.material == "lamp")
-    assert lamp.emission == (5, 4, 3) and "material lamp: picture gone.png is not there" in notes
+    assert lamp.emission == (5, 4, 3) and "material lamp: picture gone.png was not found" in notes
     assert {p.name for p in parts.sources} == {
         "thing.obj", "thing.mtl", "wood grain.png", "holes.png", "flat.png", "bumps.png"
     }  # fmt: skip
@@ -202,27 +202,27 @@ def test_odd_but_sound(tmp_path: Path) -> None:
         "l 1 2\r\nf 1/1\t2/1  3/1   # a face\r\nvp 1 2\r\n"
     )
     parts = parts_of(tmp_path, text)
-    assert len(parts.objects[0].mesh.faces) == 1 and "lines are not read" in parts.warnings
+    assert len(parts.objects[0].mesh.faces) == 1 and "lines are ignored" in parts.warnings
     head = "v 0 0 0\nv 1 0 0\nv nan 1 0\nv 0 1 0\n"
     parts = parts_of(tmp_path, head + "f 1 2 3\nf 1 2 4\nf 1 1 2\n")
     notes = " ".join(parts.warnings)
-    assert "a corner is not finite" in notes and "no area" in notes and len(parts.objects[0].mesh.faces) == 1
+    assert "a vertex is not finite" in notes and "no area" in notes and len(parts.objects[0].mesh.faces) == 1
 
 
 WRONG = {
     "v 1 2\n": r"line 10: v with too few numbers",
     "v 1 2 x\n": r"line 10: not a number; found x",
-    "f 1 2 9\n": r"line 10: corner names a v that is not there; found 9; expected at most 4",
-    "f 1 2 -9\n": r"line 10: corner names a v that is not there; found -9",
-    "f 0 1 2\n": r"line 10: corner names a v that is not there; found 0",
-    "f 1/9 2/2 3/3\n": r"line 10: corner names a vt",
-    "f 1 2/2 3\n": r"line 10: face that cannot be read",
-    "f 1/2/3/4 1 1\n": r"line 10: face that cannot be read",
+    "f 1 2 9\n": r"line 10: corner has an unknown v; found 9; expected at most 4",
+    "f 1 2 -9\n": r"line 10: corner has an unknown v; found -9",
+    "f 0 1 2\n": r"line 10: corner has an unknown v; found 0",
+    "f 1/9 2/2 3/3\n": r"line 10: corner has an unknown vt",
+    "f 1 2/2 3\n": r"line 10: face cannot be read",
+    "f 1/2/3/4 1 1\n": r"line 10: face cannot be read",
     "f a b c\n": r"line 10: not a number; found a",
     "f 1 2 99999999999999999999\n": r"line 10: ",
     "": r"holds no triangles",
     "f 1 2\n": r"holds no triangles",
-    "f \n": r"line 10: face that cannot be read",
+    "f \n": r"line 10: face cannot be read",
     "f 1/ 2/ 3/\n": r"line 10: ",
     "mtllib thing.mtl\nusemtl a\nf 1 2 3\n": r"thing.mtl: line 2 Kd: not a finite number; found nan",
 }
@@ -307,7 +307,7 @@ Frobnicate 3
         wo = np.array([np.sin(np.radians(theta_deg)), 0, np.cos(np.radians(theta_deg))])
         for name in names:
             assert MaterialBSDF(m[name]).albedo(wo).max() < 1.01, (name, theta_deg)
-    assert "Frobnicate is not read" in notes and notes.count("nowhere.png is not there") == 2
+    assert "Frobnicate is ignored" in notes and notes.count("nowhere.png was not found") == 2
 
 
 def test_a_material_that_the_scene_describes_is_not_called_grey(tmp_path: Path) -> None:
@@ -317,4 +317,4 @@ def test_a_material_that_the_scene_describes_is_not_called_grey(tmp_path: Path) 
     head = 'format = "lambent-scene"\nversion = 1\nname = "two"\ngeometry = "two.obj"\n'
     (tmp_path / "scene.toml").write_text(head + "[materials.red]\nkd = [0.5, 0.1, 0.1]\n")
     scene = load_scene(tmp_path / "scene.toml")
-    assert [w for w in scene.warnings if "it is grey" in w] == ["material plain: is not described: it is grey"]
+    assert [w for w in scene.warnings if "it becomes grey" in w] == ["material plain: is not defined: it becomes grey"]

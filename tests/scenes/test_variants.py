@@ -71,7 +71,7 @@ def test_objects_of_one_material_that_part_ways_get_materials_of_their_own(tmp_p
     assert sphere not in others and {sphere, *others} == {"white", "white_2"}
     assert scene.materials["white_2"].model_copy(update={"name": "white"}) == scene.materials["white"]
     assert [*scene.variants[0].looks] == [sphere]
-    assert "material white: variants part its objects, others are of white_2" in scene.warnings
+    assert "material white: variants split its objects; the others get white_2" in scene.warnings
 
 
 def test_a_material_keeps_its_textures_with_other_numbers_and_takes_those_of_another(tmp_path: Path) -> None:
@@ -98,18 +98,18 @@ def test_variants_that_change_nothing_part_no_materials() -> None:
 
 WRONG = {
     '[[variants]]\nname = "a"\nmaterials.wite.kd = 0.1': r"a.materials.wite: unknown material.*did you mean 'white'",
-    '[[variants]]\nname = "a"\nmaterials.white = {}': r"a.materials.white: says nothing; expected use, file, colour",
+    '[[variants]]\nname = "a"\nmaterials.white = {}': r"a.materials.white: is empty; expected use, file, colour",
     '[[variants]]\nname = "a"\nmaterials.white.colour = "blue"': r"white.colour: not a colour; found blue; .*#rrggbb",
-    '[[variants]]\nname = "a"\nmaterials.white = {colour = "#000000", kd = 1}': r"says its colour twice",
-    '[[variants]]\nname = "a"\nmaterials.white = {use = "gold", kd = 1}': r"says more than use; found kd",
+    '[[variants]]\nname = "a"\nmaterials.white = {colour = "#000000", kd = 1}': r"has two colours",
+    '[[variants]]\nname = "a"\nmaterials.white = {use = "gold", kd = 1}': r"has other keys beside use; found kd",
     '[[variants]]\nname = "a"\nmaterials.white.use = "goold"': r"white.use: unknown material; found goold",
     '[[variants]]\nname = "a"\nmaterials.white.use = 3': r"white.use: is not a name; found 3",
     '[[variants]]\nname = "a"\nmaterials.white.file = "../a.json"': r"white.file: .*leaves its folder",
     '[[variants]]\nname = "a"\nmaterials.white.kd = -1': r"materials.white: kd.*greater than or equal to 0",
-    '[[variants]]\nname = "a"\nobjects."chair*" = "gold"': r"objects.chair\*: fits no object",
+    '[[variants]]\nname = "a"\nobjects."chair*" = "gold"': r"objects.chair\*: matches no object",
     '[[variants]]\nname = "a"\nobjects.sphere = "goold"': r"objects.sphere: unknown material; found goold",
-    '[[variants]]\nname = "a"\nlight.sun = "blck"': r"a.light.sun: not a light; found blck",
-    '[[variants]]\nname = "a"\nlight.sun = "1@4"': r"a.light.sun: not a light; found 1@4",
+    '[[variants]]\nname = "a"\nlight.sun = "blck"': r"a.light.sun: cannot be read as light; found blck",
+    '[[variants]]\nname = "a"\nlight.sun = "1@4"': r"a.light.sun: cannot be read as light; found 1@4",
     '[[variants]]\nname = "a"\nlight.sun = 5000': r"a.light.sun: intensity is out of range; found 5000",
     '[[variants]]\nname = "a"\n[[variants]]\nname = "a"': r"variants: name is used twice; found a",
     '[[variants]]\nname = ""': r"variants.0.name",

@@ -240,7 +240,7 @@ def test_a_manifest_cannot_lead_outside(tmp_path: Path) -> None:
 
 def test_create_does_not_take_over_a_folder(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("mine")
-    with pytest.raises(UserError, match="not empty and not a store"):
+    with pytest.raises(UserError, match="neither empty nor a store"):
         Store.create(tmp_path, {})
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 

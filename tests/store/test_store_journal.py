@@ -101,7 +101,7 @@ def test_half_a_line_of_the_journal_neither_counts_nor_spoils_the_next(tmp_path:
         writer.write((2, 0), np.float32(3))  # as after a full disk
         assert set(Store.open(tmp_path / "s").artefact("a").done) == {"0.0", "2.0"}, line[:length]
     (tmp_path / "s/a/journal").write_bytes(whole + line + b"\n9.0 0 1;")
-    assert set(Store.open(tmp_path / "s").artefact("a").done) == {"0.0", "1.0"}, "there is no chunk 9"
+    assert set(Store.open(tmp_path / "s").artefact("a").done) == {"0.0", "1.0"}, "unknown chunk 9"
     (tmp_path / "s/a/journal").write_bytes(whole + b"\n0 0 1;")
     with pytest.raises(UserError, match="manifest is damaged"):
         Store.open(tmp_path / "s")

@@ -66,7 +66,9 @@ def test_a_second_process_is_told_who_writes_and_damages_nothing(tmp_path: Path)
         lambda: write_scene_record(reader, RECORD),
     ]
     for attempt in attempts:
-        with pytest.raises(UserError, match=rf"is being written; found process {process.pid}; .*wait") as caught:
+        with pytest.raises(
+            UserError, match=rf"is locked by another writer; found process {process.pid}; .*wait"
+        ) as caught:
             attempt()
         assert str(folder) in str(caught.value)
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before

@@ -212,31 +212,31 @@ BIG = 15 << 30
 @pytest.mark.parametrize(
     ("place", "value", "word"),
     [
-        ((*ARRAYS, "light_map/raw", "done"), {"7.0": 1}, "there is no chunk 7.0"),
-        ((*ARRAYS, "light_map/raw", "done"), {"00.0": 1}, "there is no chunk 00.0"),
-        ((*ARRAYS, "light_map/raw", "done"), {"..": 1}, "there is no chunk"),
+        ((*ARRAYS, "light_map/raw", "done"), {"7.0": 1}, "unknown chunk 7.0"),
+        ((*ARRAYS, "light_map/raw", "done"), {"00.0": 1}, "unknown chunk 00.0"),
+        ((*ARRAYS, "light_map/raw", "done"), {"..": 1}, "unknown chunk"),
         ((*ARRAYS, "light_map/raw", "done"), {"0.0": [1, -1]}, "not a count"),
         ((*ARRAYS, "light_map/raw", "shape"), [4.0, 4], "not a count"),
-        ((*ARRAYS, "light_map/raw", "dtype"), "O", "no array of numbers"),
-        ((*ARRAYS, "light_map/raw", "dtype"), "S1000000000", "no array of numbers"),
-        ((*ARRAYS, "light_map/raw", "dtype"), [["a", "f4"]], "are texts"),
+        ((*ARRAYS, "light_map/raw", "dtype"), "O", "unknown dtype"),
+        ((*ARRAYS, "light_map/raw", "dtype"), "S1000000000", "unknown dtype"),
+        ((*ARRAYS, "light_map/raw", "dtype"), [["a", "f4"]], "must be text"),
         ((*ARRAYS, "light_map/raw", "chunks"), [BIG, BIG], "impossible chunks"),
         ((*ARRAYS, "light_map/raw", "chunks"), [0, 4], "impossible chunks"),
         ((*ARRAYS, "light_map/raw", "shape"), [1 << 22, 4], "too many chunks"),
-        ((*ARRAYS, "geometry/uv", "shape"), [3, 2], "chunk cannot be read|lengths differ|chunk"),
-        ((*ARRAYS, "geometry/faces", "dtype"), "float32", "array of another shape"),
+        ((*ARRAYS, "geometry/uv", "shape"), [3, 2], "chunk cannot be read|arrays have different lengths|chunk"),
+        ((*ARRAYS, "geometry/faces", "dtype"), "float32", "array has the wrong shape or type"),
         ((*ARRAYS, "probe/floor/radiance", "meta"), {}, "centre"),
         ((*ARRAYS, "probe/floor/radiance", "meta", "centre"), [0, float("nan"), 0], "3 finite numbers"),
         ((*ARRAYS, "probe/floor/radiance", "meta", "seen_irradiance"), [1] * 8, "9 finite numbers"),
         ((*ARRAYS, "probe/floor/radiance", "meta", "unit"), 0, "a number from 1"),
         ((*ARRAYS, "environment/radiance", "meta", "unit"), float("nan"), "a number from 1"),
-        ((*SCENE, "objects", 0, "material"), "woof", "no such material; found woof"),
-        ((*SCENE, "objects", 0, "face_count"), 3, "no such faces"),
-        ((*SCENE, "objects", 0, "first_face"), -1, "no such faces"),
-        ((*SCENE, "reflectors", 0, "parts", 0, "object"), "flood", "no such object; found flood"),
-        ((*SCENE, "reflectors", 0, "parts", 0, "faces"), [2], "no such faces"),
+        ((*SCENE, "objects", 0, "material"), "woof", "unknown material; found woof"),
+        ((*SCENE, "objects", 0, "face_count"), 3, "face index out of range"),
+        ((*SCENE, "objects", 0, "first_face"), -1, "face index out of range"),
+        ((*SCENE, "reflectors", 0, "parts", 0, "object"), "flood", "unknown object; found flood"),
+        ((*SCENE, "reflectors", 0, "parts", 0, "faces"), [2], "face index out of range"),
         ((*SCENE, "cameras", 0, "fov_y_deg"), float("nan"), "sees no angle"),
-        ((*SCENE, "textures"), {"woof": {"parts": {}}}, "no such material"),
+        ((*SCENE, "textures"), {"woof": {"parts": {}}}, "unknown material"),
         ((*SCENE, "exposure_ev"), float("inf"), "not finite"),
         ((*SCENE, "materials", "wood", "name"), "\ud800", "manifest"),
         ((*SCENE, "materials", "wood", "kd"), [10**400] * 3, "manifest"),
@@ -294,7 +294,7 @@ def test_an_array_of_15_gb_without_files_is_refused_before_it_is_made(tmp_path: 
     }  # fmt: skip
     (tmp_path / "s/manifest.json").write_text(json.dumps(manifest))
     store = Store.open(tmp_path / "s")
-    with alarm(), pytest.raises(UserError, match=r"next to nothing in its files|does not fit into memory"):
+    with alarm(), pytest.raises(UserError, match=r"almost no data on disk|does not fit into memory"):
         store.read("light_map/irradiance")
 
 

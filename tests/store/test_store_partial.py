@@ -100,7 +100,7 @@ def test_an_array_that_was_begun_anew_is_not_mixed_with_the_old_one(tmp_path: Pa
     writer.finish()
     reader = Store.open(tmp_path / "s")
     fresh = writer._store.begin("a", "a", VALUES.shape, (2, 3), "float32", key="another")
-    with pytest.raises(UserError, match="was begun anew while it was read"):
+    with pytest.raises(UserError, match="was rewritten while it was read"):
         reader.read("a")
     with pytest.raises(UserError, match="writer was closed or replaced"):
         writer.write((0, 0), VALUES[:2, :3])

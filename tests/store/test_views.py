@@ -35,8 +35,8 @@ def test_round_trip(tmp_path):
         (lambda d: d["cameras"][0].update(position=[0, 1e308, 0]), "not within 1e9 m"),
         (lambda d: d["cameras"][0].update(fov_y_deg=180), "sees no angle"),
         (lambda d: d["paths"][0].update(times_s=[0, 3]), "one time per key"),
-        (lambda d: d["paths"][0].update(times_s=[0, 3, 3]), "begin at 0, grow"),
-        (lambda d: d["paths"][0].update(seconds=9), "begin at 0, grow"),
+        (lambda d: d["paths"][0].update(times_s=[0, 3, 3]), "start at 0, increase"),
+        (lambda d: d["paths"][0].update(seconds=9), "start at 0, increase"),
         (lambda d: d["paths"][0].update(keys=[], times_s=[]), "one time per key"),
     ],
 )

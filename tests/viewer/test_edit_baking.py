@@ -52,9 +52,9 @@ def test_what_arrives_is_told_and_a_good_end_has_no_error(begun):
 @pytest.mark.parametrize(
     ("end", "line"),
     [
-        ("say(error='scene.toml: no such file')", "scene.toml: no such file"),
+        ("say(error='scene.toml: file does not exist')", "scene.toml: file does not exist"),
         ("raise RuntimeError('no memory')", "the bake ended with 1 (RuntimeError: no memory)"),
-        ("sys.exit(3)", "the bake ended with 3 (no word)"),
+        ("sys.exit(3)", "the bake ended with 3 (no message)"),
     ],
 )
 def test_errors_are_one_line(begun, end, line):

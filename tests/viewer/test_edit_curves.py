@@ -353,7 +353,7 @@ def test_errors_are_a_line(session):
     state = CurveState()
     strokes = state.strokes
     strokes.once(session, lambda: session.remove("brass", "highlight", 3))
-    assert "no such layer" in strokes.message and not session.history.can_undo
+    assert "layer index out of range" in strokes.message and not session.history.can_undo
     region = Region(a=-0.1, b=0.0, c=0.1, d=0.2)
     strokes.replace(session, lambda: session.pull("brass", "highlight", region, y=2.0))
     assert strokes.message == ""

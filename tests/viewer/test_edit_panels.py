@@ -85,7 +85,7 @@ def test_the_buttons_of_the_column(driver):
     assert state.pixel_exact
     driver.click("save session")
     assert state.files.home is not None
-    driver.click("hand over")
+    driver.click("export")
     until(state, lambda: state.files.handed is not None)
     driver.frame(2)
 

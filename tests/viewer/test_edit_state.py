@@ -266,7 +266,7 @@ def test_unsaved_materials_are_named_at_the_end(ready, capsys):
     assert capsys.readouterr().err == ""
     state.session.tint("wall", "diffuse", 2.0)
     state.files.name_unsaved()
-    assert capsys.readouterr().err == "lambent: note: wall changed and not saved\n"
+    assert capsys.readouterr().err == "lambent: note: changes not saved: wall\n"
 
 
 def test_a_material_is_handed_over_as_a_document(ready):

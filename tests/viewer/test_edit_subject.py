@@ -67,7 +67,7 @@ def test_another_light_means_another_store(tmp_path, sky):
     bright = Surroundings(file=str(sky), scale=2.0)
     assert len({lit.store_for(bright), lit.store, plain.store}) == 3
     assert lit.session.environment == ImageEnvironment(sky.resolve())
-    with pytest.raises(UserError, match=r"no such file.*--environment|--environment.*no such file"):
+    with pytest.raises(UserError, match=r"file does not exist.*--environment|--environment.*file does not exist"):
         opened(box, tmp_path, environment=tmp_path / "none.hdr")
 
 
@@ -133,12 +133,12 @@ def test_merged_materials_and_hard_edges_last_with_the_session(tmp_path):
 
 def test_options_of_the_other_mode_are_refused(tmp_path):
     Material(name="brass").save(tmp_path / "brass.json")
-    with pytest.raises(UserError, match=r"--crease-angle.*is for scenes|is for scenes.*--crease-angle"):
+    with pytest.raises(UserError, match=r"--crease-angle.*applies to scenes|applies to scenes.*--crease-angle"):
         edit.run(tmp_path / "brass.json", crease_deg=40.0)
-    with pytest.raises(UserError, match=r"--camera.*is for scenes|is for scenes.*--camera"):
+    with pytest.raises(UserError, match=r"--camera.*applies to scenes|applies to scenes.*--camera"):
         edit.run(tmp_path / "brass.json", camera="front")
     box = type(tmp_path)("builtin:teatray")
-    with pytest.raises(UserError, match="edited by itself"):
+    with pytest.raises(UserError, match="takes no material document"):
         edit.run(box, tmp_path / "brass.json")
     with pytest.raises(UserError, match="one environment"):
         edit.run(box, environments=[tmp_path / "a.hdr", tmp_path / "b.hdr"])

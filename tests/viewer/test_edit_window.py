@@ -86,7 +86,7 @@ def test_a_scene_is_baked_edited_and_opened_again(opened, tmp_path):
     again.click(*again.point("all##preset"))
     pull(again, 0.4, 0.6)
     again.wait_for(lambda state: not state["busy"])
-    assert again.close("discard") == 0 and "changed and not saved" in again.log()
+    assert again.close("discard") == 0 and "changes not saved" in again.log()
 
 
 def fold(session, *headers):

@@ -69,7 +69,7 @@ def test_fix_and_narrow(driver, state):
 
 
 def test_the_diffuse_term_is_coupled(driver, state):
-    driver.click("kd falls off as Fresnel rises", 0.1)
+    driver.click("kd falls as Fresnel rises", 0.1)
     assert state.editor.subject.material.kd_coupled
     driver.click("undo")
     assert state.editor.subject.material == BRASS
@@ -130,7 +130,7 @@ def test_a_second_document(monkeypatch, tmp_path, screen):
     driver = PanelDriver(monkeypatch, MaterialMode(state, Drawing(None)))
     tick(driver)
     assert {"A", "B"} == set(state.editor.shown.images)
-    driver.click("take B's numbers")
+    driver.click("copy B")
     tick(driver)
     assert state.editor.subject.material.kt_d == FROSTED.kt_d and state.editor.subject.material.name == "brass"
     driver.close()

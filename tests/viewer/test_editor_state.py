@@ -82,7 +82,7 @@ def test_what_is_compared_with(editor):
     editor.subject.step(moved(BRASS, mx=0.3))
     editor.subject.step(moved(BRASS, mx=0.5))
     assert editor.subject.compared == BRASS
-    editor.subject.reference = "before the last step"
+    editor.subject.reference = "before the last edit"
     assert editor.subject.compared.lobes[0].mx == 0.3
     editor.subject.reference = "as saved"
     assert editor.subject.compared is None

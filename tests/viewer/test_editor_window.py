@@ -73,4 +73,4 @@ def test_save_and_close(session):
     session.drag(session.point("mx", 0.3), session.point("mx", 0.6))
     session.wait_for(lambda state: lobe_of(state).get("mx", 0) > saved.lobes[0].mx)
     assert session.close("discard") == 0
-    assert "brass was changed and not saved" in session.log()
+    assert "changes not saved: brass" in session.log()

@@ -78,7 +78,7 @@ def test_discarding_writes_nothing(panels, state, tmp_path, capsys):
     panels.click("discard##closing")
     assert state.screen.closes
     panels.mode.close()
-    assert list(tmp_path.iterdir()) == [] and "brass changed and not saved" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [] and "changes not saved: brass" in capsys.readouterr().err
 
 
 def test_staying_goes_on(panels, state):

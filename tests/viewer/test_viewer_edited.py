@@ -105,5 +105,5 @@ def test_without_room_on_the_gpu_the_cores_draw_and_it_is_said(device: Any, monk
     picture.compose()
     assert isinstance(picture.canvas, SentCanvas)
     assert "no room for another" in said[0]
-    assert "the processor's cores draw the picture" in said[0]
+    assert "the CPU draws the picture" in said[0]
     assert pixels(device, texture_of(picture)).any()

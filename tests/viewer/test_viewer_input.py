@@ -124,7 +124,7 @@ def test_f_frames_the_selection(mouse, state, name):
 def test_f_without_a_selection_says_so(mouse, state):
     before = state.navigation.camera
     send(mouse, "key_down", key="f")
-    assert state.navigation.camera == before and "click an object" in state.screen.messages[-1].text
+    assert state.navigation.camera == before and "select an object" in state.screen.messages[-1].text
 
 
 def test_framing_looks_for_a_line_of_sight_that_is_free(state):

@@ -56,7 +56,7 @@ def test_a_saved_session_is_there_again(window, tmp_path):
     window.edits.end_stroke()
     window.edits.store("evening")
     window.edits.put_beside(RoomState())
-    assert set(window.keeper.unsaved) >= {"plaster", "the mix of light", "stored states"}
+    assert set(window.keeper.unsaved) >= {"plaster", "the light mix", "stored states"}
     assert window.keeper.save() and window.keeper.unsaved == ()
     window.keeper.close()
     again = Window(tmp_path)
@@ -179,7 +179,7 @@ def test_a_store_that_is_gone_is_said(window, tmp_path):
     window.paint(RED)
     (tmp_path / ".session.lock").unlink()
     tmp_path.rmdir()
-    assert not window.keeper.save() and "the store is gone" in window.screen.messages[-1].text
+    assert not window.keeper.save() and "store was deleted or moved" in window.screen.messages[-1].text
     assert not window.keeper.keeps
 
 

@@ -74,7 +74,7 @@ def test_a_store_that_is_gone_is_not_made_anew(state, tmp_path):
     walk_and_edit(state)
     shutil.rmtree(tmp_path / "store")
     state.recordings.save_view()
-    assert "the store is gone" in state.screen.messages[-1].text and not (tmp_path / "store").exists()
+    assert "store was deleted or moved" in state.screen.messages[-1].text and not (tmp_path / "store").exists()
     (said,) = state.recordings.rescue()
     file = tmp_path / "walk 1-rescued-001.json"
     assert str(file) in said
@@ -116,5 +116,5 @@ def test_a_walk_that_can_be_kept_nowhere_is_said(mode, state, capsys, monkeypatc
     state.materials.edits.undo()
     mode.close()
     said = capsys.readouterr().err
-    assert said.startswith("lambent: note: the recorded walk could not be kept: ") and said.count("\n") == 1
+    assert said.startswith("lambent: note: the recorded walk could not be saved: ") and said.count("\n") == 1
     assert "walk 1-rescued-001.json: cannot be written (Permission denied)" in said

@@ -195,7 +195,7 @@ def test_the_camera_and_the_walker(whole):
     before = state.navigation.camera.position[1]
     whole.drag("eye height", 0.5, 0.7)
     assert state.navigation.camera.position[1] > before
-    whole.click("near plane by the scene's size", 0.05)
+    whole.click("near plane by scene size", 0.05)
     assert state.look.near_m == 0.01
     whole.frame()
     whole.drag("near", 0.3, 0.9)

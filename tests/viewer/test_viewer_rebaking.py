@@ -146,11 +146,11 @@ def test_an_edit_that_needs_what_the_store_lacks_is_one_line(store, tmp_path):
     bare = next(o for o in scene.objects if o.name not in probes and not scene.materials[o.material].lobes)
     material = scene.materials[bare.material]
     glossy = material.model_copy(update={"lobes": (Lobe(mx=0.05, my=0.05, r0=0.5),)})
-    with pytest.raises(UserError, match=f"{bare.material}: as it is now it needs a probe"):
+    with pytest.raises(UserError, match=f"{bare.material}: needs a probe"):
         bake_again(store, tmp_path / "copy", {bare.material: glossy}, quality=TINY)
     if "light_map/irradiance_back" not in Store.open(store):
         thin = material.model_copy(update={"kd": (0.2,) * 3, "kt_d": (0.4,) * 3})
-        with pytest.raises(UserError, match=f"{bare.material}: as it is now it needs a light map of its far side"):
+        with pytest.raises(UserError, match=f"{bare.material}: needs a light map of its far side"):
             bake_again(store, tmp_path / "copy", {bare.material: thin}, quality=TINY)
     assert not (tmp_path / "copy").exists()
 
@@ -260,10 +260,10 @@ def test_an_edit_is_estimated_then_baked_then_exact(room, store):
     truth = Renderer(open_device(), Store.open(copy_beside(store)))
     np.testing.assert_allclose(image(room.renderer, state), image(truth, state), rtol=2e-3, atol=1e-4)
     assert any(
-        re.fullmatch(r"baking anew \d:\d\d \(\d:\d\d the first time\): light map 25 %", line) for line in room.lines
+        re.fullmatch(r"baking again \d:\d\d \(first bake \d:\d\d\): light map 25 %", line) for line in room.lines
     )
-    assert state.rebaking.line == "exact: baked anew" and "exact again" in state.screen.messages[-1].text
-    estimated = next(n for n, line in enumerate(room.lines) if "; new light on" in line or "comes in" in line)
+    assert state.rebaking.line == "exact: baked again" and "exact again" in state.screen.messages[-1].text
+    estimated = next(n for n, line in enumerate(room.lines) if "; new light on" in line or "blending in" in line)
     whole = np.abs(room.seen[-1] - room.seen[estimated - 1])
     frames = np.array([np.abs(b - a) for a, b in zip(room.seen[estimated - 1 :], room.seen[estimated:], strict=False)])
     assert whole.max() > 0.01, "the estimate was one"
@@ -431,15 +431,15 @@ def test_an_edit_meanwhile_and_closing_end_the_process(store, screen, monkeypatc
 @pytest.mark.parametrize(
     ("then", "line"),
     [
-        ("say(error='room.toml: no such file')", "not baked anew: room.toml: no such file"),
+        ("say(error='room.toml: file does not exist')", "not baked again: room.toml: file does not exist"),
         ("raise RuntimeError('no memory')", "ended with 1 (RuntimeError: no memory)"),
-        ("sys.exit(0)", "not baked anew: the bake ended early"),
+        ("sys.exit(0)", "not baked again: the bake ended too soon"),
     ],
 )
 def test_faults_are_one_line_and_the_estimate_stays(store, screen, monkeypatch, tmp_path, then, line):
     room = Room(store, screen, monkeypatch, tmp_path, then)
     room.paint()
-    room.until(lambda: "not baked anew" in room.state.rebaking.line)
+    room.until(lambda: "not baked again" in room.state.rebaking.line)
     assert line in room.state.rebaking.line and not room.state.rebaking.exact
     for _ in range(3):
         room.frame()

@@ -112,7 +112,7 @@ def test_record_save_rename_delete(state, tmp_path):
     before = state.recordings.recorder.draft
     state.recordings.recorder.smooth(1.5)
     assert state.recordings.recorder.draft != before
-    for name, word in (("", "a name is missing"), ("tour", "the name is taken"), ("a\tb", "not a name")):
+    for name, word in (("", "name is empty"), ("tour", "name is already used"), ("a\tb", "not a name")):
         state.recordings.recorder.name = name
         state.recordings.save()
         assert word in state.screen.messages[-1].text and state.recordings.recorder.draft is not None
@@ -158,7 +158,7 @@ def test_views_are_saved_renamed_and_deleted(state, tmp_path):
     state.recordings.save_view()
     state.recordings.view_name = "front"
     state.recordings.save_view()
-    assert "the name is taken" in state.screen.messages[-1].text
+    assert "name is already used" in state.screen.messages[-1].text
     state.recordings.view_name = "door"
     state.recordings.save_view()
     assert [c.name for c in state.recordings.cameras] == ["front", "side", "view 1", "door"]
@@ -204,7 +204,7 @@ def test_two_windows_name_what_they_save_beside_each_other(state, tmp_path):
     other.add(at(4), "gate")
     state.recordings.view_name = "gate"
     state.recordings.save_view()
-    assert "the name is taken" in state.screen.messages[-1].text and state.recordings.cameras[-1].name == "gate", (
+    assert "name is already used" in state.screen.messages[-1].text and state.recordings.cameras[-1].name == "gate", (
         "and is shown"
     )
 

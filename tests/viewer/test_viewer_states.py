@@ -92,7 +92,7 @@ def test_undo_of_what_is_beside_ends_the_split(state):
     state.states.split = True
     assert state.states.split and state.divider is state.states.divider
     state.states.label()
-    assert (state.states.divider.a_label, state.states.divider.b_label) == ("as it is now", "as baked")
+    assert (state.states.divider.a_label, state.states.divider.b_label) == ("the room now", "as baked")
     state.materials.edits.undo()
     assert not state.states.split and state.divider is None
 
@@ -125,11 +125,11 @@ def test_the_panel_stores_takes_and_compares(panels, state):
     panels.click("store##state name")
     panels.frame(2)
     assert edits.stored == {"evening": RoomState(light=dimmed)}
-    panels.click("take##as baked")
+    panels.click("apply##as baked")
     assert edits.room == AS_BAKED
-    panels.click("beside##evening")
+    panels.click("split##evening")
     assert state.states.split and edits.other.light == dimmed
-    panels.click("exchange")
+    panels.click("swap")
     assert edits.light == dimmed and edits.other == AS_BAKED
     panels.click("split view", 0.05)
     assert not state.states.split
@@ -170,9 +170,9 @@ def test_variants_are_offered(monkeypatch, scene, screen, geometry):
     driver = PanelDriver(monkeypatch, WalkMode(state, WalkInput(state, geometry), Drawing(None)))
     driver.click("States", 0.3)
     driver.frame(2)
-    driver.click("take##variant night")
+    driver.click("apply##variant night")
     assert state.lights.mix == OFF
-    driver.click("beside##variant day")
+    driver.click("split##variant day")
     assert state.states.split and state.materials.edits.other.textures == {"plaster": "brass"}
     driver.close()
 

@@ -101,7 +101,7 @@ def test_the_walk_mode(walk):
     state.lights.groups = (LightGroupRecord(name="lamp", members=("bulb",), share=1.0),)
     state.navigation.scrub(state.scene.paths[0], 1.0)
     state.recordings.set_key()
-    state.answering.possible, state.rebaking.line = True, "baking anew"
+    state.answering.possible, state.rebaking.line = True, "baking again"
     check(walk, seen)
     state.recordings.save_view()
     check(walk, seen)
@@ -122,7 +122,7 @@ def test_the_walk_mode(walk):
     state.materials.edits.change("brass", state.scene.materials["plaster"])
     check(walk, seen)
     wanted = {"cancel the film", "mx", "rename##new camera name", "smooth", "save##closing", "planes", "delete##path"}
-    wanted |= {"save session", "light answers", "bake edits", "take##as baked", "x##evening", "set keys", "1.0 s##key"}
+    wanted |= {"save session", "light follows", "bake edits", "apply##as baked", "x##evening", "set keys", "1.0 s##key"}
     assert wanted <= set(seen) and len(seen) > 80
 
 
@@ -150,7 +150,7 @@ def test_the_editor(monkeypatch, screen, tmp_path):
     editor.leave = lambda: None
     check(driver, seen)
     driver.close()
-    assert {"stop, keep the best", "sought##mx", "take B's numbers", "close##editor", "##axis"} <= set(seen)
+    assert {"stop, keep the best", "sought##mx", "copy B", "close##editor", "##axis"} <= set(seen)
 
 
 class FitUnderWay:
@@ -177,7 +177,7 @@ def test_editing_in_place(monkeypatch, screen, tmp_path):
     check(driver, seen)
     driver.close()
     state.close()
-    assert {"tray##edited", "fit scale", "snapshot", "hand over", "##base x", "collapse"} <= set(seen)
+    assert {"tray##edited", "fit scale", "snapshot", "export", "##base x", "collapse"} <= set(seen)
 
 
 def test_a_tooltip_covers_no_line_of_the_panel(monkeypatch):

@@ -133,7 +133,7 @@ def test_what_cannot_be_traced_is_said(pictures, state, tmp_path):
     state.look.show, state.store = "full", None
     other = Pictures(pictures._renderer, state)
     drawn(other, state, SIZE)
-    assert "no store" in state.comparison.fault and len(other.shown) == 1
+    assert "no scene file" in state.comparison.fault and len(other.shown) == 1
 
 
 def test_a_store_without_a_scene_is_a_line(renderer, state, tmp_path):
@@ -144,7 +144,7 @@ def test_a_store_without_a_scene_is_a_line(renderer, state, tmp_path):
     while not state.comparison.fault and time.monotonic() - began_s < LONGEST_S:
         drawn(pictures, state, SIZE)
         time.sleep(POLL_S)
-    assert "does not say where its scene is" in state.comparison.fault and "\n" not in state.comparison.fault
+    assert "no path of its scene file" in state.comparison.fault and "\n" not in state.comparison.fault
     pictures.close()
 
 

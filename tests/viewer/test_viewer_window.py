@@ -133,7 +133,7 @@ def test_close(window):
     window.settle()
     assert window.process.poll() is None and window.state()["selected"] == "ball", "the question took the key"
     assert window.close("discard") == 0
-    assert "note: brass changed and not saved" in window.log()
+    assert "note: changes not saved: brass" in window.log()
 
 
 def lobe_of(state):
@@ -158,7 +158,7 @@ def test_without_a_display(store):
 
 
 @pytest.mark.parametrize(
-    ("mode", "says"), [("walk", "not a store"), ("material", "no such file"), ("edit", "no such file")]
+    ("mode", "says"), [("walk", "not a store"), ("material", "file does not exist"), ("edit", "file does not exist")]
 )
 def test_a_missing_file_is_said_before_a_missing_display(tmp_path, monkeypatch, mode, says):
     from lambent.viewer.app import run

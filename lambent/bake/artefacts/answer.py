@@ -294,7 +294,7 @@ def _seen_by_probes(context: BakeContext, stale: set[str]) -> None:
         return
     eyes, owners = ProbeEyes(context.traced), shared_probes(store)
     for number, name in enumerate(names):
-        context.progress(number, len(names), f"what the probe of {name} sees")
+        context.progress(number, len(names), f"answer of the probe of {name}")
         radiance = store.artefact(probe_name(name, "radiance"))
         own: set[str] = set()
         if radiance.meta.get("object_left_out", True):
@@ -302,4 +302,4 @@ def _seen_by_probes(context: BakeContext, stale: set[str]) -> None:
         found = eyes.look(np.array(radiance.meta["centre"]), radiance.shape[1], frozenset(own))
         for part in SEEN:
             context.put(KIND, probe_spots_name(name, part), getattr(found, part), context.provenance())
-    context.progress(len(names), len(names), "what probes see")
+    context.progress(len(names), len(names), "answer of probes")

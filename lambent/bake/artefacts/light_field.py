@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 KIND = "light_field"
 NEEDS = ("geometry", "light_map", "probe")
 REVISION = 6
-MATTE = "%s: light_field: its material reflects nothing but diffuse light, it gets none"
+MATTE = "%s: light_field is ignored: its material is purely diffuse"
 PATHS_OF_A_CHUNK = 1 << 21
 MIRROR_DEPTH = 6  # glossy surfaces in a row on paths of level 1, of objects without light fields
 BYTES_PER_TEXEL = {False: 8.0, True: 3.0}  # of radiance, in blocks or not, and of inverse distance

@@ -26,7 +26,9 @@ REVISION = 5
 SHARING = "sharing"  # the step that finds whose probe each object shows
 PARTS = ("radiance", "distance", "planes")
 GROUPS = "groups"  # a further part, where light is sorted
-TOO_FEW = "%s: its probe has not seen %.0f %% of what it mirrors; a tenth is looked up %.0f degrees or more off"
+TOO_FEW = (
+    "%s: its probe misses %.0f %% of what the object mirrors; a tenth of its look-ups are %.0f degrees or more off"
+)
 log = logging.getLogger(__name__)
 
 

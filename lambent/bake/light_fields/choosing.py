@@ -48,14 +48,14 @@ class Chooser:
         """Trials of those of the objects that are worth one."""
         flat, looks = shown_by_reflectors(self._scene, self._store), dict[str, Watched]()
         for i, name in enumerate(curved := [name for name in names if name not in flat]):
-            part_of(progress, 0.0, 0.5, "what probes show")(i, len(curved), "")
+            part_of(progress, 0.0, 0.5, "error of probes")(i, len(curved), "")
             if (seen := self.watched(name)) is not None:
                 looks[name] = seen
         level = usual_level(looks.values())
         wrong = {name: seen.size_sr * self._probe_error(name, seen, level) for name, seen in looks.items()}
         found = dict[str, Trial]()
         for i, name in enumerate(some := worth_trying(wrong)):
-            part_of(progress, 0.5, 1.0, "light fields on trial")(i, len(some), "")
+            part_of(progress, 0.5, 1.0, "trial light fields")(i, len(some), "")
             with suppress(UserError):  # nothing of it is in the open
                 found[name] = self.trial(name, looks[name], level)
         return found

@@ -69,7 +69,7 @@ class Placing:
         places = spread_evenly(mesh, CANDIDATES * count, rng)
         places, heights = self.in_the_open(places, offset)
         if not len(places):
-            raise UserError("nothing of its surface is in the open", hint="leave out its light field")
+            raise UserError("its surface is hidden everywhere", hint="leave out its light field")
         density = densities(places, area_m2, count, self.free_m(places), emphasis or Emphasis())
         kept = thinned(places, density, count, rng)
         chosen = places[kept]

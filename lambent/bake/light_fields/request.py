@@ -49,7 +49,7 @@ def as_asked(scene: Scene, asked: str) -> Scene:
         fits = [name for name in names if name == pattern or fnmatchcase(name, pattern)]
         if not fits:
             said, hint = f"names of objects, {AUTO}, {NONE} or {AS_SCENE}", did_you_mean(pattern, names)
-            raise UserError("fits no object", field="--light-fields", got=pattern, expected=said, hint=hint)
+            raise UserError("matches no object", field="--light-fields", got=pattern, expected=said, hint=hint)
         fields |= {name: scene.light_fields.get(name, LightFieldWish()) for name in fits}
     return replace(scene, light_fields=fields)
 

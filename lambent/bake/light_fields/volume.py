@@ -39,7 +39,7 @@ def volume_points(builder: SceneBuilder, mesh: Mesh, name: str, count: int) -> P
     places = low - margin + even_places(TRIED * count) * (high - low + 2 * margin)
     free = places[_is_free(builder, scene, places, (low, high))][:count]
     if not len(free):
-        raise UserError("nothing of its box is free", hint="leave out its light field")
+        raise UserError("its box has no free space", hint="leave out its light field")
     return Placed(free, normalize(free - (low + high) / 2 + 1e-9), margin)
 
 

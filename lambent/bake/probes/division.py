@@ -87,7 +87,7 @@ def cuts_of(scene: Scene, progress: Progress = silent) -> dict[str, Cut]:
     builder = SceneBuilder(scene)
     whole, solids, cuts = builder.build(), SolidTest(builder, None), dict[str, Cut]()
     for i, o in enumerate(tried):
-        progress(i, len(tried), "what probes see")
+        progress(i, len(tried), "views of probes")
         cut = _cut_of(builder, o, solids, whole, places)
         if len(cut) > 1:
             cuts[o.name] = cut

@@ -46,7 +46,7 @@ def retraced(
     how = Sampling((paths, paths), 0.0, DEPTH, per_pass, unseen=unseen)
     parts: list[NDArray[np.float32]] = []
     for first in range(0, len(chosen), AT_ONCE):
-        progress(first, len(chosen), "path tracing what is compared with")
+        progress(first, len(chosen), "path tracing the reference")
         mine = chosen[first : first + AT_ONCE]
         line = _in_a_line(sides, mine)
         region = tuple(slice(0, size) for size in (2, 1, len(mine), 4))

@@ -81,9 +81,7 @@ def measure(
     bsdf = _load(dict(specimen), name)
     flags = bsdf.flags()
     if mi.has_flag(flags, mi.BSDFFlags.Delta) or mi.has_flag(flags, mi.BSDFFlags.Null):
-        raise UserError(
-            "scatters into single directions, which cannot be measured", field=name, hint="give it roughness"
-        )
+        raise UserError("is specular (a delta BSDF), which cannot be measured", field=name, hint="give it roughness")
     setup = incident or (ANISOTROPIC if mi.has_flag(flags, mi.BSDFFlags.Anisotropic) else ISOTROPIC)
     setup = replace(setup, noise=noise, seed=seed)
     transmits = mi.has_flag(flags, mi.BSDFFlags.Transmission)

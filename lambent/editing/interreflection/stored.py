@@ -79,13 +79,13 @@ def interreflections(
 
     if name("interreflection", "tails") not in store:
         raise UserError(
-            f"no interreflections of camera {camera.name}, {size[0]} x {size[1]}", file=store.folder,
+            f"no interreflections for camera {camera.name}, {size[0]} x {size[1]}", file=store.folder,
             hint="bake them: `lambent bake SCENE -o STORE --only interreflection`",
         )  # fmt: skip
     known_tails = store.artefact(name("interreflection", "tails"))
     if known_tails.meta.get("points", (now := store.artefact(name("view_points", "pixel")).key)) != now:
         raise UserError(
-            "interreflections are of other materials than the view shows now", file=store.folder,
+            "interreflections were baked for other materials", file=store.folder,
             hint="bake them again: `lambent bake SCENE -o STORE --only interreflection`",
         )  # fmt: skip
     tails = Tails.of(known_tails.meta["tails"])
@@ -136,6 +136,6 @@ def _term(store: Store, name: str, points: int, factors: int) -> tuple[TermLight
 def _check(store: Store, tile: str, material: str, fixed: str) -> None:
     if tile in store and store.artefact(tile).meta["fixed"] != fixed:
         raise UserError(
-            "interreflections are of other terms than the material has", file=store.folder, field=material,
+            "interreflections were baked for other terms of the material", file=store.folder, field=material,
             hint="bake the view for editing again",
         )  # fmt: skip

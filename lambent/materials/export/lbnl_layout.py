@@ -56,7 +56,7 @@ def losses(directions: Iterable[str], grey: bool) -> tuple[str, ...]:
     """Sentences on what a file of blocks of these directions does not tell."""
     lost = []
     if not grey:
-        lost.append("colour in tools other than Radiance: they read Visible, the luminance, and no other block")
+        lost.append("colour in tools other than Radiance: they read only the block Visible, the luminance")
     if not any(name.endswith("Front") for name in directions):
-        lost.append("light from behind is unknown: Radiance takes the back as black, transmission as mutual")
+        lost.append("light from behind is unknown: Radiance takes the back as black, transmission as reciprocal")
     return tuple(lost)

@@ -51,7 +51,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     blocks = {f"{way} {side}": f[k] for k, way in enumerate(("Reflection", "Transmission")) for side, f in sides}
     lit = {name: values for name, values in blocks.items() if values.any()}
     if not lit:
-        raise UserError("scatters no light, so there is nothing to write", file=scatterer.name)
+        raise UserError("scatters no light: there is nothing to write", file=scatterer.name)
     write_text(Path(path), _document(scatterer.name, lit, grey))
     cost = read_back(subject, Path(path), losses(lit, grey))
     if max(cost.share.values()) < _EXACT:

@@ -32,7 +32,7 @@ def material_of(subject: Subject) -> Material:
     """The subject; raises `UserError` for a table."""
     if isinstance(subject, Material):
         return subject
-    raise UserError("is a measurement, not a material", file=subject.info.file, hint="lambent fit makes one of it")
+    raise UserError("is a measurement, not a material", file=subject.info.file, hint="fit it first with `lambent fit`")
 
 
 def without_retro(material: Material) -> Material:

@@ -44,7 +44,9 @@ def likeness(material: Material, progress: Progress = silent) -> tuple[Likeness,
     """The nodes' numbers that look most like `material`, rounded as in the file, and their cost."""
     lost = shape_losses(material)
     if material.lobes:
-        lost.append("some renderers add light that rough facets lose (energy compensation); it is not counted here")
+        lost.append(
+            "some renderers add light that rough facets lose (energy compensation); the errors do not include it"
+        )
     if material.transmission_lobes:
         lost.append("lobes of transmission are those of a thin wall; a renderer without thin walls bends the light")
     return sums.likeness(material, TOOL, lost, progress)

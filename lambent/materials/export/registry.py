@@ -33,7 +33,7 @@ def writer_for(path: Path, name: str | None = None) -> Writer:
     if len(fitting) == 1:
         return found[fitting[0]]
     if fitting:
-        hint = f"say which: --as {' or --as '.join(fitting)}"
+        hint = f"choose one: --as {' or --as '.join(fitting)}"
         raise UserError("several formats have this ending", file=path, hint=hint)
     endings = sorted({ending for writer in found.values() for ending in writer.ENDINGS})
     raise UserError("unknown ending", file=path, got=path.suffix or "none", expected=", ".join(endings))

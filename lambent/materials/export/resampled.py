@@ -96,6 +96,6 @@ def _of_the_peak_about_the_light(samples: MeasuredSamples, f: Floats) -> list[st
     if misplaced < PEAK_TOLERANCE:
         return []
     return [
-        f"the peak about the light: within {PEAK_DEG:g} degrees of it the file returns {held / given:.2f} times as "
-        f"much light, and {misplaced:.0%} at another place"
+        f"the retro-reflective peak: within {PEAK_DEG:g} degrees of it the file returns {held / given:.2f} times as "
+        f"much light, {misplaced:.0%} of it misplaced"
     ]

@@ -38,7 +38,7 @@ MOST_TUPLES = 100_000  # of a table, which are scouts too
 CHROMA_TOLERANCE = 0.004  # range of u' and v' in a cell
 _WAVELENGTHS = ("Visible", "CIE-u", "CIE-v")
 _DIGITS, _ALL_DIGITS = 6, 9  # of means, and of a tree that was read
-_LOST_PATCHES = "the borders of patches, which are not those of cells; --as lbnl_xml keeps a matrix on Klems full"
+_LOST_PATCHES = "the patch borders, which do not match the cells; --as lbnl_xml keeps a matrix on Klems full"
 _MENTIONED = 0.01  # share of the light in uneven cells from which it is reported
 
 Trees = dict[str, tuple[TensorTree, ...]]
@@ -62,7 +62,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent, rank: Rank 
     own = _own_trees(subject, rank)
     trees, lost = (own, []) if own else _grown(subject, scatterer, rank, progress)
     if not trees:
-        raise UserError("scatters no light, so there is nothing to write", file=scatterer.name)
+        raise UserError("scatters no light: there is nothing to write", file=scatterer.name)
     with atomic_path(Path(path)) as beside, beside.open("w", encoding="utf-8") as file:
         file.writelines(_document(scatterer.name, trees, _ALL_DIGITS if own else _DIGITS))
     return read_back(subject, Path(path), tuple(lost))

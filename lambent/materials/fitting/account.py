@@ -78,7 +78,7 @@ def below_zero(samples: MeasuredSamples, metric: Metric) -> list[str]:
     if not (negative := negative_readings(samples)):
         return []
     taken = "as 0" if metric.clamps else "as measured"
-    return [f"{negative}; they are kept, and the {metric.name} metric takes a reading below zero {taken}"]
+    return [f"{negative}; a fit keeps them, and the {metric.name} metric counts them {taken}"]
 
 
 def restrictions(fix: Fixed, ranges: Ranges) -> list[str]:
@@ -103,7 +103,7 @@ def _bounds(side: Side, lobes: Sequence[Candidate], boxes: Sequence[Box]) -> lis
                 if abs(lobe.coordinates[axis] - bound[axis]) <= AT_BOUND * extent and value not in legal[base]:
                     lines.append(f"{parameter(kind, base, index)} is at its {word} bound {value:.3g}")
         if not np.any(lobe.k > 0):
-            lines.append(f"{parameter(kind, 'k', index)} is 0: the lobe explains nothing")
+            lines.append(f"{parameter(kind, 'k', index)} is 0: the lobe contributes nothing")
     return lines
 
 
@@ -123,13 +123,13 @@ def _energy(material: Material) -> list[str]:
     if not more_than_arrives(albedo).any():
         return []
     at = f"theta {np.degrees(theta[highest[0]]):.0f} deg"
-    return [f"scatters more than it receives: albedo {albedo[highest]:.2f} at {at}"]
+    return [f"scatters more light than it receives: albedo {albedo[highest]:.2f} at {at}"]
 
 
 def _ambiguity(samples: MeasuredSamples, found: Mapping[Side, object]) -> list[str]:
     lines = []
     if found.get("transmission"):
-        lines.append("transmission: only kt (1 - r0) can be measured")
+        lines.append("transmission: only the product kt (1 - r0) can be determined")
     if found.get("reflection"):
         cos_d = np.sqrt(np.maximum((1 + np.sum(samples.wi * samples.wo, axis=1)) / 2, 0))
         near = ~samples.transmitted

@@ -105,7 +105,7 @@ class Comparison:
 
     def warning(self, kept: bool) -> str:
         """The same with what to do about it; `kept`: the fit was to follow the albedos already."""
-        return f"{self}; " + ("more lobes follow it better" if kept else "--keep-albedo holds the fit to it")
+        return f"{self}; " + ("more lobes follow it better" if kept else "--keep-albedo constrains the fit to it")
 
     def to_json(self) -> dict[str, Any]:
         return {

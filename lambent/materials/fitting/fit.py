@@ -162,7 +162,7 @@ def fit(
     whole = table if isinstance(table, MeasuredTable) else whole
     _check(count, gain, method, distribution)
     if keep_albedo and (whole is None or method == "grid"):
-        raise UserError("albedos are kept by the gradient method, of a table", field="keep_albedo", got=method)
+        raise UserError("needs the method gradient and a whole table", field="keep_albedo", got=method)
     parameters.check(fix, ranges, count)
     share = gain if lobes == "auto" else 0.0
     kinds = DISTRIBUTIONS[distribution]
@@ -206,7 +206,7 @@ def fit(
         *_fewer(found, lobes),
     )
     if partial:
-        warnings = ("cancelled: the best found so far", *warnings)
+        warnings = ("cancelled: best result so far", *warnings)
     provenance = Provenance(
         source=samples.info.file,
         source_sha256=sha256_of(source) if source is not None else None,
@@ -254,7 +254,7 @@ def _choose(found: dict[Side, Found], other: dict[Side, Found], task: Task) -> s
     taken = task.retro is True or share >= RETRO_GAIN
     if taken:
         found["reflection"] = other["reflection"]
-    verdict = "taken" if taken else f"not taken: at least {RETRO_GAIN:.0%} are asked for"
+    verdict = "added" if taken else f"not added: less than {RETRO_GAIN:.0%}"
     return f"a retro-reflective lobe removes {share:.1%} of the {task.metric.name} error ({verdict})"
 
 
@@ -376,7 +376,7 @@ def _by_lobes(found: dict[Side, Found]) -> list[str]:
 
 def _fewer(found: dict[Side, Found], lobes: int | Literal["auto"]) -> list[str]:
     return [
-        f"{side}: {count} lobe(s); another one explains nothing more"
+        f"{side}: {count} lobe(s); another one reduces the error no further"
         for side, one in found.items()
         if lobes != "auto" and 0 < (count := one.mirroring) < lobes
     ]

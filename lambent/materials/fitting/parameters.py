@@ -138,7 +138,7 @@ def check(fix: Fixed, ranges: Ranges, lobes: int) -> None:
     for name, (lo, hi) in ranges.items():
         if name in ("kd", "kt_d"):
             raise UserError(
-                "diffuse terms come from the histogram and have no range", field=name, hint="fix it instead"
+                "diffuse terms are read from the histogram and take no range", field=name, hint="fix it instead"
             )
         _check_value(name, lo)
         _check_value(name, hi)

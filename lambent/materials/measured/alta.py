@@ -101,7 +101,7 @@ def _parametrisation(name: str | None, inputs: int, path: Path) -> Parametrisati
     full = "directions of light and view, in one of: " + ", ".join(PARAMETRISATIONS)
     if name in SLICES:
         got = f"{name}: {SLICES[name]}"
-        raise UserError("is a slice of a BRDF, which does not determine it", file=path, got=got, expected=full)
+        raise UserError("is a slice that does not determine the BRDF", file=path, got=got, expected=full)
     if inputs == 1:
         got = f"#DIM {inputs}, #PARAM_IN {name or 'not stated'}"
         raise UserError("is a curve over one variable, not a BRDF", file=path, got=got, expected=full)
@@ -111,7 +111,7 @@ def _parametrisation(name: str | None, inputs: int, path: Path) -> Parametrisati
     found = PARAMETRISATIONS[name]
     if found.inputs != inputs:
         expected = f"{found.inputs} for {name}"
-        raise UserError("number of columns does not fit", file=path, field="#DIM", got=inputs, expected=expected)
+        raise UserError("wrong number of columns", file=path, field="#DIM", got=inputs, expected=expected)
     return found
 
 
@@ -119,10 +119,10 @@ def _quantity(name: str | None, outputs: int, path: Path) -> tuple[Quantity, str
     """What the values are, and their kind if there are three."""
     if name not in _QUANTITIES:
         expected = f"one of: {', '.join(_QUANTITIES)}"
-        hint = "state in the header what the values are, if you know"
+        hint = "state the quantity in the header, if you know it"
         got = name or "nothing"
         raise UserError(
-            "does not say what is stored", file=path, field="#PARAM_OUT", got=got, expected=expected, hint=hint
+            "quantity of the values is not stated", file=path, field="#PARAM_OUT", got=got, expected=expected, hint=hint
         )
     if outputs not in (1, 3) or (name == "XYZ_COLOR" and outputs == 1):
         expected = "3 values" if name == "XYZ_COLOR" else "1 value or 3 (R, G, B): nothing states wavelengths"
@@ -138,5 +138,5 @@ def _rows(body: bytes, stated: int, confidence: str, path: Path) -> Floats:
     widths = {stated, stated + further}
     if found and found not in widths:
         expected = " or ".join(str(width) for width in sorted(widths)) + " by #DIM and #VS"
-        raise UserError("number of columns does not fit", file=path, got=found, expected=expected)
+        raise UserError("wrong number of columns", file=path, got=found, expected=expected)
     return rows_of(body, found or stated, path)

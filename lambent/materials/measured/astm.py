@@ -59,7 +59,7 @@ def read(path: Path) -> MeasuredTable:
     stated = keys.get("NUM_POINTS")
     if stated is not None and stated.split()[0] != str(len(rows)):
         expected = f"{len(rows)}, the number of rows"
-        raise UserError("number of tuples does not fit", file=path, field="NUM_POINTS", got=stated, expected=expected)
+        raise UserError("wrong number of tuples", file=path, field="NUM_POINTS", got=stated, expected=expected)
     theta = rows[:, [layout.angles["theta_i"], layout.angles["theta_o"]]]
     finite = np.abs(theta[np.isfinite(theta)])
     radians = layout.radians or (len(finite) > 0 and float(finite.max()) <= np.pi / 2 + 1e-3)

@@ -98,11 +98,11 @@ def read(path: Path) -> MeasuredTable:
         refuse_decimal_commas(body, path)
         first = shown(body.strip().split(b"\n")[0])
         got = f"{len(_SEPARATORS.split(first.strip()))} columns without names"
-        raise UserError("nothing says which quantity the columns hold", file=path, got=got, hint=HINT_QUANTITY)
+        raise UserError("the columns have no names", file=path, got=got, hint=HINT_QUANTITY)
     layout = layout_of(names, path)
     if layout.quantity is None:
         got = ", ".join(names[column] for column in layout.values)
-        raise UserError("value columns do not say what they hold", file=path, got=got, hint=HINT_QUANTITY)
+        raise UserError("quantity of the value columns is not stated", file=path, got=got, hint=HINT_QUANTITY)
     rows = rows_of(body, len(names), path)
     notes = ("angles are in radians",) if layout.radians else ()
     return assemble(rows, layout, 0.0, path, NAME, Path(path).stem, notes)
@@ -135,7 +135,7 @@ def layout_of(names: list[str], path: Path) -> Layout:
     Raises
     ------
     UserError
-        An angle is missing or named twice, or the value columns are of no known kind.
+        An angle is missing or named twice, or the unknown value columns.
     """
     angles: dict[str, int] = {}
     for column, name in enumerate(names):
@@ -160,7 +160,7 @@ def layout_of(names: list[str], path: Path) -> Layout:
         if len(words) == 3 and all(named) and len(stems) == 1:
             return Layout(angles, columns, quantity_of(stems.pop()), kind, (), radians)
     expected = "one column, three (r g b or x y z), or one per wavelength (such as 550nm)"
-    raise UserError("value columns are of no known kind", file=path, got=" ".join(words) or "none", expected=expected)
+    raise UserError("unknown value columns", file=path, got=" ".join(words) or "none", expected=expected)
 
 
 def _angle(name: str) -> str | None:
@@ -183,10 +183,10 @@ def rows_of(body: bytes, columns: int, path: Path) -> Floats:
     flat = numbers(re.sub(rb"[,;]", b" ", body), path)
     lines = sum(1 for line in body.split(b"\n") if line.strip(b" \t,;"))
     if lines == 0:
-        raise UserError("holds no rows", file=path)
+        raise UserError("has no rows", file=path)
     if len(flat) != lines * columns:
         got = f"{len(flat)} numbers in {lines} rows"
-        raise UserError("a row has another number of columns than names", file=path, got=got, expected=columns)
+        raise UserError("a row does not have one value per column name", file=path, got=got, expected=columns)
     return flat.reshape(-1, columns)
 
 

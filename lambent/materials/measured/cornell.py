@@ -54,7 +54,7 @@ def read(path: Path) -> ScatteredTable:
         raise UserError("wavelengths are missing or do not increase", file=path, expected=f"{count} wavelengths in nm")
     if len(rest) == 0 or len(rest) % (4 + count):
         expected = f"a multiple of 4 + {count}"
-        raise UserError("number of values does not fit", file=path, got=f"{len(rest)} numbers", expected=expected)
+        raise UserError("wrong number of values", file=path, got=f"{len(rest)} numbers", expected=expected)
     rows = rest.reshape(-1, 4 + count)
     theta = rows[:, [0, 2]]
     if not (np.isfinite(rows[:, :4]).all() and (theta >= 0).all() and (theta <= np.pi / 2 + 1e-3).all()):

@@ -42,7 +42,7 @@ def left_out(samples: MeasuredSamples) -> tuple[dict[str, float], list[str]]:
 def negative(samples: MeasuredSamples) -> list[str]:
     """Readings below zero, as noise leaves them: fits keep them, `eval` does not."""
     found = negative_readings(samples)
-    return [f"{found}; a fit keeps them, what is drawn or converted takes them as 0"] if found else []
+    return [f"{found}; a fit keeps them, drawing and conversion use 0"] if found else []
 
 
 def non_reciprocity(table: MeasuredTable) -> tuple[float, list[str]]:
@@ -92,7 +92,7 @@ def extrapolation(table: MeasuredTable) -> tuple[float, list[str]]:
     }
     parts = [f"{percentage(100 * (beyond & there).mean())} {name}" for name, there in places.items()]
     share = float(beyond.mean())
-    said = f"nothing was measured around {percentage(100 * share)} of the pairs of directions ({', '.join(parts)})"
+    said = f"nothing was measured near {percentage(100 * share)} of the direction pairs ({', '.join(parts)})"
     return share, [
         f"{said}: f is extrapolated there, within the range of the 16 nearest"
     ] if share > EXTRAPOLATED else []

@@ -83,9 +83,11 @@ def _lines(body: bytes, path: Path) -> tuple[Floats, Floats, Indices]:
     odd = np.flatnonzero((per_line != 2) & (per_line != 3))
     if len(odd):
         got = f"{per_line[odd[0]]} numbers in line {odd[0] + 3}"
-        raise UserError("a line is broken", file=path, got=got, expected="2 (a block begins) or 3 (a measurement)")
+        raise UserError(
+            "wrong number of values in a line", file=path, got=got, expected="2 (a block begins) or 3 (a measurement)"
+        )
     if (per_line == 3).sum() == 0 or per_line[0] != 2:
-        raise UserError("holds no block with measurements", file=path)
+        raise UserError("has no block with measurements", file=path)
     starts = np.cumsum(per_line) - per_line
     blocks, rows = (flat[starts[per_line == count, None] + np.arange(count)] for count in (2, 3))
     return blocks, rows, np.cumsum(per_line == 2)[per_line == 3] - 1
@@ -96,7 +98,7 @@ def _angles(pairs: Floats, unit: str, path: Path) -> Floats:
     if unit == "sin":
         radius = np.hypot(pairs[:, 0], pairs[:, 1])
         if not (radius <= 1 + 1e-6).all():
-            raise UserError("direction cosines are longer than 1", file=path, got=float(radius.max()))
+            raise UserError("direction cosines exceed 1", file=path, got=float(radius.max()))
         theta = np.degrees(np.arcsin(radius.clip(0, 1)))
         return np.stack([theta, np.degrees(np.arctan2(pairs[:, 1], pairs[:, 0]))], axis=1)
     return np.stack([np.abs(pairs[:, 0]), pairs[:, 1] + np.where(pairs[:, 0] < 0, 180, 0)], axis=1)

@@ -183,7 +183,7 @@ def sheet_of(angles_deg: Floats, f: Floats, images: Flags, path: Path) -> AnyShe
     theta_i, phi_i = angles_deg[0, :2]
     if not sensible(f).any():
         where = f"theta_i {theta_i:g}, phi_i {phi_i:g}"
-        raise UserError("no value was measured for an incident direction", file=path, field=where)
+        raise UserError("an incident direction has no measured value", file=path, field=where)
     frame = specular_frame(theta_i, phi_i)
     wo = direction(*np.radians(angles_deg[:, 2:].T))
     theta, phi = np.unique(angles_deg[:, 2]), np.unique(angles_deg[angles_deg[:, 2] > 0, 3])

@@ -64,10 +64,10 @@ def read(path: Path) -> GonioTable:
     content = read_text(path)
     names = _names(content[:_HEADER_BYTES])
     if names is None or tuple(names[:4]) != ANGLES:
-        raise UserError("first line that is no comment must name the columns", file=path, expected=" ".join(ANGLES))
+        raise UserError("first line that is not a comment must name the columns", file=path, expected=" ".join(ANGLES))
     if names[4:] not in _VALUE_COLUMNS:
         known, got = [" ".join(columns) for columns in _VALUE_COLUMNS], " ".join(names[4:]) or "none"
-        raise UserError("value columns do not say what they hold", file=path, got=got, expected=f"one of: {known}")
+        raise UserError("quantity of the value columns is not stated", file=path, got=got, expected=f"one of: {known}")
     quantity = QUANTITIES[_VALUE_COLUMNS.index(names[4:]) % len(QUANTITIES)]
     rows = _rows(content, len(names), path)
     f, keys = to_f(unmarked(rows[:, 4:]), quantity, rows[:, 2]), _keys(content[:_HEADER_BYTES])
@@ -81,17 +81,17 @@ def _rows(content: bytes, columns: int, path: Path) -> Floats:
     line = next(line for line in lines if line.split(b"#")[0].strip())
     start = lines.tell()
     if not re.search(rb"^[^\S\n]*[^#\s]", content[start:], re.MULTILINE):
-        raise UserError("holds no rows", file=path)
+        raise UserError("has no rows", file=path)
     text = io.TextIOWrapper(lines, encoding="utf-8")
     delimiter = next((mark for mark in (",", ";") if mark.encode() in line), None)
     try:
         rows = np.loadtxt(text, delimiter=delimiter, ndmin=2)
     except ValueError as error:
         hint = HINT_DECIMAL_COMMA if has_decimal_commas(content) else None
-        raise UserError(f"a row is broken ({str(error).splitlines()[0]})", file=path, hint=hint) from error
+        raise UserError(f"a row is malformed ({str(error).splitlines()[0]})", file=path, hint=hint) from error
     if rows.shape[1] != columns:
         got = rows.shape[1]
-        raise UserError("a row has another number of columns than names", file=path, got=got, expected=columns)
+        raise UserError("a row does not have one value per column name", file=path, got=got, expected=columns)
     check_angles(rows[:, :4], path)
     rows[np.isinf(rows)] = np.nan
     return rows

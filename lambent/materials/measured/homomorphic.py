@@ -135,10 +135,10 @@ def read(path: Path) -> HomomorphicTable:
         lines = shown(text.strip()).split("\n")
         kind, alpha = int(lines[1]), np.array([float(word) for word in lines[2].split()])
         if kind == 2:
-            raise UserError("holds no factors", file=path, field="line 2", got="kind 2, a highlight alone",
+            raise UserError("has no factors", file=path, field="line 2", got="kind 2, a highlight alone",
                             expected="kind 0 or 1", hint="open the file of P and Q beside it")  # fmt: skip
         if kind == 1:
-            notes += ("its extra highlight, whose scale the file does not tell, is left out",)
+            notes += ("its extra highlight is left out: the file does not state its scale",)
         paths = [_beside(path, letter, endings) for letter, endings in (("P", ("_0", "p")), ("Q", ("_1", "q")))]
     else:
         alpha = np.array([float(word) for word in shown(text).split()])
@@ -170,7 +170,7 @@ def _texture(path: Path) -> Floats:
     picture = read_encoded(path)[..., :3]
     if picture.shape[0] != picture.shape[1] or len(picture) < 2:
         got = f"{picture.shape[1]}x{picture.shape[0]}"
-        raise UserError("is no parabolic map", file=path, got=got, expected="a square picture")
+        raise UserError("is not a parabolic map", file=path, got=got, expected="a square picture")
     return picture
 
 

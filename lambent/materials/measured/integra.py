@@ -93,7 +93,9 @@ def read(path: Path) -> GonioTable:
     kind = keys.get("typedata", "")
     if kind not in _KINDS:
         expected = f"one of: {', '.join(_KINDS)}"
-        raise UserError("does not say what is stored", file=path, field="TypeData", got=kind or None, expected=expected)
+        raise UserError(
+            "quantity of the values is not stated", file=path, field="TypeData", got=kind or None, expected=expected
+        )
     channels = _channels(text[first.start() :] if first else b"", grid, keys.get("typecolormodel", ""), path)
     values = np.stack([channel.values for channel in channels], axis=-1)
     cos_o = _cos_theta_o(grid)[..., None]
@@ -112,7 +114,12 @@ def read(path: Path) -> GonioTable:
     if kind.endswith("absolute"):
         values = values if kbdf is None else values * kbdf[:, :, None, None]
     elif kbdf is None:
-        raise UserError("is relative and states no share of the light", file=path, field="kbdf", expected="its values")
+        raise UserError(
+            "is relative and does not state the share of the light (kbdf)",
+            file=path,
+            field="kbdf",
+            expected="its values",
+        )
     else:
         values = values * _scale(specular_table(grid, values, path, NAME, far=far, mirrored=mirrored), grid, kbdf)
         notes += ("relative values are scaled to the shares of the light that the file states (kbdf)",)
@@ -134,7 +141,7 @@ def _grid(head: bytes, path: Path) -> SpecularGrid:
         count, *listed = numbers(found[1], path, name) if found[1].strip() else [np.nan]
         if not listed or count != len(listed):
             got = f"{count:g} and {len(listed)}"
-            raise UserError("count does not fit its angles", file=path, field=name, got=got)
+            raise UserError("count differs from the number of angles", file=path, field=name, got=got)
         angles = np.array(listed)
         if not ((np.diff(angles) > 0).all() and low <= angles[0] and angles[-1] <= high):
             expected = f"increasing degrees from {low:g} to {high:g}"
@@ -160,7 +167,7 @@ def _channels(body: bytes, grid: SpecularGrid, model: str, path: Path) -> list[_
         channel = _channel(body[found.end() : end], name, grid, path)
         key = f"wl {channel.wavelength_nm:g}" if name == "wl" else name
         if key in parts:
-            raise UserError("is there twice", file=path, field=key)
+            raise UserError("is duplicated", file=path, field=key)
         parts[key] = channel
     wanted = {"rgb": ["red", "gre", "blu"], "bw": ["bw"]}.get(model, [])
     if model.startswith("spectral"):
@@ -168,10 +175,10 @@ def _channels(body: bytes, grid: SpecularGrid, model: str, path: Path) -> list[_
         stated = model.split()[1:2]
         if not wanted or stated not in ([], [str(len(wanted))]):
             got = f"{len(wanted)} wavelengths"
-            raise UserError("number of wavelengths does not fit", file=path, field="TypeColorModel", got=got)
+            raise UserError("wrong number of wavelengths", file=path, field="TypeColorModel", got=got)
     if not wanted or set(wanted) != set(parts):
         field, got = f"TypeColorModel {model}", ", ".join(parts) or "none"
-        raise UserError("channels do not fit the colour model", file=path, field=field, got=got)
+        raise UserError("channels do not match the colour model", file=path, field=field, got=got)
     return [parts[key] for key in wanted]
 
 
@@ -179,7 +186,7 @@ def _channel(part: bytes, name: str, grid: SpecularGrid, path: Path) -> _Channel
     data = _DATA.match(part)
     if data is None or data.end() != len(part) or (data[1] is None) == (name == "wl"):
         expected = "kbdf and its values, def, the values, enddef" + (", after the wavelength" if name == "wl" else "")
-        raise UserError("block is broken", file=path, field=name, expected=expected)
+        raise UserError("block is malformed", file=path, field=name, expected=expected)
     wavelength = float(numbers(data[1], path, name)[0]) if data[1] else np.nan
     if name == "wl" and not (np.isfinite(wavelength) and wavelength > 0):
         raise UserError("is not a wavelength in nm", file=path, field=name, got=shown(data[1]))
@@ -192,7 +199,7 @@ def _counted(text: bytes, shape: tuple[int, ...], field: str, path: Path) -> Flo
     found, expected = numbers(text, path, field), int(np.prod(shape))
     if len(found) != expected:
         wanted = f"{expected}: " + " x ".join(str(count) for count in shape)
-        raise UserError("number of values does not fit", file=path, field=field, got=len(found), expected=wanted)
+        raise UserError("wrong number of values", file=path, field=field, got=len(found), expected=wanted)
     return found.reshape(shape)
 
 

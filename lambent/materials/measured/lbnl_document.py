@@ -71,7 +71,7 @@ def parse(content: bytes, path: Path) -> Document:
         The content is not XML, another document, declares a document type, or is beyond the limits.
     """
     if b"\0" in content:
-        raise UserError("holds NUL bytes", file=path, expected="XML in UTF-8")
+        raise UserError("has NUL bytes", file=path, expected="XML in UTF-8")
     if _LONG_TAG.search(content):
         raise UserError("has a tag of over 8192 bytes", file=path)
     tree = ET.TreeBuilder()
@@ -81,10 +81,10 @@ def parse(content: bytes, path: Path) -> Document:
         nonlocal elements, depth
         elements, depth = elements + 1, depth + 1
         if elements > _MOST_ELEMENTS or depth > _DEEPEST:
-            raise UserError("has more elements, or deeper ones, than any BSDF file", file=path)
+            raise UserError("has more or deeper elements than any BSDF file", file=path)
         name = tag.rpartition(":")[2]
         if depth == 1 and name != ROOT:
-            raise UserError("another kind of XML", file=path, got=tag, expected=ROOT)
+            raise UserError("wrong kind of XML", file=path, got=tag, expected=ROOT)
         tree.start(name, {})
 
     def end(tag: str) -> None:
@@ -93,7 +93,7 @@ def parse(content: bytes, path: Path) -> Document:
         tree.end(tag.rpartition(":")[2])
 
     def refuse_doctype(*_: object) -> None:
-        raise UserError("declares a document type, whose entities are not followed", file=path)
+        raise UserError("declares a document type, which is not supported", file=path)
 
     parser = expat.ParserCreate()
     parser.buffer_text, parser.buffer_size = True, 1 << 16

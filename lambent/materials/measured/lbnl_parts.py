@@ -65,7 +65,7 @@ def parts_of(document: Document, file: Path) -> tuple[dict[Where, Part], tuple[s
         parts = {where: TreePart(tuple(_tree(one, rank, file) for one in blocks)) for where, blocks in chosen.items()}
     lit = {where: part for where, part in parts.items() if not part.dark}
     if not lit:
-        raise UserError("holds no value above zero", file=file)
+        raise UserError("has no value above zero", file=file)
     if any(where[0] == "transmission" for where in parts) and not any(where[0] == "transmission" for where in lit):
         notes.append("transmission is zero throughout: opaque")
     if document.layers > 1:
@@ -88,7 +88,7 @@ def _choose(document: Document, file: Path) -> tuple[dict[Where, list[Texts]], l
     main = next((n for n in (*_LUMINANCE, "solar") if n in names), None)
     if main is None:
         got = ", ".join(names.values()) or None
-        raise UserError("has no block that can be used", file=file, field="Wavelength", got=got, expected="Visible")
+        raise UserError("has no usable block", file=file, field="Wavelength", got=got, expected="Visible")
     found: dict[Where, dict[int, Texts]] = {}
     repeated = 0
     for block in document.blocks:
@@ -107,7 +107,7 @@ def _choose(document: Document, file: Path) -> tuple[dict[Where, list[Texts]], l
     chosen = {w: [b[k] for k in range(3 if len(b) == 3 else 1)] for w, b in found.items() if 0 in b}
     if not chosen:
         expected = "Transmission or Reflection, Front or Back"
-        raise UserError("no block names a side", file=file, field="WavelengthDataDirection", expected=expected)
+        raise UserError("no block has a side", file=file, field="WavelengthDataDirection", expected=expected)
     return chosen, _wavelength_notes(names, main, chosen, repeated)
 
 
@@ -136,7 +136,7 @@ def _bases_of(document: Document, file: Path, notes: list[str]) -> dict[str, Ang
         if usual is not None:
             if _same(usual, basis):
                 continue
-            notes.append(f"{name} is not the usual one; taken as the file defines it, which Radiance does not")
+            notes.append(f"{name} differs from the standard basis: the file's definition is used, unlike in Radiance")
         bases[name.lower()] = basis
     return bases
 
@@ -148,7 +148,7 @@ def _matrix_of(
     channels = [_matrix(block, by_rows, bases, file) for block in blocks]
     incident, outgoing, _ = channels[0]
     if any((i, o) != (incident, outgoing) for i, o, _ in channels):
-        raise UserError("colours have other bases than Visible", file=file)
+        raise UserError("colour blocks have a different angle basis than Visible", file=file)
     values = np.stack([values for _, _, values in channels], axis=-1)
     if len(channels) == 3:
         read = np.asarray((values >= 0).all(axis=-1, keepdims=True))  # else noise, which is no saturated colour
@@ -175,7 +175,7 @@ def _matrix(
     words = count_words(text)
     if words != shape[0] * shape[1]:
         field, expected = block["WavelengthDataDirection"], f"{shape[0]} x {shape[1]} values"
-        raise UserError("count does not fit", file=file, field=field, got=words, expected=expected)
+        raise UserError("wrong number of values", file=file, field=field, got=words, expected=expected)
     try:
         values = _finite(numbers_of(text), block, file)
     except Malformed as error:
@@ -192,7 +192,7 @@ def _tree(block: Texts, rank: Rank, file: Path) -> TensorTree:
         tree = parse_tree(_data(block), rank)
     except Malformed as error:
         field = block["WavelengthDataDirection"]
-        raise UserError(f"tensor tree is broken ({error})", file=file, field=field) from error
+        raise UserError(f"tensor tree is malformed ({error})", file=file, field=field) from error
     _finite(tree.values, block, file)
     return tree
 
@@ -205,9 +205,7 @@ def _data(block: Texts) -> bytes:
 def _finite(values: Floats, block: Texts, file: Path) -> Floats:
     count = int((~np.isfinite(values)).sum())
     if count:
-        raise UserError(
-            "holds values that are not finite", file=file, field=block["WavelengthDataDirection"], got=count
-        )
+        raise UserError("has values that are not finite", file=file, field=block["WavelengthDataDirection"], got=count)
     return values
 
 

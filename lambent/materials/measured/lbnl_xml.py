@@ -166,7 +166,7 @@ class LbnlTable(MeasuredTable):
             if where in self.uses and self.uses[where].backwards:
                 notes.append(f"{name} is not in the file, or zero: reversed from the other side, as in Radiance")
         if self._turned:
-            notes.append("the file holds light from -z alone: for a fit the sheet is turned over")
+            notes.append("the file has light from -z only: for a fit the sheet is turned over")
         if 0 < anisotropy <= ISOTROPIC_WITHIN:
             notes.append(f"turning the sheet changes f by {100 * anisotropy:.2g} %: taken as isotropic")
         negative = {where: part.negative for where, part in self.parts.items() if part.negative}

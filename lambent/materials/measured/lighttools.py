@@ -74,7 +74,9 @@ def read(path: Path) -> MeasuredTable:
         notes += ("the file's data of light from the back are not used",)
     if len({words["POI"] for words, _ in kept}) > 1:
         got = f"{len({words['POI'] for words, _ in kept})} planes of incidence (POI)"
-        raise UserError("several planes of incidence are not read", file=path, got=got, expected="one: isotropic data")
+        raise UserError(
+            "several planes of incidence are not supported", file=path, got=got, expected="one: isotropic data"
+        )
     channels = _channels(kept, coloured, path)
     rows = []
     for kind, aoi in sorted({(words["ScatterType"], _aoi(words, path)) for words, _ in kept}):
@@ -105,7 +107,7 @@ def _angles(head: bytes, name: str, path: Path) -> Floats:
     count, *listed = numbers(found[1], path, name)
     if not listed or count != len(listed):
         got = f"{count:g} and {len(listed)}"
-        raise UserError("count does not fit its angles", file=path, field=name, got=got)
+        raise UserError("count differs from the number of angles", file=path, field=name, got=got)
     angles = np.array(listed)
     if not ((np.diff(angles) > 0).all() and angles[0] >= 0 and angles[-1] <= _LISTS[name]):
         expected = f"increasing degrees from 0 to {_LISTS[name]:g}"
@@ -134,11 +136,11 @@ def _blocks(body: bytes, shape: tuple[int, int], path: Path) -> list[Block]:
         values = numbers(body[tis.end() : end], path, field)
         if len(values) != shape[0] * shape[1]:
             expected = f"{shape[0]} azimuths x {shape[1]} radial angles"
-            raise UserError("number of values does not fit", file=path, field=field, got=len(values), expected=expected)
+            raise UserError("wrong number of values", file=path, field=field, got=len(values), expected=expected)
         blocks.append((words, values.reshape(shape)))
     if not blocks or len(starts) != len(blocks):
         got = f"{len(starts)} AOI and {len(blocks)} TIS"
-        raise UserError("number of blocks does not fit", file=path, got=got, expected="a TIS after each AOI")
+        raise UserError("wrong number of blocks", file=path, got=got, expected="a TIS after each AOI")
     return blocks
 
 

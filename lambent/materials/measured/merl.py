@@ -42,7 +42,7 @@ def read(path: Path) -> MerlTable:
     Raises
     ------
     UserError
-        The size does not fit the header, the byte order is big-endian, or nothing was measured.
+        The size does not match the header, the byte order is big-endian, or nothing was measured.
     """
     content = read_bytes(path, MEASURED_BYTES)
     shape = struct.unpack_from("<3i", content)
@@ -50,7 +50,7 @@ def read(path: Path) -> MerlTable:
         raise UserError("is big-endian", file=path, expected="little-endian numbers, as MERL publishes them")
     if min(shape) <= 0 or len(content) != _bytes_of(shape):
         got = f"{' x '.join(map(str, shape))} bins in {len(content)} bytes"
-        raise UserError("size does not fit the header", file=path, got=got, expected=f"{_bytes_of(shape)} bytes")
+        raise UserError("size does not match the header", file=path, got=got, expected=f"{_bytes_of(shape)} bytes")
     planes = np.frombuffer(content, "<f8", offset=_HEADER_BYTES).reshape(3, *shape)
     return MerlTable(planes, path)
 
@@ -78,7 +78,7 @@ class MerlTable(ReflectionTable):
             )
         require_values(np.moveaxis(planes, 0, -1), self._measured, path)
         sizes = dict(zip(("theta_h", "theta_d", "phi_d"), planes.shape[1:], strict=True))
-        self.info = isotropic_brdf(path, NAME, sizes, ("values stand at the centres of their bins",))
+        self.info = isotropic_brdf(path, NAME, sizes, ("values lie at the centres of their bins",))
 
     @cached_property
     def _filled(self) -> Floats:

@@ -133,7 +133,7 @@ def _beam(keys: dict[str, str], body: bytes, path: Path, number: int) -> _Beam:
     lines = len(_LINE.findall(body))
     if lines == 0 or len(flat) != lines * columns:
         got = f"{len(flat)} numbers in {lines} rows"
-        raise UserError("rows do not fit the header", file=path, field=where, got=got, expected=f"{columns} per row")
+        raise UserError("rows do not match the header", file=path, field=where, got=got, expected=f"{columns} per row")
     rows = flat.reshape(-1, columns)
     if not np.isfinite(rows[:, :2]).all():
         raise UserError("an angle is not finite", file=path, field=where)

@@ -234,7 +234,7 @@ def collect(
     left_out = LeftOut(*counts)
     chosen = np.flatnonzero(used)
     if len(chosen) == 0:
-        raise UserError("holds no measured value", file=info.file, got=f"{len(f)} tuples, {describe(left_out)}")
+        raise UserError("has no measured value", file=info.file, got=f"{len(f)} tuples, {describe(left_out)}")
     if max_count is not None and len(chosen) > max_count:
         chosen = chosen[even_choice(len(chosen), max_count)]
     return MeasuredSamples(wi[chosen], wo[chosen], f[chosen], weight[chosen], left_out, info)

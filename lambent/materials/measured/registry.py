@@ -65,14 +65,14 @@ def load(path: Path | str, reconstruction: Reconstruction | Literal["auto"] = AU
         if reconstruction == AUTO:
             return table
         if not isinstance(table, GonioTable):
-            raise UserError(f"{reader.NAME} has its own way between directions", file=path, field="reconstruction")
+            raise UserError(f"does not apply to {reader.NAME}", file=path, field="reconstruction")
         return dataclasses.replace(table, reconstruction=reconstruction)
     if head.startswith(UTF16):
         raise is_utf16(path)
     if (kind := kind_of(head)) is not None:
-        raise UserError(f"is {kind[0]}, which is not read", file=path, hint=kind[1])
+        raise UserError(f"is {kind[0]}, which is not supported", file=path, hint=kind[1])
     known = ", ".join(reader.NAME for reader in readers())
-    raise UserError("not a measured material of a known format", file=path, expected=f"one of: {known}")
+    raise UserError("unknown format of measured material", file=path, expected=f"one of: {known}")
 
 
 def is_known(path: Path | str) -> bool:

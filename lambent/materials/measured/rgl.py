@@ -51,7 +51,7 @@ def read(path: Path) -> RglTable:
         _require(name in tensors, path, name, "is missing")
         tensor = tensors[name]
         _require(tensor.dtype == np.float32 and tensor.ndim == dimensions, path, name, "has the wrong shape or type")
-        _require(bool(np.isfinite(tensor.astype(np.float32)).all()), path, name, "holds values that are not finite")
+        _require(bool(np.isfinite(tensor.astype(np.float32)).all()), path, name, "has values that are not finite")
     phi, theta = (tensors[name].astype(np.float64) for name in ("phi_i", "theta_i"))
     for name, nodes, low, high in (("phi_i", phi, -np.pi, 2 * np.pi), ("theta_i", theta, 0, np.pi / 2)):
         ordered = len(nodes) > 0 and bool((np.diff(nodes) > 0).all())
@@ -60,7 +60,7 @@ def read(path: Path) -> RglTable:
     ndf, sigma, vndf = (tensors[name].astype(np.float32) for name in ("ndf", "sigma", "vndf"))
     for name, table in (("ndf", ndf), ("sigma", sigma), ("vndf", vndf)):
         _require(min(table.shape[-2:]) >= 2, path, name, "is too small")
-        _require(bool((table >= 0).all()), path, name, "holds negative values")
+        _require(bool((table >= 0).all()), path, name, "has negative values")
     _require(vndf.shape[:2] == (len(phi), len(theta)), path, "vndf", "does not fit phi_i and theta_i")
     _require(bool((vndf.sum(axis=(2, 3)) > 0).all()), path, "vndf", "is zero for an incident direction")
     _require(bool((sigma > 0).any()), path, "sigma", "is zero")
@@ -79,7 +79,7 @@ def _values_rgb(tensors: Tensors, path: Path) -> Floats:
     values = tensors[name]
     incident = tensors["vndf"].shape[:2]
     usual = values.ndim == 5 and values.dtype == np.float32 and values.shape[:2] == incident
-    _require(usual and min(values.shape) > 0 and min(values.shape[3:]) >= 2, path, name, "has a wrong shape or type")
+    _require(usual and min(values.shape) > 0 and min(values.shape[3:]) >= 2, path, name, "has the wrong shape or type")
     channels_last = np.moveaxis(values.astype(np.float32), 2, -1)
     if name == "rgb":
         _require(channels_last.shape[-1] == 3, path, name, "does not have three channels")

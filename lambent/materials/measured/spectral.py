@@ -36,7 +36,7 @@ def rgb_of_measured(spectra: Floats, usable: Flags, wavelengths_nm: Floats) -> t
     rgb = np.full((len(spectra), 3), np.nan)
     rgb[usable] = spectra[usable] @ rgb_of_spectra(wavelengths_nm).T
     rgb, outside = _within_gamut(rgb, spectra)
-    notes: tuple[str, ...] = ("spectra became linear RGB under D65",)
+    notes: tuple[str, ...] = ("spectra were converted to linear RGB under D65",)
     if outside:
         notes += (f"{outside} spectra are more saturated than Rec.709; the negative channel became 0",)
     return rgb, notes
@@ -45,7 +45,7 @@ def rgb_of_measured(spectra: Floats, usable: Flags, wavelengths_nm: Floats) -> t
 def rgb_of_xyz(values: Floats) -> tuple[Floats, tuple[str, ...]]:
     """Linear RGB (..., 3) of tristimulus values under D65, and notes; negative ones stay negative."""
     rgb, outside = _within_gamut(xyz_to_rgb(values), values)
-    notes: tuple[str, ...] = ("tristimulus values became linear RGB under D65",)
+    notes: tuple[str, ...] = ("tristimulus values were converted to linear RGB under D65",)
     if outside:
         notes += (f"{outside} values are more saturated than Rec.709; the negative channel became 0",)
     return rgb, notes

@@ -84,7 +84,7 @@ def specular_table(
         made = Sheet(grid.radial, azimuth, values[k, i].swapaxes(0, 1), frame, images)
         if not np.isfinite(made.values).all(axis=1).any():
             field = f"angle of incidence {grid.theta_i[i]:g}, rotation {phi:g}"
-            raise UserError("no value was measured for an incident direction", file=path, field=field)
+            raise UserError("an incident direction has no measured value", file=path, field=field)
         return made
 
     rotations = list(zip(order, phi_i, strict=True))

@@ -119,4 +119,4 @@ def require_values(values: Floats, measured: Flags, file: Path | str) -> None:
     with np.errstate(invalid="ignore"):
         finite, negative = np.isfinite(values) & (values <= LARGEST_F), int((values < 0).sum())
     got = f"{values.size} values, {int((~finite).sum())} not finite or beyond {LARGEST_F:g} /sr, {negative} negative"
-    raise UserError("holds no measured value", file=file, got=got)
+    raise UserError("has no measured value", file=file, got=got)

@@ -36,7 +36,7 @@ def read_tensors(path: Path) -> Tensors:
     try:
         return _parse(content, path)
     except (struct.error, UnicodeDecodeError) as error:
-        raise UserError("header of the tensor file is cut off or broken", file=path) from error
+        raise UserError("header of the tensor file is truncated or malformed", file=path) from error
 
 
 def _parse(content: bytes, path: Path) -> Tensors:
@@ -52,7 +52,7 @@ def _parse(content: bytes, path: Path) -> Tensors:
         dimensions, kind, offset = struct.unpack_from("<HBQ", content, at)
         if kind not in _TYPES or dimensions > _DIMENSIONS_MAX:
             got = f"type {kind}, {dimensions} dimensions"
-            raise UserError("unknown kind of tensor", file=path, field=name, got=got)
+            raise UserError("unknown tensor type", file=path, field=name, got=got)
         shape = struct.unpack_from(f"<{dimensions}Q", content, at + 11)
         at += 11 + 8 * dimensions
         dtype = np.dtype(_TYPES[kind])

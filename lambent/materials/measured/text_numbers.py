@@ -85,8 +85,8 @@ def numbers(text: bytes, path: Path, field: str | None = None) -> Floats:
         except ValueError as error:
             word = shown(match[0])
             hint = HINT_DECIMAL_COMMA if has_decimal_commas(text) else None
-            raise UserError("holds a word that is not a number", file=path, field=field, got=word, hint=hint) from error
-    raise UserError("holds numbers that cannot be read", file=path, field=field)
+            raise UserError("has a word that is not a number", file=path, field=field, got=word, hint=hint) from error
+    raise UserError("has numbers that cannot be read", file=path, field=field)
 
 
 def refuse_decimal_commas(text: bytes, path: Path) -> None:

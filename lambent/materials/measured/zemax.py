@@ -69,7 +69,7 @@ def read(path: Path) -> GonioTable:
     parts = [part.partition(b"DataEnd")[0] for part in body.split(b"DataBegin")]
     if len(parts) != channels:
         expected = f"{channels} for {words['SpectralContent']}"
-        raise UserError("number of data sections does not fit", file=path, got=len(parts), expected=expected)
+        raise UserError("wrong number of data sections", file=path, got=len(parts), expected=expected)
     read_parts = [_section(part, shape, path) for part in parts]
     values, tis = (np.stack(arrays, axis=-1) for arrays in zip(*read_parts, strict=True))
     return _table(values, tis, lists, words, path)
@@ -85,7 +85,9 @@ def _header(head: bytes, path: Path) -> tuple[dict[str, str], dict[str, Floats]]
             raise UserError("is missing", file=path, field=name)
         count, *angles = numbers(found[1], path, name) if found[1].strip() else [np.nan]
         if len(angles) == 0 or count != len(angles):
-            raise UserError("count does not fit its angles", file=path, field=name, got=f"{count:g} and {len(angles)}")
+            raise UserError(
+                "count differs from the number of angles", file=path, field=name, got=f"{count:g} and {len(angles)}"
+            )
         lists[name] = np.array(angles)
         open_end = name == "AngleOfIncidence" and angles[-1] >= high
         if not ((np.diff(angles) > 0).all() and low <= angles[0] and angles[-1] <= high) or open_end:
@@ -108,7 +110,7 @@ def _section(part: bytes, shape: tuple[int, ...], path: Path) -> tuple[Floats, F
     count, each = shape[0] * shape[1], shape[2] * shape[3]
     if blocks[0].strip() or len(blocks) != count + 1:
         expected = f"{shape[0]} rotations x {shape[1]} angles of incidence, each after its TIS"
-        raise UserError("number of data blocks does not fit", file=path, got=len(blocks) - 1, expected=expected)
+        raise UserError("wrong number of data blocks", file=path, got=len(blocks) - 1, expected=expected)
     read_blocks = []
     for number, block in enumerate(blocks[1:], 1):
         # Without a DataEnd, the next channel's name follows the last block.
@@ -116,7 +118,7 @@ def _section(part: bytes, shape: tuple[int, ...], path: Path) -> tuple[Floats, F
         found = numbers(re.sub(rb"\n\s*(?:Tristimulus\w*|Monochrome)\s*$", b"", block), path, field)
         if len(found) != each + 1:
             expected = f"TIS and {shape[2]} azimuths x {shape[3]} radial angles"
-            raise UserError("number of values does not fit", file=path, field=field, got=len(found), expected=expected)
+            raise UserError("wrong number of values", file=path, field=field, got=len(found), expected=expected)
         read_blocks.append(found)
     whole = np.stack(read_blocks)
     return whole[:, 1:].reshape(shape), whole[:, 0].reshape(shape[:2])

@@ -24,7 +24,7 @@ class Kurt(Model):
         Parameter("mx", 0.003, 1.5, 0.2, "roughness along the brushing direction t", unit="slope", scale="log"),
         Parameter("my", 0.003, 1.5, 0.2, "roughness across the brushing direction", unit="slope", scale="log"),
         Parameter("r0", 0.0, 1.0, 0.5, "Fresnel reflectance at normal incidence", rgb=True),
-        Parameter("alpha", 0.0, 1.0, 0.0, "exponent of the cosine product: how much grazing light gains"),
+        Parameter("alpha", 0.0, 1.0, 0.0, "exponent of the cosine product: increase at grazing angles"),
     )
     white: ClassVar = {"k": 1.0, "r0": 1.0, "alpha": 0.5}
     known_deficiencies: ClassVar = {
@@ -83,6 +83,8 @@ class KurtRetro(Kurt):
     )
     parameters = (
         *Kurt.parameters[:-1],
-        Parameter("alpha", LEAST_ALPHA, 1.0, 0.0, "exponent of the cosine product: below 0 grazing light is lost"),
+        Parameter(
+            "alpha", LEAST_ALPHA, 1.0, 0.0, "exponent of the cosine product: below 0 the lobe falls at grazing angles"
+        ),
     )
     retro = True

@@ -116,10 +116,10 @@ def read_fits(path: Path) -> dict[str, Published]:
             continue
         one = _published(line.strip(), path, number)
         if one.name in found:
-            raise UserError(f"two materials have one name, the second in line {number}", file=path, got=one.name)
+            raise UserError(f"two materials have the same name, the second in line {number}", file=path, got=one.name)
         found[one.name] = one
     if not found:
-        raise UserError("holds no material", file=path, expected="lines such as NAME = Aggregate(Lambertian(...), ...)")
+        raise UserError("has no material", file=path, expected="lines such as NAME = Aggregate(Lambertian(...), ...)")
     return found
 
 

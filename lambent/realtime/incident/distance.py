@@ -22,7 +22,7 @@ def serves(probe: Probe) -> bool:
 
 
 def distances(probe: Probe, w: Floats) -> Floats:
-    assert probe.distance is not None, "this look-up does not serve the probe"
+    assert probe.distance is not None, "this look-up does not apply to the probe"
     found = sample(probe.distance[..., None], w)[:, 0]
     return np.where(np.isfinite(found) & (found < HALF_MAX), found, np.inf)
 
@@ -32,6 +32,6 @@ def constants(probe: Probe) -> dict[str, int]:
 
 
 def resources(device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
-    assert probe.distance is not None, "this look-up does not serve the probe"
+    assert probe.distance is not None, "this look-up does not apply to the probe"
     distance = np.minimum(np.nan_to_num(probe.distance, nan=HALF_MAX, posinf=HALF_MAX), HALF_MAX)
     return (cube_texture(device, [inverse_depth(distance)], "r16float").create_view(dimension="cube"),)

@@ -67,7 +67,7 @@ class LightFieldLookUp:
 
     def resources(self, device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
         light_field = probe.light_field
-        assert light_field is not None, "this look-up does not serve the probe"
+        assert light_field is not None, "this look-up does not apply to the probe"
         sky = np.zeros((6, 1, 1, 3), np.float32) if probe.sky is None else finite(probe.sky)[0]
         maps = ResidentMaps(device, light_field, probe.most_bytes, probe.policy, lambda w: sample(sky, w))
         if not maps.whole:
@@ -116,4 +116,4 @@ def check_serves(scene: BakedScene, wanted: str, store: str) -> None:
         raise UserError("the store has no light field", field="--lookup", got=wanted, hint=hint)
     if not any(look_up.serves(replace(DARK, light_field=one)) for one in scene.light_fields.values()):
         hint = "give the object `light_field = { levels = 1 }` in the scene, and bake"
-        raise UserError("light fields show their object with its reflections", field="--lookup", got=wanted, hint=hint)
+        raise UserError("no light field has its object's own maps", field="--lookup", got=wanted, hint=hint)

@@ -41,7 +41,7 @@ class Contents:
         """A scene of this file alone, with daylight and a camera if it lacks them."""
         shines = bool(self.environment or self.lights or any(any(o.emission) for o in self.objects))
         own_light = self.environment is not None or (self.tells_its_light and shines)
-        notes = ("nothing in it emits light: it gets daylight",) if self.tells_its_light and not own_light else ()
+        notes = ("it has no light: daylight is added",) if self.tells_its_light and not own_light else ()
         sets = {variant: self.dressed(variant) for variant in self.variants}
         scene = Scene(
             name=name,
@@ -80,7 +80,7 @@ def lights_that_stay(objects: Sequence[SceneObject], variants: Mapping[str, Sequ
     for variant, dressed in variants.items():
         others = [o.name for o, now in zip(objects, dressed, strict=True) if now.emission != o.emission]
         if others:
-            yield f"variant {variant}: {', '.join(others[:2])} would emit other light, which stays as baked"
+            yield f"variant {variant}: {', '.join(others[:2])} would change emission, which is ignored"
 
 
 class UniqueNames:

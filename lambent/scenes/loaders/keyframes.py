@@ -91,7 +91,7 @@ def read_keyframes(path: Path, given: Known) -> Keyframes:
             raise invalid(error, path, {*_Key.model_fields, *_Document.model_fields}) from error
     for first, second in pairwise(document.keys):
         if second.at <= first.at:
-            raise UserError("times do not grow", file=path, field="keys.at", got=f"{first.at:g}, {second.at:g}")
+            raise UserError("times do not increase", file=path, field="keys.at", got=f"{first.at:g}, {second.at:g}")
     files = SceneFiles(path)
 
     def read(name: str, field: str) -> Material:
@@ -104,7 +104,7 @@ def read_keyframes(path: Path, given: Known) -> Keyframes:
 def _moment(key: _Key, number: int, given: Known, read: Callable[[str, str], Material], path: Path) -> _Moment:
     where = f"keys.{number}"
     if sum((key.as_baked, key.variant is not None)) > 1:
-        raise UserError("is as baked, and a variant", file=path, field=where, got=key.variant)
+        raise UserError("sets both as_baked and a variant", file=path, field=where, got=key.variant)
     looks, light = dict[str, Look](), dict[str, GroupMix]()
     if key.variant is not None:
         variant = variant_named(given.variants, key.variant, f"{path.name}: {where}.variant")
@@ -120,8 +120,8 @@ def _moment(key: _Key, number: int, given: Known, read: Callable[[str, str], Mat
 
 def _known_view(name: str, given: Known, path: Path, where: str) -> str:
     if not given.mixes:
-        hint = "save one in the window, with its mix"
-        raise UserError("no view was saved with a mix of the light", file=path, field=f"{where}.view", hint=hint)
+        hint = "save a view in the window with its light mix"
+        raise UserError("no saved view has a light mix", file=path, field=f"{where}.view", hint=hint)
     return known("saved view", name, given.mixes, file=path, field=f"{where}.view")
 
 

@@ -121,7 +121,7 @@ def _format_of(path: Path) -> ModuleType:
     module = next((m for m in formats() if path.suffix.lower() in m.ENDINGS), None)
     if module is None:
         expected = ", ".join([*(ending for m in formats() for ending in m.ENDINGS), TOML])
-        raise UserError("unknown kind of scene", file=path, got=path.suffix or "no extension", expected=expected)
+        raise UserError("unknown scene format", file=path, got=path.suffix or "no file extension", expected=expected)
     return module
 
 

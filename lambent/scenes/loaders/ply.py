@@ -78,7 +78,7 @@ def read(path: Path) -> MeshArrays:
         elif element.name == "face" and element.lists == 1:
             corners, sizes = rows.faces(element)
         elif element.name in ("vertex", "face"):
-            raise UserError("holds lists that are not read", file=path, field=f"element {element.name}")
+            raise UserError("has unsupported lists", file=path, field=f"element {element.name}")
         else:
             break  # what follows the faces cannot be seen
     positions = _columns(vertex, ("x", "y", "z"))
@@ -97,7 +97,7 @@ def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
     """Byte order (a value of `ORDERS`), elements, and where the data begin."""
     end = data.find(b"end_header", 0, HEADER_MAX)
     if not data.startswith(b"ply") or end < 0:
-        raise UserError("not a PLY file", file=path, got=repr(data[:4]), expected="it to begin with ply")
+        raise UserError("not a PLY file", file=path, got=repr(data[:4]), expected="ply at its start")
     order, elements = "", []
     for number, line in enumerate(data[:end].decode("latin-1").splitlines(), 1):
         words = line.split()
@@ -153,7 +153,7 @@ class _Rows:
             self._check(end + head.itemsize)
             (size,) = size_of.unpack_from(self._data, end + size_at)
             if not 0 <= size < np.inf:
-                raise UserError("face that cannot be read", file=self._path, got=size)
+                raise UserError("face cannot be read", file=self._path, got=size)
             FACE_CORNERS.check(int(size), file=self._path)
             sizes.append(int(size))
             end += head.itemsize + sizes[-1] * item.itemsize
@@ -187,7 +187,7 @@ def _doubles(text: bytes, path: Path) -> memoryview:
     try:
         values = np.fromstring(text, sep=" ")
     except ValueError as error:
-        raise UserError("holds something that is no number", file=path) from error
+        raise UserError("has a word that is not a number", file=path) from error
     return values.view(np.uint8).data
 
 

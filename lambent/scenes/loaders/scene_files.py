@@ -54,7 +54,7 @@ class SceneFiles:
         spelt = path if _is_file(path) else _in_other_case(path, self.root)
         if spelt is None or spelt == path:
             return path
-        note = f"{name} is {spelt.relative_to(self.root).as_posix()} on this disk"
+        note = f"{name} is spelt {spelt.relative_to(self.root).as_posix()} on disk"
         if note not in self.notes:
             self.notes.append(note)
         return spelt
@@ -85,7 +85,7 @@ class SceneFiles:
         """The file that `name` means in `file`, as a source; None, and a note, where it is not there."""
         path, moved = self.find(name, file, field)
         if not path.is_file():
-            note(f"{what} {name} is not there{otherwise}")
+            note(f"{what} {name} was not found{otherwise}")
             return None
         if moved:
             note(f"{what} {name} was found beside {file.name}")

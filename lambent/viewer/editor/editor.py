@@ -1,4 +1,4 @@
-"""The material editor without its window: one material, a measurement to judge it by, plots of both.
+"""The material editor without its window: one material, a measurement to compare it with, plots of both.
 
 `lambent edit` shows it beside a preview, the walk mode beside the room. Both draw it with the same panels, and both
 change the material through the same `MaterialEdits`, so that undo is shared.
@@ -26,7 +26,7 @@ METHODS: tuple[Method, ...] = get_args(Method)
 
 
 class Fit:
-    """One fit at a time, with so many `lobes` per side; `work` while it runs, `warnings` of the last one."""
+    """A fit with `lobes` per side: `work` while it runs, `warnings` of the last one. One fit runs at a time."""
 
     def __init__(self, subject: Subject, screen: Screen) -> None:
         self._subject, self._screen = subject, screen
@@ -35,7 +35,7 @@ class Fit:
         self.distribution: DistributionChoice = DISTRIBUTION
         self.work: Work | None = None
         self.warnings: tuple[str, ...] = ()
-        self._keep = False  # the result of a fit that was stopped
+        self._keep = False  # whether a stopped fit's result is kept
 
     def start(self, measurement: Measurement | None, metric: str) -> None:
         """Fit under the restrictions; the result comes as one step of undo."""
@@ -45,7 +45,7 @@ class Fit:
         most = 4 if automatic else int(self.lobes)
         fix, ranges, unknown = self._subject.restrictions.for_fit(material, most)
         if unknown:
-            say(f"not part of this fit: {', '.join(unknown)}")
+            say(f"left out of the fit: {', '.join(unknown)}")
         self._keep, method, distribution = False, self.method, self.distribution
 
         def run(progress: Progress) -> Any:
@@ -60,13 +60,13 @@ class Fit:
         self.work = Work(run, partial(self._take, metric), lambda error: say(f"not fitted: {error}"))
 
     def stop(self, *, keep: bool) -> None:
-        """End a fit that runs; `keep`: take the best it has."""
+        """Stop a running fit; `keep`: take its best material."""
         if self.work is not None:
             self._keep = keep
             self.work.cancel()
 
     def poll(self) -> None:
-        """Take the result of a fit that has ended."""
+        """Take the result of a finished fit."""
         self.work = pending(self.work)
 
     def _take(self, metric: str, result: Any) -> None:
@@ -81,7 +81,7 @@ class Fit:
 
 
 class Editor:
-    """See the module: the material `name` of `edits`."""
+    """Editor of the material `name` of `edits`; see the module."""
 
     def __init__(self, edits: MaterialEdits, name: str, screen: Screen) -> None:
         self.subject = Subject(edits, name)
@@ -91,12 +91,12 @@ class Editor:
         self.measurement: Measurement | None = None
         self.metric = "cuberoot"
         self.linked_roughness = True
-        self.leave: Callable[[], None] | None = None  # closes the editor, where it is a guest in another mode
+        self.leave: Callable[[], None] | None = None  # closes the editor within another mode
         self._queue: list[Callable[[], None]] = []
         self._closed = False
 
     def show_measurement(self, measurement: Measurement | None) -> None:
-        """Judge by this measurement from now on."""
+        """Compare with this measurement from now on."""
         self.measurement, self.fit.warnings = measurement, ()
         self.shown = Shown(measurement)
         distances = [abs(incident.theta_deg - 45) for incident in self.shown.incidents]
@@ -107,12 +107,12 @@ class Editor:
         self.files.save(self.measurement)
 
     def queue(self, act: Callable[[], None]) -> None:
-        """Do something once the frame is drawn: a panel that shows a list does not change it meanwhile."""
+        """Run an action after the frame: a panel must not change a list while it draws it."""
         self._queue.append(act)
 
     @property
     def busy(self) -> bool:
-        """Whether something goes on that no event announces."""
+        """Whether background work runs whose end no event announces."""
         return self.subject.edits.in_stroke or bool(self._queue or self._works)
 
     @property
@@ -132,7 +132,7 @@ class Editor:
             self.shown.update(self.subject, self.metric, self.plots)
 
     def close(self) -> None:
-        """Stop work in the background; nothing is shown any more."""
+        """Stop background work."""
         self._closed = True
         for work in self._works:
             work.cancel()

@@ -33,9 +33,9 @@ def kind_of(path: Path) -> Kind:
 def with_account(
     material: Material, origin: Material, measurement: Measurement | None, errors: Mapping[str, float]
 ) -> Material:
-    """The material as it is saved: provenance of its `origin`, as fitted or loaded, and a note where numbers changed.
+    """The material to save, with the provenance of its `origin` and a note where numbers changed.
 
-    `errors` are those of the material against the measurement, E by metric; empty without one.
+    `errors` are the errors E against the measurement, by metric; empty without a measurement.
     """
     before = origin.provenance
     if same_numbers(material, origin):
@@ -45,23 +45,23 @@ def with_account(
     account = before or Provenance()
     if measurement is not None:
         info = measurement.samples.info
-        note += f"; the errors are of these numbers against {info.file}"
+        note += f"; the errors compare these numbers with {info.file}"
         source, source_format = account.source or info.file, account.source_format or info.format
         account = account.model_copy(update={"errors": dict(errors), "source": source, "source_format": source_format})
     elif account.errors:
-        note += "; the errors are of the numbers before"
+        note += "; the errors are from before the edit"
     notes = (*(n for n in account.notes if not n.startswith(BY_HAND)), note)
     return material.model_copy(update={"provenance": account.model_copy(update={"notes": notes})})
 
 
 def document_file(folder: Path, text: str, *, bare: bool = False) -> Path:
-    """The .json file of a typed name, in `folder` unless it says otherwise, which a `bare` name may not.
+    """The .json file of a typed name or path, in `folder` if relative; a `bare` name may have no folder.
 
-    Raises a `UserError` where it is no such name, or nothing can be written there.
+    Raises a `UserError` where the name cannot be used, or nothing can be written there.
     """
     name = text.strip()
     if not name.endswith(".json") or Path(name).name == ".json" or (bare and Path(name).name != name):
-        raise UserError("not a file name", got=text, expected="a name like walnut.json")
+        raise UserError("is not a file name", got=text, expected="a file name, as in walnut.json")
     return file_in(folder, name)
 
 
@@ -69,14 +69,14 @@ def typed_path(text: str) -> Path:
     """A path as typed or dropped: without blanks and quotes around it, ~ expanded; `UserError` where there is none."""
     plain = text.strip().removeprefix("file://").strip("'\" ")
     if not plain:
-        raise UserError("no file named", hint="type its path")
+        raise UserError("no file name given", hint="type a path")
     return Path(plain).expanduser()
 
 
 class Files:
-    """Opens and saves files, and says so, or why not, on the screen; a failure changes nothing.
+    """Opens and saves files, and reports success or failure on the screen; a failure changes nothing.
 
-    `show` gets a measurement once it is read. The document is saved as `name`.
+    `show` is called with a measurement once it is read. The document is saved as `name`.
     """
 
     def __init__(self, subject: Subject, screen: Screen, show: Callable[[Measurement], None]) -> None:
@@ -88,7 +88,7 @@ class Files:
         self._may_replace: set[Path] = set()
 
     def open(self, text: str) -> None:
-        """Load what the user named: a measurement, a material document, or an environment."""
+        """Load a file that the user named: a measurement, a material document, or an environment."""
         try:
             path = typed_path(text)
             kind = kind_of(path)
@@ -96,11 +96,11 @@ class Files:
                 self._subject.adopt(load_material(path))
                 self._may_replace.clear()
                 self.came_from(path)
-                self._screen.say(f"material of {path.name}; undo brings back the one before")
+                self._screen.say(f"loaded the material of {path.name}; undo restores the previous one")
             elif kind == "measurement":
                 self._read(path)
             elif self.open_environment is None:
-                raise UserError("environments are for `lambent edit`", file=path)
+                raise UserError("an environment can be dropped only in `lambent edit`", file=path)
             else:
                 self.open_environment(path)
         except UserError as error:
@@ -118,20 +118,20 @@ class Files:
 
     def _read(self, path: Path) -> None:
         if self.loading is not None:
-            raise UserError("another file is being read", file=path)
+            raise UserError("still reading another file; try again when it is done", file=path)
         self.loading = Work(lambda progress: read_measurement(path, progress), self._show, self._refuse)
 
     def poll(self) -> None:
-        """Take a measurement that has been read."""
+        """Take a measurement that was read in the background."""
         self.loading = pending(self.loading)
 
     def came_from(self, path: Path) -> None:
-        """Save to `path` from now on, without a second try: the material came from there."""
+        """Save to `path` from now on without asking twice: the material came from there."""
         self.name = str(path)
         self._may_replace.add(path.resolve())
 
     def save(self, measurement: Measurement | None) -> None:
-        """Write the document, with an account of its numbers; an unrelated file is replaced at the second try."""
+        """Write the document with its provenance; replace an unrelated file only at the second try."""
         try:
             path = document_file(self._screen.folder, self.name)
             if path.exists() and path.resolve() not in self._may_replace:

@@ -1,4 +1,4 @@
-"""The polar matrix: disks as large as the room allows, measured and model beside each other."""
+"""The polar matrix: disks as large as space allows, measurement and model side by side."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from lambent.viewer.editor.readings import Incident
 
-HEAD_PX = 17.0  # a line of text above a row or a block
+HEAD_PX = 17.0  # height of the title above a row or a block
 LARGEST_PX = 170.0
 
 
@@ -22,8 +22,7 @@ class Matrix:
 
 
 def matrix(incidents: Sequence[Incident], kinds: int, sides: int, width: float, height: float) -> Matrix:
-    """With one phi_i (isotropic tables): lines of theta_i, the kinds below each other. Else a block of theta_i x phi_i
-    per kind, beside or below each other."""
+    """Lay out the disks: rows of theta_i with one phi_i (isotropic tables), else theta_i x phi_i blocks per kind."""
     if len({i.phi_deg for i in incidents}) == 1:
         options = [_lines(incidents, kinds, sides, width, height, lines) for lines in range(1, len(incidents) + 1)]
     else:

@@ -1,4 +1,4 @@
-"""A measured file, prepared so that a material can be judged against it while a slider moves."""
+"""A measured file, prepared for comparison with a material while a slider moves."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from lambent.materials.measured.protocol import MeasuredSamples
 from lambent.viewer.editor.readings import FINE_PX, Disks, incidents_of, single
 
 FEW = 12_000  # tuples that stand for all while a slider moves
-CHUNK = 100_000  # tuples between two looks at whether to go on
+CHUNK = 100_000  # tuples between two checks for cancellation
 NEAR = Lobe(mx=0.3, my=0.3)
 FAR = Lobe(side="transmission", mx=0.3, my=0.3, r0=(0.0, 0.0, 0.0), k=(0.1, 0.1, 0.1))
 
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """A measured table. Of `samples`, `few` have weights that make every metric come out within a percent of all."""
+    """A measured table. The weighted subset `few` of `samples` reproduces every metric to about 1 %."""
 
     path: Path
     samples: MeasuredSamples
@@ -43,7 +43,7 @@ class Measurement:
 
     @property
     def is_small(self) -> bool:
-        """Whether `few` are all."""
+        """Whether `few` has all samples."""
         return len(self.few) == len(self.samples)
 
     @cached_property
@@ -51,7 +51,7 @@ class Measurement:
         return single(self.few.wi), single(self.few.wo)
 
     def error(self, material: Material, metric: str) -> float:
-        """E of the material over the few tuples: a few milliseconds."""
+        """E of the material over the subset; takes a few milliseconds."""
         wi, wo = self._few_directions
         f = np.stack(evaluate(wi, wo, material), axis=-1)
         return METRICS[metric].error(self.few, _channels(f, self.few))
@@ -60,7 +60,7 @@ class Measurement:
         """Metric name -> E over all tuples; `progress` may raise `Cancelled`."""
         parts = []
         for first in range(0, len(self.samples), CHUNK):
-            progress(first, len(self.samples), "error of all tuples")
+            progress(first, len(self.samples), "error over all tuples")
             here = slice(first, first + CHUNK)
             wi, wo = components(self.samples.wi[here]), components(self.samples.wo[here])
             parts.append(np.stack(evaluate(wi, wo, material), axis=-1))
@@ -76,20 +76,20 @@ def read_measurement(path: Path, progress: Progress = silent) -> Measurement:
     samples = load(path).samples()
     progress(1, 5, "thinning")
     few = thinned(samples, FEW)
-    progress(2, 5, "gathering incident directions")
+    progress(2, 5, "sorting by incident direction")
     gathered = tuple(incidences(samples))
     progress(3, 5, "drawing disks")
     laid_out = Disks(incidents_of(gathered), samples.info.transmits, FINE_PX)
     disks, mirrored = laid_out.measured(gathered), laid_out.mirrored(gathered)
-    progress(4, 5, "the best Lambertian surface")
+    progress(4, 5, "fitting a Lambertian surface")
     return Measurement(path, samples, few, gathered, disks, mirrored, lambertian_errors(few))
 
 
 def thinned(samples: MeasuredSamples, count: int) -> MeasuredSamples:
-    """About `count` tuples whose weights make any metric's sum come out without bias; always the same ones.
+    """A deterministic subset of about `count` tuples, weighted so that every metric's sum is unbiased.
 
-    Systematic sampling in storage order, a third of the density each by weight, by weight times the cube root of p, and
-    by weight times p, so that both narrow peaks and what is dark are met.
+    Systematic sampling in storage order, with a third of the density each by weight, by weight times the cube root of
+    p, and by weight times p, so that both narrow peaks and dark parts are sampled.
     """
     if len(samples) <= count:
         return samples
@@ -109,7 +109,7 @@ def _channels(f: Floats, samples: MeasuredSamples) -> Floats:
 
 
 def start_material(measurement: Measurement) -> Material:
-    """A diffuse term read off the measurement, and one plain lobe per side, to be dragged or fitted from."""
+    """Start material: a diffuse term read off the measurement, and one plain lobe per side."""
     samples = measurement.few
     far = samples.transmitted
     lobes = tuple(lobe for lobe, here in ((NEAR, ~far), (FAR, far)) if here.any())

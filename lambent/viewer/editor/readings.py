@@ -1,4 +1,4 @@
-"""A material in numbers, as the editor plots it: disks, curves in the plane of incidence, albedo.
+"""Values of a material that the editor plots: disks, curves in the plane of incidence, albedo.
 
 Everything is evaluated by the material's own BSDF. While a slider moves, disks have fewer pixels and the albedo fewer
 samples, so that a frame stays short.
@@ -23,10 +23,10 @@ from lambent.materials.fitting.symmetry import mirrored
 from lambent.materials.lobes import Vector
 from lambent.viewer.mode import Image
 
-FINE_PX = 72  # of a disk at rest
+FINE_PX = 72  # diameter of a disk at rest
 WHITE_PERCENTILE = 99.8
-UNKNOWN = (56, 68, 90)  # of directions that were not measured
-HATCH_PX = 5  # between lines over what is known by symmetry alone
+UNKNOWN = (56, 68, 90)  # colour of directions that were not measured
+HATCH_PX = 5  # distance of hatching lines over values known by symmetry only
 THETA_O_DEG = np.linspace(-89.5, 89.5, 359)
 ALBEDO_THETA_DEG = np.linspace(0.0, 85.0, 18)
 WITHOUT_MEASUREMENT_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
@@ -34,7 +34,7 @@ WITHOUT_MEASUREMENT_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
 
 @dataclass(frozen=True)
 class Incident:
-    """Incident direction: where the light comes from."""
+    """An incident direction."""
 
     theta_deg: float
     phi_deg: float
@@ -44,7 +44,7 @@ class Incident:
 
 
 def incidents_of(gathered: Sequence[Incidence]) -> tuple[Incident, ...]:
-    """The measured incident directions; without a measurement a few of theta_i alone."""
+    """The measured incident directions; without a measurement, a few theta_i at phi_i = 0."""
     if not gathered:
         return tuple(Incident(theta, 0.0) for theta in WITHOUT_MEASUREMENT_DEG)
     return tuple(Incident(entry.theta_deg, entry.phi_deg) for entry in gathered)
@@ -83,7 +83,7 @@ class Disks:
         return self._of(gathered)
 
     def mirrored(self, gathered: Sequence[Incidence]) -> Floats:
-        """(K, inside, 3) brightness where symmetry tells it from what was measured elsewhere, else NaN."""
+        """(K, inside, 3) brightness known by symmetry from other measured directions, else NaN."""
         return self._of([mirrored(entry, gathered) for entry in gathered])
 
     def _of(self, gathered: Sequence[Incidence | None]) -> Floats:
@@ -97,7 +97,7 @@ class Disks:
     def picture(self, values: Floats, white: float, guessed: Floats | None = None) -> Image:
         """RGBA picture of all disks, black to `white`; off the disks it is transparent.
 
-        Where `values` are NaN, `guessed` stands in for them, hatched.
+        Where `values` are NaN, `guessed` is shown, hatched.
         """
         unknown = np.isnan(values[..., :1])
         if guessed is not None:
@@ -121,7 +121,7 @@ class Disks:
 
 
 def white_of(values: Floats) -> float:
-    """The brightness to show as white."""
+    """The brightness that is shown as white."""
     known = values[np.isfinite(values)]
     return max(float(np.percentile(known, WHITE_PERCENTILE)), 1e-6) if len(known) else 1.0
 

@@ -1,4 +1,4 @@
-"""Parameters that the user fixed or narrowed for a fit, by the fit's names; they follow lobes that come and go."""
+"""Parameters that the user fixed or limited for a fit, by the fit's names; they follow added and removed lobes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def lobe_names(material: Material) -> list[dict[str, str]]:
 
 @dataclass
 class Restrictions:
-    """Names that are fixed at the material's values, and intervals of others."""
+    """Fixed parameter names, and intervals of other parameters."""
 
     fixed: set[str] = field(default_factory=set)
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
@@ -35,11 +35,11 @@ class Restrictions:
 
     @property
     def kept(self) -> Kept:
-        """All of it, frozen."""
+        """A frozen copy."""
         return frozenset(self.fixed), tuple(sorted(self.ranges.items()))
 
     def restore(self, kept: Kept) -> None:
-        """Become what was kept."""
+        """Restore a frozen copy."""
         self.fixed, self.ranges = set(kept[0]), dict(kept[1])
 
     def fix(self, name: str, fixed: bool) -> None:
@@ -63,7 +63,7 @@ class Restrictions:
     def for_fit(
         self, material: Material, lobes: int
     ) -> tuple[dict[str, Value], dict[str, tuple[float, float]], list[str]]:
-        """`fix` and `ranges` of a fit with `lobes` a side, and the names that are no parameters of that fit."""
+        """`fix` and `ranges` for a fit with `lobes` per side, and the names that this fit does not have."""
         from lambent.materials.fitting.parameters import known_parameters
 
         values = dict(_values(material))
@@ -74,7 +74,7 @@ class Restrictions:
         return fix, ranges, unknown
 
     def follow(self, before: Material, after: Material, kept: list[int]) -> None:
-        """Rename after lobes came or went; `kept[i]` is the index that lobe i of `after` had in `before`, or -1."""
+        """Rename after lobes were added or removed; `kept[i]` is the index of lobe i of `after` in `before`, or -1."""
         old, new = lobe_names(before), lobe_names(after)
         renamed = {old[was][base]: new[now][base] for now, was in enumerate(kept) if was >= 0 for base in ("k", *SHAPE)}
         renamed |= {name: name for name in DIFFUSE}
@@ -93,5 +93,5 @@ def _values(material: Material) -> Iterator[tuple[str, Value]]:
 
 
 def _plain(value: Value) -> Value:
-    """One number for three that are equal."""
+    """One number where three are equal."""
     return value[0] if isinstance(value, tuple) and value[0] == value[1] == value[2] else value

@@ -1,4 +1,4 @@
-"""The plots of the editor as they are at this moment, brought up to date piece by piece where something has changed."""
+"""The present plots of the editor, updated only where an input has changed."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from lambent.viewer.editor.subject import Subject
 from lambent.viewer.mode import Image
 from lambent.viewer.work import Work, pending
 
-COARSE_PX = 40  # of a disk while a slider moves
-MOVING_VALUES = 30_000  # pixels of disks while a slider moves; with many disks they are smaller still
+COARSE_PX = 40  # diameter of a disk while a slider moves
+MOVING_VALUES = 30_000  # total pixels of all disks while a slider moves
 LEAST_PX = 12
 REST_S = 0.3
 ALBEDO_SAMPLES, MOVING_ALBEDO_SAMPLES = 1024, 128
@@ -38,9 +38,9 @@ class Plots:
     chosen: int = 0
     channel: Channel = "mean"
     scale: Scale = "cube root"
-    brighter: float = 0.0  # stops by which p is multiplied in the disks
+    brighter: float = 0.0  # stops on p in the disks
     visible: bool = True
-    fit_axes: bool = True  # the axes have yet to take the extent of the curves
+    fit_axes: bool = True  # the axes are fitted to the curves in the next frame
 
     def choose(self, incident: int) -> None:
         """Plot the plane of another incident direction."""
@@ -48,13 +48,13 @@ class Plots:
 
 
 class Shown:
-    """Disks, curves, albedo and errors of the material A and, where there is one, of B, beside a measurement."""
+    """Disks, curves, albedo and errors of the material A, of B if there is one, and of a measurement."""
 
     def __init__(self, measurement: Measurement | None) -> None:
         self._measurement = measurement
         self.incidents = incidents_of(measurement.gathered if measurement else ())
         self.error: float | None = None  # of A under the chosen metric
-        self.exact = False  # whether it is over all tuples
+        self.exact = False  # whether the error is over all tuples
         self.exact_errors: dict[str, float] = {}
         self.compared_error: float | None = None  # of B
         self.images: dict[str, Image] = {}  # "measured", "A" and "B": all disks in one picture
@@ -62,7 +62,7 @@ class Shown:
         self.transmits = False
         self.curves: Curves = {}  # p (N, C) over theta_o (N,) in degrees, in the chosen plane of incidence
         self.albedos: Curves = {}  # (N, C) over theta_i
-        self.moving_seconds = 0.0  # of the last update while a slider moved
+        self.moving_seconds = 0.0  # time of the last update while a slider moved
         self.exact_work: Work | None = None
         self._white = 1.0
         self._done: dict[str, Any] = {}  # part -> the inputs it was last made from
@@ -89,14 +89,14 @@ class Shown:
             self.moving_seconds = time.perf_counter() - began
 
     def _moving(self, material: Material, in_stroke: bool) -> bool:
-        """Whether a slider moves: one that is held still counts as at rest after a moment."""
+        """Whether a slider moves; a slider held still counts as at rest after a moment."""
         now_s = time.monotonic()
         if self._new("moment", material):
             self._changed_s = now_s
         return in_stroke and now_s - self._changed_s < REST_S
 
     def _new(self, part: str, *made_of: Any) -> bool:
-        """Whether `part` was last made of something else; it counts as made of this from now on."""
+        """Whether the inputs of `part` have changed; records the present inputs."""
         if self._done.get(part) == made_of:
             return False
         self._done[part] = made_of

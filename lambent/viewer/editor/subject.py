@@ -1,4 +1,4 @@
-"""The material being edited: steps that change it, its origins, and the material B that it is compared with."""
+"""The edited material: its steps of undo, its origins, and the material B to compare with."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from lambent.materials.document import Kind, Lobe, Material
 from lambent.viewer.editor.restrictions import Kept, Restrictions
 from lambent.viewer.edits import MaterialEdits
 
-B = Literal["nothing", "as loaded", "as saved", "before the last step", "a document"]
+B = Literal["nothing", "as loaded", "as saved", "before the last edit", "a document"]
 REFERENCES: tuple[B, ...] = get_args(B)
 
 
 @dataclass
 class Subject:
-    """A material of `edits`, under its `name` there; undo is that of the whole window."""
+    """The material `name` of `edits`; undo is shared by the whole window."""
 
     edits: MaterialEdits
     name: str
@@ -26,7 +26,7 @@ class Subject:
     def __post_init__(self) -> None:
         self.loaded = self.material
         self._restrictions = Restrictions(keep=partial(self.edits.keep_beside, self.name))
-        self._origins = [self.loaded]  # as they were loaded or fitted, with their provenance
+        self._origins = [self.loaded]  # materials as loaded or fitted, with their provenance
 
     @property
     def material(self) -> Material:
@@ -34,7 +34,7 @@ class Subject:
 
     @property
     def restrictions(self) -> Restrictions:
-        """Of the material's parameters in a fit; a change is a step of undo, like one of a number."""
+        """Restrictions of the material's parameters in a fit; every change is a step of undo."""
         kept = cast(Kept | None, self.edits.beside(self.name))
         self._restrictions.restore(kept or (frozenset(), ()))
         return self._restrictions
@@ -45,7 +45,7 @@ class Subject:
         found = {
             "as loaded": self.loaded,
             "as saved": self.edits.saved.get(self.name),
-            "before the last step": self.edits.previous(self.name),
+            "before the last edit": self.edits.previous(self.name),
             "a document": self.document,
         }
         return found.get(self.reference)
@@ -58,22 +58,22 @@ class Subject:
 
     @property
     def unsaved(self) -> bool:
-        """Whether there is something that saving would keep."""
+        """Whether the material has unsaved changes."""
         kept, now = self.edits.saved.get(self.name, self.loaded), self.material
         return now.name != kept.name or not same_numbers(now, kept)
 
     def change(self, material: Material) -> None:
-        """One more moment of the stroke that is under way."""
+        """Change the material within the present stroke."""
         self.edits.change(self.name, material)
 
     def step(self, material: Material) -> None:
-        """A whole step of undo."""
+        """Change the material as one step of undo."""
         self.edits.end_stroke()
         self.change(material)
         self.edits.end_stroke()
 
     def adopt(self, material: Material) -> None:
-        """Take a material that comes with a provenance of its own, as a step."""
+        """Take a material with its own provenance, as one step of undo."""
         self._origins.append(material)
         self.step(material)
 
@@ -93,7 +93,7 @@ class Subject:
         self._with_lobes(tuple(lobes[i] for i in kept), kept)
 
     def turn_lobe(self, index: int, kind: Kind) -> None:
-        """Make a lobe one of another kind; its restrictions are dropped."""
+        """Change the kind of a lobe, and drop its restrictions."""
         lobes = list(self.material.lobes)
         lobes[index] = lobes[index].of_kind(kind)
         self._with_lobes(tuple(lobes), [i if i != index else -1 for i in range(len(lobes))])
@@ -108,5 +108,5 @@ class Subject:
 
 
 def same_numbers(a: Material, b: Material) -> bool:
-    """Whether two materials scatter alike; names and provenance aside."""
+    """Whether two materials scatter alike, whatever their names and provenance."""
     return a.model_copy(update={"name": b.name, "provenance": b.provenance}) == b

@@ -1,4 +1,4 @@
-"""The question what is to become of unsaved work, before the window closes."""
+"""The question about unsaved work before the window closes."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from lambent.viewer.panels.widgets import AMBER, buttons, wrapped
 
 TITLE = "Close the window?"
 WIDE_PX = 340.0
-HIGH = 0.4  # its top, of the window's height
+HIGH = 0.4  # top of the question, as a share of the window's height
 FLAGS = imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
 
 
 def draw(mode: Mode) -> None:
-    """The question, while it is asked; the answers are save, discard, and stay."""
+    """Draw the question while it is asked; the answers are save, discard, and stay."""
     screen = mode.screen
     if not screen.asks_to_close:
         return
     if not imgui.is_popup_open(TITLE):
         imgui.open_popup(TITLE)
     size = imgui.get_io().display_size
-    # Held by its top: messages below the buttons come and go, and must not move them from under the pointer.
+    # Fixed at its top: messages below the buttons must not move them from under the pointer.
     imgui.set_next_window_pos((size.x / 2, HIGH * size.y), imgui.Cond_.always, (0.5, 0.0))
     imgui.set_next_window_size((min(WIDE_PX, size.x), 0))
     if not imgui.begin_popup_modal(TITLE, None, FLAGS)[0]:
@@ -46,11 +46,11 @@ def draw(mode: Mode) -> None:
     imgui.spacing()
     gap = imgui.get_style().item_spacing.x
     buttons([
-        ("save##closing", True, save, "saves all of it, and closes (Enter)"),
-        ("discard##closing", True, discard, "closes, and keeps nothing of it"),
-        ("stay##closing", True, stay, "goes on as if nothing had been asked (Esc)"),
+        ("save##closing", True, save, "saves everything and closes (Enter)"),
+        ("discard##closing", True, discard, "closes without saving"),
+        ("stay##closing", True, stay, "returns to the window (Esc)"),
     ], (imgui.get_content_region_avail().x - 2 * gap) / 3)  # fmt: skip
-    wrapped([message.text for message in screen.messages], AMBER)  # why something could not be saved
+    wrapped([message.text for message in screen.messages], AMBER)  # reasons for failed saves
     if screen.asks_to_close and imgui.is_key_pressed(imgui.Key.escape, False):
         stay()
     elif screen.asks_to_close and imgui.is_key_pressed(imgui.Key.enter, False):

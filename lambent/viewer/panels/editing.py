@@ -1,4 +1,4 @@
-"""The panels of the editor: error, history and files; every number and the comparison with B; the fit."""
+"""The panels of the editor: error, undo and files; parameters and the comparison with B; the fit."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ RANGE_PX = 26
 
 
 def draw_head(editor: Editor) -> None:
-    """Error, history and files, above the panels."""
+    """Draw error, undo and files, above the panels."""
     _names(editor)
     _error(editor)
     _history(editor)
@@ -44,7 +44,7 @@ def draw_head(editor: Editor) -> None:
 
 
 def draw(editor: Editor) -> None:
-    """Every number of the material, adding lobes, and the choice of B."""
+    """Draw every parameter of the material, buttons for lobes, and the choice of B."""
     subject = editor.subject
     material = subject.material
     edited, editor.linked_roughness = _numbers(editor, material)
@@ -60,10 +60,10 @@ def _names(editor: Editor) -> None:
     loading, measurement = editor.files.loading, editor.measurement
     imgui.align_text_to_frame_padding()
     imgui.text_unformatted(f"{editor.subject.material.name}{' *' if editor.subject.unsaved else ''}")
-    explain("the material; * there is something to save")
+    explain("the material; * means unsaved changes")
     if editor.leave is not None:
         imgui.same_line(imgui.get_content_region_avail().x - 46)
-        if press("close##editor", "closes the editor and keeps the material", -1):
+        if press("close##editor", "closes the editor; the material stays as it is", -1):
             editor.queue(editor.leave)
     text = f"{len(measurement.samples)} tuples of {measurement.samples.info.file}" if measurement else "no measurement"
     coloured(f"reading: {loading.what}" if loading else text, DIM)
@@ -75,7 +75,7 @@ def _names(editor: Editor) -> None:
 def _error(editor: Editor) -> None:
     shown, measurement, subject = editor.shown, editor.measurement, editor.subject
     metric = METRICS[editor.metric]
-    meaning = f"what an error is, here and in a fit: {metric.source}, in {metric.unit}"
+    meaning = f"error metric, here and in a fit: {metric.source}, in {metric.unit}"
     editor.metric = choice("##metric", editor.metric, tuple(METRICS), meaning, 104)
     imgui.same_line()
     if measurement is None or shown.error is None:
@@ -84,9 +84,7 @@ def _error(editor: Editor) -> None:
     flat = max(measurement.lambertian[editor.metric], 1e-300)
     mark = "" if shown.exact else "~ "
     imgui.text_unformatted(f"{mark}{shown.error:.4g}   {100 * shown.error / flat:.1f} % of Lambertian")
-    explain(
-        "error of the material; its share of the error of the best Lambertian surface; ~: of a choice of the tuples"
-    )
+    explain("error of the material, also relative to the best Lambertian surface; ~: from a sample of the tuples")
     if shown.compared_error is None:
         imgui.text_disabled("B: nothing to compare with" if subject.compared is None else "B")
     else:
@@ -98,16 +96,14 @@ def _history(editor: Editor) -> None:
     subject, edits = editor.subject, editor.subject.edits
     changed, revert = subject.material != subject.loaded, partial(subject.step, subject.loaded)
     width = (imgui.get_content_region_avail().x - 2 * imgui.get_style().item_spacing.x) / 3
-    undo = ("undo", edits.can_undo, edits.undo, "takes back the last step (Ctrl+Z)")
-    redo = ("redo", edits.can_redo, edits.redo, "does the step again (Ctrl+Shift+Z)")
-    buttons(
-        [undo, redo, ("revert", changed, revert, "returns to the material as it was loaded; this can be undone")], width
-    )
+    undo = ("undo", edits.can_undo, edits.undo, "undoes the last step (Ctrl+Z)")
+    redo = ("redo", edits.can_redo, edits.redo, "redoes the step (Ctrl+Shift+Z)")
+    buttons([undo, redo, ("revert", changed, revert, "restores the material as loaded; can be undone")], width)
 
 
 def _files(editor: Editor) -> None:
     files = editor.files
-    meaning = "writes the material as a document (Ctrl+S)"
+    meaning = "saves the material as a document (Ctrl+S)"
     files.name, wanted = path_field("file", files.name, "save", "name.json", meaning)
     if wanted:
         editor.save()
@@ -116,7 +112,7 @@ def _files(editor: Editor) -> None:
         files.typed,
         "load",
         "another measurement or material...",
-        "reads another measured table or material document; a file can be dropped onto the window, too",
+        "opens another measured table or material document; you can also drop a file onto the window",
     )
     if text is not None:
         files.open(text)
@@ -128,12 +124,12 @@ def _numbers(editor: Editor, material: Material) -> tuple[Material, bool]:
     changed, name = imgui.input_text("name", material.name)
     explain("name of the material in its document")
     renamed = material.model_copy(update={"name": name}) if changed and name.strip() else material
-    changed, coupled = imgui.checkbox("kd falls off as Fresnel rises", material.kd_coupled)
-    explain("couples the diffuse reflection to the lobes: kd is then the albedo from straight above; a fit keeps this")
+    changed, coupled = imgui.checkbox("kd falls as Fresnel rises", material.kd_coupled)
+    explain("couples diffuse reflection to the lobes: kd becomes the albedo at normal incidence; a fit keeps this")
     if changed:
         renamed = renamed.model_copy(update={"kd_coupled": coupled})
     imgui.text_disabled("fix")
-    explain("a fixed number stays as it is in a fit; <> narrows the interval where a fit may seek it")
+    explain("a fit keeps fixed parameters; <> limits the range of a parameter in a fit")
 
     @contextmanager
     def line(lobe: int | None, attribute: str) -> Iterator[None]:
@@ -158,13 +154,13 @@ def _numbers(editor: Editor, material: Material) -> tuple[Material, bool]:
 
 
 def _interval(editor: Editor, parameter: str, model: Parameter) -> None:
-    """The button that narrows a parameter's interval, and the interval where there is one."""
+    """Draw the button that limits a parameter's range, and the range if there is one."""
     restrictions = editor.subject.restrictions
     interval = restrictions.ranges.get(parameter)
     if imgui.small_button(f"{'x' if interval else '<>'}##narrow {parameter}"):
         interval = None if interval else (model.low, model.high)
         restrictions.narrow(parameter, interval)
-    explain(f"lets a fit seek {parameter} anywhere" if interval else f"lets a fit seek {parameter} within an interval")
+    explain(f"lets a fit vary {parameter} freely" if interval else f"limits the range of {parameter} in a fit")
     if interval is None:
         return
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + imgui.get_frame_height() + imgui.get_style().item_spacing.x)
@@ -174,7 +170,7 @@ def _interval(editor: Editor, parameter: str, model: Parameter) -> None:
         f"sought##{parameter}", *interval, 0.002 * (model.high - model.low), model.low, model.high,
         "%.4g" if log else "%.3f", None, imgui.SliderFlags_.always_clamp,
     )  # fmt: skip
-    explain(f"the interval where a fit may seek {parameter}")
+    explain(f"range of {parameter} in a fit")
     if changed and low < high:
         restrictions.narrow(parameter, (max(low, model.low), min(high, model.high)))
 
@@ -185,16 +181,16 @@ def _heading(editor: Editor, index: int, lobe: Lobe) -> Lobe:
     imgui.align_text_to_frame_padding()
     imgui.text_unformatted(f"lobe {index + 1}")
     imgui.same_line()
-    meaning = "where the lobe points: to the mirror image, through the surface, or back to the light"
+    meaning = "direction of the lobe: mirror direction, through the surface, or back to the light"
     room = imgui.get_content_region_avail().x
     turned = choice("##kind", lobe.kind, KINDS, meaning, min(112, 0.37 * room))
     if turned != lobe.kind:
         editor.queue(lambda: subject.turn_lobe(index, turned))
     imgui.same_line()
-    meaning = "distribution of the microfacets: beckmann falls off as a bell, ggx has long tails"
+    meaning = "microfacet distribution: beckmann is bell-shaped, ggx has long tails"
     kind = choice("##distribution", lobe.distribution, OF_LOBES, meaning, min(96, 0.3 * room))
     imgui.same_line()
-    if press("remove", "takes the lobe away; this can be undone", -1):
+    if press("remove", "removes the lobe; can be undone", -1):
         editor.queue(lambda: subject.remove_lobe(index))
     return lobe if kind == lobe.distribution else lobe.model_copy(update={"distribution": kind})
 
@@ -212,38 +208,38 @@ def _new_lobes(editor: Editor) -> None:
 def _compare(editor: Editor) -> None:
     subject, files = editor.subject, editor.files
     imgui.separator_text("compare with B")
-    subject.reference = choice("B", subject.reference, REFERENCES, "the material to hold against this one")
+    subject.reference = choice("B", subject.reference, REFERENCES, "the material to compare with")
     if subject.reference == "a document":
         text = typed_field("B", files.typed, "open", "material document (.json)", "reads the document to compare with")
         if text is not None:
             files.open_compared(text)
     other = subject.compared
     if subject.reference != "nothing" and other is None:
-        imgui.text_disabled("there is none yet")
-    if other is not None and press("take B's numbers", "makes the material the same as B; this can be undone", -1):
+        imgui.text_disabled("no document chosen yet")
+    if other is not None and press("copy B", "copies B's parameters; can be undone", -1):
         named = other.model_copy(update={"name": subject.material.name})
         editor.queue(lambda: subject.step(named))
 
 
 def draw_fit(editor: Editor) -> None:
-    """Options of a fit, its progress, its warnings."""
+    """Draw options of a fit, its progress, and its warnings."""
     fit = editor.fit
-    meaning = "lobes per side; auto adds some as long as they take off a share of the error"
+    meaning = "lobes per side; auto adds lobes as long as they reduce the error enough"
     fit.lobes = choice("lobes", fit.lobes, LOBES, meaning)
-    meaning = "distribution of the microfacets; best tries both"
+    meaning = "microfacet distribution; best tries both"
     fit.distribution = choice("distribution", fit.distribution, DISTRIBUTION_CHOICES, meaning)
-    meaning = "gradient: least squares from several starts; grid: the hierarchical search of the thesis"
+    meaning = "gradient: least squares from several starts; grid: hierarchical grid search, slower"
     fit.method = choice("method", fit.method, METHODS, meaning)
     restrictions = editor.subject.restrictions
     words = [*sorted(restrictions.fixed)]
     words += [f"{name} {low:.3g}..{high:.3g}" for name, (low, high) in sorted(restrictions.ranges.items())]
     if words:
         imgui.push_text_wrap_pos()
-        imgui.text_disabled("fixed or narrowed: " + ", ".join(words))
+        imgui.text_disabled("fixed or limited: " + ", ".join(words))
         imgui.pop_text_wrap_pos()
     work = fit.work
     if work is None:
-        meaning = "fits under the metric above, with what is fixed and narrowed; the result is one step of undo"
+        meaning = "fits under the metric above, with the fixed and limited parameters; one undo step"
         start = partial(fit.start, editor.measurement, editor.metric)
         buttons([("fit from here", editor.measurement is not None, start, meaning)], -1)
     else:
@@ -252,9 +248,9 @@ def draw_fit(editor: Editor) -> None:
         goes_on = not work.cancelling
         width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
         cancel, stop = partial(fit.stop, keep=False), partial(fit.stop, keep=True)
-        keep = "ends the fit and takes the best material it has"
+        keep = "stops the fit and takes its best material"
         actions = [
-            ("cancel##fit", goes_on, cancel, "ends the fit and leaves the material"),
+            ("cancel##fit", goes_on, cancel, "stops the fit; the material stays as it was"),
             ("stop, keep the best", goes_on, stop, keep),
         ]
         buttons(actions, width)

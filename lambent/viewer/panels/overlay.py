@@ -1,4 +1,4 @@
-"""Over the picture: messages, how far it is refined, the scale of its colours."""
+"""Overlay of the picture: messages, progress of refinement, colour scales."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from lambent.viewer.screen import Rect, Screen
 
 MARGIN_PX = 12
 BAR_PX = 16
-STEPS = 96  # of a scale bar
+STEPS = 96  # colours of a scale bar
 SHADE = (0, 0, 0, 0.6)
-# Without focus: a window that takes it when it appears ends the drag of a slider.
+# Without focus: a window that takes the focus ends the drag of a slider.
 FLAGS = (
     imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.always_auto_resize
     | imgui.WindowFlags_.no_focus_on_appearing | imgui.WindowFlags_.no_nav | imgui.WindowFlags_.no_saved_settings
@@ -24,7 +24,7 @@ FLAGS = (
 
 
 def draw(screen: Screen, first: Sequence[str] = (), *, refining: bool = True) -> None:
-    """Lines at the lower left: `first`, the messages, and, while `refining`, how far the picture is."""
+    """Draw lines at the lower left: `first`, the messages, and, with `refining`, the progress of refinement."""
     lines, s, picture = [*first, *(message.text for message in screen.messages)], screen.statistics, screen.picture
     if refining and 0 < s.accumulated < s.accumulate_to:
         lines.append(f"refining: {s.accumulated} of {s.accumulate_to}")
@@ -43,25 +43,25 @@ def draw(screen: Screen, first: Sequence[str] = (), *, refining: bool = True) ->
 
 
 def over(picture: Rect, texture: imgui.ImTextureRef | None) -> None:
-    """A texture with clear pixels over the whole picture, where there is one."""
+    """Draw a texture with clear pixels over the whole picture, if there is one."""
     if texture is not None:
         imgui.get_background_draw_list().add_image(texture, picture.point(0, 0), picture.point(1, 1))
 
 
 def false_colour_bar(picture: Rect, look: Look) -> None:
-    """The scale of a picture in false colours."""
+    """Draw the scale of a picture in false colours."""
     if look.is_false_coloured:
         scale_bar_of(picture, look.shown_scale, look.quantity.unit)
 
 
 def scale_bar_of(picture: Rect, scale: Range, unit: str) -> None:
-    """A scale with its round numbers."""
+    """Draw a scale with round numbers."""
     marks = [(float(scale.share(np.array(value))), number(value)) for value in scale.marks()]
     scale_bar(picture, marks, scale.stops, unit)
 
 
 def scale_bar(picture: Rect, marks: Sequence[tuple[float, str]], stops: np.ndarray, unit: str) -> None:
-    """Colours (N, 3) from low to high and numbers at shares of the scale, at the right of the picture."""
+    """Draw colours (N, 3) from low to high, with numbers at shares of the scale, at the right of the picture."""
     line = imgui.get_text_line_height()
     wide = max(imgui.calc_text_size(text).x for text in (unit, *(text for _, text in marks)))
     x0 = picture.x + picture.width - wide - BAR_PX - 2 * MARGIN_PX
@@ -79,7 +79,7 @@ def scale_bar(picture: Rect, marks: Sequence[tuple[float, str]], stops: np.ndarr
     last = float("inf")
     for share, text in marks:
         y = y1 - share * (y1 - y0)
-        if last - y >= line:  # a number that would touch the one below is left out
+        if last - y >= line:  # skip a number that would touch the one below
             behind.add_line((x0 + BAR_PX - 4, y), (x0 + BAR_PX, y), white)
             behind.add_text((x0 + BAR_PX + 6, y - line / 2), white, text)
             last = y

@@ -1,6 +1,6 @@
-"""Every number of a material as a control, with the range, scale and unit that its model gives it.
+"""Controls for every parameter of a material, with the range, scale and unit of its model.
 
-The material panel shows them plain; the editor adds, per number, whether a fit keeps it and where a fit may seek it.
+The material panel shows plain controls; the editor adds whether a fit keeps a parameter, and its range in a fit.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from lambent.viewer.panels.widgets import check, rgb, slider
 LOBE = {parameter.name: parameter for parameter in Kurt.parameters}
 RETRO = {parameter.name: parameter for parameter in KurtRetro.parameters}
 DIFFUSE = {
-    "kd": "share of light that is reflected diffusely, in red, green and blue",
-    "kt_d": "share of light that is transmitted diffusely, in red, green and blue",
+    "kd": "diffuse reflectance in red, green and blue",
+    "kt_d": "diffuse transmittance in red, green and blue",
 }
-# Surrounds the control of a lobe's attribute, or of a diffuse coefficient (lobe None): its line, in the editor.
+# Wraps the control of a lobe's attribute, or of a diffuse coefficient (lobe None), with the editor's additions.
 Line = Callable[[int | None, str], AbstractContextManager[object]]
 
 
@@ -35,15 +35,15 @@ def edited(
 ) -> tuple[Material, bool]:
     """The material after this frame, and whether mx and my keep their ratio.
 
-    `all_terms`: the diffuse transmittance is there even where it is 0. `heading` draws what stands above a lobe's
-    numbers and may change the lobe.
+    `all_terms`: show the diffuse transmittance even where it is 0. `heading` draws the heading of a lobe and may
+    change the lobe.
     """
     changes: dict[str, object] = {}
     for name in ("kd", "kt_d") if all_terms or any(material.kt_d) else ("kd",):
         with line(None, name):
             changes[name] = rgb(name, getattr(material, name), 1.0, DIFFUSE[name])
     if material.lobes:
-        linked = check("keep the ratio of mx and my", linked, "moves both roughnesses by the same factor")
+        linked = check("keep the ratio of mx and my", linked, "scales both roughnesses by the same factor")
     changes["lobes"] = tuple(_lobe(index, lobe, linked, line, heading) for index, lobe in enumerate(material.lobes))
     return material.model_copy(update=changes), linked
 
@@ -73,7 +73,7 @@ def _parameter(parameter: Parameter, lobe: Lobe) -> Value:
 
 
 def _linked(before: Lobe, after: Lobe) -> Lobe:
-    """Both roughnesses scaled as the one that was moved."""
+    """Scale the other roughness like the changed one."""
     if (before.mx, before.my) == (after.mx, after.my):
         return after
     scale = after.mx / before.mx if after.mx != before.mx else after.my / before.my

@@ -15,9 +15,9 @@ from lambent.viewer.mode import Beside, Textures
 from lambent.viewer.panels.widgets import Colour, choice, coloured, explain
 
 BRIGHTER_PX, BRIGHTER_STOPS = 120.0, (0.0, 20.0)
-GAP_PX = 2.0  # around a disk
+GAP_PX = 2.0  # gap around a disk
 CHOSEN, RIM, TEXT, DIM = (1.0, 0.72, 0.2, 1.0), (0.33, 0.35, 0.38, 1.0), (0.8, 0.82, 0.85, 1.0), (0.6, 0.63, 0.68, 1.0)
-ALBEDO_SHARE = 0.34  # of the width below the picture
+ALBEDO_SHARE = 0.34  # share of the width below the picture
 MEASURED, MODEL, OTHER, SOURCE = (0.86, 0.88, 0.9, 1), (1.0, 0.62, 0.2, 1), (0.35, 0.72, 1.0, 1), (1.0, 0.85, 0.3, 0.5)
 KINDS = {"measured": MEASURED, "B": OTHER, "A": MODEL}  # drawn in this order
 RED, GREEN, BLUE = (1.0, 0.42, 0.38, 1), (0.42, 0.86, 0.46, 1), (0.45, 0.62, 1.0, 1)
@@ -30,7 +30,7 @@ X, Y = implot.ImAxis_.x1, implot.ImAxis_.y1
 
 
 def beside(editor: Editor | None) -> Beside | None:
-    """The plots of an editor that is open and shows them."""
+    """The plots of an open editor."""
     if editor is None or not editor.plots.visible:
         return None
     return Beside(partial(_disks, editor), partial(_curves, editor), editor.shown.images)
@@ -40,14 +40,14 @@ def _title(editor: Editor, kind: str) -> str:
     return kind if kind == "measured" else f"model {kind}" if kind == "B" or editor.subject.compared else "model"
 
 
-# disks: every incident direction, measured and model beside each other; a click chooses one
+# Disks: every incident direction, measurement and model side by side; a click chooses a direction.
 
 
 def _disks(editor: Editor, textures: Textures) -> None:
     shown, chosen = editor.shown, editor.plots.chosen
     kinds = [kind for kind in ("measured", "A", "B") if kind in shown.layout and kind in textures]
     imgui.set_next_item_width(min(BRIGHTER_PX, imgui.get_content_region_avail().x))
-    meaning = "makes all disks brighter by so many stops: what is dark beside a highlight comes out of the black"
+    meaning = "brightens all disks by this number of stops, to show dark parts beside a highlight"
     plots = editor.plots
     plots.brighter = imgui.slider_float("##brighter", plots.brighter, *BRIGHTER_STOPS, "%+.1f stops", _CLAMP)[1]
     explain(meaning)
@@ -96,16 +96,16 @@ def _words(laid: Matrix, kinds: list[str], origin: imgui.ImVec2) -> None:
         lines.add_text((origin.x + x, origin.y + y), colour, words)
 
 
-# curves: measured as dots, the model as lines
+# Curves: measurement as dots, model as lines.
 
 
 def _curves(editor: Editor, textures: Textures) -> None:
     plots, shown = editor.plots, editor.shown
-    scale = choice("##axis", plots.scale, SCALES, "scale of the axis of p", 110)
+    scale = choice("##axis", plots.scale, SCALES, "scale of the p axis", 110)
     if plots.scale != scale:
         plots.scale, plots.fit_axes = scale, True
     imgui.same_line()
-    plots.channel = choice("##channel", plots.channel, CHANNELS, "mean over the channels, all three, or one", 90)
+    plots.channel = choice("##channel", plots.channel, CHANNELS, "channels: their mean, all three, or one", 90)
     imgui.same_line()
     if not shown.curves:  # before the first frame
         return
@@ -118,7 +118,7 @@ def _curves(editor: Editor, textures: Textures) -> None:
         return
     space = imgui.get_style().item_spacing.x
     wide = (room.x - space) * (1 - ALBEDO_SHARE)
-    legend = implot.Flags_.none if plots.channel != "RGB" else implot.Flags_.no_legend  # nine colours need none
+    legend = implot.Flags_.none if plots.channel != "RGB" else implot.Flags_.no_legend  # nine curves would fill it
     if implot.begin_plot("##in plane", (wide, room.y), _PLOT | legend):
         _in_plane(editor)
         implot.end_plot()
@@ -178,7 +178,7 @@ def _axes(x: str, y: str, ticks: range) -> None:
 
 
 def _series(editor: Editor, curves: Curves, scale: str) -> None:
-    """Draw the curves of both sides: triangles and thin lines are the far one."""
+    """Draw the curves of both sides; triangles and thin lines are transmitted light."""
     for far in (False, True) if editor.shown.transmits else (False,):
         for kind, colour in KINDS.items():
             x, values = curves.get((kind, far), ((), np.zeros((0, 1))))
@@ -197,7 +197,7 @@ def _series(editor: Editor, curves: Curves, scale: str) -> None:
 
 
 def _channels(plots: Plots, values: Floats) -> list[tuple[str, Floats, Colour | None]]:
-    """(channel, values (N,), colour) of values (N, C); colour None: that of the kind."""
+    """(channel, values (N,), colour) of values (N, C); colour None: the colour of the kind."""
     if values.shape[1] == 1 or plots.channel == "mean":
         return [("", values.mean(axis=1), None)]
     if plots.channel == "RGB":

@@ -19,18 +19,18 @@ def draw(screen: Screen, editor: Editor | None, notes: Sequence[str] = ()) -> No
         ("integrator", s.integrator),
         ("frame", f"{s.frame_ms:.1f} ms"),
         ("picture", f"{width} x {height}" + (f" ({100 * s.scale:.0f} % of the window's)" if s.scale < 1 else "")),
-        ("frame wanted", f"{pace.target_ms:.0f} ms" if pace.adaptive else "-"),
+        ("target", f"{pace.target_ms:.0f} ms" if pace.adaptive else "-"),
         ("samples per pixel", str(s.samples)),
         ("at rest", f"{s.accumulated} of {s.accumulate_to}" if s.accumulated else "-"),
         ("draw calls", str(s.draw_calls)),
-        ("planar reflections", "left out in motion" if s.mirrors is None else str(s.mirrors)),
+        ("planar reflections", "skipped in motion" if s.mirrors is None else str(s.mirrors)),
     ]
     if editor is not None:
-        table.append(("disks, curves, error", f"{1e3 * editor.shown.moving_seconds:.1f} ms while a slider moves"))
+        table.append(("plots", f"{1e3 * editor.shown.moving_seconds:.1f} ms while a slider moves"))
     if maps := s.light_fields:
         table.append(("light fields", f"{maps['resident']} of {maps['maps']} maps, {maps['resident_mb']:.1f} MB"))
         share = maps["misses"] / max(maps["hits"] + maps["misses"], 1)
-        table.append(("maps asked for", f"{maps['hits']} there, {maps['misses']} not ({100 * share:.1f} %)"))
+        table.append(("map requests", f"{maps['hits']} hits, {maps['misses']} misses ({100 * share:.1f} %)"))
         table.append(("cache", str(maps["cache"])))
     table += [(f"GPU: {name}", f"{ms:.2f} ms") for name, ms in s.gpu_ms.items()]
     rows(table, "statistics")

@@ -1,6 +1,6 @@
-"""Controls that more than one panel uses. Each returns the value as it is after this frame.
+"""Controls shared by panels. Each returns the value after this frame.
 
-Every control has a `meaning`: a sentence that appears while the mouse rests on it.
+Every control has a `meaning`: its tooltip.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from lambent.core.plain import Triple, triple
 
 Colour = tuple[float, float, float, float]
 Word = TypeVar("Word", bound=str)
-THREE_PX = 150.0  # of three sliders that have room for three digits
+THREE_PX = 150.0  # least width of three sliders with three digits
 TOOLTIP_GAP_PX = 4.0
 AMBER, DIM = (1.0, 0.75, 0.35, 1.0), (0.62, 0.65, 0.70, 1.0)
 
@@ -38,14 +38,14 @@ def check(label: str, value: bool, meaning: str) -> bool:
 
 
 def press(label: str, meaning: str, width: float = 0.0, *, small: bool = False) -> bool:
-    """A button; whether it was pressed."""
+    """A button; returns whether it was pressed."""
     pressed = imgui.small_button(label) if small else imgui.button(label, (width, 0))
     explain(meaning)
     return pressed
 
 
 def listed(label: str, on: bool, meaning: str, flags: int = 0) -> bool:
-    """A line of a list that can be chosen; whether it was."""
+    """A selectable line of a list; returns whether it was chosen."""
     chosen = imgui.selectable(label, on, flags)[0]
     explain(meaning)
     return chosen
@@ -54,7 +54,7 @@ def listed(label: str, on: bool, meaning: str, flags: int = 0) -> bool:
 def slider(
     label: str, value: float, low: float, high: float, meaning: str, *, log: bool = False, unit: str = ""
 ) -> float:
-    """A slider; Ctrl+click takes a typed number, kept within the range."""
+    """A slider; Ctrl+click to type a number, which is clamped to the range."""
     flags = imgui.SliderFlags_.always_clamp
     if log:
         flags |= imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
@@ -66,7 +66,7 @@ def slider(
 def rgb(label: str, value: Triple, high: float, meaning: str) -> Triple:
     """Three sliders of linear coefficients and a swatch that opens a colour picker.
 
-    The picker works on the colour as the display shows it; a coefficient above 1 keeps its scale.
+    The picker works on the displayed colour; coefficients above 1 keep their scale.
     """
     imgui.push_id(label)
     swatch_px = imgui.get_frame_height()
@@ -94,7 +94,7 @@ def rgb(label: str, value: Triple, high: float, meaning: str) -> Triple:
 
 
 def path_field(label: str, text: str, button: str, hint: str, meaning: str) -> tuple[str, bool]:
-    """A field for a path with a button at its end; returns the text and whether it is to be opened now."""
+    """A text field with a button; returns the text and whether it was submitted."""
     room = imgui.calc_text_size(button).x + 2 * imgui.get_style().frame_padding.x + imgui.get_style().item_spacing.x
     imgui.set_next_item_width(-room)
     flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.elide_left
@@ -106,15 +106,15 @@ def path_field(label: str, text: str, button: str, hint: str, meaning: str) -> t
 
 
 def typed_field(label: str, typed: dict[str, str], button: str, hint: str, meaning: str) -> str | None:
-    """A path field whose text stays in `typed`; the text once it is to be opened."""
+    """A path field whose text is kept in `typed`; returns the text when submitted."""
     typed[label], wanted = path_field(label, typed.get(label, ""), button, hint, meaning)
     return typed[label] if wanted else None
 
 
 def explain(text: str) -> None:
-    """Help that appears while the mouse rests on the control before, but not in a drag.
+    """Tooltip of the previous control; not during a drag.
 
-    It stands left of the panel, where there is room, so that it covers none of the lines.
+    It is placed left of the panel, where there is room, so that it covers no line.
     """
     if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip) and not imgui.is_any_item_active():
         left = imgui.get_window_pos().x - TOOLTIP_GAP_PX
@@ -131,7 +131,7 @@ def coloured(text: str, colour: Colour) -> None:
 
 
 def wrapped(lines: Sequence[str], colour: Colour = AMBER) -> None:
-    """Texts, each on as many lines as it needs."""
+    """Wrapped texts."""
     imgui.push_text_wrap_pos()
     for line in lines:
         coloured(line, colour)
@@ -139,13 +139,13 @@ def wrapped(lines: Sequence[str], colour: Colour = AMBER) -> None:
 
 
 def shadowed(lines: imgui.ImDrawList, at: tuple[float, float], text: str, colour: Colour, shade: float = 0.8) -> None:
-    """Text that can be read over any picture."""
+    """Text with a shadow, readable over any picture."""
     lines.add_text((at[0] + 1, at[1] + 1), imgui.get_color_u32((0, 0, 0, shade)), text)
     lines.add_text(at, imgui.get_color_u32(colour), text)
 
 
 def buttons(actions: Sequence[tuple[str, bool, Callable[[], None], str]], width: float = 0.0) -> None:
-    """Buttons in a row: (label, whether it can be pressed, action, meaning)."""
+    """Buttons in a row: (label, enabled, action, meaning)."""
     for index, (label, possible, act, meaning) in enumerate(actions):
         if index:
             imgui.same_line()

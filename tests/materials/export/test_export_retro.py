@@ -65,7 +65,7 @@ def test_exact_documents_are_kept_beside(tmp_path: Path):
 def test_gonio_text_keeps_the_peak(tmp_path: Path):
     cost = gonio_text.write(TAPE, tmp_path / "tape.txt")
     assert any("of the light" in line for line in cost.lost)
-    assert not any(line.startswith("the peak about the light") for line in cost.lost)
+    assert not any(line.startswith("the retro-reflective peak") for line in cost.lost)
     table = load(tmp_path / "tape.txt")
     assert table.choice.way == "back_vector"
     for theta in (30.0, 42.5):
@@ -96,8 +96,8 @@ def test_coarser_formats_say_what_becomes_of_the_peak(writer, tmp_path: Path):
     cost = writer.write(table, path)
     if not cost.errors:
         cost = read_back(table, path, cost.lost)
-    (line,) = (line for line in cost.lost if line.startswith("the peak about the light"))
-    assert "at another place" in line and "times as much" in line
+    (line,) = (line for line in cost.lost if line.startswith("the retro-reflective peak"))
+    assert "misplaced" in line and "times as much" in line
 
 
 def test_documents_without_it_do_not_mention_it(tmp_path: Path):

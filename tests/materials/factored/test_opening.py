@@ -57,7 +57,7 @@ def test_files_of_no_kind_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="JSON cannot be read"):
         editable_of(tmp_path / "broken.json")
     (tmp_path / "notes.txt").write_text("some notes\n")
-    with pytest.raises(UserError, match="not a measured material"):
+    with pytest.raises(UserError, match="unknown format of measured material"):
         editable_of(tmp_path / "notes.txt")
 
 

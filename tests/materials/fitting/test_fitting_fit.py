@@ -137,7 +137,7 @@ def test_the_number_of_lobes_is_found(paint):
 def test_lobes_that_explain_nothing_are_not_added():
     flat = fit(grey(PAINT.model_copy(update={"lobes": ()}), replace(FEW, noise=0, floor=0)), lobes=4)
     assert len(flat.material.lobes) < 4
-    assert any("explains nothing more" in line for line in flat.warnings)
+    assert any("reduces the error no further" in line for line in flat.warnings)
     assert flat.errors["cuberoot"] < 1e-3
 
 

@@ -95,7 +95,7 @@ def test_what_was_done_is_said(metric: str, taken: str) -> None:
     assert provenance.samples["used"] == len(samples) and "negative" not in provenance.samples
     (line,) = (note for note in provenance.notes if "below zero" in note)
     assert line.startswith(f"{samples.below_zero} of {len(samples)} tuples") and "they are kept" in line
-    assert f"the {metric} metric takes a reading below zero {taken}" in line
+    assert f"the {metric} metric counts them {taken}" in line
     clean = fit(synthesise(YELLOW, replace(FEW, floor=0.0)).samples(), metric=metric).material.provenance
     assert clean is not None and not any("below zero" in note for note in clean.notes)
 

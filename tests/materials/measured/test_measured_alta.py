@@ -176,7 +176,7 @@ def test_bivariate_tables_hold_at_every_azimuth(tmp_path: Path) -> None:
         ("#DIM 4 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n0 0 0 0 1\n", "#DIM: .*expected 3 for"),
         ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n0 0 0 1\n", "PARAM_OUT: does not say.*INV_STERADIAN"),
         ("#DIM 3 7\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n" + "0 " * 10, "wavelengths"),
-        ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n0 0 0 1 2\n", "columns does not fit"),
+        ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n0 0 0 1 2\n", "wrong number of columns"),
         ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n0 0 0 x\n", "not a number; found x"),
         ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n0 0 0,2 1\n", "decimal commas|columns"),
         ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n30 20 90 1\n", "more than a turn.*radians"),

@@ -147,12 +147,15 @@ ROWS = "0 0 0 0 1\n0 0 20 0 1\n0 0 20 90 1\n"
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        (ROWS, "nothing says which quantity.*theta_i phi_i theta_o phi_o, then f"),
-        ("theta_in phi_in theta_out phi_out value\n" + ROWS, "do not say what they hold; found value"),
-        ("theta_in phi_in theta_out phi_out r g b\n0 0 0 0 1 1 1\n", "do not say what they hold"),
+        (ROWS, "the columns have no names.*theta_i phi_i theta_o phi_o, then f"),
+        (
+            "theta_in phi_in theta_out phi_out value\n" + ROWS,
+            "quantity of the value columns is not stated; found value",
+        ),
+        ("theta_in phi_in theta_out phi_out r g b\n0 0 0 0 1 1 1\n", "quantity of the value columns is not stated"),
         ("theta_in phi_in theta_out phi_out a b\n0 0 0 0 1 1\n", "no known kind"),
         ("theta_in phi_in theta_out phi_out brdf\n", "no rows"),
-        ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 1\n0 0 0\n", "another number of columns"),
+        ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 1\n0 0 0\n", "one value per column name"),
         ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 spam\n", "found spam"),
         ("theta_in;phi_in;theta_out;phi_out;brdf\n0,5;0;0;0;0,25\n", "decimal commas"),
         ("0,5;0,0;0,0;0,0;0,25\n0,5;0,0;9,0;0,0;0,25\n", "decimal commas"),

@@ -185,9 +185,9 @@ def test_outgoing_grid_is_closer_at_the_mirror_direction() -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("theta_i phi_i theta_o phi_o\n0 0 0 0\n", "do not say what they hold"),
-        ("theta_i phi_i theta_o phi_o value\n0 0 0 0 1\n", "do not say what they hold"),
-        ("theta_i phi_i theta_o phi_o f_r f_g\n0 0 0 0 1 1\n", "do not say what they hold"),
+        ("theta_i phi_i theta_o phi_o\n0 0 0 0\n", "quantity of the value columns is not stated"),
+        ("theta_i phi_i theta_o phi_o value\n0 0 0 0 1\n", "quantity of the value columns is not stated"),
+        ("theta_i phi_i theta_o phi_o f_r f_g\n0 0 0 0 1 1\n", "quantity of the value columns is not stated"),
         ("theta_i phi_i theta_o phi_o p\n", "no rows"),
         ("theta_i phi_i theta_o phi_o p\n# only this\n", "no rows"),
         ("theta_i phi_i theta_o phi_o p\n0 0 0 0 x\n", "row is broken"),
@@ -196,7 +196,7 @@ def test_outgoing_grid_is_closer_at_the_mirror_direction() -> None:
         ("theta_i phi_i theta_o phi_o p\n95 0 0 0 1\n", "outside its range"),
         ("theta_i phi_i theta_o phi_o p\n0 0 200 0 1\n", "outside its range"),
         ("theta_i phi_i theta_o phi_o p\n0 nan 20 0 1\n", "outside its range"),
-        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 nan\n", "no value was measured"),
+        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 nan\n", "has no measured value"),
         ("theta_i phi_i theta_o phi_o p\n0 0 0 0 -3\n", "no measured value"),
         ("theta_i phi_i theta_o phi_o p\n0,5 0 0 0 1\n", "decimal commas"),
         ("theta_i phi_i theta_o phi_o p\n0 0 0 0 1\n20 40 0 0 1\n", "do not form a grid"),

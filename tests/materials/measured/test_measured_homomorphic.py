@@ -111,7 +111,7 @@ def test_a_picture_that_is_no_map_is_refused(tmp_path: Path) -> None:
     factors(tmp_path)
     picture(tmp_path / "velvetq.png", np.ones((32, 64, 3)))
     (tmp_path / "alpha").write_text(ALPHA)
-    with pytest.raises(UserError, match=r"velvetq\.png: is no parabolic map; found 64x32"):
+    with pytest.raises(UserError, match=r"velvetq\.png: is not a parabolic map; found 64x32"):
         load(tmp_path / "alpha")
     (tmp_path / "velvetq.png").write_bytes(b"no picture")
     with pytest.raises(UserError, match=r"velvetq\.png"):

@@ -89,8 +89,8 @@ def test_broken_files(tmp_path: Path) -> None:
     good = merl_bytes(np.full((90, 90, 180, 3), 0.1))
     path = tmp_path / "a"
     for content, expected in (
-        (good[:-8], "size does not fit"),
-        (good[:5000], "size does not fit"),
+        (good[:-8], "size does not match"),
+        (good[:5000], "size does not match"),
         (np.array([90, 90, 180], ">i4").tobytes() + bytes(100), "big-endian"),
         (merl_bytes(np.full((4, 4, 4, 3), np.nan)), "no measured value"),
         (np.array([4, 4, 4], "<i4").tobytes() + np.full(192, np.nan).tobytes(), "no measured value"),

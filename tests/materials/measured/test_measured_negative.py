@@ -81,7 +81,7 @@ def test_noise_near_the_horizon_is_noise() -> None:
 
 
 def test_nothing_above_zero_is_nothing_measured() -> None:
-    with pytest.raises(UserError, match="holds no measured value"):
+    with pytest.raises(UserError, match="has no measured value"):
         collected(np.full((COUNT, 1), -0.1))
 
 

@@ -138,5 +138,5 @@ def test_the_way_is_given_where_a_file_is_read(tmp_path):
     assert load(file, "quadrilinear").choice.way == "quadrilinear"
     patches = tmp_path / "patches.xml"
     lbnl_xml.write(Material(name="grey", kd=0.5), patches)
-    with pytest.raises(UserError, match="has its own way"):
+    with pytest.raises(UserError, match="does not apply to"):
         load(patches, "back_vector")

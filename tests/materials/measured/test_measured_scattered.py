@@ -118,7 +118,7 @@ def test_it_says_where_nothing_was_measured(hemisphere):
     assert table.extrapolates(light, direction(np.full(200, 1.5), 2.0)).all()
     assert table.extrapolates(hemisphere(500, 7, 60), hemisphere(500, 8, 60) * (-1, 1, 1)).mean() < 0.2
     (said,) = extrapolation(table)[1]
-    assert "of the pairs of directions" in said
+    assert "of the direction pairs" in said
     assert "within 20 degrees of the light" in said
     assert said in inspect_table(table)["findings"]
 

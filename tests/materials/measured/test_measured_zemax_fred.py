@@ -158,15 +158,18 @@ GOOD = zemax_text(tilted_lobe, "PlaneSymmetrical")
         (lambda text: text.replace("PlaneSymmetrical", "PlanSymmetrical"), "did you mean 'PlaneSymmetrical'"),
         (lambda text: text.replace("ScatterType\tBRDF", ""), "ScatterType: is unknown"),
         (lambda text: text.replace("ScatterRadial", "Scatterradius"), "ScatterRadial: is missing"),
-        (lambda text: text.replace("AngleOfIncidence\t3", "AngleOfIncidence\t4"), "count does not fit"),
+        (lambda text: text.replace("AngleOfIncidence\t3", "AngleOfIncidence\t4"), "count differs"),
         (lambda text: text.replace("10\t40\t70", "40\t10\t70"), "not a list of angles"),
         (lambda text: text.replace("10\t40\t70", "10\t40\t90"), "not a list of angles"),
         (lambda text: text.replace("DataBegin", ""), "has no DataBegin"),
-        (lambda text: text.replace("TIS", "", 1), "data blocks does not fit"),
-        (lambda text: text[:-200], "number of values does not fit"),
+        (lambda text: text.replace("TIS", "", 1), "wrong number of data blocks"),
+        (lambda text: text[:-200], "wrong number of values"),
         (lambda text: text.replace("TIS\t0.5", "TIS\t0,5"), "decimal commas"),
         (lambda text: text.replace("Monochrome\nSca", "XYZ\nSca"), "data sections"),
-        (lambda text: text[: text.index("TIS")] + "TIS 0\n" + "0 " * 133 + "TIS 0\n" + "0 " * 266, "blocks does not"),
+        (
+            lambda text: text[: text.index("TIS")] + "TIS 0\n" + "0 " * 133 + "TIS 0\n" + "0 " * 266,
+            "wrong number of data blocks",
+        ),
     ],
 )
 def test_broken_zemax_files(tmp_path: Path, change, expected: str) -> None:
@@ -187,7 +190,7 @@ def test_broken_zemax_files(tmp_path: Path, change, expected: str) -> None:
         ("type bsdf_data\nformat angles=deg bsdf=value scale=1\n10 0\n0 0 1 2\n", "4 numbers in line 4"),
         ("type bsdf_data\nformat angles=deg bsdf=value scale=1\n10 0\n0 0 0,5\n", "decimal commas"),
         ("type bsdf_data\nformat angles=deg bsdf=value scale=1\n95 0\n0 0 1\n", "outside its range"),
-        ("type bsdf_data\nformat angles=sin bsdf=value scale=1\n0 0\n2 0 1\n", "longer than 1"),
+        ("type bsdf_data\nformat angles=sin bsdf=value scale=1\n0 0\n2 0 1\n", "direction cosines exceed 1"),
         ("type bsdf_data\nformat angles=deg bsdf=value scale=1\n10 0\n0 0 spam\n", "found spam"),
     ],
 )

@@ -54,7 +54,7 @@ class Gltf:
         end = view.byteOffset + view.byteLength
         if end > len(buffer):
             raise self.error(
-                "buffer view ends after its buffer", f"bufferViews.{index}", f"{end} bytes", f"at most {len(buffer)}"
+                "buffer view ends beyond its buffer", f"bufferViews.{index}", f"{end} bytes", f"at most {len(buffer)}"
             )
         return buffer, view.byteOffset, view.byteLength, view.byteStride
 
@@ -71,7 +71,7 @@ class Gltf:
         self._ask("read", ELEMENTS_READ, a.count * width, field)
         s, field = a.sparse, f"{field}.sparse"
         if s is not None and s.count > a.count:
-            raise self.error("more values than the accessor has", field, s.count, f"at most {a.count}")
+            raise self.error("has more values than its accessor", field, s.count, f"at most {a.count}")
         if s is not None and s.count:
             kind = np.dtype(COMPONENTS[s.index_type])
             places = self._elements(s.index_view, s.index_offset, kind, (s.count, 1), f"{field}.indices")
@@ -99,7 +99,7 @@ class Gltf:
         step = stride or dtype.itemsize * width
         need = offset + step * (count - 1) + dtype.itemsize * width if count else 0
         if need > length:
-            raise self.error("accessor ends after its buffer view", field, f"{need} bytes", f"at most {length}")
+            raise self.error("accessor ends beyond its buffer view", field, f"{need} bytes", f"at most {length}")
         if count == 0:
             return np.zeros((0, width), dtype)
         return np.ndarray(shape, dtype, buffer, start + offset, (step, dtype.itemsize)).copy()
@@ -124,7 +124,7 @@ class Gltf:
             try:
                 return base64.b64decode(uri.partition(",")[2], validate=True)
             except binascii.Error as error:
-                raise UserError(f"its base64 data is damaged ({error})", file=self.path, field=field) from error
+                raise UserError(f"base64 data is damaged ({error})", file=self.path, field=field) from error
         if is_remote(uri):
             hint = "put the file beside the scene"
             raise UserError("is on the network", file=self.path, field=field, got=uri, hint=hint)
@@ -145,13 +145,13 @@ def read(path: Path, root: Path | None = None) -> Gltf:
     Raises
     ------
     UserError
-        Where the file is truncated, not glTF 2.0, needs an extension that is not read, or names a file elsewhere.
+        Where the file is truncated, not glTF 2.0, requires an unsupported extension, or names a file elsewhere.
     """
     data = read_bytes(path, GLTF_BYTES)
     text, binary = _chunks(data, path) if path.suffix.lower() == ".glb" else (data, None)
     if len(text) > GLTF_JSON_BYTES:
         expected, hint = f"at most {GLTF_JSON_BYTES}", "save it as .glb, or with its buffers in files"
-        raise UserError("its JSON is too large", file=path, got=f"{len(text)} bytes", expected=expected, hint=hint)
+        raise UserError("JSON is too large", file=path, got=f"{len(text)} bytes", expected=expected, hint=hint)
     raw = parse_json(text, path)
     if not isinstance(raw, dict):
         raise UserError("not a glTF document", file=path, got=type(raw).__name__, expected="an object")
@@ -164,7 +164,7 @@ def read(path: Path, root: Path | None = None) -> Gltf:
     unread = sorted(set(document.extensionsRequired) - READ_EXTENSIONS)
     if unread:
         advice = "export without compression" if any("compression" in name for name in unread) else None
-        raise UserError("needs an extension that is not read", file=path, got=", ".join(unread), hint=advice)
+        raise UserError("requires an unsupported extension", file=path, got=", ".join(unread), hint=advice)
     gltf = Gltf(path, document, (), SceneFiles(path, root))
     return replace(gltf, buffers=tuple(_buffers(gltf, binary)))
 
@@ -189,7 +189,7 @@ def _buffers(gltf: Gltf, binary: bytes | None) -> Iterator[bytes]:
 def _chunks(data: bytes, path: Path) -> tuple[bytes, bytes | None]:
     """JSON and binary chunk of a GLB container."""
     if len(data) < 20 or struct.unpack_from("<I", data)[0] != MAGIC:
-        raise UserError("not a GLB file", file=path, got=repr(data[:4]), expected="it to begin with glTF")
+        raise UserError("not a GLB file", file=path, got=repr(data[:4]), expected="glTF at its start")
     _, version, total = struct.unpack_from("<III", data)
     if version != 2:
         raise UserError("unknown GLB version", file=path, got=version, expected=2)
@@ -201,7 +201,9 @@ def _chunks(data: bytes, path: Path) -> tuple[bytes, bytes | None]:
         length, kind = struct.unpack_from("<II", data, offset)
         if offset + 8 + length > total:
             left = f"{total - offset - 8} left"
-            raise UserError("a chunk ends after the file", file=path, got=f"{length} bytes", expected=f"at most {left}")
+            raise UserError(
+                "a chunk ends beyond the file", file=path, got=f"{length} bytes", expected=f"at most {left}"
+            )
         chunks.setdefault(kind, data[offset + 8 : offset + 8 + length])
         offset += 8 + length
     if JSON_CHUNK not in chunks:

@@ -23,7 +23,7 @@ from lambent.scenes.scene import Texture
 
 def surface_of(document: MaterialDocument, textures: Textures, notes: list[str]) -> Surface:
     """The surface a material describes; `notes` gets a line about everything lost."""
-    notes += [f"not read: {name}" for name in sorted(set(document.extensions) - READ_EXTENSIONS)]
+    notes += [f"ignored: {name}" for name in sorted(set(document.extensions) - READ_EXTENSIONS)]
     reading = _Reading(document, textures, notes)
     older = document.specular_glossiness
     if older is not None and not document.pbrMetallicRoughness.model_fields_set:
@@ -50,7 +50,7 @@ class _Reading:
         # ior = 0 is specified to mean no Fresnel effect: r0 = 1, which the specular colour scales.
         plain = r0_of(document.ior) * np.asarray(specular.specularColorFactor)
         if specular.specularTexture is not None or specular.specularColorTexture is not None:
-            notes.append("the textures of its specular extension are not read")
+            notes.append("textures of its specular extension are ignored")
         strength, direction = self._anisotropy()
         along = combined(lambda a: a + (1 - a) * strength**2, across, notes=notes) if strength else across
         aspect = float(max(across.mean[0], ROUGHNESS_MIN) / max(along.mean[0], ROUGHNESS_MIN))
@@ -116,12 +116,12 @@ class _Reading:
             left = np.asarray(volume.attenuationColor) ** (volume.thicknessFactor / volume.attenuationDistance)
             tinted = (replace(g, k=scaled(g.k, left)) if g.side == "transmission" else g for g in surface.lobes)
             surface = replace(surface, lobes=tuple(tinted))
-            self._notes.append("its volume absorbs as a sheet of its thickness does")
+            self._notes.append("its volume becomes a sheet of its thickness")
         diffuse = self._document.diffuse_transmission
         if not diffuse.diffuseTransmissionFactor:
             return surface
         if diffuse.diffuseTransmissionTexture is not None or diffuse.diffuseTransmissionColorTexture is not None:
-            self._notes.append("the textures of its diffuse transmission are not read")
+            self._notes.append("textures of its diffuse transmission are ignored")
         factor = self._document.pbrMetallicRoughness.baseColorFactor[:3]
         tone = float(np.mean(surface.kd.mean)) / max(float(np.mean(factor)), 1e-6)
         passed = diffuse.diffuseTransmissionFactor * min(tone, 1.0) * np.asarray(diffuse.diffuseTransmissionColorFactor)
@@ -132,7 +132,7 @@ class _Reading:
         if not coat.clearcoatFactor:
             return surface
         if coat.clearcoatTexture or coat.clearcoatRoughnessTexture or coat.clearcoatNormalTexture:
-            self._notes.append("the textures of its clear coat are not read")
+            self._notes.append("textures of its clear coat are ignored")
         k = constant(np.full(3, coat.clearcoatFactor))
         return surface.coated(SpecularLobe(constant(coat.clearcoatRoughnessFactor**2), k, np.full(3, 0.04)))
 
@@ -167,7 +167,7 @@ class _Reading:
             return surface
         even = float(alpha.mean[0])
         if alpha.is_texture and float(np.ptp(alpha.values)) > 0.02:
-            self._notes.append("alpha BLEND cuts holes where it is below a half")
+            self._notes.append("alpha BLEND becomes a cut-out at .5")
             return replace(surface, opacity=absolute(alpha))
         if even >= 1:
             return surface

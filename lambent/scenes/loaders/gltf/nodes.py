@@ -104,14 +104,15 @@ class _Reading:
         document = self._gltf.document
         of_materials = {name for material in document.materials for name in material.extensions}
         for name in sorted(set(document.extensionsUsed) - READ_EXTENSIONS - of_materials):
-            yield f"extension {name} is not read"
+            yield f"extension {name} is ignored"
 
     def _renamings(self) -> Iterator[str]:
         for name, others in self._renamed.items():
             if len(others) == 1:
-                yield f"{name}: the name is used twice, one is now {others[0]}"
+                yield f"{name}: the name is used twice; the second is renamed to {others[0]}"
             else:
-                yield f"{name}: the name is used {len(others) + 1} times, now also {others[0]} to {others[-1]}"
+                times = f"the name is used {len(others) + 1} times"
+                yield f"{name}: {times}; the others are renamed to {others[0]} ... {others[-1]}"
 
     def walk(self) -> None:
         """Visit every node of the scene once, parents first."""
@@ -128,14 +129,16 @@ class _Reading:
             index, parent = stack.pop()
             field = f"nodes.{index}"
             if index in seen:
-                raise UserError("node is reached twice", file=gltf.path, field=field, expected="a tree")
+                raise UserError(
+                    "node has several parents or is part of a cycle", file=gltf.path, field=field, expected="a tree"
+                )
             seen.add(index)
             node = gltf.pick(document.nodes, index, "nodes")
             world = parent @ _local(node)
             if np.abs(world[3] - (0, 0, 0, 1)).max() > 1e-6:
                 raise gltf.error("not an affine matrix", f"{field}.matrix", world[3].tolist(), "a last row of 0 0 0 1")
             if not (np.abs(world) < FAR).all():
-                raise UserError("transform is not finite, or leads absurdly far", file=gltf.path, field=field)
+                raise UserError("transform is not finite or too large", file=gltf.path, field=field)
             self._visit(node, world)
             stack += [(child, world) for child in reversed(node.children)]
 
@@ -260,7 +263,7 @@ def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int) -> tupl
     faces = _faces(order, primitive.mode)
     TRIANGLES.check(len(faces), file=gltf.path, field=name)
     if primitive.mode == 4 and len(order) % 3:
-        notes.append(f"{name}: {len(order) % 3} indices left over")
+        notes.append(f"{name}: {len(order) % 3} indices at the end are ignored")
 
     def optional(attribute: str, width: int) -> Floats | None:
         if attribute not in attributes:
@@ -271,7 +274,7 @@ def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int) -> tupl
         return array[used]
 
     if "COLOR_0" in attributes:
-        notes.append(f"{name}: colours of its vertices are not read")
+        notes.append(f"{name}: vertex colours are ignored")
     uv = optional(f"TEXCOORD_{uv_set}", 2)
     if uv is not None:
         uv = uv * (1, -1) + (0, 1)  # glTF counts v from the top

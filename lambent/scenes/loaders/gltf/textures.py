@@ -36,7 +36,7 @@ class Textures:
         texture = gltf.pick(gltf.document.textures, reference.index, "textures")
         image = None if texture.image is None else self._image(texture.image, notes)
         if texture.image is None:
-            notes.append(f"texture {reference.index} has no image of a readable kind: only its factor counts")
+            notes.append(f"texture {reference.index} has no readable image: only its factor is used")
         if image is None:
             return None
         if uv_set_of(reference) != uv_set:
@@ -46,7 +46,7 @@ class Textures:
         if texture.sampler is not None:
             sampler = gltf.pick(gltf.document.samplers, texture.sampler, "samplers")
             if (sampler.wrapS, sampler.wrapT) != (REPEAT, REPEAT):
-                notes.append("its textures are repeated beyond their edges, not clamped or mirrored")
+                notes.append("its textures are repeated, not clamped or mirrored")
         return replace(image, uv_transform=_uv_transform(reference))
 
     def rgb(self, reference: TextureReference | None, uv_set: int, notes: list[str], *, srgb: bool) -> Textured | None:
@@ -60,11 +60,11 @@ class Textures:
         document = gltf.pick(gltf.document.images, number, "images")
         if document.uri is not None and is_remote(document.uri):
             notes.append(
-                f"picture {document.uri} is on the network: only its factor counts; put the file beside the scene"
+                f"picture {document.uri} is on the network: only its factor is used; put the file beside the scene"
             )
             return None
         if document.uri is not None and gltf.is_missing(document.uri, field):
-            notes.append(f"picture {document.uri} is not there: only its factor counts")
+            notes.append(f"picture {document.uri} was not found: only its factor is used")
             return None
         if document.uri is not None:
             data = gltf.resource(document.uri, field)

@@ -35,7 +35,7 @@ def leaning_warnings(objects: Sequence[SceneObject]) -> list[str]:
     names = ", ".join([*list(counts)[:NAMED], *(["..."] if len(counts) > NAMED else [])])
     return [
         f"{sum(counts.values())} triangles of {len(counts)} objects ({names}) have normals over {LEANING_DEG:.0f} "
-        f"degrees off, as boxes with smooth normals do: a crease angle of {LEANING_DEG:.0f} makes such edges hard "
+        f"degrees from the face, as on boxes with smooth normals: a crease angle of {LEANING_DEG:.0f} makes them hard "
         "(--crease-angle, crease_angle in a scene.toml)"
     ]
 

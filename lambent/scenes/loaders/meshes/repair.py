@@ -61,7 +61,7 @@ def mesh_of(arrays: MeshArrays, *, name: str, file: Path) -> tuple[Mesh | None, 
         raise UserError("face index out of range", file=file, field=name, got=got, expected=expected)
     faces = _usable(positions, faces, notes)
     if not len(faces):
-        return None, [f"{name}: left out, it has no triangle with an area ({'; '.join(notes) or 'empty'})"]
+        return None, [f"{name}: left out, no triangle has an area ({'; '.join(notes) or 'empty'})"]
     if normals is None:  # every triangle gets vertices of its own
         own = faces.reshape(-1)
         faces = np.arange(len(own)).reshape(-1, 3)
@@ -102,7 +102,7 @@ def _usable(positions: Floats, faces: NDArray[np.integer], notes: list[str]) -> 
     """Faces with finite corners and an area, in float32, as they will be stored."""
     finite = np.asarray(np.isfinite(positions).all(axis=-1))[faces].all(axis=-1)
     if not finite.all():
-        notes.append(f"{int((~finite).sum())} triangles dropped: a corner is not finite")
+        notes.append(f"{int((~finite).sum())} triangles dropped: a vertex is not finite")
     faces = faces[finite]
     if not len(faces):
         return faces
@@ -125,7 +125,7 @@ def _unit_normals(positions: Floats, faces: NDArray[np.integer], normals: Floats
         for corner in range(3):
             np.add.at(mean, faces[:, corner], vectors)
         unit[broken] = normalize(mean)[broken]
-        notes.append(f"{int(broken.sum())} normals had no direction: taken from the faces")
+        notes.append(f"{int(broken.sum())} normals had no direction: replaced by face normals")
     unit[np.linalg.norm(unit, axis=-1) < 0.5] = (0.0, 1.0, 0.0)  # of faces that cancel, of vertices that nothing uses
     return unit
 

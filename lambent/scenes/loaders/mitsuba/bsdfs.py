@@ -41,9 +41,9 @@ MEASURED = {
     "plastic": "albedo within .01 of Mitsuba's",
     "roughplastic": PLASTIC,
     "pplastic": PLASTIC,
-    "roughconductor": "albedo within .07 of Mitsuba's (at 75 degrees .1), 1 to 25 % of its light elsewhere",
+    "roughconductor": "albedo within .07 of Mitsuba's (at 75 degrees .1), 1 to 25 % of its light in other directions",
     "thindielectric": "passes light within .04 of Mitsuba's, reflects .11 too little at 75 degrees",
-    "roughdielectric": "spreads light as a solid's face does head-on, a third less at 40 degrees",
+    "roughdielectric": "spreads light as a solid's face does at normal incidence, a third less at 40 degrees",
     "principled": PRINCIPLED,
     "principledthin": PRINCIPLED,
     "phong": "light within 2 % head-on; at 60 degrees 34 % elsewhere, as half vectors make highlights longer",
@@ -68,9 +68,9 @@ def surface_of(plugin: Plugin) -> Surface:
 def _unknown(plugin: Plugin) -> Surface:
     inner = plugin.objects("bsdf")
     if plugin.type == "measured":
-        plugin.note("its measured file is not read, it is grey: fit the file and assign the fit")
+        plugin.note("its measured file is ignored, it becomes grey: fit the file and assign the fit")
     else:
-        plugin.note(f"unknown, {'the BSDF nested in it is used' if inner else 'it is grey'}")
+        plugin.note(f"unknown, {'its nested BSDF is used' if inner else 'it becomes grey'}")
     return surface_of(inner[0]) if inner else Surface.grey()
 
 
@@ -83,7 +83,7 @@ def _rough_diffuse(plugin: Plugin) -> Surface:
     """Lambertian with the mean albedo of Oren and Nayar 1994 (eq. 30, without interreflections)."""
     variance = max(plugin.number("alpha", 0.2), 0.0) ** 2 / 2  # of the facets' angles
     if variance > 0:
-        plugin.note("is Lambertian here, of the mean albedo of Oren and Nayar's roughness")
+        plugin.note("becomes Lambertian with the mean albedo of its Oren-Nayar roughness")
     plugin.ignore("use_fast_approx")
     share = 1 - 0.5 * variance / (variance + 0.33) + 0.45 * variance / (variance + 0.09) * OREN_NAYAR_MEAN
     return Surface(kd=scaled(_diffuse(plugin).kd, share))
@@ -118,7 +118,7 @@ def _conductor(plugin: Plugin, rough: bool = False) -> Surface:
 
 def _dielectric(plugin: Plugin, rough: bool = False) -> Surface:
     eta = _eta(plugin, "bk7")
-    plugin.note(f"is a thin sheet here: light is {'spread, ' if rough else ''}not bent")
+    plugin.note(f"becomes a thin sheet: light is {'spread, ' if rough else ''}not refracted")
     return _sheet(plugin, fresnel.reflectance(COS, eta), (eta - 1) / 2, rough)
 
 
@@ -160,9 +160,9 @@ def _ward(plugin: Plugin) -> Surface:
 def _nested(plugin: Plugin) -> Surface:
     inner = plugin.objects("bsdf")
     if len(inner) > 1:
-        plugin.note("only the first of its sides is read")
+        plugin.note("only its first side is used")
     if not inner:
-        plugin.note("holds no BSDF, it is grey")
+        plugin.note("has no BSDF, it becomes grey")
         return Surface.grey()
     return surface_of(inner[0])
 
@@ -181,7 +181,7 @@ def _mask(plugin: Plugin) -> Surface:
         return replace(surface, opacity=absolute(held))
     share = float(np.clip(held.mean[0], 0, 1))
     if share < 1:
-        plugin.note("light that passes through it loses .13 at 75 degrees")
+        plugin.note("transmission is .13 too low at 75 degrees")
     return surface if share == 1 else surface.seen_through(np.full(3, share))
 
 
@@ -198,7 +198,7 @@ def _normal_map(plugin: Plugin) -> Surface:
 
 
 def _bump_map(plugin: Plugin) -> Surface:
-    plugin.note("its bump map is not read")
+    plugin.note("its bump map is ignored")
     plugin.ignore("scale", "")
     plugin.objects("texture")
     return _nested(plugin)
@@ -207,7 +207,7 @@ def _bump_map(plugin: Plugin) -> Surface:
 def _blend(plugin: Plugin) -> Surface:
     inner = plugin.objects("bsdf")
     if len(inner) < 2:
-        plugin.note("holds fewer than two BSDFs")
+        plugin.note("has fewer than two BSDFs")
         return _nested(plugin)
     weight = number(plugin, "weight", 0.5)
     if weight.is_texture:
@@ -221,7 +221,9 @@ def _mixture(plugin: Plugin) -> Surface:
     words = plugin.text("weights").replace(",", " ").split()
     weights = [float(word) for word in words if is_number(word) and 0 <= float(word) <= 1]
     if not inner or len(weights) != len(inner):
-        raise plugin.element.error("weights do not fit its BSDFs", got=len(weights), expected=len(inner))
+        raise plugin.element.error(
+            "number of weights differs from number of BSDFs", got=len(weights), expected=len(inner)
+        )
     return _blended(plugin, [(surface_of(p), w) for p, w in zip(inner, weights, strict=True)])
 
 
@@ -258,13 +260,13 @@ def _facets(plugin: Plugin, rough: bool) -> SpecularLobe:
     """A lobe of the plugin's distribution and roughness that reflects everything."""
     white = constant(WHITE)
     if not rough:
-        plugin.reading.note(f"mirrors and clear glass have the roughness {ROUGHNESS_MIN}, the smallest there is")
+        plugin.reading.note(f"mirrors and clear glass get the least roughness, {ROUGHNESS_MIN}")
         return SpecularLobe(constant(ROUGHNESS_MIN), white, WHITE)
     distribution = plugin.text("distribution", "beckmann").lower()
     if distribution not in ("beckmann", "ggx", "phong", "as"):
-        plugin.note(f"unknown distribution {distribution}: beckmann")
+        plugin.note(f"unknown distribution {distribution}: Beckmann is used")
     if distribution in ("phong", "as"):
-        plugin.note(f"distribution {distribution} is Beckmann's here, of the same slopes")
+        plugin.note(f"distribution {distribution} becomes Beckmann with the same slopes")
     m = number(plugin, "alpha_u" if plugin.has("alpha_u") else "alpha", 0.1)
     aspect = 1.0
     if plugin.has("alpha_v"):
@@ -312,7 +314,7 @@ def _metal(plugin: Plugin) -> tuple[Floats, Floats]:
     known = {**METALS, **{f"{n}_palik": metal for n, metal in METALS.items()}}
     if name not in known:
         hint = did_you_mean(name, METALS)
-        plugin.note(f"unknown metal {name}, it is aluminium{f' ({hint})' if hint else ''}")
+        plugin.note(f"unknown metal {name}: aluminium is used{f' ({hint})' if hint else ''}")
         name = "Al"
     straight, grazing = (np.array(v) for v in known[name])
     return straight / grazing, grazing

@@ -188,7 +188,7 @@ class _Parser:
             stack.append(element)
 
         def refuse(*_: object) -> None:
-            raise UserError("document type declarations are not read", file=path, hint="remove the <!DOCTYPE ...>")
+            raise UserError("document type declarations are not supported", file=path, hint="remove the <!DOCTYPE ...>")
 
         parser.StartElementHandler = start
         parser.EndElementHandler = lambda _: stack.pop()

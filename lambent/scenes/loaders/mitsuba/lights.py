@@ -51,17 +51,17 @@ def _picture(plugin: Plugin, matrix: Floats) -> Environment | None:
     """Mitsuba's pictures have +y on top, as ours, and +z in the middle, where ours have -z."""
     path = plugin.file()
     if not path.is_file():
-        plugin.note(f"picture {plugin.text('filename')} is not there: left out")
+        plugin.note(f"picture {plugin.text('filename')} was not found: left out")
         return None
     plugin.reading.files.use(path)
     axes = matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
     if axes[1, 1] < UPRIGHT:
-        plugin.note("its image is tilted: it stands upright here")
+        plugin.note("its tilt is ignored")
     if np.linalg.det(axes) < 0:
-        plugin.note("its image is mirrored: it is not here")
+        plugin.note("its mirroring is ignored")
     gamma = plugin.number("gamma", 0.0)
     if gamma > 0:
-        plugin.note("its gamma is not read")
+        plugin.note("its gamma is ignored")
     turned_deg = math.degrees(math.atan2(axes[0, 2], axes[2, 2]))
     rotation_deg = turned_deg % 360 - 180
     return ImageEnvironment(path, plugin.number("scale", 1.0), round(rotation_deg, 4), "lat-long")
@@ -71,20 +71,20 @@ def _daylight(plugin: Plugin, world: Floats, matrix: Floats) -> SunSky:
     """sunsky, sky or sun; in version 3 its own up is z, in 0.6 y."""
     up = normalize(matrix[:3, :3] @ ([0.0, 1.0, 0.0] if plugin.reading.document.is_old else [0.0, 0.0, 1.0]))
     if up[1] < UPRIGHT:
-        plugin.note("its sky is tilted: it stands upright here")
+        plugin.note("its tilt is ignored")
     given = plugin.vector("sun_direction")
     if given is not None and given.any():
         towards = normalize(world[:3, :3] @ given)
     else:
-        plugin.note("place and time are not read: the sun stands where Lambent's daylight has it")
+        plugin.note("place and time are ignored: the sun is at Lambent's default")
         plugin.ignore("latitude", "longitude", "timezone", "year", "month", "day", "hour", "minute", "second")
         towards = np.array(DAYLIGHT.sun_direction)
     if towards[1] < 0:
-        plugin.note("its sun is below the horizon: it stands on it")
+        plugin.note("its sun is below the horizon: moved up to it")
         towards = normalize(np.array([towards[0] + 1e-9, 0.0, towards[2]]))
     scale = plugin.number("scale", 1.0)
     plugin.ignore("resolution", "stretch")
-    plugin.note("a diffuse ground of its albedo lies below the horizon, where Mitsuba has none")
+    plugin.note("a diffuse ground of its albedo is added below the horizon")
     return SunSky(
         triple(towards),
         turbidity=min(max(plugin.number("turbidity", 3.0), 1.0), 10.0),
@@ -101,7 +101,7 @@ def _sun_radius_deg(plugin: Plugin) -> float:
     wanted = aperture_deg / 2 * plugin.number("sun_radius_scale", 1.0)
     radius_deg = min(max(wanted, LEAST_SUN_DEG), MOST_SUN_DEG)
     if radius_deg != wanted:
-        plugin.note(f"its sun's radius of {wanted:g} degrees is {radius_deg:g} here")
+        plugin.note(f"its sun's radius of {wanted:g} degrees becomes {radius_deg:g}")
     return radius_deg
 
 
@@ -125,7 +125,7 @@ def light_of(plugin: Plugin, world: Floats) -> PointLight | DirectionalLight | N
             raise plugin.element.error("direction is zero")
         made = DirectionalLight(triple(normalize(direction_world)), _emitted(plugin, "irradiance"), name)
     else:
-        plugin.note("left out, an emitter of an unknown kind")
+        plugin.note("left out, unknown kind of emitter")
         return None
     plugin.note_unread()
     return made
@@ -147,7 +147,7 @@ def emission_of(shape: Plugin) -> Triple:
     """Radiance of a shape's area emitter."""
     plugin = next(iter(shape.objects("emitter")), None)
     if plugin is not None and plugin.type != "area":
-        plugin.note("left out, only area emitters are read on shapes")
+        plugin.note("left out, a shape can have only area emitters")
     if plugin is None or plugin.type != "area":
         return 0.0, 0.0, 0.0
     radiance = _emitted(plugin, "radiance")
@@ -166,13 +166,13 @@ def _emitted(plugin: Plugin, name: str) -> Triple:
 def camera_of(plugin: Plugin, name: str, world: Floats) -> Camera | None:
     """A perspective camera; None, and a warning, if it is of another kind."""
     if plugin.type not in ("perspective", "thinlens"):
-        plugin.note("left out, only perspective cameras are read")
+        plugin.note("left out, only perspective cameras are supported")
         return None
     if plugin.type == "thinlens":
-        plugin.note("its depth of field is not read")
+        plugin.note("its depth of field is ignored")
         plugin.ignore("aperture_radius", "focus_distance")
     if plugin.has("principal_point_offset_x", "principal_point_offset_y"):
-        plugin.note("its principal point is in the middle here")
+        plugin.note("its principal point is moved to the middle")
         plugin.ignore("principal_point_offset_x", "principal_point_offset_y")
     film = next(iter(plugin.objects("film")), None)
     width, height = (film.number(n, d) if film else d for n, d in (("width", 768.0), ("height", 576.0)))
@@ -180,7 +180,7 @@ def camera_of(plugin: Plugin, name: str, world: Floats) -> Camera | None:
         raise plugin.element.error("film has no size", got=f"{width} x {height}")
     matrix = world @ plugin.transform()
     if np.linalg.det(matrix[:3, :3]) < 0:
-        plugin.note("its image is mirrored: it is not here")
+        plugin.note("its mirroring is ignored")
     fov_y_deg = min(max(_fov_y_deg(plugin, width / height), 1.0), 150.0)
     plugin.objects("sampler")
     plugin.ignore("focus_distance")
@@ -196,7 +196,7 @@ def _fov_y_deg(plugin: Plugin, aspect: float) -> float:
     if plugin.has("fov"):
         fov_deg = plugin.number("fov", 45.0)
         if not 0 < fov_deg < 180:
-            raise plugin.element.error("field of view is impossible", got=fov_deg, expected="between 0 and 180")
+            raise plugin.element.error("field of view is out of range", got=fov_deg, expected="between 0 and 180")
         half = math.tan(math.radians(fov_deg) / 2)
     else:  # of a 35 mm film, along its diagonal
         try:

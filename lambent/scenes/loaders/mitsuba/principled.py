@@ -37,7 +37,7 @@ def principled(plugin: Plugin, thin: bool = False) -> Surface:
         index = (1 + math.sqrt(r0)) / max(1 - math.sqrt(r0), 1e-3)
         surface = _spread(surface, index, thin)
         if not thin:
-            plugin.note("is a thin sheet here: light is not bent")
+            plugin.note("becomes a thin sheet: light is not refracted")
     most = 1 - r0 - (1 - r0) / 21  # diffuse light that the lobe leaves: together their albedo stays below 1
     kd = combined(lambda b, m: np.minimum(b, most) * (1 - m) * (1 - through), base, metallic, notes=notes)
     surface = replace(surface, kd=kd, coupled=False)

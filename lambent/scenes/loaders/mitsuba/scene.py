@@ -30,8 +30,8 @@ from lambent.scenes.scene import DirectionalLight, Environment, Light, PointLigh
 
 GROUPS = ("shapegroup", "instance", "merge")
 LEVEL = 0.05  # how far from horizontal a camera's sideways axis may lie along the axis that is up
-UNREAD = {"medium": "participating media are not read", "volume": "volumes are not read",
-          "subsurface": "subsurface scattering is not read"}  # fmt: skip
+UNREAD = {"medium": "participating media are ignored", "volume": "volumes are ignored",
+          "subsurface": "subsurface scattering is ignored"}  # fmt: skip
 
 
 def load(path: Path, root: Path | None = None) -> Contents:
@@ -64,7 +64,7 @@ class _Scene:
         sensors = list(children_of(self._reading, "sensor"))
         self._world, turned = _upright(sensors)
         if turned:
-            self._warnings.append(f"its cameras have {turned} up: the scene is turned to have y up")
+            self._warnings.append(f"its cameras have {turned} up: the scene is rotated to y up")
         for shape in children_of(self._reading, "shape"):
             self._add_shape(shape, self._world)
         if not self._objects:
@@ -126,10 +126,10 @@ class _Scene:
         placed = world @ shape.transform()
         for group in shape.objects("shape"):
             if group.type != "shapegroup":
-                shape.note("its shape is not a shapegroup")
+                shape.note("its shape is no shapegroup")
             for inner in group.objects("shape", refs=False):
                 if inner.type in GROUPS:
-                    raise inner.element.error("groups within groups are not read")
+                    raise inner.element.error("nested groups are ignored")
                 self._add_shape(inner, placed)
         shape.note_unread()
 
@@ -158,7 +158,7 @@ class _Scene:
     def _take_sky_units(self, lit: bool) -> None:
         """Bring emission beside a sky into its unit: Mitsuba has all light in W/(sr m^2 nm) then."""
         if lit or any(any(o.emission) for o in self._objects):
-            self._warnings.append("its lamps are taken to be in the unit of its sky, W/(sr m2 nm): 1 is 73 kcd/m2")
+            self._warnings.append("its lamps are taken in the unit of its sky, W/(sr m2 nm): 1 is 73 kcd/m2")
         self._objects = [replace(o, emission=lights.scaled(o.emission)) for o in self._objects]
 
     def _cameras(self, sensors: list[Plugin]) -> list[Camera]:
@@ -179,10 +179,10 @@ class _Scene:
         known = {"shape", "sensor", "emitter", "bsdf", "texture", "integrator", "sampler", "film", "rfilter", "alias"}
         left = [tag for tag in kinds if tag not in known | set(UNREAD)]
         if left:
-            self._reading.note(f"not read: {', '.join(f'<{tag}>' for tag in left)}")
+            self._reading.note(f"ignored: {', '.join(f'<{tag}>' for tag in left)}")
         integrators = [e.type for e in self._reading.document.elements if e.tag == "integrator"]
         if integrators:
-            self._reading.note(f"its integrator ({integrators[0]}) is not read: Lambent has its own")
+            self._reading.note(f"its integrator ({integrators[0]}) is ignored")
 
 
 def _upright(sensors: list[Plugin]) -> tuple[Floats, str | None]:

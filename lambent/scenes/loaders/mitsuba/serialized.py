@@ -43,7 +43,7 @@ def read(path: Path, index: int) -> MeshArrays:
     head = unpacked(memoryview(data)[start + 4 :], HEAD_BYTES)
     begin = 4 if version == 3 else head.find(b"\0", 4) + 1  # after the name, which version 4 has
     if not 4 <= begin <= len(head) - 16:
-        raise UserError("mesh is cut off, or its name does not end", file=path, got=f"{len(head)} bytes")
+        raise UserError("mesh is truncated, or its name does not end", file=path, got=f"{len(head)} bytes")
     flags, (vertices, triangles) = struct.unpack_from("<I", head)[0], struct.unpack_from("<QQ", head, begin)
     SERIALIZED_VERTICES.check(vertices, file=path)
     TRIANGLES.check(triangles, file=path)
@@ -52,7 +52,7 @@ def read(path: Path, index: int) -> MeshArrays:
     size = 12 * triangles + vertices * real.itemsize * sum(widths.values())
     body = head[begin + 16 :] + unpacked(inflate.unconsumed_tail, max(size - len(head) + begin + 16, 1))
     if len(body) < size:
-        raise UserError("mesh is cut off", file=path, got=f"{len(body)} bytes", expected=size)
+        raise UserError("mesh is truncated", file=path, got=f"{len(body)} bytes", expected=size)
     arrays, at = {}, 0
     for name, width in widths.items():
         values = np.frombuffer(body, real, vertices * width, at)
@@ -71,7 +71,7 @@ def _offset(data: bytes, index: int, path: Path) -> tuple[int, int]:
     count = struct.unpack_from("<I", data, len(data) - 4)[0]
     width = 8 if version == 4 else 4
     if not 0 <= index < count or 4 + count * width > len(data):
-        raise UserError("file has no such mesh", file=path, field="shape_index", got=index, expected=f"below {count}")
+        raise UserError("mesh index out of range", file=path, field="shape_index", got=index, expected=f"below {count}")
     place = len(data) - 4 - (count - index) * width
     start = struct.unpack_from("<Q" if version == 4 else "<I", data, place)[0]
     if start + 4 > len(data) or struct.unpack_from("<H", data, start)[0] != MAGIC:

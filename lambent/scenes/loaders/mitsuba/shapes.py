@@ -36,7 +36,7 @@ def mesh_of_shape(plugin: Plugin, name: str, world: Floats, known: dict[int, Mad
     """
     make = KINDS.get(plugin.type)
     if make is None:
-        return None, [f"{plugin.label}: left out, a shape of an unknown kind"]
+        return None, [f"{plugin.label}: left out, unknown kind of shape"]
     to_world = world @ plugin.transform()
     key = id(plugin.element)
     if key in known:
@@ -47,14 +47,14 @@ def mesh_of_shape(plugin: Plugin, name: str, world: Floats, known: dict[int, Mad
         try:
             made: Made = make(plugin, name)
         except MissingFile as missing:
-            made = None, [f"{name}: left out, its file {missing} is not there"], False
+            made = None, [f"{name}: left out, its file {missing} was not found"], False
         local, notes, from_faces = known[key] = made
     if local is None:
         return None, notes
     if abs(np.linalg.det(to_world[:3, :3])) < UNSCALED:
-        return None, [*notes, f"{name}: left out, its transform is flat"]
+        return None, [*notes, f"{name}: left out, its transform is singular"]
     if not len(local.faces):
-        return None, [*notes, f"{name}: left out, it has no triangle with an area"]
+        return None, [*notes, f"{name}: left out, no triangle has an area"]
     mesh = transformed(local, to_world)
     # Mitsuba makes missing normals of faces that a mirroring transform has turned; given ones are moved as ours are.
     turned = from_faces and np.linalg.det(to_world[:3, :3]) < 0
@@ -167,7 +167,7 @@ def _cylinder(plugin: Plugin, name: str) -> Made:
     p0, p1 = np.zeros(3) if p0 is None else p0, np.array([0.0, 0.0, 1.0]) if p1 is None else p1
     radius, length = abs(plugin.number("radius", 1.0)), float(np.linalg.norm(p1 - p0))
     if length == 0:
-        return None, [f"{name}: left out, its ends are one point"], False
+        return None, [f"{name}: left out, its ends coincide"], False
     z = np.linspace(0, 1, 2)[:, None]
     phi, cos_phi, sin_phi = _circle(AROUND)
     normals = _stacked(cos_phi, sin_phi, 0 * z)

@@ -62,7 +62,7 @@ def of_texture(texture: Plugin) -> Textured:
     elif texture.type in ("rgb", "srgb", "uniform", "d65", "rawconstant", "constant"):
         v = colour(texture, "color" if texture.has("color") else "value", GREY)
     else:
-        texture.note("unknown texture, it is grey")
+        texture.note("unknown texture, it becomes grey")
         return constant(np.full(3, GREY))
     texture.note_unread()
     return v
@@ -89,7 +89,7 @@ def _bitmap(texture: Plugin) -> Textured:
     for side in ("wrap_mode", "wrap_mode_u", "wrap_mode_v"):
         mode = texture.text(side, "repeat").lower()
         if mode != "repeat":
-            texture.note(f"its texture is repeated beyond its edges, not {mode}")
+            texture.note(f"its texture is repeated, not {mode}")
     channel = texture.text("channel").lower()
     if channel in ("r", "g", "b"):
         texels = np.repeat(texels[..., ["r", "g", "b"].index(channel), None], 3, axis=-1)
@@ -102,7 +102,7 @@ def _image(texture: Plugin) -> TextureImage | None:
     """The image of a bitmap; None, and a note, if its file is not there."""
     name, uv_transform, element = texture.text("filename"), _uv_transform(texture), texture.element
     field = f"line {element.line} filename"
-    image = texture.reading.images.named(name, element.file, field, texture.note, ": it is grey")
+    image = texture.reading.images.named(name, element.file, field, texture.note, ": it becomes grey")
     return None if image is None else replace(image, uv_transform=uv_transform)
 
 

@@ -109,7 +109,7 @@ class Plugin:
         names = {**self._values, **{n or e.tag: e for n, e in self._objects}}
         left = sorted(n for n in names if n and n not in self._asked and n not in MACHINERY and n not in but)
         if left:
-            self.note(f"not read: {', '.join(left)}")
+            self.note(f"ignored: {', '.join(left)}")
 
     def _take(self, name: str) -> Element | None:
         self._asked.add(name)
@@ -143,11 +143,11 @@ class Plugin:
         if element is None:
             return np.eye(4)
         if element.tag == "animation":
-            self.note("its movement is not read: it stands as at the beginning")
+            self.note("its motion is ignored: it stays at its first place")
             element = next((e for e in element.children if e.tag == "transform"), element)
         matrix = transform_of(element)
         if not (np.abs(matrix) < FAR).all():
-            raise element.error("transform is not finite, or leads absurdly far")
+            raise element.error("transform is not finite or too large")
         return matrix
 
     def transform_element(self, name: str = "to_world") -> Element | None:
@@ -209,7 +209,7 @@ def look_at(part: Element) -> Floats:
     """(4, 4) of a camera or object: x to the left, y up, z forward."""
     origin, target = (triple(part.floats(3, a)) for a in ("origin", "target"))
     if origin == target:
-        raise part.error("origin and target are the same point")
+        raise part.error("origin and target coincide")
     up = triple(part.floats(3, "up")) if "up" in part.attributes else (0.0, 1.0, 0.0)
     right, upwards, forward = camera_axes(Camera("", origin, target, up))
     matrix = np.eye(4)

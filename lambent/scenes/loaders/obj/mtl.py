@@ -82,7 +82,7 @@ class Library:
         for name in [names] if whole.is_file() else names.split():
             if self._files.find(name, obj, field)[0] in self._files.sources:
                 continue
-            otherwise = ": its materials are grey"
+            otherwise = ": its materials become grey"
             path = self._files.look_for("material library", name, obj, field, self._notes.append, otherwise)
             if path is not None:
                 self._entries = _entries(path, self._notes) | self._entries
@@ -115,18 +115,18 @@ def _entries(path: Path, notes: list[str]) -> dict[str, Entry]:
         if words[0].lower() == "newmtl":
             name = line.strip()[len("newmtl") :].strip() or f"material_{number}"
             if name in entries:
-                notes.append(f"material {name} is described twice in {path.name}: the last holds")
+                notes.append(f"material {name} is defined twice in {path.name}: the last definition is used")
             MATERIALS.check(len(entries), file=path)
             entry = entries[name] = Entry(path)
         elif entry is None:
             if key in NUMBERS | MAPS:
-                raise UserError("stands before any newmtl", file=path, field=f"line {number}", got=words[0])
+                raise UserError("comes before the first newmtl", file=path, field=f"line {number}", got=words[0])
         elif key in NUMBERS:
             entry.numbers[key] = _numbers(words, path, number, notes)
         elif key in MAPS:
             entry.maps[key] = (*_map(line.strip()[len(words[0]) :].strip(), path, number), number)
-        elif words[0].lower() not in SILENT and f"statement {words[0]} is not read" not in notes:
-            notes.append(f"statement {words[0]} is not read")
+        elif words[0].lower() not in SILENT and f"statement {words[0]} is ignored" not in notes:
+            notes.append(f"statement {words[0]} is ignored")
     return entries
 
 
@@ -134,7 +134,7 @@ def _numbers(words: list[str], path: Path, line: int, notes: list[str]) -> tuple
     field = f"line {line} {words[0]}"
     rest = [w for w in words[1:] if w != "-halo"]
     if rest and rest[0] in ("spectral", "xyz"):
-        notes.append(f"{words[0]} {rest[0]} on line {line} of {path.name} is not read: it is grey")
+        notes.append(f"{words[0]} {rest[0]} on line {line} of {path.name} is ignored: it becomes grey")
         return (GREY,)
     try:
         values = tuple(float(w.partition("#")[0] or "nan") for w in rest[:3] if not w.startswith("#"))
@@ -177,7 +177,7 @@ class _Reading:
     def surface(self) -> Surface:
         unread = sorted(UNREAD & self._keys())
         if unread:
-            self._notes.append(f"not read: {', '.join(unread)}")
+            self._notes.append(f"ignored: {', '.join(unread)}")
         kd = self._coloured("Kd", "map_Kd", GREY if "map_Kd" not in self._entry.maps else 1.0)
         surface = self._metallic(kd) if {"Pr", "Pm", "map_Pr", "map_Pm"} & self._keys() else self._phong(kd)
         surface = self._clear_coated(surface)
@@ -194,7 +194,7 @@ class _Reading:
         r0 = self._r0()
         strength = min(max(self._number("aniso", 0.0), 0.0), 1.0)
         if self._number("anisor", 0.0):
-            self._notes.append("its anisotropy is not turned (anisor)")
+            self._notes.append("the rotation of its anisotropy (anisor) is ignored")
         aspect = math.sqrt(1 - 0.9 * strength)
         along = combined(lambda a: np.clip(a, 0, 1) / aspect, alpha, notes=self._notes)
         return metallic_roughness(base, metallic, along, np.full(3, r0), self._notes, aspect=aspect**2)
@@ -237,7 +237,7 @@ class _Reading:
         if mask is not None:
             return replace(surface, opacity=absolute(mask.opacity() if mask.alpha else _first_channel(mask)))
         if cut is not None and cut.alpha and float(cut.opacity().values.min()) < 0.5:
-            self._notes.append("the alpha channel of its texture cuts it out")
+            self._notes.append("the alpha channel of its texture becomes a cut-out")
             return replace(surface, opacity=absolute(cut.opacity()))
         if opacity < 1:
             self._notes.append(f"is transparent ({1 - opacity:.0%}), without refraction")
@@ -264,7 +264,7 @@ class _Reading:
                 continue
             normals = image.rgb(srgb=False).values * 2 - 1
             if key != "norm" and not _looks_like_normals(normals):
-                self._notes.append("its bump map is not read")
+                self._notes.append("its bump map is ignored")
                 continue
             return absolute(Textured(normals, image.uv_transform))
         return None

@@ -47,7 +47,7 @@ def load(path: Path, root: Path | None = None) -> Contents:
     """
     files = SceneFiles(path, root)
     text = read(path)
-    warnings = [f"{what} are not read" for word, what in UNREAD.items() if any(w == word for _, w, _ in text.words)]
+    warnings = [f"{what} are ignored" for word, what in UNREAD.items() if any(w == word for _, w, _ in text.words)]
     triangles = triangles_of(text, path)
     names, material_names, owner = _owners(text, triangles.lines, warnings, path)
     library = Library(files)
@@ -101,7 +101,7 @@ def _owners(
     thing = thing_at[1][np.searchsorted(thing_at[0], lines, side="right") - 1]
     material = material_at[1][np.searchsorted(material_at[0], lines, side="right") - 1]
     if len(things) > OBJECTS_MAX:
-        warnings.append(f"{len(things)} groups are taken as one object per material")
+        warnings.append(f"{len(things)} groups are merged to one object per material")
         things, thing = ["object"], np.zeros_like(thing)
     key = thing * len(materials) + material
     kinds, first, owner = np.unique(key, return_index=True, return_inverse=True)

@@ -86,7 +86,7 @@ def parse(data: bytes, file: Path) -> ObjText:
         if len(over):
             field = f"line {np.repeat(lines, sizes)[over[0]]}"
             got, most = int(corners[over[0], column]) + 1, f"at most {counts[kind]}"
-            raise UserError(f"corner names a {kind} that is not there", file=file, field=field, got=got, expected=most)
+            raise UserError(f"corner has an unknown {kind}", file=file, field=field, got=got, expected=most)
     v, vt, vn = (np.concatenate(values[kind]) for kind in WIDTHS)
     return ObjText(v, vt, vn, corners, sizes, lines, words)
 
@@ -174,7 +174,7 @@ class _Block:
         text = text.replace(b"/", b" ")
         bad |= _tokens(text) != np.bincount(face, width, minlength=len(lines))
         if bad.any():
-            raise self._error("face that cannot be read", lines[int(np.argmax(bad))])
+            raise self._error("face cannot be read", lines[int(np.argmax(bad))])
         values = self._parsed(text, np.int64, lines)
         corners = np.full((len(form), 3), -1, np.int64)
         for column, kind in enumerate(WIDTHS):
@@ -185,7 +185,7 @@ class _Block:
             wrong = (index == 0) | (place < 0)
             if wrong.any():
                 at = int(np.argmax(wrong))
-                raise self._error(f"corner names a {kind} that is not there", line[at], int(index[at]))
+                raise self._error(f"corner has an unknown {kind}", line[at], int(index[at]))
             corners[named, column] = place
         yield corners, sizes, lines + self.first_line
 

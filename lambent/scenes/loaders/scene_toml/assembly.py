@@ -37,7 +37,7 @@ def assembled(contents: Sequence[Contents], variant: str | None, path: Path) -> 
     """
     known = {name for c in contents for name in c.variants}
     if variant is not None and variant not in known:
-        hint = did_you_mean(variant, known) or ("the geometry has none" if not known else None)
+        hint = did_you_mean(variant, known) or ("the geometry has no variants" if not known else None)
         raise UserError(
             "unknown variant", file=path, field="variant", got=variant, expected=", ".join(sorted(known)) or None,
             hint=hint,
@@ -68,7 +68,9 @@ def _own_names(
         called[name] = name
         if name in materials and not same:
             called[name] = names.unique(name)
-            warnings.append(f"material {name}: two files have one of this name, the second is now {called[name]}")
+            warnings.append(
+                f"material {name}: two files have a material of this name; the second is renamed to {called[name]}"
+            )
     return called
 
 
@@ -94,14 +96,14 @@ def assigned(
             by_name[name] = replace(by_name[name], material=material)
         if not fits:
             hint = did_you_mean(pattern, [*originals.values(), *originals]) or NAMES_HINT
-            warnings.append(f"assign.{pattern} fits no object and no material: {hint}")
+            warnings.append(f"assign.{pattern} matches no object and no material: {hint}")
     return tuple(by_name.values()), warnings
 
 
 def check_material(name: str, materials: Mapping[str, Material], path: Path, field: str) -> None:
     """`UserError` where a scene.toml names a material that is not there."""
     if name not in materials:
-        hint = did_you_mean(name, materials) or f"describe it under [materials.{name}]"
+        hint = did_you_mean(name, materials) or f"define it under [materials.{name}]"
         raise UserError("unknown material", file=path, field=field, got=name, hint=hint)
 
 
@@ -111,5 +113,5 @@ def fitting(pattern: str, names: Iterable[str], path: Path, field: str, got: str
     fits = [name for name in names if fnmatchcase(name, pattern)]
     if not fits:
         hint = did_you_mean(pattern, names) or NAMES_HINT
-        raise UserError("fits no object", file=path, field=field, got=got, hint=hint)
+        raise UserError("matches no object", file=path, field=field, got=got, hint=hint)
     return fits

@@ -93,7 +93,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         *lights_that_stay(objects, dressings),
     )
     if environment is None and not lights and not any(any(o.emission) for o in objects):
-        environment, notes = DAYLIGHT, (*notes, "nothing in it emits light: it gets daylight")
+        environment, notes = DAYLIGHT, (*notes, "it has no light: daylight is added")
     _check_names([c.name for c in cameras], path, "cameras")
     _check_names([p.name for p in document.paths], path, "paths")
     scene = Scene(
@@ -133,9 +133,9 @@ def _there(document: SceneDocument, path: Path, files: SceneFiles) -> tuple[list
         if not name.startswith("builtin:") and not files.path(name, path, "geometry").is_file()
     ]  # fmt: skip
     if len(gone) == len(names):
-        raise UserError(f"names no file that is there: {', '.join(gone)}", file=path, field="geometry")
+        raise UserError(f"no geometry file was found: {', '.join(gone)}", file=path, field="geometry")
     there = [entry for entry, name in zip(document.geometry, names, strict=True) if name not in gone]
-    return there, [f"geometry {name} is not there: left out" for name in gone]
+    return there, [f"geometry {name} was not found: left out" for name in gone]
 
 
 def _parse(path: Path) -> SceneDocument:
@@ -153,7 +153,7 @@ def _geometry(entry: str | GeometrySection, path: Path, files: SceneFiles, read_
         return read_geometry(entry, path, files)
     contents, size = read_geometry(entry.file, path, files), entry.scale
     if not 1e-9 <= size <= 1e9 or max(np.abs(o.mesh.positions).max() for o in contents.objects) * size > ABSURD:
-        raise UserError("scale leads absurdly far", file=path, field="geometry.scale", got=size)
+        raise UserError("scale is too large", file=path, field="geometry.scale", got=size)
     matrix = np.diag([size] * 3 + [1.0])
 
     def scaled(position: Triple) -> Triple:
@@ -178,7 +178,7 @@ def _materials(document: SceneDocument, path: Path, files: SceneFiles) -> dict[s
         where = f"{path}: materials.{name}"
         if "file" in table:
             if len(table) > 1:
-                raise UserError("says more than its file", file=where, got=sorted(set(table) - {"file"})[0])
+                raise UserError("has other keys beside file", file=where, got=sorted(set(table) - {"file"})[0])
             field = f"materials.{name}.file"
             if not isinstance(table["file"], str):
                 raise UserError("is not a file name", file=path, field=field, got=table["file"])

@@ -25,9 +25,9 @@ def one_of(section: Section, *names: str, needed: bool = True) -> None:
     """`ValueError` where a section has more than one of these keys, or none that is needed."""
     given = [name for name in names if getattr(section, name) is not None]
     if len(given) > 1:
-        raise ValueError(f"says its light twice, by {given[0]} and {given[1]}")
+        raise ValueError(f"has two intensities, {given[0]} and {given[1]}")
     if needed and not given:
-        raise ValueError(f"does not say its light, by one of {', '.join(names)}")
+        raise ValueError(f"has no intensity: set one of {', '.join(names)}")
 
 
 def coloured(value: float, colour: Colour | None) -> Triple:

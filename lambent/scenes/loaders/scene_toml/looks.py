@@ -45,7 +45,7 @@ def mixes_told(light: Mapping[str, str | float], path: Path, where: str) -> dict
         try:
             found[name] = mix_of(str(value), str(value))
         except UserError as error:
-            expected = "an intensity, off, a temperature as 2700K, #rrggbb, or several with commas"
+            expected = "an intensity, off, 2700K, #rrggbb, or several joined by commas"
             raise UserError(error.message, file=path, field=f"{where}.{name}", got=value, expected=expected) from error
     return found
 
@@ -56,7 +56,7 @@ def _look(
     """Another material of the scene, another document, or the same material with other numbers."""
     for key in (USE, FILE):
         if key in table and len(table) > 1:
-            raise UserError(f"says more than {key}", file=path, field=field, got=sorted({*table} - {key})[0])
+            raise UserError(f"has other keys beside {key}", file=path, field=field, got=sorted({*table} - {key})[0])
         if not isinstance(table.get(key, ""), str):
             raise UserError("is not a name", file=path, field=f"{field}.{key}", got=table[key])
     if USE in table:
@@ -66,12 +66,12 @@ def _look(
         return Look(read(table[FILE], f"{field}.{FILE}"))
     if not table:
         expected = "use, file, colour, or keys of a material document"
-        raise UserError("says nothing", file=path, field=field, expected=expected)
+        raise UserError("is empty", file=path, field=field, expected=expected)
     now = looks[name]
     numbers = dict(table)
     if COLOUR in numbers:
         if "kd" in numbers:
-            raise UserError("says its colour twice, by colour and kd", file=path, field=field)
+            raise UserError("has two colours, colour and kd", file=path, field=field)
         numbers["kd"] = hex_colour(str(numbers[COLOUR]))
         if numbers["kd"] is None:
             raise UserError(

@@ -102,7 +102,7 @@ class ComputedSection(Section):
     @classmethod
     def _is_known(cls, name: str) -> str:
         if name not in COMPUTED:
-            raise ValueError(f"there is no computed environment {name!r}, but {', '.join(sorted(COMPUTED))}")
+            raise ValueError(f"unknown computed environment {name!r}; expected {', '.join(sorted(COMPUTED))}")
         return name
 
     def environment(self) -> ComputedEnvironment:
@@ -124,11 +124,13 @@ class LightFieldSection(Section):
     @model_validator(mode="after")
     def _one_place(self) -> LightFieldSection:
         if self.volume and self.refracts:
-            raise ValueError("volume fills the object's box for another object, refracts is for the object itself")
+            raise ValueError(
+                "volume (for a replacement of the object) and refracts (for the object itself) exclude each other"
+            )
         if self.volume and (self.offset_m is not None or self.error is not None):
-            raise ValueError("offset_m and error are of points on the surface, not of a volume")
+            raise ValueError("offset_m and error apply to points on the surface, not to a volume")
         if self.levels is not None and (self.volume or self.refracts):
-            raise ValueError("levels is of maps that show the object; those of a volume, and of refraction, do not")
+            raise ValueError("levels applies to maps that show the object, not to a volume or to refraction")
         return self
 
     def wish(self) -> LightFieldWish:
@@ -154,7 +156,7 @@ class ObjectSection(Section):
         if isinstance(value, bool):
             return {"use": value}
         if not isinstance(value, dict):
-            raise ValueError("is true, false, or a table of points, texels, offset_m and error")
+            raise ValueError("must be true, false, or a table of points, texels, offset_m and error")
         return value
 
     @model_validator(mode="after")
@@ -181,7 +183,7 @@ class ViewSection(Section):
     @model_validator(mode="after")
     def _looks_somewhere(self) -> ViewSection:
         if self.position == self.target:
-            raise ValueError("position and target are the same point")
+            raise ValueError("position and target coincide")
         return self
 
     def camera(self, name: str) -> Camera:
@@ -269,7 +271,7 @@ class SceneDocument(Section):
     @model_validator(mode="after")
     def _one_exposure(self) -> SceneDocument:
         if self.exposure_ev is not None and self.exposure_ev100 is not None:
-            raise ValueError("says its exposure twice, by exposure_ev and exposure_ev100")
+            raise ValueError("has two exposures, exposure_ev and exposure_ev100")
         return self
 
     @field_validator("geometry", mode="before")

@@ -62,10 +62,10 @@ def finished(name: str, surface: Surface, notes: list[str]) -> tuple[Material, M
     kd, diffuse = relative(surface.kd, surface.opacity)
     kt_d, through = relative(surface.kt_d, surface.opacity)
     if max(*kd, *kt_d) > 1:
-        notes.append(f"reflects more light than arrives ({max(*kd, *kt_d):.3g}): cut to 1")
+        notes.append(f"reflects more light than arrives ({max(*kd, *kt_d):.3g}): clipped to 1")
         kd, kt_d = np.minimum(kd, 1), np.minimum(kt_d, 1)
     if diffuse is not None and through is not None and not _same(diffuse, through):
-        notes.append("its diffuse transmission varies as its diffuse reflection does")
+        notes.append("its diffuse transmission follows the texture of its diffuse reflection")
     lobes, shades, slopes = [], [], []
     for lobe in surface.lobes:
         k, shade = relative(lobe.k, surface.opacity)
@@ -116,7 +116,7 @@ def _shared(found: Sequence[Texture | None], what: str, notes: list[str]) -> Tex
     if not textures:
         return None
     if any(t is None or not _same(t, textures[0]) for t in found):
-        notes.append(f"the {what} of its lobes vary differently: all follow the first")
+        notes.append(f"the {what} of its lobes have different textures: all use the first")
     return textures[0]
 
 

@@ -16,7 +16,7 @@ from lambent.scenes.scene import Texture
 ROUGHNESS_MIN = 0.003  # slope; below, single precision loses the lobe
 BLACK = np.zeros(3)
 GREY = 0.5  # of surfaces that are not described
-UNDESCRIBED = "is not described: it is grey"
+UNDESCRIBED = "is not defined: it becomes grey"
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def metallic_roughness(
         share = np.asarray(reflectance.values / highest.astype(np.float32), np.float32)
         k, r0 = Textured(share, reflectance.uv_transform), highest
         if metallic.is_texture:
-            notes.append("its metallic texture is right at normal incidence alone: bare parts lack Fresnel's rise")
+            notes.append("its metallic texture is exact at normal incidence only: metal parts lack the Fresnel rise")
     else:
         grazing = weight + (1 - weight) * float(np.clip(metallic.mean[0], 0, 1))
         k, r0 = constant(np.full(3, grazing)), reflectance.mean / max(grazing, 1e-6)

@@ -98,7 +98,7 @@ class TextureImages:
                     picture.thumbnail((SIDE_MAX, SIDE_MAX))
                 return TextureImage(np.asarray(picture.convert("RGBA")), alpha)
         except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-            why = "not a picture of a known kind" if "cannot identify" in str(error) else str(error)
+            why = "unknown picture format" if "cannot identify" in str(error) else str(error)
             raise UserError(f"picture cannot be read ({why})", file=file, field=field) from error
 
     def _reduced(self, rgb: NDArray[np.float32], name: str) -> NDArray[np.float32]:

@@ -10,18 +10,18 @@ from lambent.viewer.screen import Screen
 
 check = check_there  # before a window is opened
 STARTS = ("edit",)
-NO_DISPLAY = "editing in place needs one: use `lambent.editing` from Python, as docs/editing.md shows"
+NO_DISPLAY = "editing in place needs a display; without one, use `lambent.editing` from Python (docs/editing.md)"
 
 
 def edits(path: Path) -> bool:
-    """Whether it is a scene, a store or a session."""
+    """Whether the path is a scene, a store or a session."""
     from lambent.viewer.modes.edit.subject import kind_of
 
     return kind_of(path) is not None
 
 
 def start(path: Path, name: str, screen: Screen, **options: Any) -> Mode:
-    """The mode on a scene, a store or a session; for the options see `subject.opened`."""
+    """Start the mode on a scene, a store or a session; options as of `subject.opened`."""
     from lambent.realtime.device import open_device
     from lambent.viewer.modes.edit.drawing import EditDrawing
     from lambent.viewer.modes.edit.mode import EditMode

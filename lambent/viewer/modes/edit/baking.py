@@ -1,4 +1,4 @@
-"""What is baked or measured beside the window: the process, how far it is, and when it will be done."""
+"""Background bakes and measurements of the edit mode: the process, its progress, and its remaining time."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from lambent.viewer.worker_process import WorkerProcess
 
 LIGHTS = (400, 4000)
 WORKER, BOUNCES = "lambent.viewer.modes.edit.worker", "--bounces"
-ONE_CURVE, TWO_CURVES = 0.6, 12.0  # time that transport takes where a whole view shows it; visibility takes 1
-LEAST_DONE = 0.02  # before it, nobody can say how long it takes
+ONE_CURVE, TWO_CURVES = 0.6, 12.0  # time of transport for a whole view, relative to that of visibility
+LEAST_DONE = 0.02  # least share done before the remaining time is estimated
 _NUMBER = re.compile(r"(\d+) lights$")
 
 
 @dataclass
 class Stage:
-    """How far the transport for so many lights is: its steps, by name, and their weights; that of visibility is 1."""
+    """Progress of the transport for `lights` lights: its steps, by name, with their weights; visibility has 1."""
 
     weights: Mapping[str, float]
     began_s: float
@@ -38,7 +38,7 @@ class Stage:
     reported_s: float = 0.0
 
     def take(self, what: str, share: float, lights: int, now_s: float) -> None:
-        """A step of the bake goes on."""
+        """Take the progress of a step."""
         if lights != self.lights:
             self.lights, self.step, self.before, self.began_s = lights, what, 0.0, now_s
         elif what != self.step:
@@ -46,7 +46,7 @@ class Stage:
         self.share, self.reported_s = share, now_s
 
     def left_s(self, now_s: float) -> float | None:
-        """Seconds until these lights are there, if it goes on like this; None while that is anybody's guess."""
+        """Estimated seconds until these lights are done; None while too little is done for an estimate."""
         total = 1.0 + sum(self.weights.values())
         done = (self.before + self.share * self._weight(self.step)) / total
         if done < LEAST_DONE:
@@ -60,22 +60,22 @@ class Stage:
 
 @dataclass
 class Passes:
-    """How far the interreflections are: passes double the samples until there are `wanted`."""
+    """Progress of interreflections: passes double the samples up to `wanted`."""
 
     wanted: int
-    samples: int = 0  # of the pass under way
+    samples: int = 0  # samples of the present pass
     share: float = 0.0
     reported_s: float = 0.0
     begins: tuple[tuple[float, float], ...] = ()  # time and share at the begin of the last two passes
 
     def take(self, before: int, samples: int, share: float, now_s: float) -> None:
-        """The pass from `before` to so many samples goes on."""
+        """Take the progress of the pass from `before` to `samples` samples."""
         self.share, self.reported_s = (before + share * (samples - before)) / self.wanted, now_s
-        if samples != self.samples and share < 1:  # passes that are there already end at once
+        if samples != self.samples and share < 1:  # finished passes end at once
             self.samples, self.begins = samples, (*self.begins[-1:], (now_s, self.share))
 
     def left_s(self, now_s: float) -> float | None:
-        """Seconds until all are there, at the pace of the last passes; None while that is anybody's guess."""
+        """Estimated seconds until all passes are done, from the last passes; None while there is no estimate."""
         began_s, before = self.begins[0] if self.begins else (0.0, 1.0)
         if self.share - before < LEAST_DONE * (1 - before):
             return None
@@ -84,22 +84,22 @@ class Passes:
 
 
 class Baking:
-    """One run of the worker: transport of so many lights, interreflections, or a proposal of these.
+    """One run of the worker: transport for a number of lights, interreflections, or a proposal for these.
 
     Attributes
     ----------
     document : SessionDocument
         The session that it bakes for.
     error : str
-        Why it ended early, in a line; empty where it did not.
+        Why the worker failed, in one line; empty where it did not.
     arrived : list of int
-        Numbers of lights that are in the store, in the order of their arrival; whoever reads them takes them out.
+        Numbers of lights that have arrived in the store, in order; the reader removes them.
     has_view : bool
         Whether the points of the view are in the store.
     samples : int
-        Of interreflections, that all points have now.
+        Samples of interreflections that all points have now.
     proposal : Proposal or None
-        What was asked for, once it is there.
+        The requested proposal, once it is finished.
     """
 
     def __init__(
@@ -127,7 +127,7 @@ class Baking:
         self._curves = {(name, t.name): len(t.factors) for name, t in terms}
         self._stage = Stage({}, clock())
         self.weigh({name: 1 / len(self.document.materials) for name in self.document.materials})
-        self._job = tempfile.TemporaryDirectory()  # as long as the process
+        self._job = tempfile.TemporaryDirectory()  # kept while the process runs
         job = Path(self._job.name) / "job.edits.json"
         Session(session.document, session.folder).save(job)
         self._process: WorkerProcess | None = WorkerProcess(
@@ -136,7 +136,7 @@ class Baking:
 
     @property
     def running(self) -> bool:
-        """Whether it goes on; takes its end."""
+        """Whether the worker runs; handles its end."""
         if self._process is None or self._process.running:
             return self._process is not None
         self.error, self._process = self._process.error, None
@@ -145,7 +145,7 @@ class Baking:
 
     @property
     def line(self) -> str:
-        """What it does now, and how much longer these lights take."""
+        """The present step and the remaining time, as a line."""
         left_s, stage = self._stage.left_s(self._clock()), self._stage
         if self._passes is not None:
             left_s, step = self._passes.left_s(self._clock()), f"{self.what} {100 * self._share:.0f} %"
@@ -154,21 +154,21 @@ class Baking:
         return step if left_s is None else f"{step}, about {left_s:.0f} s for {stage.lights} lights"
 
     def weigh(self, shares: Mapping[str, float]) -> None:
-        """Tell which share of the view's points each material has."""
+        """Set each material's share of the view's points."""
         self._stage.weights = {
             f"{name}: {term}": shares.get(name, 0.0) * (TWO_CURVES if curves == 2 else ONE_CURVE)
             for (name, term), curves in self._curves.items()
         }
 
     def close(self) -> None:
-        """End the process; what it has finished stays in the store."""
+        """Stop the process; finished work stays in the store."""
         if self._process is not None:
             self._process.close()
             self._process = None
             self._job.cleanup()
 
     def take(self, said: Mapping[str, object]) -> None:
-        """Take a line of the worker."""
+        """Handle a line of the worker."""
         if "proposal" in said:
             self.proposal = Proposal.of(cast(Mapping[str, Any], said["proposal"]))
             return

@@ -1,4 +1,4 @@
-"""The panel of interreflections: what a bake would edit and take, the bake, what is shown of it."""
+"""The panel of interreflections: materials and costs of a bake, its progress, and the shown part."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from lambent.viewer.panels.widgets import AMBER, DIM, buttons, check, choice, pr
 
 SHARES, MERGE = ("in view", "passes on"), "merge"
 Merge = Callable[[str, str], None]
-MOST_ROWS = 8  # of materials, before they scroll
+MOST_ROWS = 8  # rows of materials before they scroll
 
 
 def draw_interreflections(bounced: Bounced, merge: Merge) -> None:
-    """The choice and its costs, then the bake, then what is shown; `merge` makes a material one with another."""
+    """Draw materials and costs, the bake, and the shown part; `merge` merges one material with another."""
     imgui.begin_disabled(bounced.baking is not None)
     series = SERIES if bounced.series in SERIES else (*SERIES, bounced.series)
-    meaning = "bands at the first surface, the second, ...; 1 stands for a diffuse surface of the same albedo"
+    meaning = "bands per curve at the first surface, the second, ...; 1: a diffuse surface of the same albedo"
     bounced.change(choice("series", bounced.series, series, meaning))
-    meaning = "paths per pixel that the bake ends with"
+    meaning = "paths per pixel when the bake is done"
     bounced.wanted = int(choice("samples", str(bounced.wanted), [str(n) for n in SAMPLES], meaning))
     if bounced.proposal is not None and bounced.fixed is not None:
         _draw_materials(bounced, bounced.proposal, bounced.fixed, merge)
@@ -29,8 +29,8 @@ def draw_interreflections(bounced: Bounced, merge: Merge) -> None:
     wanted = bounced.samples < bounced.wanted
     buttons([
         ("continue" if bounced.samples else "bake", not bounced.on and wanted, bounced.start,
-         "bakes in the background; the picture is shown after every pass, with less noise each time"),
-        ("stop", bounced.on, bounced.stop, "ends the bake; finished passes stay"),
+         "bakes in the background and shows the picture after every pass, with less noise each time"),
+        ("stop", bounced.on, bounced.stop, "stops the bake and keeps finished passes"),
     ])  # fmt: skip
     if bounced.baking is None:  # below the buttons, which stay where they are
         _draw_costs(bounced)
@@ -39,13 +39,13 @@ def draw_interreflections(bounced: Bounced, merge: Merge) -> None:
         noise = f", noise {bounced.noise:.1%} of the mean" if bounced.noise is not None else ""
         lines.append(f"{bounced.samples} samples a pixel{noise}")
     wrapped(lines, DIM)
-    meaning = "light that met so many surfaces; each is shown once it is baked"
+    meaning = "shows light after this number of surfaces, as soon as it is baked"
     bounced.shown = choice("shown", bounced.shown, list(SHOWN), meaning)
     wrapped([bounced.trouble] if bounced.trouble else [], AMBER)
 
 
 def _draw_materials(bounced: Bounced, proposal: Proposal, fixed: frozenset[str], merge: Merge) -> None:
-    """A check box for each material, whether it is edited in the light that it passes on; a button if it has a twin."""
+    """Draw a check box per material, for edits of the light it passes on, and a merge button if it has a twin."""
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.scroll_y
     line = imgui.get_frame_height() + 2 * imgui.get_style().cell_padding.y
     height = (min(len(proposal.rows), MOST_ROWS) + 1) * line
@@ -60,7 +60,9 @@ def _draw_materials(bounced: Bounced, proposal: Proposal, fixed: frozenset[str],
     imgui.table_headers_row()
     for row in proposal.rows:
         imgui.table_next_column()
-        meaning = "edits of it change the light on other surfaces; else it scatters there as it is in the scene"
+        meaning = (
+            "its edits change the light on other surfaces; otherwise light on them stays that of the original material"
+        )
         edited = check(f"{row.material}##edited", row.material not in fixed, meaning)
         if edited != (row.material not in fixed):
             bounced.choose(row.material, edited)
@@ -74,16 +76,16 @@ def _draw_materials(bounced: Bounced, proposal: Proposal, fixed: frozenset[str],
 
 
 def _draw_merge(material: str, twin: str | None, merge: Merge) -> None:
-    meaning = f"looks like {twin}: becomes one material with it, which takes less; undo parts them again"
+    meaning = f"looks like {twin}: merging both saves time and memory; undo splits them again"
     if twin is not None and press(f"{MERGE}##{material}", meaning):
         merge(material, twin)
 
 
 def _draw_costs(bounced: Bounced) -> None:
-    """Time and memory of the choice; while they are measured, those of the choice before are gone."""
+    """Draw time and memory of the choice; nothing while they are measured."""
     proposal = bounced.proposal
     if bounced.is_measured and proposal is not None:
         alike = [f"{one} and {other} look the same" for one, other in proposal.alike.items()]
         wrapped([*proposal.sums(), *proposal.reasons[:3], *alike[:3]], DIM)
     elif bounced.is_measuring:
-        wrapped(["time and memory are being measured"], DIM)
+        wrapped(["measuring time and memory"], DIM)

@@ -1,4 +1,4 @@
-"""The edited picture as textures: A and B, in their own pixels, where they fit into the window."""
+"""The edited picture as textures: A and B, fitted into the window or at one pixel per pixel."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from lambent.viewer.modes.edit.state import EditState
 from lambent.viewer.modes.edit.tone import Bytes
 from lambent.viewer.screen import Rect, Statistics
 
-FORMAT = "rgba8unorm"  # bytes come encoded
+FORMAT = "rgba8unorm"  # values are encoded
 
 
 class EditDrawing(Drawing):
@@ -33,7 +33,7 @@ class EditDrawing(Drawing):
         width, height = state.session.document.size
         self._textures = [self._texture(width, height) for _ in "AB"]
         self._pair = [texture.create_view() for texture in self._textures]
-        # Another view of B: Dear ImGui's backend forgets a view a frame after it had another name.
+        # A second view of B: Dear ImGui's backend drops a view one frame after its name changes.
         self._alone = [self._textures[1].create_view()]
         self._put: list[Shown | None] = [None, None]
         self._outline: tuple[object, Image] | None = None
@@ -42,7 +42,7 @@ class EditDrawing(Drawing):
 
     @property
     def views(self) -> list[Any]:
-        """A and B where two are compared, else the picture alone."""
+        """A and B where two are compared, else only the picture."""
         return self._pair if self.divider is not None else self._alone
 
     @property
@@ -52,7 +52,7 @@ class EditDrawing(Drawing):
 
     @property
     def images(self) -> Mapping[str, Image]:
-        """The outline of the object under the mouse, and for a moment of what was selected."""
+        """The outline of the object under the mouse, and for a moment that of a new selection."""
         view, wanted = self._state.loading.view, self._state.outlined
         if view is None or not wanted:
             return {}
@@ -61,7 +61,7 @@ class EditDrawing(Drawing):
         return {"outline": self._outline[1]}
 
     def within(self, place: Rect) -> Rect:
-        """The largest place of the picture's shape, or one of its own pixels; in the middle."""
+        """The largest centred place of the picture's aspect, or a place of its pixel size."""
         width, height = self._state.session.document.size
         scale = min(place.width / width, place.height / height)
         if self._state.pixel_exact:
@@ -70,7 +70,7 @@ class EditDrawing(Drawing):
         return Rect(place.x + (place.width - wide) // 2, place.y + (place.height - high) // 2, wide, high)
 
     def update(self, place: Rect, pixel_ratio: float) -> None:
-        """Upload what is new of the last frame."""
+        """Upload the changes of the last frame."""
         self._ratio = pixel_ratio
         frame = self._state.painter.take()
         if frame is None or frame is self._frame:
@@ -84,10 +84,10 @@ class EditDrawing(Drawing):
         self._state.screen.statistics = Statistics(self._adapter, frame_ms=1e3 * frame.seconds, resolution=size)
 
     def save(self) -> None:
-        """Write the picture, PNG as shown and EXR as radiance; the picture A beside it where two are compared."""
+        """Write the picture as shown (PNG) and as radiance (EXR), and the picture A where two are compared."""
         frame, screen = self._frame, self._state.screen
         if frame is None:
-            screen.say("picture not saved: there is none yet")
+            screen.say("picture not saved: nothing is drawn yet")
             return
         stem = unused(screen.folder, plain_name(self._state.subject.name, "scene"), ".png", ".exr", "-A.png", "-A.exr")
         pictures = [("", frame.shown)] + ([("-A", frame.compared)] if frame.compared is not None else [])
@@ -101,7 +101,7 @@ class EditDrawing(Drawing):
             screen.say(f"saved {stem}.png and {stem}.exr")
 
     def close(self) -> None:
-        """End the work in the background."""
+        """Stop background work."""
         self._state.close()
 
     def _with_scale(self, shown: Bytes) -> Bytes:

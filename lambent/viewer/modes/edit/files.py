@@ -1,4 +1,4 @@
-"""Files of the edit mode: sessions, material documents that are handed over, and what is dropped onto the window."""
+"""Files of the edit mode: sessions, exported material documents, and files dropped onto the window."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from lambent.viewer.work import Work
 
 
 class Tables:
-    """Curves of tables, each made once: that takes seconds."""
+    """Cache of the curves of measured tables, which take seconds to compute."""
 
     def __init__(self) -> None:
         self._made: dict[tuple[Path, int], Editable] = {}
@@ -36,14 +36,14 @@ class Tables:
 
 
 class Files:
-    """Saves and opens, and says so, or why not, on the screen; a failure changes nothing.
+    """Saves and opens files, and reports success or failure on the screen; a failure changes nothing.
 
     Attributes
     ----------
     home : Path or None
         Where the session is saved; None until it has a file.
     handed : Handover or None
-        What was handed over last.
+        The last exported material.
     """
 
     def __init__(self, session: Session, screen: Screen, name: str, home: Path | None, tables: Tables) -> None:
@@ -62,7 +62,7 @@ class Files:
 
     @property
     def doing(self) -> str:
-        """What is under way, for people; empty where nothing is."""
+        """The running task, for people; empty without one."""
         return self._work.what if self._work is not None else ""
 
     @property
@@ -71,18 +71,18 @@ class Files:
         return self._session.document != self._saved
 
     def poll(self) -> None:
-        """Take the end of what was under way."""
+        """Handle the end of the running task."""
         if self._work is not None and self._work.poll():
             self._work = None
 
     def close(self) -> None:
-        """Cancel what is under way."""
+        """Cancel the running task."""
         if self._work is not None:
             self._work.cancel()
             self._work = None
 
     def save(self) -> None:
-        """Write the session to its file; to a new one of the next free number where it has none."""
+        """Write the session to its file, or to a new file with the next free number."""
         target, document = self.home or self._unused(self._stem), self._session.document
         try:
             self._session.save(target)
@@ -93,22 +93,22 @@ class Files:
             self._screen.say(f"saved {target}")
 
     def rescue(self) -> Iterator[Path]:
-        """Write an unsaved session to a file of a new name, because the window is about to be lost."""
+        """Write an unsaved session to a new file, because the window is about to be lost."""
         if self.unsaved:
             file = self._unused(f"{self._stem}-rescued")
             self._session.save(file)
             yield file
 
     def name_unsaved(self) -> None:
-        """Say on stderr which materials were changed and not saved."""
+        """Name unsaved materials on stderr."""
         if self.unsaved:
             now, before = self._session.document.materials, self._saved.materials
             changed = [name for name in {**before, **now} if now.get(name) != before.get(name)]
             names = ", ".join(changed) or "the environment"
-            sys.stderr.write(f"lambent: note: {names} changed and not saved\n")
+            sys.stderr.write(f"lambent: note: changes not saved: {names}\n")
 
     def hand_over(self, material: str) -> None:
-        """Write a material document of a material as it is edited now; lobes are fitted beside the window."""
+        """Write the edited material as a document; lobes are fitted in the background."""
         session = Session(self._session.document, self._session.folder, self._tables)
 
         def done(found: Handover) -> None:
@@ -117,15 +117,15 @@ class Files:
             try:
                 found.material.save(file)
             except (UserError, OSError) as error:
-                self._screen.say(f"not handed over: {error}")
+                self._screen.say(f"not exported: {error}")
                 return
             self.handed, self.handed_to = found, file
             self._screen.say(f"saved {file}: {found.verdict}")
 
-        self._begin(lambda: hand_over(session, material), f"fitting {material}", done, "not handed over")
+        self._begin(lambda: hand_over(session, material), f"fitting {material}", done, "not exported")
 
     def open(self, text: str, material: str) -> None:
-        """Take a file: a document or a table for a material, an image as the environment."""
+        """Open a file: a document or a table for a material, or an image as the environment."""
         try:
             path = typed_path(text)
             kind = kind_of(path)
@@ -140,12 +140,12 @@ class Files:
             self._screen.say(f"not loaded: {error}")
 
     def light_with(self, path: Path) -> None:
-        """Light the scene with an image, as a step of undo."""
+        """Light the scene with an image, as one step of undo."""
         if not path.is_file():
-            raise UserError("no such file", file=path)
+            raise UserError("file does not exist", file=path)
         light = Surroundings(file=str(path.resolve()))
         self._session.history.change(self._session.document.model_copy(update={"environment": light}))
-        self._screen.say(f"light of {path.name}: the picture follows when its transport is baked")
+        self._screen.say(f"environment {path.name}: the picture follows once its transport is baked")
 
     def _become(self, name: str, start: Start, path: Path) -> None:
         try:
@@ -153,7 +153,7 @@ class Files:
         except UserError as error:
             self._screen.say(f"not loaded: {error}")
         else:
-            self._screen.say(f"{name} is {path.name} now; undo brings back the one before")
+            self._screen.say(f"{name} is now {path.name}; undo restores the previous material")
 
     def _unused(self, stem: str) -> Path:
         folder = self._screen.folder
@@ -161,6 +161,6 @@ class Files:
 
     def _begin(self, run: Callable[[], object], what: str, done: Callable[..., None], refused: str) -> None:
         if self._work is not None:
-            raise UserError(f"still {self.doing}", hint="wait until that is done")
+            raise UserError(f"still {self.doing}", hint="wait until it is done")
         self._work = Work(lambda _: run(), done, lambda error: self._screen.say(f"{refused}: {error}"))
         self._work.what = what

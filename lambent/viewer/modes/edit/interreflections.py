@@ -1,4 +1,4 @@
-"""Interreflections in the window: which materials are edited in them, the bake beside it, what the store has."""
+"""Interreflections in the window: the choice of materials, the background bake, and the stored light."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from lambent.viewer.work import Work
 SERIES = ("64,1,1,1", "64,1,1", "128,8,1", "64,16")
 SAMPLES = (256, 1024, 4096, 16384)
 SHOWN: Mapping[str, tuple[int, int]] = {
-    "all light": ALL_HITS, "direct light": (1, 1), "up to 2 surfaces": (1, 2), "up to 3 surfaces": (1, 3),
-    "2 surfaces alone": (2, 2), "3 surfaces alone": (3, 3), "4 surfaces alone": (4, 4),
-    "all but direct light": BEYOND_DIRECT,
+    "all light": ALL_HITS, "direct light": (1, 1), "1 to 2 surfaces": (1, 2), "1 to 3 surfaces": (1, 3),
+    "2 surfaces only": (2, 2), "3 surfaces only": (3, 3), "4 surfaces only": (4, 4),
+    "indirect light": BEYOND_DIRECT,
 }  # fmt: skip
 
 
@@ -37,21 +37,21 @@ class Bounced:
     Attributes
     ----------
     on : bool
-        Whether more samples are baked until there are `wanted`.
+        Whether samples are baked up to `wanted`.
     series, wanted
-        Of the bake; see `bake.bounces`.
+        Series of bands and samples of the bake; see `bake.bounces`.
     fixed : frozenset of str or None
-        Materials that are not edited in the light of others: as in the store, as proposed, as the user chose. None
-        until one of these is known.
+        Materials whose edits do not change the light on others: from the store, the proposal, or the user. None
+        before.
     proposal : Proposal or None
-        What a bake for these takes.
+        Costs of a bake for these.
     shown : str
         A key of `SHOWN`.
     samples : int
-        Paths per pixel of what is shown; 0 without interreflections.
+        Paths per pixel of the shown light; 0 without interreflections.
     noise : float or None
-        Of what is shown: standard error of a point's interreflections, as a share of their mean; as the bake noted it,
-        until passes arrive to compare. None where neither is there.
+        Standard error of a point's shown interreflections relative to their mean: measured between passes, or before
+        that as noted by the bake. None where neither is known.
     """
 
     def __init__(self, painter: Painter, bake: Callable[..., Baking] = Baking) -> None:
@@ -64,11 +64,11 @@ class Bounced:
         self.trouble = ""
         self._painter, self._bake = painter, bake
         self._proposing: Baking | None = None
-        self._asked: Bounces | None = None  # what the proposal, or the one under way, is for
+        self._asked: Bounces | None = None  # input of the present proposal
         self._is_own = False  # whether the user chose what is fixed
         self._reading: Work | None = None
         self._folder: Path | None = None
-        self._given: object = None  # the view and its light, that samples belong to
+        self._given: object = None  # view and light of the samples
         self._light: tuple[int, Pixels] | None = None  # samples and light of the last pass
 
     @property
@@ -82,21 +82,21 @@ class Bounced:
 
     @property
     def line(self) -> str:
-        """How far the bake is; empty at rest."""
+        """Progress of the bake as a line; empty without one."""
         return self.baking.line if self.baking is not None else ""
 
     @property
     def bounces(self) -> Bounces:
-        """What a bake would be for."""
+        """Input of the next bake."""
         return Bounces(Bounces.of_text(self.series), self.wanted, self.fixed or frozenset())
 
     @property
     def is_measured(self) -> bool:
-        """Whether the proposal says what a bake takes as things are chosen now."""
+        """Whether the proposal matches the present choice."""
         return self.proposal is not None and not self.is_measuring and self._asked == self.bounces
 
     def tick(self, session: Session, folder: Path, idle: bool) -> None:
-        """Take what arrived, and begin what is wanted; `idle`: direct light is there, and nobody writes the store."""
+        """Take finished work and start wanted work; `idle`: direct light is done and nothing else writes the store."""
         if self._reading is not None and self._reading.poll():
             self._reading = None
         if self.baking is not None and self.baking.samples > self.samples and self._reading is None:
@@ -123,18 +123,18 @@ class Bounced:
             self._propose(session, folder)
 
     def start(self) -> None:
-        """Bake, or go on, as soon as a choice of materials is there."""
+        """Start or continue the bake, as soon as materials are chosen."""
         self.on, self.trouble = True, ""
 
     def stop(self) -> None:
-        """End the bake; the passes that it has finished stay in the store."""
+        """Stop the bake; its finished passes stay in the store."""
         self.on = False
         if self.baking is not None:
             self.baking.close()
             self.baking = None
 
     def begin_anew(self) -> None:
-        """The store's samples no longer serve: of other terms, materials or bands."""
+        """Forget the store's samples, which are for other terms, materials or bands."""
         if self.baking is not None:
             self.baking.close()
             self.baking = None
@@ -142,7 +142,7 @@ class Bounced:
         self.samples, self.noise, self._light, self._asked = 0, None, None, None
 
     def change(self, series: str) -> None:
-        """Bake another series of bands from now on."""
+        """Use another series of bands from the next bake on."""
         if series != self.series:
             self.begin_anew()
             self.series = series
@@ -150,7 +150,7 @@ class Bounced:
                 self.fixed = None
 
     def choose(self, material: str, edited: bool) -> None:
-        """Edit a material in the light of others, or fix it, from the next bake on."""
+        """Choose from the next bake on whether edits of a material change the light on others."""
         assert self.fixed is not None
         self.begin_anew()
         self._is_own = True
@@ -164,7 +164,7 @@ class Bounced:
             self._reading = None
 
     def _propose(self, session: Session, folder: Path) -> None:
-        """Measure what the choice takes; where nothing is chosen, propose one that keeps all that was edited."""
+        """Measure the costs of the choice; without a choice, propose one that includes all edited materials."""
         self._stop_proposing()
         materials = session.document.materials
         changed = {name for name, one in materials.items() if one.curves or one.tints}
@@ -173,7 +173,7 @@ class Bounced:
         self._proposing = self._bake(session, folder, bounces=self._asked, proposing=kept)
 
     def _keep_to(self, materials: Collection[str]) -> None:
-        """Forget materials that were merged with others, and a proposal from before."""
+        """Drop merged materials from the choice, and an old proposal."""
         if self.fixed is not None:
             self.fixed &= frozenset(materials)
         if self.proposal is not None and {row.material for row in self.proposal.rows} != {*materials}:

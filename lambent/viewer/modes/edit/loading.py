@@ -1,4 +1,4 @@
-"""What a store has of a view, read in a thread and given to the painter."""
+"""Reads the data of a view from a store in a thread, and passes it to the painter."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from lambent.viewer.work import Work
 
 @dataclass(frozen=True)
 class ViewMap:
-    """What the pixels of a view show.
+    """Backdrop and objects in the pixels of a view.
 
     Attributes
     ----------
     backdrop : (H, W, 3) float32
     object : (H, W) int32
-        Number of the object; -1 where there is none.
+        Index of the object; -1 where there is none.
     objects : tuple of (name, material)
     """
 
@@ -41,13 +41,13 @@ class ViewMap:
 
     @cached_property
     def materials(self) -> tuple[str, ...]:
-        """Those that are seen, in the order of the objects."""
+        """Visible materials, in the order of the objects."""
         seen = [self.objects[number][1] for number in np.unique(self.object) if number >= 0]
         return tuple(dict.fromkeys(seen))
 
     @cached_property
     def shares(self) -> dict[str, float]:
-        """Share of the points that each material has."""
+        """Share of the points with each material."""
         numbers = self.object[self.object >= 0]
         counts = np.bincount(numbers, minlength=len(self.objects)) / max(len(numbers), 1)
         shares: dict[str, float] = {}
@@ -84,13 +84,13 @@ def read_view(store: Store, view: SessionDocument) -> ViewMap | None:
 
 
 class Loading:
-    """Feeds the painter from one store, reading in the background; `begins` with the view before it has transport.
+    """Feeds the painter from one store, reading in the background; `begins` shows the view before its transport.
 
     Attributes
     ----------
     view : ViewMap or None
     lights : int
-        Of the transport that is shown; 0 where there is none yet.
+        Number of lights of the shown transport; 0 without any.
     """
 
     def __init__(self, painter: Painter, folder: Path, *, begins: bool = True) -> None:
@@ -105,18 +105,18 @@ class Loading:
         return self._work is not None
 
     def poll(self) -> None:
-        """Take what was read."""
+        """Take finished reads."""
         if self._work is not None and self._work.poll():
             self._work = None
 
     def close(self) -> None:
-        """Wait for the reading under way."""
+        """Wait for the present read."""
         if self._work is not None:
             self._work.wait()
             self._work = None
 
     def start(self, session: Session, lights: int | None, failed: Callable[[UserError], None]) -> None:
-        """Read the transport of so many lights for a session: the most where it is None, the view alone for 0."""
+        """Read the transport for a number of lights; None: the most there is, 0: the view only."""
         view, wanted = session.document, {name: session.original(name) for name in session.document.materials}
         copy = Session(view, session.folder)
 
@@ -147,5 +147,5 @@ class Loading:
         self.lights = max(self.lights, lights)
 
     def has(self, name: str, made: Editable, lights: int) -> bool:
-        """Whether transport of at least so many lights was read that serves a material."""
+        """Whether transport for at least this number of lights was read that applies to a material."""
         return any(count >= lights and same_quotients(one, made) for count, one in self._loaded.get(name, []))

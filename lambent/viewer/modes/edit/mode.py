@@ -1,4 +1,4 @@
-"""The edit mode put together: its panels, its input, what is drawn over the picture."""
+"""The edit mode: its panels, its input, and what is drawn over the picture."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ SHORTCUTS = (
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show everything but the picture"),
 )
-LOOK_S = 0.02  # between two looks for a frame while the picture changes
+LOOK_S = 0.02  # interval of polling for a frame while the picture changes
 
 
 class EditInput(Input):
-    """The view stays as it is: the mouse points at materials."""
+    """Input of the edit mode: the camera is fixed, the mouse points at materials."""
 
     def __init__(self, state: EditState) -> None:
         bounds: Any = tuple(map(tuple, state.subject.scene.bounds))
@@ -44,10 +44,10 @@ class EditInput(Input):
         self._state = state
 
     def dragged(self, dx: float, dy: float) -> None:
-        """Nothing moves."""
+        """Ignore drags: the camera is fixed."""
 
     def keys(self, key: str, event: Mapping[str, Any], ui_has_keys: bool) -> None:
-        """Undo and redo are the session's."""
+        """Handle undo and redo of the session."""
         pressed = event["event_type"] == "key_down" and not ui_has_keys
         held = "Control" in event["modifiers"] or "Meta" in event["modifiers"]
         if pressed and held and key in ("z", "y"):
@@ -107,7 +107,7 @@ class EditMode(Mode):
         overlay.draw(self.screen, self._lines(), refining=False)
 
     def _lines(self) -> list[str]:
-        """Work in the background, and its errors."""
+        """Lines on background work and its errors."""
         state = self.state
         lines = [line for line in (state.trouble, state.painter.notice) if line]
         if state.baking is not None:
@@ -120,7 +120,7 @@ class EditMode(Mode):
             lines.append(state.files.doing)
         frame = state.painter.frame
         if frame is not None and frame.needed:
-            lines.append(f"shown as before, until its transport is there: {', '.join(sorted(frame.needed))}")
+            lines.append(f"waiting for transport, shown without the edit: {', '.join(sorted(frame.needed))}")
         return lines
 
     def drop(self, path: str) -> None:
@@ -142,7 +142,7 @@ class EditMode(Mode):
 
 
 def columns(state: EditState) -> tuple[Panel, ...]:
-    """The column, each panel on the state."""
+    """Panels of the column."""
     return (
         Panel(
             "Material",
@@ -151,12 +151,19 @@ def columns(state: EditState) -> tuple[Panel, ...]:
             opened=True,
         ),
         Panel("View", partial(panels.draw_look, state), "exposure and view transform", opened=True),
-        Panel("Compare", partial(panels.draw_compare, state), "the picture against an earlier state", opened=True),
-        Panel("Save", partial(panels.draw_files, state), "the session, and the material as a document", opened=True),
+        Panel(
+            "Compare", partial(panels.draw_compare, state), "the picture compared with an earlier state", opened=True
+        ),
+        Panel(
+            "Save",
+            partial(panels.draw_files, state),
+            "save the session, or export the material as a document",
+            opened=True,
+        ),
         Panel(
             "Interreflections",
             partial(draw_interreflections, state.bounced, state.session.merge),
-            "light that met other surfaces",
+            "light between surfaces",
         ),
         Panel("Scene", partial(panels.draw_scene, state), "the view, its light, and its transport", opened=True),
         Panel("Help", partial(rows, SHORTCUTS, "shortcuts"), "mouse and keys"),

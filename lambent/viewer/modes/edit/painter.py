@@ -1,7 +1,7 @@
-"""The edited picture in a thread of its own: what is wanted goes in, frames come out.
+"""Draws the edited picture in a thread of its own: wishes go in, frames come out.
 
-Whatever arrives, transport of more lights or of another environment, the picture goes over to it in `FADE_S`: the
-difference between before and after is added and fades, while edits show in every frame.
+When new transport arrives, for more lights or another environment, the picture blends over in `FADE_S`: the difference
+between before and after is added and fades out, while every frame shows the edits.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from lambent.realtime.edited.commands import OutOfGpuMemory
 from lambent.viewer.modes.edit.shown import Backend, Fading, OnHost, Shown, faded
 
 FADE_S = 0.5
-FRAME_S = 0.05  # a frame that nobody takes is followed by the next one after so long
+FRAME_S = 0.05  # time after which a frame that was not taken is replaced
 Materials = Mapping[str, Editable]
 
 
 @dataclass(frozen=True)
 class Wish:
-    """What frames are to show: B, the materials as they are edited now, and A to compare with, if any.
+    """The wanted picture: B, the materials with their edits, and A to compare with, if any.
 
-    A are other materials, or those of B in `direct` light. With a `difference`, B shows by how much it is above A.
+    A has other materials, or those of B in `direct` light. With `difference`, B shows its difference from A.
     """
 
     now: Materials = field(default_factory=dict)
@@ -44,14 +44,14 @@ class Wish:
     view: str = "filmic"
     exposure_ev: float = 0.0
     scale: Range = field(default_factory=Range)
-    surfaces: tuple[int, int] = ALL_HITS  # least and most on the paths that are shown
+    surfaces: tuple[int, int] = ALL_HITS  # least and most surfaces on the shown light paths
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame: the picture B, A that it is compared `against`, and the wish that it shows.
+    """A frame: the picture B, the picture A that it is compared `against`, and the wish that it shows.
 
-    `needed` are materials whose transport does not serve the wish; they are shown as they were.
+    `needed` are materials whose transport does not apply to the wish; they are shown without the edit.
     """
 
     number: int
@@ -69,7 +69,7 @@ class Frame:
 
     @property
     def compared(self) -> Shown | None:
-        """A where it is shown beside B, not as the difference."""
+        """A where it is shown beside B, None for a difference."""
         return self.against if self.wish.difference is None else None
 
     @property
@@ -78,11 +78,11 @@ class Frame:
 
 
 class Painter:
-    """Draws frames of the size (height, width) until it is closed. `frame` is the last one; errors are in `error`, and
-    `notice` is a line about what the user should know.
+    """Draws frames of `size` (height, width) until it is closed. `frame` is the last one, `error` an error, and
+    `notice` a line for the user.
 
-    Only this thread touches the picture. `run` has it do something between two frames. The next frame is drawn as soon
-    as the last one was taken, or something else is wanted: frames that a slower window never shows take no time.
+    Only this thread touches the picture; `run` executes a function in it between two frames. The next frame is drawn as
+    soon as the last one was taken, or another is wanted: no time goes to frames that a slower window never shows.
     """
 
     def __init__(
@@ -96,13 +96,13 @@ class Painter:
         self._backend = backend if backend is not None else OnHost()
         self._light: Interreflections | None = None
         self._picture = self._anew(np.zeros((*size, 3), np.float32))
-        self._parts: dict[str, list[Part]] = {}  # the one in the picture first, then those that served before
-        self._given: dict[str, Editable] = {}  # what the picture was told last
+        self._parts: dict[str, list[Part]] = {}  # the present one first, then earlier ones
+        self._given: dict[str, Editable] = {}  # materials last passed to the picture
         self._fade: Image | None = None
         self._fade_from_s = 0.0
         self._compared: tuple[Materials, Image] | None = None
         self._wish, self._tasks, self._closed = Wish(), deque[Callable[[], None]](), False
-        self._at_task = False  # taken, and not yet in a frame
+        self._at_task = False  # a task has run that no frame shows yet
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._work, daemon=True)
         self._thread.start()
@@ -114,7 +114,7 @@ class Painter:
             self._changed.notify()
 
     def take(self) -> Frame | None:
-        """The last frame, to be shown."""
+        """Take the last frame to show it."""
         with self._changed:
             if self._taken is not self.frame:
                 self._taken = self.frame
@@ -122,7 +122,7 @@ class Painter:
             return self._taken
 
     def run(self, task: Callable[[], None]) -> None:
-        """Do something in the thread of the picture, before the next frame."""
+        """Run a function in the thread of the picture, before the next frame."""
         with self._changed:
             self._tasks.append(task)
             self._changed.notify()
@@ -141,10 +141,10 @@ class Painter:
         self._thread.join()
         self._picture.close()
 
-    # What `run` may be given, with arguments.
+    # Functions for `run`.
 
     def begin(self, backdrop: Image) -> None:
-        """Begin anew with what is seen without reflection: under another light, parts from before are of no use."""
+        """Restart with the backdrop, without transport, which another light has made useless."""
         before = self._image()
         self._picture.close()
         self._parts, self._given, self._light, self._compared = {}, {}, None, None
@@ -162,7 +162,7 @@ class Painter:
         self._fade_over(before)
 
     def give(self, light: Interreflections) -> None:
-        """Add interreflections, or replace them by less noisy ones."""
+        """Add interreflections, or replace them with less noisy ones."""
         self._light = light
         self._picture.give(light, {name: self._given.get(name, part.start) for name, part in light.parts.items()})
         self._compared = None
@@ -180,7 +180,7 @@ class Painter:
             self.error = error
 
     def _turn(self) -> bool:
-        """One frame, if one is due; False when the painter is closed."""
+        """Draw a frame if one is due; return False when the painter is closed."""
         with self._changed:
             while not (self._closed or self._tasks or self.busy):
                 self._changed.wait()
@@ -194,7 +194,7 @@ class Painter:
                 task()
             self._draw(wish, began_s)
         except OutOfGpuMemory as error:
-            self.notice = f"{error.message}: the processor's cores draw the picture"
+            self.notice = f"{error.message}: the CPU draws the picture"
             self._go_on_without_gpu(wish)
             self._draw(wish, began_s)
         with self._changed:
@@ -222,7 +222,7 @@ class Painter:
         self.frame = Frame(number, wish, shown, against, needed, settled, seconds)
 
     def _show(self, name: str, made: Editable) -> bool:
-        """Let the picture go to a material; False where it has no transport for that."""
+        """Change the picture to a material; return False where it has no transport for it."""
         if name not in self._parts or self._given.get(name) is made:
             return True
         with suppress(TransportNeeded):
@@ -244,7 +244,7 @@ class Painter:
             self._picture.draw()
 
     def _image_of(self, materials: Materials, now: Materials) -> Image:
-        """The picture of A, drawn once; materials whose transport is gone are as they are in B."""
+        """The picture of A, drawn once; materials without transport are shown as in B."""
         if self._compared is None or self._compared[0] is not materials:
             for name, made in materials.items():
                 self._show(name, made)
@@ -257,7 +257,7 @@ class Painter:
         return self._compared[1]
 
     def _image(self) -> Image:
-        """The picture now, with the rest of what fades."""
+        """The present picture with the rest of the fading difference."""
         return faded(self._picture.image(), self._fading())
 
     def _fading(self) -> Fading | None:
@@ -272,7 +272,7 @@ class Painter:
         return WholePicture(EditedPicture(backdrop, {}, self._backend.canvas))
 
     def _go_on_without_gpu(self, wish: Wish) -> None:
-        """Have the processor's cores draw all that the picture has."""
+        """Continue on the CPU with everything in the picture."""
         self._picture.close()
         self._backend, self._given = self._backend.without_gpu(), {}
         self._picture, self._compared = self._anew(self._backdrop), None
@@ -282,12 +282,12 @@ class Painter:
             self.give(self._light)
 
     def _fade_over(self, before: Image) -> None:
-        """Go over from an image to what the picture shows now."""
+        """Start to blend from an image to the present picture."""
         self._fade, self._fade_from_s = before - self._picture.image(), self._clock()
 
 
 def checked(painter: Painter) -> None:
-    """Raise what went wrong in the thread."""
+    """Raise an error of the thread."""
     if painter.error is not None:
         error, painter.error = painter.error, None
         raise error

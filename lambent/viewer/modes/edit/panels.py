@@ -1,4 +1,4 @@
-"""The column of the edit mode: what is edited, curves, comparison, the look, files."""
+"""The panels of the edit mode: scene, material and curves, comparison, look, files."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ LEAST_CHOICE_PX = 80.0
 
 
 def draw_scene(state: EditState) -> None:
-    """The view, its light, and how far its transport is."""
+    """Draw the view, its light, and the progress of its transport."""
     document = state.session.document
     width, height = document.size
     light = document.environment.file.rpartition("/")[2] if document.environment else "the scene's"
     rows(
         [("camera", document.camera.name), ("picture", f"{width} x {height}"), ("light", light),
-         ("transport", f"{state.loading.lights} lights" if state.loading.lights else "not yet")], "scene"
+         ("transport", f"{state.loading.lights} lights" if state.loading.lights else "not baked yet")], "scene"
     )  # fmt: skip
     if state.baking is not None:
         imgui.push_text_wrap_pos()
@@ -45,24 +45,24 @@ def draw_scene(state: EditState) -> None:
         state.files.typed,
         "light",
         "another .hdr or .exr, lat-long...",
-        "lights the scene with an image from then on; this can be undone",
+        "lights the scene with this image; can be undone",
     )
     if text is not None:
         state.files.open(text, state.material)
-    meaning = "lets the material begin as something else; a file can be dropped onto the window, too"
+    meaning = "replaces the material before its edits; you can also drop a file onto the window"
     text = typed_field("become", state.files.typed, "open", "a material document or a table...", meaning)
     if text is not None:
         state.files.open(text, state.material)
 
 
 def draw_material(state: EditState, curves: Curves) -> None:
-    """The selected material, what it is made of, and its curves."""
+    """Draw the selected material, its source, and its curves."""
     names = state.materials
     if not names:
         return
     if state.material not in names:
         state.material = names[0]
-    meaning = "the material whose curves are pulled (Tab takes the next)"
+    meaning = "the material to edit (Tab selects the next)"
     room = imgui.get_content_region_avail().x - sum(imgui.calc_text_size(word).x for word in ("material", *HISTORY))
     room -= 2 * imgui.get_style().item_spacing.x + 6 * imgui.get_style().frame_padding.x
     chosen = choice("material", state.material, names, meaning, max(room, LEAST_CHOICE_PX))
@@ -72,25 +72,34 @@ def draw_material(state: EditState, curves: Curves) -> None:
         imgui.same_line()
     history, session = state.session.history, state.session
     buttons([
-        (HISTORY[0], history.can_undo, session.undo, "takes back the last step (Ctrl+Z)"),
-        (HISTORY[1], history.can_redo, session.redo, "does the step again (Ctrl+Shift+Z)"),
+        (HISTORY[0], history.can_undo, session.undo, "undoes the last step (Ctrl+Z)"),
+        (HISTORY[1], history.can_redo, session.redo, "redoes the step (Ctrl+Shift+Z)"),
     ])  # fmt: skip
     fixed = state.session.original(chosen).fixed
     if fixed:
-        coloured(f"stays as it is: {', '.join(fixed)}", DIM)
+        coloured(f"cannot be edited: {', '.join(fixed)}", DIM)
     curves.draw(chosen)
 
 
 def draw_compare(state: EditState) -> None:
-    """What the picture A shows, and whether B shows its difference to A."""
+    """Draw the choice of the picture A, and whether B shows its difference from A."""
     compared = state.compared
     before = compared.chosen
-    compared.chosen = choice("A", compared.chosen, compared.choices, "what the picture is held against")
+    compared.chosen = choice("A", compared.chosen, compared.choices, "state A, with which the picture is compared")
     compared.divider.a_label, compared.divider.b_label = compared.chosen, "now"
-    buttons([("snapshot", bool(state.now), lambda: compared.keep(state.now), "keeps this state, to compare with")])
+    buttons(
+        [
+            (
+                "snapshot",
+                bool(state.now),
+                lambda: compared.keep(state.now),
+                "stores the present state, to compare with later",
+            )
+        ]
+    )
     imgui.same_line()
     imgui.begin_disabled(compared.chosen == OFF)
-    meaning = "shows how much the picture is above A, in false colours: blue is darker, orange brighter, black the same"
+    meaning = "shows the difference from A in false colours: blue darker, orange brighter, black equal"
     shown = check("difference", state.is_difference, meaning)
     if compared.chosen != OFF:
         compared.is_difference = shown
@@ -99,28 +108,28 @@ def draw_compare(state: EditState) -> None:
         compared.scale = None
     if state.is_difference:
         imgui.same_line()
-        if press("fit scale", "sets the colours' range to the largest difference but the outermost half percent"):
+        if press("fit scale", "fits the colour range to the differences, without the largest half per cent"):
             compared.scale = None
 
 
 def draw_look(state: EditState) -> None:
-    """Exposure, view transform, size."""
+    """Draw exposure, view transform and size."""
     look = state.look
     looks.draw_exposure(look)
     looks.draw_transform(look)
     if look.is_false_coloured:
         looks.draw_range(look, state.screen)
-    meaning = "shows the picture unscaled, instead of as large as the window allows"
+    meaning = "shows one pixel of the picture as one pixel of the screen, instead of filling the window"
     state.pixel_exact = check("one pixel of the picture is one of the screen", state.pixel_exact, meaning)
 
 
 def draw_files(state: EditState) -> None:
-    """The session, and the material as a document."""
+    """Draw saving of the session and export of the material."""
     files = state.files
     buttons([
-        ("save session", True, files.save, "saves the session (Ctrl+S), never onto a file that it did not come from"),
-        ("hand over", not files.busy and bool(state.material), lambda: files.hand_over(state.material),
-         "saves the material as a document that every other command opens; lobes are fitted where needed"),
+        ("save session", True, files.save, "saves the session (Ctrl+S); never overwrites another session's file"),
+        ("export", not files.busy and bool(state.material), lambda: files.hand_over(state.material),
+         "saves the edited material as a document for all other commands, with fitted lobes where needed"),
     ])  # fmt: skip
     if files.home is not None:
         coloured(files.home.name + (" (changed)" if files.unsaved else ""), DIM)
@@ -129,13 +138,13 @@ def draw_files(state: EditState) -> None:
     if files.handed is not None and files.handed_to is not None:
         found = files.handed
         shares = [(f"error, {name}", f"{share:.2%}") for name, share in found.shares.items()]
-        fitted = ", ".join(found.fitted) or "nothing: it is exact"
+        fitted = ", ".join(found.fitted) or "none: exact"
         rows([("file", files.handed_to.name), ("fitted", fitted), ("verdict", str(found.verdict)), *shares], "handed")
         wrapped(found.warnings, AMBER)
 
 
 class Curves:
-    """The curve editor, and what the picture has to know of it."""
+    """The curve editor, and the material that it drags."""
 
     def __init__(self, state: EditState) -> None:
         self._state = state
@@ -144,7 +153,7 @@ class Curves:
         self._editor = CurveEditor()
 
     def draw(self, material: str) -> None:
-        """Draw the curves of a material; the one that is grabbed becomes active in the picture."""
+        """Draw the curves of a material; a grabbed curve becomes active in the picture."""
         state, editor = self._state, self._editor
         editor.draw(state.session, material)
         if editor.active_curve != self._active:

@@ -1,4 +1,4 @@
-"""Pictures as the window shows them: bytes that the processor made, or textures that never leave the GPU."""
+"""Pictures for the window: bytes made by the CPU, or textures that stay on the GPU."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lambent.viewer.edited import ShadedCanvas, sums
 from lambent.viewer.modes.edit.tone import Bytes, difference, displayed
 
 Look = tuple[str, float, Range]  # view transform, exposure in EV, scale of false colours
-Fading = tuple[Image, float]  # what is added to a picture, and the share of it that is left
+Fading = tuple[Image, float]  # a difference added to a picture, and the share of it that is left
 
 
 class Shown(Protocol):
@@ -32,26 +32,26 @@ class Shown(Protocol):
         """(H, W, 4), encoded."""
 
     def put(self, texture: Any) -> None:
-        """Bring it into a texture of the window."""
+        """Copy the picture into a texture of the window."""
 
 
 class Backend(Protocol):
-    """Where pictures are summed and made visible."""
+    """A backend that sums pictures and displays them."""
 
     def canvas(self, background: Image) -> Canvas:
-        """What a picture is drawn on."""
+        """A canvas for a picture."""
 
     def show(self, canvas: Any, look: Look, fading: Fading | None) -> Shown:
-        """The picture of a canvas that `canvas` made, as last composed."""
+        """The last composed picture of a canvas from `canvas`."""
 
     def still(self, image: Image, look: Look) -> Shown:
-        """A picture that stays: linear radiance."""
+        """A fixed picture of linear radiance."""
 
     def difference(self, shown: Shown, against: Shown, scale: SignedRange) -> Shown:
-        """By how much a picture is above another, in colours made on the processor."""
+        """Difference of two pictures in false colours, computed on the CPU."""
 
     def without_gpu(self) -> Backend:
-        """The processor's cores, for the same window."""
+        """The CPU backend for the same window."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class HostShown:
 
 
 class OnHost:
-    """`Backend` of the processor's cores; without a device nothing can be put into textures."""
+    """`Backend` on the CPU; without a device nothing can be copied into textures."""
 
     def __init__(self, device: Any = None) -> None:
         self._device = device
@@ -98,7 +98,7 @@ class OnHost:
 
 @dataclass(frozen=True)
 class GpuShown:
-    """`Shown` in textures that the next frame is drawn over; reading them back waits for the GPU."""
+    """`Shown` in textures that the next frame overwrites; reading them back waits for the GPU."""
 
     device: Any
     light: Any
@@ -120,12 +120,12 @@ class GpuShown:
 
 
 class OnGpu:
-    """`Backend` of compute shaders: a frame is a few submissions, and no picture crosses to the processor or back."""
+    """`Backend` of compute shaders: a frame is a few submissions, and no picture leaves the GPU."""
 
     def __init__(self, device: Any) -> None:
         self._device, self._display = device, Display(device)
         self._targets: dict[tuple[str, int, int], Any] = {}
-        self._sent: dict[str, tuple[Image, Any]] = {}  # images that stay, with their textures
+        self._sent: dict[str, tuple[Image, Any]] = {}  # fixed images, with their textures
 
     def canvas(self, background: Image) -> ShadedCanvas:
         return ShadedCanvas(self._device, background)
@@ -161,10 +161,10 @@ class OnGpu:
 
 
 def faded(image: Image, fading: Fading | None) -> Image:
-    """An image with what fades."""
+    """An image plus the fading difference."""
     return image if fading is None else np.maximum(image + np.float32(fading[1]) * fading[0], 0)
 
 
 def backend_of(device: Any) -> Backend:
-    """The faster one: a software adapter runs shaders on the cores that numba has, and takes several times as long."""
+    """The faster backend: a software adapter shares the CPU cores with numba and is several times slower."""
     return OnGpu(device) if sums(device) else OnHost(device)

@@ -1,4 +1,4 @@
-"""The edit mode without its window: session, picture, transport that comes, what is selected and compared."""
+"""The edit mode without its window: session, picture, arriving transport, selection and comparison."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from lambent.viewer.modes.edit.shown import Backend
 from lambent.viewer.modes.edit.subject import Subject
 from lambent.viewer.screen import Screen
 
-OUTLINED_S = 1.0  # after a selection
+OUTLINED_S = 1.0  # time that a new selection is outlined
 OFF, DIRECT, UNEDITED = "off", "direct light", "as opened"
-Fixed = tuple[object, ...]  # all that transport depends on
+Fixed = tuple[object, ...]  # everything that transport depends on
 
 
 @dataclass
 class Compared:
-    """What the picture A shows: nothing, direct light alone, the materials as they were opened, or a snapshot.
+    """The content of picture A: nothing, direct light only, the materials as opened, or a snapshot.
 
-    Where `is_difference`, B shows by how much it is above A, on a `scale` that is fitted where it is None.
+    With `is_difference`, B shows its difference from A, on a `scale` that is fitted where it is None.
     """
 
     chosen: str = OFF
@@ -58,14 +58,14 @@ class Compared:
         self.kept[self.chosen] = materials
 
     def fit(self, frame: Frame) -> None:
-        """Take a scale that suits a frame with this A, where none is there."""
+        """Fit the scale to a frame with this A, where there is none."""
         shows_a = frame.wish.compared is self.materials and frame.wish.direct == (self.chosen == DIRECT)
         if self.scale is None and self.is_difference and shows_a and frame.compared_radiance is not None:
             self.scale = SignedRange.fitting(photometric(frame.radiance - frame.compared_radiance))
 
 
 class EditState:
-    """See the module. `trouble` is a line about what failed; empty where nothing did."""
+    """State of the edit mode; see the module. `trouble` is a line on a failure, else empty."""
 
     def __init__(
         self,
@@ -90,9 +90,9 @@ class EditState:
         self.files = Files(self.session, screen, subject.name, subject.home, tables or Tables())
         self._bake = bake
         self.bounced = Bounced(self.painter, bake)
-        self._sources: Sequence[object] = ()  # for which transport was seen to last
+        self._sources: Sequence[object] = ()  # sources of materials at the last check of transport
         self._fixed: Fixed | None = None
-        self._weighed: Baking | None = None  # the one that knows what the view shows
+        self._weighed: Baking | None = None  # the bake that has the shares of materials in the view
         self._document: SessionDocument | None = None
         self._now: dict[str, Editable] = {}
         self._wish = Wish()
@@ -102,35 +102,35 @@ class EditState:
 
     @property
     def busy(self) -> bool:
-        """Whether work goes on in the background whose progress is to be seen."""
+        """Whether background work runs whose progress is shown."""
         return self.baking is not None or self.loading.busy or self.files.busy or self.bounced.busy
 
     @property
     def is_difference(self) -> bool:
-        """Whether the difference of B and A is shown."""
+        """Whether the difference of B from A is shown."""
         return self.compared.is_difference and self.compared.chosen != OFF
 
     @property
     def scale(self) -> Range | None:
-        """Of the colours of the picture, where they stand for numbers."""
+        """Scale of the picture's false colours, if any."""
         if self.is_difference:
             return self.compared.scale
         return self.look.scale if self.look.is_false_coloured else None
 
     @property
     def now(self) -> Materials:
-        """The materials as they are edited now."""
+        """The materials with their present edits."""
         return self._wish.now
 
     @property
     def materials(self) -> tuple[str, ...]:
-        """Those that can be selected: what the view shows, or, before that is known, all."""
+        """Selectable materials: those in view, or, before that is known, all."""
         view = self.loading.view
         return view.materials if view is not None and view.materials else tuple(self.session.document.materials)
 
     @property
     def outlined(self) -> tuple[str, ...]:
-        """Objects whose outline is shown: the one under the mouse, and for a moment those of a new selection."""
+        """Outlined objects: the one under the mouse, and for a moment those of a new selection."""
         view = self.loading.view
         if view is not None and self.selection_is_new:
             return tuple(name for name, material in view.objects if material == self.material)
@@ -145,13 +145,13 @@ class EditState:
         self.material, self.selected_s = material, self.screen.clock()
 
     def select_next(self) -> None:
-        """The next one that the view shows."""
+        """Select the next material in view."""
         names = self.materials
         at = names.index(self.material) + 1 if self.material in names else 0
         self.select(names[at % len(names)])
 
     def tick(self) -> None:
-        """Take what the background has, and let the picture follow the session."""
+        """Take results of background work, and update the picture to the session."""
         checked(self.painter)
         self.files.poll()
         self.loading.poll()
@@ -163,7 +163,7 @@ class EditState:
         self.bounced.tick(self.session, self.loading.folder, direct)
 
     def close(self) -> None:
-        """End all work in the background; what was baked stays in the store."""
+        """Stop background work; finished work stays in the store."""
         self.stop_baking()
         self.bounced.close()
         self.files.close()
@@ -212,7 +212,7 @@ class EditState:
             self.baking = None
 
     def _have_transport(self) -> None:
-        """Where the session begins as something else than before: bake what its transport lacks."""
+        """Bake missing transport where a material's source has changed."""
         document = self.session.document
         sources = (document.environment, document.merged, *(one.source for one in document.materials.values()))
         if len(sources) == len(self._sources) and all(map(operator.is_, sources, self._sources)):
@@ -231,14 +231,14 @@ class EditState:
         if self._is_complete():
             return
         if before is not None:
-            self.screen.say("this edit needs new transport: it is baked in the background")
+            self.screen.say("this edit needs new transport; it is being baked in the background")
         if self.loading.view is not None and not self._shows_objects(self.loading.view):
             self.loading = Loading(self.painter, folder, begins=False)
         self.bounced.begin_anew()
         self.baking = self._bake(self.session, folder, self.lights)
 
     def _shows_objects(self, view: ViewMap) -> bool:
-        """Whether the objects of a view are of the session's materials, after all that was merged."""
+        """Whether the objects of a view have the session's materials, merges included."""
         objects = self.subject.scene.merged(self.session.document.merged).objects
         return view.objects == tuple((o.name, o.material) for o in objects)
 
@@ -253,7 +253,7 @@ class EditState:
         return not changed_inputs(Store.open(self.loading.folder), self.subject.scene)
 
     def stop_baking(self) -> None:
-        """End the bake; what it has finished stays in the store."""
+        """Stop the bake; finished work stays in the store."""
         if self.baking is not None:
             self.baking.close()
             self.baking = None
@@ -275,6 +275,6 @@ class EditState:
 
 
 def same(one: Wish, other: Wish) -> bool:
-    """Whether two wishes are of the same objects."""
+    """Whether two wishes have identical materials."""
     parts: list[Any] = [(w.view, w.exposure_ev, w.scale, w.surfaces, w.direct, w.difference) for w in (one, other)]
     return one.now is other.now and one.compared is other.compared and parts[0] == parts[1]

@@ -1,4 +1,4 @@
-"""What `lambent edit` opens in place: a scene's file, a store, or a saved session, as a session of one view."""
+"""Opens a scene file, a store, or a saved session as a session of one view, for `lambent edit`."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ HEAD_BYTES = 4096
 
 @dataclass(frozen=True)
 class Subject:
-    """What is edited.
+    """The session to edit, with its scene and files.
 
     Attributes
     ----------
     session : Session
-        Of all materials that objects of the scene have.
+        Session with all materials of the scene's objects.
     scene : Scene
-        With the environment that it has itself.
+        The scene with its own environment.
     folder : Path
-        Where files are saved and stores of other environments are made.
+        Folder for files, and for stores of other environments.
     store : Path
         Folder of the store that has, or will have, the transport of the view under the environment `lit_by`.
     lit_by : Surroundings or None
@@ -61,14 +61,14 @@ class Subject:
         return self.scene.name
 
     def store_for(self, environment: Surroundings | None) -> Path:
-        """The folder for transport under an environment: one store holds one environment."""
+        """The store folder for transport under an environment: one store has one environment."""
         if environment == self.lit_by:
             return self.store
         return default_store(self.folder, self.scene.name, environment, self.session.folder)
 
 
 def kind_of(path: Path) -> Kind | None:
-    """Which of these a path is; None where `lambent edit` has to open it as a material."""
+    """The kind of a path; None where `lambent edit` must open it as a material."""
     if str(path).startswith(BUILTIN_PREFIX):
         return "scene"
     if path.is_dir():
@@ -90,7 +90,7 @@ def opened(
     crease_deg: float | None = None,
     factorise: Factorise | None = None,
 ) -> Subject:
-    """What is at a path.
+    """Open a path.
 
     Parameters
     ----------
@@ -100,9 +100,9 @@ def opened(
     environment
         An image that lights the scene instead of its own environment.
     store
-        Where transport is kept. By default a store keeps its own; a scene's is made in `folder`.
+        Folder for transport. By default a store keeps its own, and a scene's is made in `folder`.
     crease_deg
-        As for `load_scene`; that of the session where it is None.
+        As for `load_scene`; by default that of the session.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def opened(
     kept = _kept_environment(base)
     lit_by = Surroundings(file=str(environment.resolve())) if environment is not None else kept
     if environment is not None and not environment.is_file():
-        raise UserError("no such file", file=environment, field="--environment")
+        raise UserError("file does not exist", file=environment, field="--environment")
     if session is None:
         where = camera_named(scene, base, camera)
         merged = _merged_in(base, scene)
@@ -148,7 +148,7 @@ def opened(
 def _changes(
     session: Session, scene: Scene, base: Path | None, camera: str | None, picture: tuple[int, int] | None
 ) -> dict[str, object]:
-    """What another view changes in a saved session, and the materials of the scene that it does not edit."""
+    """Changes to a saved session for another view, and the scene's materials that it does not edit."""
     changes: dict[str, object] = {}
     if camera is not None:
         changes["camera"] = camera_named(scene, base, camera)
@@ -187,7 +187,7 @@ def default_store(folder: Path, name: str, environment: Surroundings | None, bas
 
 
 def check_store(folder: Path, place: str) -> None:
-    """`UserError` where a folder is no store, or one that was made from another scene than that at `place`."""
+    """Raise `UserError` where a folder is no store, or the store of another scene than that at `place`."""
     if not (folder / MANIFEST).exists() or folder == Path(place):
         return
     source = Store.open(folder).documents.get("source")
@@ -197,7 +197,9 @@ def check_store(folder: Path, place: str) -> None:
         not source.startswith(BUILTIN_PREFIX) and (folder / source).resolve() == Path(place).resolve()
     )
     if not same:
-        raise UserError("store of another scene", file=folder, got=source, expected=place, hint="name another with -o")
+        raise UserError(
+            "is the store of another scene", file=folder, got=source, expected=place, hint="name another with -o"
+        )
 
 
 def scene_for(session: Session) -> Scene:
@@ -211,13 +213,15 @@ def _scene_at(place: str, crease_deg: float | None) -> Scene:
     if not Path(place).is_dir():
         return load_scene(place, crease_deg)
     if crease_deg is not None:
-        hint = "give it to the command that bakes"
-        raise UserError("a store has its normals already", file=Path(place), field="--crease-angle", hint=hint)
+        hint = "use --crease-angle in `lambent bake`"
+        raise UserError(
+            "does not apply to a store: its normals are baked", file=Path(place), field="--crease-angle", hint=hint
+        )
     return scene_of(Store.open(Path(place)))
 
 
 def _merged_in(base: Path | None, scene: Scene) -> dict[str, str]:
-    """Materials that views of a store were baked without, and those that their objects were made of."""
+    """Materials that were merged before the store's views were baked, and their replacements."""
     worn = worn_in_views(Store.open(base)) if base is not None else {}
     pairs = {o.material: worn.get(o.name, o.material) for o in scene.objects}
     return {name: other for name, other in pairs.items() if name != other and other in scene.materials}

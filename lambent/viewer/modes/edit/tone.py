@@ -1,4 +1,4 @@
-"""Radiance as bytes of a display, fast enough for every frame of a drag."""
+"""Converts radiance to display bytes, fast enough for every frame of a drag."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from lambent.editing.half_table import looked_up
 from lambent.realtime.frame_state import FALSE_COLOUR
 
 Bytes = NDArray[np.uint8]
-ROWS = 64  # at once: the steps of a transform stay in the cache
-BY_CHANNEL = ("filmic", "linear")  # each channel by itself: a table of all half floats holds the transform
+ROWS = 64  # rows per block, so that intermediate values stay in the cache
+BY_CHANNEL = ("filmic", "linear")  # transforms per channel: a table over all half floats has them
 
 
 def displayed(radiance: Image, view: str, exposure_ev: float, scale: Range) -> Bytes:
@@ -41,7 +41,7 @@ def displayed(radiance: Image, view: str, exposure_ev: float, scale: Range) -> B
 
 
 def difference(radiance: Image, other: Image, scale: SignedRange) -> Bytes:
-    """(H, W, 4) false colours of by how much the luminance of one image is above another's."""
+    """(H, W, 4) false colours of the difference in luminance of two images."""
     out = np.empty((*radiance.shape[:2], 4), np.uint8)
     out[..., 3] = 255
     share = scale.share(luminance(radiance - other) * np.float32(LUMINANCE.per_y))
@@ -50,12 +50,12 @@ def difference(radiance: Image, other: Image, scale: SignedRange) -> Bytes:
 
 
 def _half_bits(values: Image) -> NDArray[np.uint16]:
-    """Numbers of half floats: a step of one is 0.05 %, an eighth of a byte's step of a display."""
+    """Bits of half floats: one step is 0.05 %, an eighth of a display byte's step."""
     return np.clip(values, 0, HALF_MAX).astype(np.float16).view(np.uint16) & np.uint16(0x7FFF)  # -0 is 0
 
 
 def _halves() -> Image:
-    """The values of all half floats without a sign; what is no number is black, as in `to_bytes`."""
+    """The values of all unsigned half floats; NaN is black, as in `to_bytes`."""
     values = np.arange(0x8000, dtype=np.uint16).view(np.float16).astype(np.float32)
     return np.where(np.isfinite(values), values, np.float32(0))
 

@@ -1,4 +1,4 @@
-"""A process of its own that bakes the transport of a session's view, and says on stdout how far it is.
+"""Worker process that bakes the transport of a session's view, and reports progress on stdout.
 
 python -m lambent.viewer.modes.edit.worker SESSION STORE LIGHTS...
 python -m lambent.viewer.modes.edit.worker SESSION STORE --bounces JSON
@@ -28,11 +28,11 @@ from lambent.store.store import Store
 from lambent.viewer.modes.edit.baking import BOUNCES
 from lambent.viewer.modes.edit.subject import scene_for
 
-NICENESS = 10  # the window comes first
+NICENESS = 10  # the window has priority
 
 
 def main(session: Path, folder: Path, lights: Sequence[int]) -> None:
-    """Bake for the first number of lights, then for the first two, and so on."""
+    """Bake for each number of lights in turn."""
     from lambent.bake.bake import bake
     from lambent.bake.quality import quality_named
     from lambent.bake.view import View
@@ -58,7 +58,7 @@ def main(session: Path, folder: Path, lights: Sequence[int]) -> None:
 
 
 def bounce(session: Path, folder: Path, bounces: Bounces, kept: Collection[str] | None) -> None:
-    """Bake interreflections; or, where materials to edit are given, propose which others to edit."""
+    """Bake interreflections, or, given materials to keep, propose further materials to edit."""
     from lambent.bake.bake import bake
     from lambent.bake.interreflection.proposal import propose, same_materials
     from lambent.bake.view import View
@@ -82,13 +82,13 @@ def bounce(session: Path, folder: Path, bounces: Bounces, kept: Collection[str] 
 
 
 def _own(session: Session, scene: Scene) -> set[str]:
-    """Materials that are no longer what the scene says."""
+    """Materials that differ from the scene's."""
     materials = session.document.materials.items()
     return {name for name, one in materials if one != EditedMaterial(source=OfDocument(material=scene.materials[name]))}
 
 
 def _note_environment(store: Store, session: Session) -> None:
-    """Keep in the store which image lights it, so that the store can be opened by itself."""
+    """Note in the store the image that lights it, so that the store can be opened without it."""
     said = session.document.environment
     if said is not None:
         file = Path(os.path.relpath(session.path(said.file).resolve(), store.folder.resolve())).as_posix()
@@ -105,7 +105,7 @@ def _progress(done: float, total: float, what: str) -> None:
 
 def _say(**words: object) -> None:
     sys.stdout.write(json.dumps(words) + "\n")
-    sys.stdout.flush()  # to a window that is gone: BrokenPipeError ends this process, too
+    sys.stdout.flush()  # BrokenPipeError ends this process when the window is gone
 
 
 if __name__ == "__main__":

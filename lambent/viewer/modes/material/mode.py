@@ -1,4 +1,4 @@
-"""The material mode: the editor and the preview that shows its material, with their panels and input."""
+"""The material mode: the editor and its preview, with their panels and input."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from lambent.viewer.screen import Screen
 from lambent.viewer.work import POLL_S
 
 SHORTCUTS = (
-    ("left drag", "turn about the shape"),
-    ("right, middle drag", "shift the view"),
-    ("wheel", "nearer, or away"),
-    ("1", "the first view again"),
+    ("left drag", "orbit the shape"),
+    ("right, middle drag", "pan"),
+    ("wheel", "zoom"),
+    ("1", "reset the view"),
     ("Ctrl+click on a slider", "type a number"),
     ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo a step"),
     ("Ctrl+S", "save the material"),
@@ -54,7 +54,7 @@ class MaterialState:
 
     @classmethod
     def of(cls, file: Path, material: Path | None, environments: Sequence[Path], screen: Screen) -> MaterialState:
-        """State that `lambent.viewer.edit.run` starts with."""
+        """The first state, from the arguments of `lambent.viewer.edit.run`."""
         measurement, start, other, home = _materials(file, material)
         look = Look(shows=tuple(show for show in SHOWS if show != LIGHT_MAP_NOISE))
         preview = _preview(file, environments)
@@ -71,7 +71,7 @@ class MaterialState:
 def _materials(file: Path, material: Path | None) -> tuple[Measurement | None, Material, Material | None, Path | None]:
     """The measurement, the material A, the material B, and the document that A came from."""
     if material is not None and (kind_of(file), kind_of(material)) == ("material", "measurement"):
-        file, material = material, file  # the other way round is as clear
+        file, material = material, file  # both orders are unambiguous
     if kind_of(file) == "environment":
         raise UserError("is a picture", file=file, expected="a measured table or a material document")
     if kind_of(file) == "material":
@@ -93,7 +93,7 @@ def _preview(file: Path, environments: Sequence[Path]) -> Preview:
 
 
 class MaterialInput(Input):
-    """Turns about the shape; saves the material."""
+    """Orbits the shape; saves the material."""
 
     def __init__(self, state: MaterialState) -> None:
         super().__init__(state.screen, state.navigation, state.editor.subject.edits)
@@ -147,16 +147,21 @@ class MaterialMode(Mode):
     def close(self) -> None:
         self.state.editor.close()
         if self.unsaved:
-            sys.stderr.write(f"lambent: note: {self.title} was changed and not saved\n")
+            sys.stderr.write(f"lambent: note: changes not saved: {self.title}\n")
 
 
 def panels(state: MaterialState) -> tuple[Panel, ...]:
-    """The column, each panel on the parts of the state that it needs."""
+    """Panels of the column."""
     editor = state.editor
     return (
         Panel("Material", partial(editing.draw, editor), "every number of the material", opened=True),
-        Panel("Fit", partial(editing.draw_fit, editor), "numbers that come nearest to the measurement", opened=True),
-        Panel("Preview", partial(draw_preview, state.preview, editor, state.look), "a shape in its light", opened=True),
+        Panel("Fit", partial(editing.draw_fit, editor), "fit the material to the measurement", opened=True),
+        Panel(
+            "Preview",
+            partial(draw_preview, state.preview, editor, state.look),
+            "shape and environment of the preview",
+            opened=True,
+        ),
         Panel("View", partial(looks.draw, state.look, state.screen), "how the preview is drawn"),
         Panel("Statistics", partial(statistics.draw, state.screen, editor), "cost of the last frame"),
         Panel("Help", partial(rows, SHORTCUTS, "shortcuts"), "mouse and keys"),
@@ -164,14 +169,14 @@ def panels(state: MaterialState) -> tuple[Panel, ...]:
 
 
 def draw_preview(preview: Preview, editor: Editor, look: Look) -> None:
-    """The shape, its light, and the exposure."""
+    """Draw shape, environment and exposure."""
     looks.draw_exposure(look, "##preview")
-    preview.shape = choice("shape", preview.shape, tuple(SHAPES), "what wears the material")
-    meaning = "the environment around it; every one is scaled to the same mean radiance"
+    preview.shape = choice("shape", preview.shape, tuple(SHAPES), "the shape that shows the material")
+    meaning = "the environment; all are scaled to the same mean radiance"
     preview.environment = choice("light", preview.environment, preview.environments, meaning)
     hint = "another .hdr or .exr, lat-long, angular or cube..."
-    text = typed_field("environment", editor.files.typed, "add", hint, "adds an environment to the list, and shows it")
+    text = typed_field("environment", editor.files.typed, "add", hint, "adds an environment to the list and shows it")
     if text is not None:
         editor.files.open(text)
-    meaning = "shows the plots of the material and of its measurement"
+    meaning = "shows plots of the material and its measurement"
     editor.plots.visible = check("disks and curves beside the picture", editor.plots.visible, meaning)

@@ -20,9 +20,9 @@ from lambent.scenes.geometry import patch, placed, sphere, teapot, turn
 from lambent.scenes.scene import Mesh
 from lambent.viewer.mode import Divider
 
-MEAN_RADIANCE = 0.35  # every environment is scaled to it, so that a change of light keeps the exposure
+MEAN_RADIANCE = 0.35  # all environments are scaled to this mean, so that they share an exposure
 LAMP_TOWARDS, LAMP_RADIUS_DEG = (0.07, -0.08, -1.0), 6.0
-LAMP_SHARE = 0.06  # of the environment's light
+LAMP_SHARE = 0.06  # light of the lamp, relative to the environment's
 OBJECT = "preview"
 BOUNDS = ((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
 CAMERA = Camera(name="front", position=(0.0, 0.75, 4.1), target=(0.0, 0.0, 0.0), fov_y_deg=32.0)
@@ -45,11 +45,11 @@ SHAPES: dict[str, Callable[[], Mesh]] = {
 
 @dataclass
 class Preview:
-    """Which shape in which light."""
+    """Shape and environment of the preview."""
 
     shape: str = "sphere"
     environment: str = "studio"
-    files: dict[str, Path] = field(default_factory=dict)  # environments of the user, by the name in the list
+    files: dict[str, Path] = field(default_factory=dict)  # the user's environments, by listed name
     divider: Divider = field(default_factory=Divider)
 
     @property
@@ -57,7 +57,7 @@ class Preview:
         return (*BUILT_IN, *self.files)
 
     def add(self, path: Path) -> str:
-        """List an environment; its name there."""
+        """Add an environment to the list, and return its listed name."""
         name = path.stem
         while name in BUILT_IN or (name in self.files and self.files[name] != path):
             name = f"{name}'"
@@ -65,11 +65,11 @@ class Preview:
         return name
 
     def choose(self, path: Path) -> None:
-        """List an environment and light the shape with it."""
+        """Add an environment to the list and use it."""
         self.environment = self.add(path)
 
     def light(self, name: str) -> Floats:
-        """The environment (6, n, n, 3) of that name, scaled to `MEAN_RADIANCE`; `UserError` where it is none."""
+        """Cube map (6, n, n, 3) of an environment, scaled to `MEAN_RADIANCE`; may raise `UserError`."""
         if name in BUILT_IN:
             cube = BUILT_IN[name]()
         else:
@@ -77,7 +77,7 @@ class Preview:
             height, width = picture.shape[:2]
             if width != 2 * height:
                 got = f"{width}x{height}"
-                what = "not a lat-long picture, an angular map, a cross or a strip"
+                what = "is no lat-long picture, angular map, cross or strip"
                 raise UserError(what, file=self.files[name], got=got, expected="2:1")
             cube = from_lat_long(picture)
         cube = np.maximum(np.nan_to_num(cube, posinf=0.0, neginf=0.0), 0)
@@ -91,7 +91,7 @@ def with_lamp(cube: Floats) -> Floats:
     """The environment with a round lamp far behind the sheet, which adds `LAMP_SHARE` of the light."""
     w = normalize(face_directions(cube.shape[1]))
     cosine = np.cos(np.radians(LAMP_RADIUS_DEG))
-    edge = 2 / cube.shape[1]  # a texel's angle: the rim is as soft as the cube is coarse
+    edge = 2 / cube.shape[1]  # one texel: the rim is as soft as the cube map's resolution
     away = np.arccos(np.clip(w @ normalize(np.array(LAMP_TOWARDS)), -1, 1))
     inside = np.clip((np.radians(LAMP_RADIUS_DEG) - away) / edge + 0.5, 0, 1)[..., None]
     radiance = LAMP_SHARE * 4 * np.pi * _mean_radiance(cube) / (2 * np.pi * (1 - cosine))

@@ -1,4 +1,4 @@
-"""The preview's pictures: A, and beside it B where two materials are compared; drawn by the renderer of the window."""
+"""The preview's pictures: A and, where two materials are compared, B, drawn by the real-time renderer."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from lambent.viewer.modes.material.preview import OBJECT, SHAPES, with_lamp
 from lambent.viewer.picture import Pair, Picture, size_px
 from lambent.viewer.screen import Rect
 
-KEPT = 4  # pictures that were shown last are kept ready
+KEPT = 4  # cached pictures
 LAMP_SHAPE = "sheet before a lamp"
 
 
 class Stage(Pair):
-    """Draws the shape and the light of a preview with the materials of its editor."""
+    """Draws a preview's shape and environment with the materials of its editor."""
 
     def __init__(self, device: Any, state: MaterialState) -> None:
         super().__init__(device)
         self._state = state
         self._lights: dict[str, Floats] = {}
         self._pictures: dict[tuple[str, str, str], Picture] = {}
-        self._lit_by: str | None = None  # the environment that could be loaded last
+        self._lit_by: str | None = None  # the last environment that was loaded
 
     @property
     def divider(self) -> Divider | None:
         return self._state.preview.divider if len(self.shown) == 2 else None
 
     def update(self, place: Rect, pixel_ratio: float) -> None:
-        """Draw what is due."""
+        """Draw the due frames."""
         state, subject = self._state, self._state.editor.subject
         self._have_light()
         materials = {"A": subject.material}
@@ -43,18 +43,18 @@ class Stage(Pair):
         pictures = [self._picture(which) for which in materials]
         self.shown = tuple(pictures)
         size, camera = size_px(place, pixel_ratio), state.navigation.camera
-        # A last: its statistics are the window's.
+        # A comes last: the window shows its statistics.
         for picture, material in reversed(list(zip(pictures, materials.values(), strict=True))):
             picture.update(state.look.frame(camera, size, {subject.name: material}))
 
     def save(self) -> None:
-        """Write the picture of A, and of B where there is one."""
+        """Write the picture of A, and of B if there is one."""
         for picture in self.shown:
             assert isinstance(picture, Picture), "as `update` made them"
             picture.save(self._state.editor.subject.name)
 
     def _have_light(self) -> None:
-        """Load the chosen environment; where that cannot be, say so and keep the one before."""
+        """Load the chosen environment; on failure say so and keep the previous one."""
         preview = self._state.preview
         if preview.environment not in self._lights:
             try:
@@ -70,7 +70,7 @@ class Stage(Pair):
         preview = self._state.preview
         key = (which, preview.shape, preview.environment)
         picture = self._pictures.pop(key, None) or self._made(preview.shape, preview.environment)
-        self._pictures[key] = picture  # the last one shown is the last one in
+        self._pictures[key] = picture  # most recently shown last
         while len(self._pictures) > KEPT:
             del self._pictures[next(iter(self._pictures))]
         return picture

@@ -1,4 +1,4 @@
-"""The walk mode: a baked store, on foot ("walk") or turning about what the camera looks at ("view")."""
+"""The walk mode: a baked store on foot ("walk") or in orbit about the camera's target ("view")."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from lambent.viewer.mode import Mode
 from lambent.viewer.screen import Screen
 
 STARTS = ("walk", "view")
-NO_DISPLAY = "use `lambent render`, or `lambent demo --headless`"
+NO_DISPLAY = "the window needs a display; without one, use `lambent render` or `lambent demo --headless`"
 
 
 def check(path: Path) -> None:
-    """`UserError` where there is no store at `path`; asked before a window is opened."""
+    """Raise `UserError` where there is no store at `path`; called before a window is opened."""
     Store.open(path).close()
 
 
@@ -22,7 +22,7 @@ def start(
     path: Path, name: str, screen: Screen, light_field_mb: float | None = None, policy: str = LEAST_RECENT,
     sky_turn_deg: float = 0.0, replaced: tuple[str, ...] = (),
 ) -> Mode:  # fmt: skip
-    """The mode on the store at `path`; `light_field_mb`: for maps of light fields on the GPU, cached by a `policy`."""
+    """Start the mode on a store; `light_field_mb`: GPU memory for light field maps, `policy`: of their cache."""
     from lambent.viewer.modes.walk.mode import open_store
 
     return open_store(

@@ -1,8 +1,8 @@
-"""Light that answers edited materials while the camera goes on: computed in a thread, shown as soon as it is there.
+"""Light that follows edited materials while the camera moves: computed in a thread, shown as soon as it is ready.
 
-The light map comes first, the probes after it, each when it is ready. An edit that comes in between drops the probes of
-the one before: the light map is never behind by more than one computation. Where a real GPU draws, its shaders compute
-the light map in its texture, and the thread reads it back for the probes and the estimate of its error alone.
+The light map comes first, then the probes one by one. A new edit drops the probes of the previous one, so that the
+light map lags by at most one computation. On a real GPU, shaders compute the light map in its texture, and the thread
+reads it back only for the probes and for the error estimate.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from lambent.store.answer import has_answer, read_answer
 from lambent.store.store import Store
 from lambent.viewer.work import Work
 
-AS_BAKED = "light of other surfaces: as baked"
-ESTIMATED = "light of other surfaces: estimated"
-WITHOUT = "the light of other surfaces stays as baked: this store has no answer (`lambent bake --only answer`)"
+AS_BAKED = "light on other surfaces: as baked"
+ESTIMATED = "light on other surfaces: estimated"
+WITHOUT = "light on other surfaces stays as baked: the store has no answer data (`lambent bake --only answer`)"
 
 
 @dataclass
 class Answering:
-    """What the panel shows: whether light answers, a line on it, and the share by which it may be off."""
+    """State for the panel: whether light follows edits, a line about it, and the likely relative error."""
 
     possible: bool = False
     on: bool = True
@@ -45,14 +45,15 @@ class Answering:
         """A line for the panel."""
         if self.likely_error is None or not self.on:
             return self.said
-        return f"light of other surfaces: estimated, off by at most about {100 * self.likely_error:.1f} %"
+        return f"light on other surfaces: estimated, error up to about {100 * self.likely_error:.1f} %"
 
 
 @dataclass(frozen=True, eq=False)
 class _Maps:
-    """`groups` are mixed where light is sorted so; else the light is shown, and probes follow.
+    """Light maps of edited materials.
 
-    `layers` are the light maps, and None of light that is on the GPU already: its error is estimated with its probes.
+    `groups` are for the light mixer, where the store has light groups; else probes follow. `layers` are the light maps,
+    None for light that is already on the GPU, whose error is estimated with its probes.
     """
 
     light: Lit
@@ -63,33 +64,33 @@ class _Maps:
 
 @dataclass(frozen=True, eq=False)
 class _Probes:
-    """The light of probes by object, and the error of the light that they see."""
+    """Light of probes by object, and the likely error of the light that they show."""
 
     lights: dict[str, ProbeLight]
     likely_error: float | None
 
 
 class AnsweringLight:
-    """Brings the light of edited materials onto the GPU. All calls come from the thread of the window."""
+    """Uploads the light of edited materials to the GPU. Call it from the thread of the window only."""
 
     def __init__(self, store: Store, renderer: Renderer, shown: Answering) -> None:
         self._store, self._renderer, self._shown = store, renderer, shown
-        self._answer: AnsweredLight | None = None  # made in the thread, with the first edit
-        self._of: Mapping[str, Material] | None = {}  # None: of something else, so that it is computed anew
+        self._answer: AnsweredLight | None = None  # made in the thread at the first edit
+        self._of: Mapping[str, Material] | None = {}  # materials of the shown light; None: compute it again
         self._work: Work | None = None
-        self._probes_of: Lit | None = None  # whose probes are to come
-        self._probing: Lit | None = None  # whose probes are being made
-        self._as_baked: dict[str, ProbeLight] | None = None  # by object with a probe, before the first edit
+        self._probes_of: Lit | None = None  # light whose probes are waiting
+        self._probing: Lit | None = None  # light whose probes are being computed
+        self._as_baked: dict[str, ProbeLight] | None = None  # baked light by owner of a probe
         self._first = [item.light for item in renderer.resources.objects]  # as baked
-        self._users: dict[str, list[int]] = {}  # numbers of the objects that show each
+        self._users: dict[str, list[int]] = {}  # indices of the objects that show each probe
         shown.possible = has_answer(store) and not renderer.scene.replaced
         if shown.possible:
             shown.said = AS_BAKED
         elif renderer.scene.replaced:
-            shown.said = "the light of other surfaces stays as baked: an object is replaced"
+            shown.said = "light on other surfaces stays as baked: an object is replaced"
 
     def another(self, renderer: Renderer, shown: Answering) -> AnsweringLight:
-        """The same for another renderer of the scene; what was read of the store is shared."""
+        """A copy for another renderer of the scene, sharing data read from the store."""
         made = AnsweringLight(self._store, renderer, shown)
         made._answer = self._answer
         return made
@@ -100,14 +101,14 @@ class AnsweringLight:
         return self._work is not None
 
     def update(self, edited: Mapping[str, Material]) -> None:
-        """Take what is finished, and begin what these materials ask for."""
+        """Take finished light, and start the light for these materials."""
         if not self._shown.possible:
             return
         wanted = edited if self._shown.on else {}
         if self._work is not None and self._work.poll():
             self._work = self._probing = None
         if wanted != self._of and self._work is not None and self._probing is not None:
-            self._work.cancel()  # probes of an edit before: begun anew where that edit comes back
+            self._work.cancel()  # probes of an earlier edit; computed again if that edit returns
             self._probes_of, self._probing = self._probing, None
         if self._work is not None:
             return
@@ -119,7 +120,7 @@ class AnsweringLight:
             self._begin_probes(light)
 
     def again(self) -> None:
-        """Compute the light anew at the next `update`, because something else was shown in its place."""
+        """Compute the light again at the next `update`, because another light was shown meanwhile."""
         self._of = None
 
     def close(self) -> None:
@@ -130,7 +131,7 @@ class AnsweringLight:
             self._work = None
 
     def _maps(self, edited: Mapping[str, Material]) -> _Maps:
-        """In the thread: the light maps of edited materials."""
+        """Compute the light maps of edited materials; runs in the thread."""
         if self._answer is None:
             device = self._renderer.device
             stored, shaders = read_answer(self._store), device if computes(device) else None
@@ -142,14 +143,14 @@ class AnsweringLight:
         return _Maps(light, None if groups else self._answer.layers(light), groups, self._likely_error(light))
 
     def _likely_error(self, light: Lit) -> float | None:
-        """In the thread: the error of light that is not as baked."""
+        """Estimate the error of light that is not as baked; runs in the thread."""
         assert self._answer is not None, "light comes from an answer"
         return None if light.is_baked else self._answer.likely_error(light, self._renderer.mixer.factors)
 
     def _show_maps(self, maps: _Maps) -> None:
         self._shown.said = AS_BAKED if maps.light.is_baked else ESTIMATED
         self._shown.likely_error = maps.likely_error
-        if maps.groups is not None:  # the mixer makes light maps and probes of them
+        if maps.groups is not None:  # the mixer makes light maps and probes from them
             self._renderer.mixer.answer(maps.groups)
         else:
             resources = self._renderer.resources
@@ -188,4 +189,4 @@ class AnsweringLight:
         self._work, self._probing = Work(run, show, self._failed), light
 
     def _failed(self, error: UserError) -> None:
-        self._shown.possible, self._shown.said = False, f"the light of other surfaces stays as baked: {error}"
+        self._shown.possible, self._shown.said = False, f"light on other surfaces stays as baked: {error}"

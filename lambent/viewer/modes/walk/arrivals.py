@@ -1,4 +1,4 @@
-"""What a bake beside the window has finished so far: told by its process, read by the window."""
+"""Finished parts of a background bake: reported by its process, read by the window."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from lambent.store.contract import probe_name
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """The front of a light map by light group (n, H, W, 3), W/m^2, of use where `finished` (H, W)."""
+    """Front side of a light map by light group (n, H, W, 3), W/m^2, valid where `finished` (H, W)."""
 
     light: NDArray[np.float16]
     finished: Flags
 
     @classmethod
     def read(cls, shape: tuple[int, int, int], stream: IO[bytes]) -> Region | None:
-        """As `rebaking_worker` writes it; None where the stream ends before it does."""
+        """Read a region as `rebaking_worker` writes it; None where the stream ends early."""
         count, height, width = shape
         size, flags = 2 * 3 * count * height * width, height * width
         found = stream.read(size + flags)
@@ -35,7 +35,7 @@ class Region:
 
 @dataclass(frozen=True)
 class Arrived:
-    """Of the light for one edit: a region; whether the light map is there; arrays of probes; and whether all is."""
+    """Arrived light of one edit: a region, whether the light map is whole, arrays of probes, whether all is whole."""
 
     region: Region | None = None
     light_map: bool = False
@@ -43,20 +43,20 @@ class Arrived:
     whole: bool = False
 
     def has_probe(self, name: str, *, by_group: bool) -> bool:
-        """Whether all arrays of the probe of an object are there."""
+        """Whether all arrays of an object's probe have arrived."""
         parts = ("radiance", "distance", "planes", *(("groups",) if by_group else ()))
         return all(probe_name(name, part) in self.probe_arrays for part in parts)
 
 
 class Arrivals:
-    """`now` is what has arrived; lines of the process are taken in a thread of their own."""
+    """Collects arrivals in `now`; a thread takes the lines of the process."""
 
     def __init__(self) -> None:
         self.now = Arrived()
         self._lock = threading.Lock()
 
     def take(self, said: Mapping[str, Any], stream: IO[bytes]) -> bool:
-        """Take a line of the process; whether it told that something has arrived."""
+        """Handle a line of the process; return whether it reported an arrival."""
         if "region" in said:
             region = Region.read(tuple(said["region"]), stream)
             if region is not None:

@@ -1,7 +1,7 @@
-"""The picture A beside B, another integrator's or the path tracer's, and how far the two are apart.
+"""Comparison of the picture A with B, drawn by another integrator or the path tracer.
 
-B is, unless chosen otherwise, the unbiased `qmc`, which accumulates while nothing moves: the error is then that of A's
-few samples. By the path tracer it is that of the bake as well. Figures compare what a display shows; the map of
+By default B uses the unbiased `qmc`, which accumulates at rest: the difference is then the error of A's few samples.
+Compared with the path tracer it includes the error of the bake. Figures compare displayed pictures; the map of
 differences compares luminances.
 """
 
@@ -32,11 +32,11 @@ Kind = Literal["difference", "FLIP"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 KINDS: tuple[Kind, ...] = get_args(Kind)
 REFERENCE = "qmc"
-TRACED = "path"  # B by the path tracer, in a process beside the window
-AS_A = "as A"  # look-up of B
-PERCENT = Range(1.0, 100.0)  # of the map of differences
-FLOOR = 0.02  # of the mean luminance: below, a difference counts as one of this
-FLIP_PIXELS = 1 << 19  # larger pictures are halved first: the library takes seconds per million
+TRACED = "path"  # B by the path tracer, in another process
+AS_A = "as A"  # look-up of B: the same as A's
+PERCENT = Range(1.0, 100.0)  # scale of the map of differences
+FLOOR = 0.02  # least divisor of relative differences, as a share of the mean luminance
+FLIP_PIXELS = 1 << 19  # larger pictures are halved: FLIP takes seconds per million pixels
 FLIP_PROGRAM = """
 import sys
 import numpy as np
@@ -48,34 +48,34 @@ _FLIP_STOPS = np.array([(0, 0, 0.02), (0.32, 0.07, 0.48), (0.72, 0.21, 0.47), (0
 
 @dataclass(frozen=True)
 class Figures:
-    """How far A is from B: dB and the mean difference in percent; mean FLIP as soon as it is there."""
+    """Difference of A from B: PSNR in dB, mean difference in per cent, and mean FLIP once it is computed."""
 
     psnr_db: float
     difference_percent: float
-    of: int  # samples per pixel and lobe of B, 0 where B does not accumulate
+    of: int  # samples per pixel and lobe of B; 0 where B does not accumulate
     flip_mean: float | None = None
     flip_of: int = 0
-    flip_step: int = 1  # pixels per side that were averaged first
+    flip_step: int = 1  # side of the pixel blocks that were averaged before FLIP
 
 
 class Comparison:
-    """Choice of the picture B, and figures and maps of its difference from A, brought up to date at rest."""
+    """Choice of the picture B, with figures and maps of its difference from A, updated at rest."""
 
     def __init__(self) -> None:
         self.mode: Mode = "off"
         self.integrator = REFERENCE
         self.look_up = AS_A
-        self.fault = ""  # why there is no B, in a line
+        self.fault = ""  # why there is no B, in one line
         self.kind: Kind = "difference"
         self.divider = Divider()
         self.figures: Figures | None = None
-        self.map: Image | None = None  # of errors, where one is to be shown
+        self.map: Image | None = None  # the error map to show, if any
         self._difference: Floats | None = None
         self._flip: Floats | None = None
         self._work: Work | None = None
         self._of: object = None
-        self._next = 1  # accumulated frames at which it is worth comparing again
-        self._painted: object = None  # the values that `map` shows
+        self._next = 1  # number of accumulated frames for the next comparison
+        self._painted: object = None  # values drawn in `map`
 
     @property
     def on(self) -> bool:
@@ -83,7 +83,7 @@ class Comparison:
 
     @property
     def is_traced(self) -> bool:
-        """Whether B is to be path traced."""
+        """Whether B is path traced."""
         return self.on and self.integrator == TRACED
 
     @property
@@ -91,20 +91,20 @@ class Comparison:
         return self._work is not None
 
     def due(self, of: object, accumulated: int) -> bool:
-        """Whether to compare the pictures of `of`, B of so many frames: at 1, 2, 4, 8... frames."""
+        """Whether to compare the pictures of `of` now: when B has accumulated 1, 2, 4, 8... frames."""
         if of != self._of:
             self.forget()
             self._of, self._next = of, 1
         return accumulated >= self._next
 
     def forget(self) -> None:
-        """Drop maps and work of other pictures; the figures stay."""
+        """Drop maps and work for earlier pictures; keep the figures."""
         if self._work is not None:
             self._work.cancel()
         self._work = self._difference = self._flip = self.map = self._painted = self._of = None
 
     def compare(self, a: Floats, b: Floats, view: str, exposure_ev: float, frames: int, samples: int) -> None:
-        """Compare pictures (H, W, 3) of radiance; FLIP goes on in the background."""
+        """Compare pictures (H, W, 3) of radiance; FLIP runs in the background."""
         self._next = 2 * max(frames, 1)
         self._difference = difference(a, b)
         pair = [shown(np.asarray(x, np.float32), view, exposure_ev) for x in (b, a)]
@@ -116,7 +116,7 @@ class Comparison:
             self._start_flip(pair, samples)
 
     def tick(self) -> None:
-        """Take FLIP once it is computed, and paint the map."""
+        """Take a finished FLIP, and draw the map."""
         self._work = pending(self._work)
         values = self._flip if self.kind == "FLIP" else self._difference
         if self.mode != "error map" or values is None:
@@ -135,19 +135,19 @@ class Comparison:
                 self.figures = replace(self.figures, flip_mean=float(error.mean()), flip_of=samples, flip_step=step)
 
         def failed(_: object) -> None:
-            self._flip = None  # PSNR and the difference stand without it
+            self._flip = None  # PSNR and mean difference remain
 
         self._work = Work(lambda progress: flip_beside(reference, test, progress), done, failed)
 
 
 def difference(a: Floats, b: Floats) -> Floats:
-    """|A - B| of the luminances (H, W) of two pictures of radiance, in percent of B's."""
+    """|A - B| of the luminances (H, W) of two pictures of radiance, in per cent of B."""
     ya, yb = luminance(np.asarray(a, np.float64)), luminance(np.asarray(b, np.float64))
     return np.asarray(100 * np.abs(ya - yb) / np.maximum(yb, max(FLOOR * float(yb.mean()), 1e-9)))
 
 
 def error_scale(kind: Kind) -> tuple[list[tuple[float, str]], Floats, str]:
-    """Marks (share of the scale, text), colours from low to high, and the unit of a map."""
+    """Ticks (share of the scale, text), colours from low to high, and the unit of a map."""
     if kind == "FLIP":
         return [(x, f"{x:g}") for x in (0.0, 0.25, 0.5, 0.75, 1.0)], _FLIP_STOPS, "FLIP"
     marks = [(float(PERCENT.share(np.array(x))), f"{x:g}") for x in PERCENT.marks()]
@@ -171,7 +171,7 @@ def _shrunk(encoded: Floats, step: int) -> Floats:
 def flip_beside(reference: Floats, test: Floats, progress: Progress) -> Floats:
     """FLIP error (H, W) of two encoded pictures (H, W, 3); `progress` may raise `Cancelled`.
 
-    In a process of its own: the library holds the interpreter while it computes, and the window would stand still.
+    It runs in another process: the library holds Python's global lock, which would freeze the window.
     """
     with tempfile.TemporaryDirectory() as folder:
         pair, error, words = (Path(folder) / name for name in ("pair.npy", "error.npy", "words.txt"))

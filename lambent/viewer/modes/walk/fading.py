@@ -1,4 +1,4 @@
-"""Light that was baked anew going over into a lane's picture, a step a frame, each made in a thread beforehand."""
+"""Blends rebaked light into a lane's picture, one step per frame, each prepared in a thread."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from lambent.viewer.modes.walk.rebaked_light import Rebaked, Step, probe_users, 
 
 
 class Fade:
-    """From what a lane shows in a mix of light groups to the light of a bake, as far as that has arrived.
+    """Blend from the light of a lane to the arrived light of a bake.
 
     Attributes
     ----------
     lane : Lane
     shown : Rebaked or None
-        What is in the picture, or goes into it.
+        Light in the picture, or being blended in.
     """
 
     def __init__(self, lane: Lane, light: Factors) -> None:
@@ -28,10 +28,10 @@ class Fade:
         self._room, self._answered = lane.room, lane.shown.on
         self._before = list(self._resources.light_layers), [item.light for item in self._resources.objects]
         self._thread = ThreadPoolExecutor(1, "rebaked")
-        self._next: Future[Step | None] | None = None  # None: nothing goes over
+        self._next: Future[Step | None] | None = None  # None: nothing is blended
 
     def bring(self, rebaked: Rebaked, camera: Camera, size: tuple[int, int]) -> None:
-        """Begin to bring in what has arrived since `shown`; seen by a camera in a picture of `size`."""
+        """Start to blend in the light that arrived since `shown`, in the order seen by a camera at picture `size`."""
         assert not self.moves, "one after the other"
         scene = self.lane.renderer.scene
         self._steps = steps(rebaked, self.shown, scene, self._resources, self._light, camera, size)
@@ -40,7 +40,7 @@ class Fade:
 
     @property
     def moves(self) -> bool:
-        """Whether light is going over."""
+        """Whether light is being blended."""
         return self._next is not None
 
     @property
@@ -50,7 +50,7 @@ class Fade:
 
     @property
     def left(self) -> tuple[str, ...]:
-        """Objects whose probes the bake does not have: they stay as they were."""
+        """Objects whose probes the bake lacks, which keep their light."""
         scene, resources = self.lane.renderer.scene, self._resources
         owners = probe_users(scene, resources, range(len(resources.objects)))
         return tuple(name for name in owners if self.shown is None or name not in self.shown.scene.probes)
@@ -61,18 +61,18 @@ class Fade:
 
     @property
     def _groups(self) -> GroupArrays | None:
-        """Light by group of the bake, where the scene has light groups, too."""
+        """The bake's light by group, where the scene has light groups."""
         return None if self.shown is None or self.lane.renderer.scene.groups is None else self.shown.scene.groups
 
     def serves(self, lane: Lane, light: Factors) -> bool:
-        """Whether this is the light of what the lane shows; once it is there, mixes of its light groups are, too."""
+        """Whether this light is for the state that the lane shows; once complete, it serves every light mix."""
         same_mix = light == self._light or (self.done and self._groups is not None)
         worn = lane.room.materials, lane.room.textures
         same_lane = lane is self.lane and lane.shown.on == self._answered
         return same_lane and worn == (self._room.materials, self._room.textures) and same_mix
 
     def step(self) -> None:
-        """Upload what is ready; nothing where the thread is not done with it."""
+        """Upload the next step if the thread has prepared it."""
         if self._next is None or not self._next.done():
             return
         upload = self._next.result()
@@ -87,14 +87,14 @@ class Fade:
 
     @property
     def _answers(self) -> bool:
-        """Whether light followed edits of the lane by itself before."""
+        """Whether the lane has estimated light for its edits."""
         return self.lane.answering is not None and self.lane.shown.possible and self._answered
 
     def end(self) -> None:
-        """Leave the lane to its own light.
+        """Return the lane to its own light.
 
-        What is whole stays until that changes: it may be the light of a state that is beside now. Where edits have no
-        answer, the lane shows what it did before.
+        Complete light stays until that changes, because it may belong to a state that is now beside. Where edits have
+        no answer, the lane shows its earlier light.
         """
         self._thread.shutdown(cancel_futures=True)
         lane, own = self.lane, self.lane.renderer.scene.groups

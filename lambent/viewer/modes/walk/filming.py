@@ -1,4 +1,4 @@
-"""A film of a camera path, made while the window goes on: a few frames at a time; it can be cancelled."""
+"""Renders a film along a camera path while the window keeps running; it can be cancelled."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from lambent.viewer.picture import scaled
 SIZES = {"1280 x 720": (1280, 720), "1920 x 1080": (1920, 1080), "3840 x 2160": (3840, 2160), "640 x 360": (640, 360)}
 FPS = (24, 25, 30, 60)
 QUALITIES = {"as in motion": 0, "refined, 64 samples": 64, "refined, 256 samples": 256}
-SLICE_S = 0.03  # of work between two looks at the events
+SLICE_S = 0.03  # time of work between two checks for events
 LONGEST_FRAMES = 100_000
 
 
 @dataclass
 class Films:
-    """Options of the Film panel, and the film under way. `quality` names the samples, see `Filming`."""
+    """Options of the Film panel, and the running film. `quality` is a key of `QUALITIES`."""
 
     size: str = next(iter(SIZES))
     fps: int = 30
@@ -47,21 +47,23 @@ class Films:
 
 
 def film_file(folder: Path, text: str) -> Path:
-    """File of a film, or of a sequence of images, for a typed name, in `folder` unless it says otherwise."""
+    """File of a film or of an image sequence, from a typed name or path, in `folder` if relative."""
     name = text.strip()
     path = Path(name)
     if path.suffix.lower() not in (FILM, *SEQUENCES) or not path.stem.strip(". ") or not name.isprintable():
-        raise UserError("not the name of a film", got=text, expected="a name like tour.mp4, tour-####.png or .exr")
+        raise UserError(
+            "is not a film name", got=text, expected="a file name, as in tour.mp4, tour-####.png or tour-####.exr"
+        )
     file = file_in(folder, name)
     check_place(file if file.suffix.lower() == FILM else sequence_file(file, 1))
     others = [there for there in pictures_there(file) if not is_marked(there)]
     if others:
-        raise UserError("exists already, and is not of Lambent", file=others[0], hint="choose another name")
+        raise UserError("exists already and was not made by Lambent", file=others[0], hint="choose another name")
     return file
 
 
 class Filming:
-    """One film under way, of frames like `frame` along `path`. `error` says why it ended early.
+    """A running film of frames like `frame` along `path`. `error` says why it ended early.
 
     The window draws with another renderer. `quality` is in samples of `qmc` per pixel, lobe and frame; with 0 the
     integrator is that of `frame`. `light` is the mix of light groups by time in seconds; without it that of `frame`.
@@ -74,7 +76,7 @@ class Filming:
         width, height = even_size(frame.width, frame.height)
         self.file, self.total, self.done = file, path.frames(fps), 0
         if self.total > LONGEST_FRAMES:
-            raise UserError("the film is too long", got=f"{self.total} frames", expected=f"at most {LONGEST_FRAMES}")
+            raise UserError("film is too long", got=f"{self.total} frames", expected=f"at most {LONGEST_FRAMES}")
         self.error: str | None = None
         self.over = False
         self._began_s, self._light = time.monotonic(), light
@@ -83,12 +85,12 @@ class Filming:
 
     @property
     def left_s(self) -> float | None:
-        """Seconds until the end, as it looks now."""
+        """Estimated seconds until the end."""
         spent_s = time.monotonic() - self._began_s
         return spent_s / self.done * (self.total - self.done) if self.done else None
 
     def step(self) -> bool:
-        """Work for about `SLICE_S`; whether it is over."""
+        """Work for about `SLICE_S`; return whether the film is finished."""
         end_s = time.monotonic() + SLICE_S
         try:
             while time.monotonic() < end_s:
@@ -100,14 +102,14 @@ class Filming:
         return self.over
 
     def cancel(self) -> None:
-        """Stop; a film leaves nothing behind, a sequence of images those that are done."""
+        """Stop: a film leaves no file, an image sequence its finished images."""
         self._work.close()
         self.over = True
 
     def _run(
         self, renderer: Renderer, path: CameraPath, frame: FrameState, fps: int, parts: int
     ) -> Generator[None, None, None]:
-        """Yields where events can be answered: after each part of a frame."""
+        """Yield after each part of a frame, so that events can be handled."""
         with pictures_writer(self.file, frame.width, frame.height, fps) as write:
             for index in range(self.total):
                 view = replace(frame, camera=camera_at(path, index / fps))

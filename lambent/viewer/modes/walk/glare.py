@@ -1,4 +1,4 @@
-"""Glare at the eye: a fisheye that is drawn one face per frame of the window, and its ratings."""
+"""Glare at the eye: draws a fisheye, one face per frame of the window, and rates it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SUPERSAMPLES = 2
 
 @dataclass
 class GlareMeter:
-    """What the panel asks for and shows; `camera` is that of `found`, `share` that of the faces drawn so far."""
+    """Request and result of the panel; `camera` belongs to `found`, `share` is the drawn share of the faces."""
 
     wanted: bool = False
     found: Glare | None = None
@@ -26,7 +26,7 @@ class GlareMeter:
 
 
 class GlareDrawing:
-    """Draws the faces of one view after the other; a new wish begins anew."""
+    """Draws the faces of a view one by one; a new request restarts."""
 
     def __init__(self, meter: GlareMeter) -> None:
         self._meter = meter

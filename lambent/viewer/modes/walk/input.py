@@ -19,29 +19,29 @@ from lambent.viewer.modes.walk.walls import Walls
 from lambent.viewer.picking import Geometry
 
 SHORTCUTS = (
-    ("W A S D, arrows", "walk; with Shift faster"),
+    ("W A S D, arrows", "walk; faster with Shift"),
     ("E, Space / Q, C", "up / down, while flying"),
-    ("F", "frame the selected object, and orbit it"),
+    ("F", "frame the selected object and orbit it"),
     ("O", "orbit, or walk"),
-    ("G", "leave the ground to fly, or come down onto the floor"),
-    ("left drag", "look around; in orbit turn about the selected object, or the target"),
-    ("right, middle drag", "shift the view (orbit)"),
-    ("wheel", "nearer to what orbit turns about, or away"),
+    ("G", "fly, or return to the floor"),
+    ("left drag", "look around; in orbit: turn about the selected object or the target"),
+    ("right, middle drag", "pan (orbit)"),
+    ("wheel", "move towards the orbit's centre, or away"),
     ("click", "select the object under the mouse"),
-    ("Esc", "select nothing"),
-    ("1 ... 9", "jump to a camera of the scene, or a saved view"),
+    ("Esc", "clear the selection"),
+    ("1 ... 9", "jump to a camera of the scene or a saved view"),
     ("V", "save the view"),
-    ("R", "record the way, or stop"),
-    ("X", "exchange the room and the state beside it, or as it was baked"),
+    ("R", "record a walk, or stop"),
+    ("X", "swap the room with the state beside it, or with the bake"),
     ("Ctrl+Z / Ctrl+Shift+Z, Ctrl+Y", "undo / redo a change of a material or the light"),
     ("Ctrl+S", "save the session with the store"),
     ("Ctrl+Q", "close the window"),
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show the panels"),
 )
-LARGE = 0.5  # radius of an object, as a share of its distance, from which orbit turns about where it was clicked
-PIECE_PX = 12.0  # of a drag in orbit, between two looks for walls
-TAP_S = 0.05  # that a key counts for at least
+LARGE = 0.5  # radius / distance from which orbit turns about the clicked point, not about the object's middle
+PIECE_PX = 12.0  # length of the pieces of a drag in orbit that are checked for walls
+TAP_S = 0.05  # least time that a key press counts
 
 
 class WalkInput(Input):
@@ -51,7 +51,7 @@ class WalkInput(Input):
         super().__init__(state.screen, state.navigation, state.materials.edits)
         self._state, self._geometry, self._walls = state, geometry, Walls(geometry.triangles)
         self.held: set[str] = set()
-        self._tapped: set[str] = set()  # pressed since the last step: a key may be released before a slow frame ends
+        self._tapped: set[str] = set()  # pressed since the last step; may be released before a slow frame ends
         self._fast = self._on_divider = self._flew = False
 
     @property
@@ -59,7 +59,7 @@ class WalkInput(Input):
         return any(key in cameras.KEYS for key in self.held | self._tapped)
 
     def walk(self, dt_s: float) -> None:
-        """Let the held keys carry the eye for `dt_s` seconds; whoever has just stopped flying comes down."""
+        """Move the eye by the held keys for `dt_s` seconds; after flying, return to the floor."""
         navigation, keys, held = self.navigation, self.held | self._tapped, bool(self.held)
         if not held:
             dt_s = TAP_S
@@ -84,7 +84,7 @@ class WalkInput(Input):
         self._state.meter.cursor = at
 
     def pressed(self, x: float) -> None:
-        """Take the divider: Dear ImGui would only after a frame with the mouse over it, and frames can be slow."""
+        """Grab the divider here, because Dear ImGui reacts only after a frame with the mouse over it."""
         place, divider = self.screen.picture, self._state.divider
         self._on_divider = divider is not None and abs(x - place.x - divider.share * place.width) <= CLICK_PX
 
@@ -119,7 +119,7 @@ class WalkInput(Input):
         return self._state.selection.pivot or super().pivot
 
     def turned(self, dx: float, dy: float) -> Camera:
-        """Who is within the scene stays there, and goes nearer to the pivot where a wall is in the way."""
+        """Orbit; a camera within the scene stays there, and moves towards the pivot where a wall is in the way."""
         navigation, pivot = self.navigation, self.pivot
         camera, bounds = navigation.camera, navigation.bounds
         pieces = math.ceil(math.hypot(dx, dy) / PIECE_PX)
@@ -131,10 +131,10 @@ class WalkInput(Input):
         return camera
 
     def _frame(self) -> None:
-        """Show the selected object as a whole, and orbit it."""
+        """Frame the selected object, and orbit it."""
         navigation, place, found = self.navigation, self.screen.picture, self._state.selection.record
         if found is None:
-            self.screen.say("nothing to frame: click an object first")
+            self.screen.say("nothing to frame: select an object first")
             return
         eye, bounds = navigation.camera.position, navigation.bounds
         around = cameras.is_within(eye, found.bounds)  # such as walls: seen from within

@@ -1,6 +1,6 @@
-"""Keeps the session of a store: opened with it, saved into it, and what is unsaved written beside it meanwhile.
+"""The session of a store: opens and saves it, and backs up unsaved changes beside it.
 
-The first window on a store keeps its session; another one shows it, and saves materials as documents alone.
+The first window on a store owns its session; another window shows it and can only save materials as documents.
 """
 
 from __future__ import annotations
@@ -14,35 +14,35 @@ from lambent.viewer.edits import MaterialEdits, unused
 from lambent.viewer.screen import Screen
 from lambent.viewer.work import Work, pending
 
-QUIET_S = 1.5  # without a change, before what is unsaved is written
-BACK = "unsaved changes of the last window are back: save them, or undo"
-ELSEWHERE = "another window keeps the session of this store: changes made here are saved as documents alone"
-NO_STORE = "there is no store to save the session with"
+QUIET_S = 1.5  # time without a change before unsaved changes are backed up
+BACK = "unsaved changes of the last window are restored: save them, or undo"
+ELSEWHERE = "another window has the session of this store open: here, only material documents can be saved"
+NO_STORE = "there is no store to save the session in"
 
 
 class SessionKeeper:
-    """The session file of one store, and the edits that it holds.
+    """The session file of one store and its edits.
 
     Attributes
     ----------
     fault : str
-        Why the session cannot be saved, in a line; empty where it can be.
+        Why the session cannot be saved, in one line; else empty.
     """
 
     def __init__(self, edits: MaterialEdits, folder: Path | None, screen: Screen) -> None:
         self._edits, self._folder, self._screen = edits, folder, screen
         self.fault = NO_STORE
-        self._kept = WalkSession()  # as it is saved
-        self._foreign: dict[str, object] = {}  # materials of the present state that the store does not have
-        self._set_aside = False  # the file that is there cannot be read, and is kept under another name
+        self._kept = WalkSession()  # as saved
+        self._foreign: dict[str, object] = {}  # materials of the present state that the store lacks
+        self._set_aside = False  # whether the unreadable session file must be renamed before saving
         self._lock: SessionLock | None = None
         self._seen = edits.session
         self._due_s: float | None = None
-        self._is_written = False  # the file of what is unsaved is there
+        self._is_written = False  # whether the backup file exists
         self._work: Work | None = None
 
     def open(self, groups: Collection[str] = ()) -> tuple[str, ...]:
-        """Take the session of the store, with what was not saved the last time; lines on what is amiss.
+        """Open the session of the store with the backup of unsaved changes; return lines on problems.
 
         `groups` are names of the store's light groups.
         """
@@ -54,7 +54,7 @@ class SessionKeeper:
             self._kept = read_session(self._folder / FILE) or WalkSession()
         except UserError as error:
             self._set_aside = True
-            lines.append(f"the session is left aside: {error}")
+            lines.append(f"the session cannot be read: {error}")
         self._edits.begin_from(self._kept)
         if not self.fault:
             lines += self._take_unsaved(self._folder / UNSAVED_FILE)
@@ -63,12 +63,12 @@ class SessionKeeper:
         if unknown := sorted(
             {*self._kept.unknown(self._edits.scene, groups), *session.unknown(self._edits.scene, groups)}
         ):
-            lines.append(f"the session names {', '.join(unknown)}, which the store does not have: kept, not shown")
+            lines.append(f"the session has {', '.join(unknown)}, which the store lacks: kept, not shown")
         self._seen = session
         return tuple(lines)
 
     def _take_lock(self, folder: Path) -> str:
-        """Make this window the one that keeps the session; why that cannot be, in a line."""
+        """Make this window the owner of the session; return why that is impossible, or an empty text."""
         try:
             self._lock = SessionLock(folder)
         except UserError as error:
@@ -80,7 +80,7 @@ class SessionKeeper:
             unsaved = read_session(file)
         except UserError as error:
             kept = _moved_aside(file)
-            return [f"unsaved changes of the last window cannot be read ({error}); the file is now {kept.name}"]
+            return [f"unsaved changes of the last window cannot be read ({error}); the file was renamed to {kept.name}"]
         if unsaved is None:
             return []
         self._is_written = True
@@ -89,7 +89,7 @@ class SessionKeeper:
 
     @property
     def session(self) -> WalkSession:
-        """What would be saved now."""
+        """The session to save."""
         session = self._edits.session
         if not self._foreign:
             return session
@@ -98,24 +98,24 @@ class SessionKeeper:
 
     @property
     def unsaved(self) -> tuple[str, ...]:
-        """What of the present session is not as it is saved, in plain words; materials by their names."""
+        """Names of unsaved parts of the session, for people; materials by name."""
         edits, kept = self._edits, self._kept
         names = [name for name in edits.scene if not self._is_saved(name)]
         more = [
             ("textures", edits.room.textures != kept.now.only(edits.scene).textures),
-            ("the mix of light", edits.light != kept.now.light),
+            ("the light mix", edits.light != kept.now.light),
             ("stored states", edits.stored != kept.states),
             ("the state to compare with", edits.other != kept.beside),
         ]
         return (*names, *(what for what, changed in more if changed))
 
     def _is_saved(self, name: str) -> bool:
-        """Whether a material is as the session has it, or as its document was saved last."""
+        """Whether a material equals that of the saved session, or its last saved document."""
         now = self._edits.current(name)
         return now in (self._kept.now.materials.get(name, self._edits.scene[name]), self._edits.saved.get(name))
 
     def save(self) -> bool:
-        """Write the session into the store; whether that was possible."""
+        """Write the session into the store; return whether it was saved."""
         if self.fault or self._folder is None:
             self._screen.say(f"session not saved: {self.fault}")
             return False
@@ -123,9 +123,9 @@ class SessionKeeper:
         self._finish()
         try:
             if not self._folder.is_dir():
-                raise UserError("the store is gone", file=self._folder)
+                raise UserError("store was deleted or moved", file=self._folder)
             if self._set_aside:
-                self._screen.say(f"the session that could not be read is now {_moved_aside(self._folder / FILE).name}")
+                self._screen.say(f"the unreadable session was renamed to {_moved_aside(self._folder / FILE).name}")
                 self._set_aside = False
             write_session(self._folder / FILE, self.session)
         except (UserError, OSError) as error:
@@ -133,11 +133,11 @@ class SessionKeeper:
             return False
         self._kept = self.session
         self._remove()
-        self._screen.say("saved the session with the store")
+        self._screen.say("saved the session in the store")
         return True
 
     def tick(self) -> None:
-        """Write what is unsaved, a while after the last change."""
+        """Back up unsaved changes, a while after the last change."""
         self._work = pending(self._work)
         if self.fault or self._folder is None:
             return
@@ -159,26 +159,26 @@ class SessionKeeper:
         return None if self._due_s is None else max(0.0, self._due_s - self._screen.clock())
 
     def rescue(self) -> Iterator[str]:
-        """The window is lost: write what is unsaved; where, for people. `UserError` where that cannot be."""
+        """Back up unsaved changes because the window is lost; yield the place, for people. May raise `UserError`."""
         self._finish()
         if not self.unsaved or self.fault or self._folder is None or not self._folder.is_dir():
             return
         write_session(self._folder / UNSAVED_FILE, self.session)
-        yield f"{self._folder / UNSAVED_FILE}, which the next window on the store brings back"
+        yield f"{self._folder / UNSAVED_FILE}; the next window on the store restores it"
 
     @property
     def keeps(self) -> bool:
-        """Whether a lost window leaves what is unsaved with the store."""
+        """Whether unsaved changes of a lost window are backed up in the store."""
         return not self.fault and self._folder is not None and self._folder.is_dir()
 
     def discard(self) -> None:
-        """Keep nothing of what is unsaved."""
+        """Discard unsaved changes and their backup."""
         self._finish()
         self._due_s = None
         self._remove()
 
     def close(self) -> None:
-        """Let another window keep the session."""
+        """Release the session to another window."""
         self._finish()
         self._release()
 
@@ -197,11 +197,11 @@ class SessionKeeper:
             self._lock.release()
 
     def _failed(self, error: UserError) -> None:
-        self._screen.say(f"unsaved changes could not be kept: {error}")
+        self._screen.say(f"unsaved changes could not be backed up: {error}")
 
 
 def _moved_aside(file: Path) -> Path:
-    """Give a file that cannot be read a free name beside its own."""
+    """Rename an unreadable file to a free name."""
     kept = file.with_name(f"{unused(file.parent, f'{file.stem}-kept', '.json')}.json")
     file.rename(kept)
     return kept

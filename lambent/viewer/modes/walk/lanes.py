@@ -1,8 +1,8 @@
-"""A lane: a renderer with baked light of its own, its picture, and the light that answers in it.
+"""A lane: a renderer with its own baked light, its picture, and the light that follows its edits.
 
-The room that is edited has one. A state that is shown beside it has another, because light maps and probes of two
-states differ; geometry and textures are on the GPU twice then. When the two states change places the lanes do, too, so
-that nothing is computed again.
+The edited room has a lane. A state beside it has a second one, because light maps and probes of two states differ;
+geometry and textures are then on the GPU twice. When the states are swapped, so are the lanes, and nothing is computed
+again.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from lambent.viewer.modes.walk.answering import Answering, AnsweringLight
 from lambent.viewer.picture import Picture
 from lambent.viewer.screen import Screen
 
-MIX_S = 0.01  # between two looks at a mix of light that is being made
-ANSWER_S = 0.01  # between two looks at light that is being computed
+MIX_S = 0.01  # interval of polling for a light mix
+ANSWER_S = 0.01  # interval of polling for computed light
 
 
 @dataclass
 class Lane:
-    """See the module. `room` is the state that was drawn last."""
+    """A lane; see the module. `room` is the last drawn state."""
 
     renderer: Renderer
     picture: Picture
@@ -35,19 +35,19 @@ class Lane:
 
     @classmethod
     def of(cls, renderer: Renderer, screen: Screen, answering: AnsweringLight | None, shown: Answering) -> Lane:
-        """Frames do not wait for maps: the picture is drawn again when they are there."""
+        """Make a lane whose frames do not wait for light field maps; it is drawn again when they arrive."""
         renderer.waits = False
         return cls(renderer, Picture(renderer, screen), answering, shown)
 
     def another(self, screen: Screen) -> Lane:
-        """A lane of the same scene, in light as baked."""
+        """A second lane of the same scene, with light as baked."""
         renderer = Renderer(self.renderer.device, self.renderer.scene, kin=self.renderer)
         shown = Answering()
         answering = None if self.answering is None else self.answering.another(renderer, shown)
         return Lane.of(renderer, screen, answering, shown)
 
     def answer(self, room: RoomState) -> None:
-        """Wear the textures of this state, and bring its light a step nearer."""
+        """Set the textures of this state, and advance its light."""
         if room.textures != self.room.textures:
             dress(self.renderer, room)
         self.room = room
@@ -55,7 +55,7 @@ class Lane:
             self.answering.update(room.materials)
 
     def frame(self, wanted: FrameState, light: Mapping[str, Triple]) -> FrameState:
-        """A frame of this lane's state, in the mix of these factors of light groups."""
+        """A frame of this lane's state with these factors of light groups."""
         renderer = self.renderer
         return replace(
             wanted, materials=dict(self.room.materials), maps=renderer.light_version, light=dict(light),
@@ -64,11 +64,11 @@ class Lane:
 
     @property
     def busy(self) -> bool:
-        """Whether light is being computed that the picture does not have yet."""
+        """Whether light for the picture is still being computed."""
         return self.renderer.mixer.busy or (self.answering is not None and self.answering.busy)
 
     def wait_s(self) -> float | None:
-        """Seconds until more of its light may be there; None: never."""
+        """Seconds until more light may be ready; None: never."""
         if self.renderer.mixer.busy:
             return MIX_S
         return ANSWER_S if self.answering is not None and self.answering.busy else None
@@ -79,13 +79,13 @@ class Lane:
             self.answering.close()
 
     def lend_light(self, other: Renderer) -> None:
-        """Let another renderer of the scene, with light of its own, show the state of this lane in any mix."""
+        """Let another renderer of the scene show this lane's state in any light mix."""
         dress(other, self.room)
         if (groups := self.renderer.mixer.groups) is not None:
             other.mixer.answer(groups)
 
 
 def dress(renderer: Renderer, room: RoomState) -> None:
-    """Show the textures that a state wears."""
+    """Show the textures of a state."""
     scene = renderer.scene.record.materials
     renderer.resources.dress({name: Look(scene[name], of) for name, of in room.textures.items()})

@@ -1,4 +1,4 @@
-"""Light fields in the window: the points of the selected object, one of which can be picked, and what its map holds."""
+"""Light fields in the window: the points of the selected object, and the map of a picked point."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from lambent.viewer.modes.walk.markers import NEAR_M, Size, projected
 
 Shows = Literal["light", "distance"]
 SHOWS: tuple[Shows, ...] = get_args(Shows)
-DISC_PX, PICKED_PX = 3.5, 6.0  # radii, logical
-REACH_PX = 8.0  # from a disc's middle, that a click may be
-HIDDEN = 1.02  # a point farther than this times what was clicked is behind it
-CHOICE = "light_field-choice"  # the look-up that shows them
-HUES = np.array([0.618034, 0.754878, 0.569840])  # as shaders show which point a pixel took
+DISC_PX, PICKED_PX = 3.5, 6.0  # radii in logical pixels
+REACH_PX = 8.0  # largest distance of a click from a disc's middle
+HIDDEN = 1.02  # points farther than this times the clicked surface are hidden
+CHOICE = "light_field-choice"  # the look-up that shows the used points
+HUES = np.array([0.618034, 0.754878, 0.569840])  # as in the shader of `CHOICE`
 
 
 @dataclass
 class FieldView:
-    """What of a light field is shown: its points, and the map of the `point` that was picked."""
+    """Shown parts of a light field: its points, and the map of the picked `point`."""
 
     fields: Mapping[str, LightField] = field(default_factory=dict)  # by object
     points_on: bool = False
@@ -51,9 +51,9 @@ class FieldView:
         return None if self.owner is None else self.fields[self.owner]
 
     def pick(self, camera: Camera, at: tuple[float, float], size: Size, distance_m: float) -> bool:
-        """Pick the point within reach of `at`, in pixels of a picture of `size`; whether there is one.
+        """Pick the point within reach of `at`, in pixels of a picture of `size`; return whether there is one.
 
-        What was clicked is `distance_m` away, and hides points behind it.
+        The clicked surface at `distance_m` hides points behind it.
         """
         light_field = self.chosen
         if light_field is None or not self.points_on:
@@ -69,7 +69,7 @@ class FieldView:
 
 
 class FieldDrawing:
-    """`images` has the discs ("points") and the map ("map") of a view, made anew where what they show changes."""
+    """`images` has the discs ("points") and the map ("map") of a view, drawn again after changes."""
 
     def __init__(self, discs: Discs, view: FieldView) -> None:
         self._discs, self._view = discs, view
@@ -78,7 +78,7 @@ class FieldDrawing:
         self.images: dict[str, Any] = {}
 
     def update(self, frame: FrameState, transform: str, exposure_ev: float, pixel_ratio: float) -> None:
-        """For the picture that `frame` asks for; `exposure_ev` is that of the maps' unit."""
+        """Update for the picture of `frame`; `exposure_ev` is relative to the maps' unit."""
         view, light_field = self._view, self._view.chosen
         points_of = (view.points_on, view.owner, view.point, frame.camera, frame.size, frame.near_m, pixel_ratio)
         if points_of != self._points_of:
@@ -101,17 +101,17 @@ class FieldDrawing:
 
 
 def shows_choice(frame: FrameState) -> bool:
-    """Whether an object shows which points answer, in their colours."""
+    """Whether an object shows the used points in their colours."""
     return CHOICE in (frame.lookup, *frame.lookups.values())
 
 
 def colours_of(numbers: Floats) -> Floats:
-    """(P, 3) in [.2, .8]: a colour for each point, of the hue that `light_field-choice` has for it."""
+    """(P, 3) in [.2, .8]: a colour for each point, with its hue in `light_field-choice`."""
     return np.asarray(0.2 + 0.6 * np.modf(numbers[:, None] * HUES)[0])
 
 
 def map_image(light_field: LightField, point: int, shows: Shows, transform: str, exposure_ev: float) -> Image:
-    """RGBA (E, E, 4) of the map of one point: its light, or its distances by their logarithm, the sky black."""
+    """RGBA (E, E, 4) of a point's map: its light, or log distances with a black sky."""
     if shows == "light":
         light = finite(light_field.radiance[point])[0]
         rgb = shown(np.asarray(light, np.float32), transform, exposure_ev)
@@ -127,7 +127,7 @@ def map_image(light_field: LightField, point: int, shows: Shows, transform: str,
 
 
 def distances_m(light_field: LightField, point: int) -> tuple[float, float]:
-    """The largest and the smallest distance that a point's map holds; 1, 1 where it sees the sky alone."""
+    """The largest and the smallest distance in a point's map; 1, 1 where it sees only the sky."""
     inverse = np.asarray(light_field.inverse_distance[point], np.float64)
     hits = inverse[np.isfinite(inverse) & (inverse > 0)]
     return (float(1 / hits.min()), float(1 / hits.max())) if len(hits) else (1.0, 1.0)

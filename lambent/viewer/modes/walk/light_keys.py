@@ -1,4 +1,4 @@
-"""Keys of a mix of light along a camera path: tracks (`core.light_mix`) with a whole mix at each of their times."""
+"""Keys of the light along a camera path: tracks (`core.light_mix`) with a complete mix at each time."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from collections.abc import Collection
 
 from lambent.core.light_mix import AS_BAKED, LightMix, MixTrack
 
-SAME_S = 0.05  # a key that is set nearer to another one takes its place
+SAME_S = 0.05  # a new key replaces a key nearer than this
 
 
 def key_times(track: MixTrack | None) -> tuple[float, ...]:
-    """Times of all keys in seconds, rising."""
+    """Times of all keys in seconds, increasing."""
     return () if track is None else tuple(sorted({time_s for keys in track.groups.values() for time_s, _ in keys}))
 
 
 def mix_at(track: MixTrack, time_s: float) -> LightMix:
-    """The mix of a key; a group without a key there is as in its last one before, else as in its first."""
+    """The mix of a key; a group without a key there has its previous key, else its first."""
     found = LightMix()
     for name, keys in track.groups.items():
         before = [mix for at, mix in keys if at <= time_s]
@@ -24,9 +24,9 @@ def mix_at(track: MixTrack, time_s: float) -> LightMix:
 
 
 def with_key(track: MixTrack | None, time_s: float, mix: LightMix, groups: Collection[str]) -> MixTrack:
-    """The track with this mix of all `groups` at a time, in the place of a key nearer than `SAME_S`.
+    """The track with this mix of all `groups` at a time, replacing a key nearer than `SAME_S`.
 
-    A group that the track did not name was as baked at its other times.
+    A group that is new in the track is as baked at its other times.
     """
     times = key_times(track)
     time_s = min((at for at in times if abs(at - time_s) < SAME_S), key=lambda at: abs(at - time_s), default=time_s)

@@ -1,4 +1,4 @@
-"""The mix of a store's light groups in the window: of the Light panel, of saved views, and of recorded walks."""
+"""The light mix in the window: of the Light panel, of saved views, and of recorded walks."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from lambent.viewer.navigation import Navigation
 
 @dataclass
 class Lights:
-    """`groups` are the store's, none where it was baked without; the mix is one of the `edits`, with their undo.
+    """The store's light `groups`, if any, and their mix, which is one of the `edits` and shares their undo.
 
-    `fields`: whether an object has a light field, which does not follow the mix.
+    `fields`: whether an object has a light field, which follows the mix only approximately.
     """
 
     groups: tuple[LightGroupRecord, ...] = ()
     edits: MaterialEdits = field(default_factory=lambda: MaterialEdits({}))
     fields: bool = False
-    at_view: str = ""  # the saved view whose mix was taken last
+    at_view: str = ""  # the saved view whose mix was last applied
 
     @property
     def mix(self) -> LightMix:
-        """What the panel shows."""
+        """The mix of the panel."""
         return self.edits.light
 
     @mix.setter
@@ -36,7 +36,7 @@ class Lights:
         self.edits.mix(mix)
 
     def visit(self, navigation: Navigation, saved: Views) -> None:
-        """Take the mix of a saved view where the camera has come to stand at one."""
+        """Apply the mix of a saved view where the camera has moved to one."""
         camera = navigation.camera
         if camera not in saved.cameras:
             self.at_view = ""
@@ -47,20 +47,20 @@ class Lights:
             self.edits.end_stroke()
 
     def known(self, factors: Mapping[str, Triple]) -> dict[str, Triple]:
-        """Those of groups that the store has: a mix may be saved with a store that was baked otherwise since."""
+        """The part of a mix whose groups the store has: the store may have been baked again since."""
         names = {group.name for group in self.groups}
         return {name: factor for name, factor in factors.items() if name in names}
 
 
 @dataclass
 class RecordedLight:
-    """Mixes and their times in seconds, as they were when a walk was recorded."""
+    """Mixes and their times in seconds while a walk was recorded."""
 
     keys: list[tuple[float, LightMix]] = field(default_factory=list)
     last_s: float = 0.0
 
     def take(self, mix: LightMix, time_s: float) -> None:
-        """The mix at this moment; it held since the last one where it is another."""
+        """Record the present mix; a changed mix also gets a key just before the change."""
         if self.keys and mix == self.keys[-1][1]:
             self.last_s = time_s
             return
@@ -70,7 +70,7 @@ class RecordedLight:
         self.last_s = time_s
 
     def track(self, began_s: float) -> MixTrack | None:
-        """The same as a track whose times count from `began_s`; None where all light was as baked."""
+        """The track of the recording, with times from `began_s`; None where all light was as baked."""
         names = {name for _, mix in self.keys for name in mix.groups}
         groups = {}
         for name in sorted(names):

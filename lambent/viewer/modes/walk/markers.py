@@ -1,4 +1,4 @@
-"""Probes and planar reflectors, drawn over the picture: mirror balls in the probes' places, outlines of reflectors."""
+"""Marks over the picture: mirror balls at probes, outlines of planar reflectors."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from lambent.store.contract import ReflectorRecord
 from lambent.viewer.mode import Image
 
 BALL_M = 0.12  # radius of a ball in the scene
-SMALLEST_PX, LARGEST_PX = 9.0, 72.0  # radius on the screen, logical
-CUBE_TEXELS = 64  # per face: a ball is small
+SMALLEST_PX, LARGEST_PX = 9.0, 72.0  # radius on the screen in logical pixels
+CUBE_TEXELS = 64  # per side of a face; a ball is small
 NEAR_M = 0.05
 Line = tuple[tuple[float, float], ...]  # a closed outline, in shares of the picture
 Size = tuple[int, int]  # width and height of the picture, logical
@@ -39,11 +39,11 @@ class Ball:
 
 
 class Marks:
-    """Marks that are wanted (`probes`, `reflectors`), as one camera sees them: balls, farthest first, and outlines."""
+    """Wanted marks (`probes`, `reflectors`) for one camera: balls, farthest first, and outlines."""
 
     def __init__(self, sources: Mapping[str, Probe], reflectors: Sequence[ReflectorRecord]) -> None:
         self.sources, self._reflectors = sources, reflectors
-        self._cubes: dict[str, Floats] = {}  # made small once
+        self._cubes: dict[str, Floats] = {}  # reduced cube maps
         self._made_for: tuple[Any, ...] = ()
         self.probes = self.reflectors = False
         self.images: dict[str, Image] = {}  # "probe NAME"
@@ -92,7 +92,7 @@ def projected(camera: Camera, points: Floats, size: Size) -> tuple[Floats, Float
 
 
 def outline(corners: Floats, camera: Camera, size: Size) -> Line | None:
-    """A polygon (P, 3) on the screen, cut at the eye; None where all of it is behind."""
+    """A polygon (P, 3) projected to the screen and clipped at the eye; None where all of it is behind the eye."""
     _, depths_m = projected(camera, corners, size)
     kept = []
     for a, b, da, db in zip(corners, np.roll(corners, -1, axis=0), depths_m, np.roll(depths_m, -1), strict=True):

@@ -1,4 +1,4 @@
-"""An exposure meter: mean and log-average luminance of the picture, their histogram, and the exposure that follows."""
+"""An exposure meter: mean, log-average and histogram of the picture's luminance, and the resulting exposure."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from lambent.core.false_colour import Range, fitting_range
 from lambent.core.photometry import LUMINANCE, Quantity, photometric
 from lambent.viewer.modes.walk.glare import GlareMeter
 
-PIXELS = 60_000  # that a reading looks at, evenly spread
+PIXELS = 60_000  # evenly spread pixels of a reading
 BINS_PER_DECADE = 12
 
 
 @dataclass(frozen=True)
 class Reading:
-    """Of one picture, in the unit of the quantity that it shows. `counts` (B,) lie between `edges` (B + 1,)."""
+    """Reading of one picture, in the unit of its quantity. `counts` (B,) lie between `edges` (B + 1,)."""
 
     mean: float
     log_mean: float
@@ -27,8 +27,8 @@ class Reading:
     high: float
     counts: Floats = field(compare=False)
     edges: Floats = field(compare=False)
-    ranges: tuple[Range, Range] = (Range(), Range())  # that hold the picture: by decades, by even steps
-    exposure_ev: float = 0.0  # that shows the middle as middle grey (core.exposure)
+    ranges: tuple[Range, Range] = (Range(), Range())  # ranges of the picture: logarithmic, linear
+    exposure_ev: float = 0.0  # shows the log-average as middle grey (core.exposure)
 
 
 def read(radiance: Floats, quantity: Quantity = LUMINANCE) -> Reading | None:
@@ -58,14 +58,14 @@ def read(radiance: Floats, quantity: Quantity = LUMINANCE) -> Reading | None:
 
 @dataclass
 class Meter:
-    """The window's meter. The panel sets `wanted` in every frame in which it is seen."""
+    """The window's meter. The panel sets `wanted` in every frame in which it is drawn."""
 
     wanted: bool = False
-    fit_wanted: bool = False  # the range of false colour follows the next reading
-    expose_wanted: bool = False  # so does the exposure
+    fit_wanted: bool = False  # whether the next reading sets the range of false colours
+    expose_wanted: bool = False  # whether the next reading sets the exposure
     fitted: set[bool] = field(default_factory=set)  # ranges that were fitted: of noise (True), of light (False)
     reading: Reading | None = None
-    cursor: tuple[float, float] | None = None  # of the mouse, as shares of the picture
-    readout_on: bool = False  # false colour shows it always
+    cursor: tuple[float, float] | None = None  # mouse position as shares of the picture
+    readout_on: bool = False  # whether the luminance under the mouse is shown; always in false colours
     under_cursor: tuple[float, float, float] | None = None  # radiance there
     glare: GlareMeter = field(default_factory=GlareMeter)

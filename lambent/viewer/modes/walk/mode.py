@@ -1,4 +1,4 @@
-"""The walk mode put together: its panels, its drawing, its input."""
+"""The walk mode: its panels, its drawing, its input."""
 
 from __future__ import annotations
 
@@ -51,10 +51,10 @@ def open_store(
     path: Path, movement: Movement, screen: Screen, light_field_mb: float | None = None, policy: str = LEAST_RECENT,
     sky_turn_deg: float = 0.0, replaced: tuple[str, ...] = (),
 ) -> WalkMode:  # fmt: skip
-    """The mode on a baked store that holds at least geometry and the scene record; else a `UserError`.
+    """Start the mode on a store with at least geometry and the scene record; else raise `UserError`.
 
-    `light_field_mb` is for the maps of light fields on the GPU, in caches of a `policy` of `core.map_cache`; the sky
-    is turned by `sky_turn_deg`, and meshes stand in the place of objects (`scenes.replacement`).
+    `light_field_mb` is the GPU memory for light field maps, cached by a `policy` of `core.map_cache`; `sky_turn_deg`
+    rotates the sky; `replaced` are meshes in place of objects (`scenes.replacement`).
     """
     store = Store.open(path)
     baked = with_replacements(read_baked(store, light_field_mb, policy), parse_replacements(replaced))
@@ -65,7 +65,7 @@ def open_store(
     state.lights.fields = bool(baked.light_fields)
     state.sky_turn_deg, state.replaced = sky_turn_deg, replaced
     from_scene = isinstance(store.documents.get(SOURCE), str) and not replaced
-    state.rebaking.possible = from_scene and sky_turn_deg % 360 == 0  # a turned sky has left the light map
+    state.rebaking.possible = from_scene and sky_turn_deg % 360 == 0  # the light map keeps the sky as baked
     of_session = state.session.open([group.name for group in state.lights.groups])
     state.missing = (*baked.missing, *state.missing, *of_session)
     state.notes, state.knows_noise = light_map_notes(store), baked.noise is not None
@@ -76,14 +76,14 @@ def open_store(
 
 
 def light_map_notes(store: Store) -> tuple[str, ...]:
-    """Noise and samples of the light map, per side, as the bake measured them."""
+    """Lines on noise and samples of the light map, per side, from the bake."""
     notes = []
     for name in ("light_map/irradiance", "light_map/irradiance_back"):
         meta = store.artefact(name).meta if name in store else {}
         noise, samples = meta.get("noise"), meta.get("samples")
         if isinstance(noise, float) and isinstance(samples, float):
             side = "far side" if name.endswith("back") else "light map"
-            notes.append(f"{side}: noise {100 * noise:.1f} % before denoising, {samples:.0f} samples a texel")
+            notes.append(f"{side}: noise {100 * noise:.1f} % before denoising, {samples:.0f} samples per texel")
     return tuple(notes)
 
 
@@ -119,7 +119,7 @@ class WalkMode(Mode):
         lines = [] if filming is None else [f"film: frame {filming.done} of {filming.total}"]
         if recorder.on:
             lines.append(f"recording {self.screen.clock() - recorder.began_s:.0f} s   (R stops)")
-        overlay.draw(self.screen, lines, refining=filming is None)  # which has the adapter to itself
+        overlay.draw(self.screen, lines, refining=filming is None)  # a film uses the adapter alone
 
         if not imgui.is_any_item_active():
             state.materials.edits.end_stroke()
@@ -163,7 +163,7 @@ class WalkMode(Mode):
         else:
             rescued("an unsaved material", lambda: self.state.materials.rescue(self.state.unsaved_materials))
         rescued("the recorded walk", self.state.recordings.rescue)
-        self.drawing.close()  # a film under way leaves nothing behind
+        self.drawing.close()  # a running film leaves no file
 
     def close(self) -> None:
         self.state.materials.close_editor()
@@ -171,49 +171,49 @@ class WalkMode(Mode):
         names = ", ".join(self.state.session.unsaved)
         self.state.session.close()
         if names:
-            sys.stderr.write(f"lambent: note: {names} changed and not saved\n")
+            sys.stderr.write(f"lambent: note: changes not saved: {names}\n")
 
 
 def panels(state: WalkState) -> tuple[Panel, ...]:
-    """The column, each panel on the parts of the state that it needs."""
+    """Panels of the column."""
     about = (state.missing, state.scene.warnings)
     return (
         Panel(
             "Material",
             partial(material.draw, state.selection, state.materials),
-            "the objects, and every number of the selected one's material",
+            "the objects, and every parameter of the selected material",
             opened=True,
         ),
         Panel(
             "States",
             partial(states.draw, state.states, state.comparison, state.screen),
-            "the room as it is now, as it was stored, and both beside each other",
+            "store the room's state, restore it, compare states",
         ),
-        Panel("View", partial(view.draw, state), "what the picture shows, and how bright", opened=True),
+        Panel("View", partial(view.draw, state), "what the picture shows, and its exposure", opened=True),
         Panel(
             "Scene",
             partial(scene.draw, state.navigation, state.recordings, *about),
-            "ways to move, cameras, saved views and walks",
+            "navigation, cameras, saved views and walks",
             opened=True,
         ),
-        Panel("Camera", partial(view.draw_camera, state), "angle of view, the walker, and marks over the picture"),
+        Panel("Camera", partial(view.draw_camera, state), "field of view, walking speed, and marks over the picture"),
         Panel(
             "Light",
             partial(lights.draw, state.lights, state.recordings),
             "each group of lamps: on or off, brightness, colour",
         ),
-        Panel("Drawing", partial(view.draw_drawing, state), "how reflections are drawn, and at which pace"),
+        Panel("Drawing", partial(view.draw_drawing, state), "how reflections are drawn, and how fast"),
         Panel(
             "Light field",
             partial(light_field.draw, state),
-            "points around the selected object, and what they see",
+            "points around the selected object and their maps",
         ),
         Panel(
             "Light meter",
             partial(metering.draw, state.meter, state.look, state.navigation),
-            "luminances of the picture in numbers, and glare",
+            "luminance of the picture in numbers, and glare",
         ),
-        Panel("Compare", partial(compare.draw, state.comparison), "the picture beside another integrator's"),
+        Panel("Compare", partial(compare.draw, state.comparison), "the picture compared with another integrator's"),
         Panel(
             "Film",
             partial(film.draw, state.films, state.recordings, state.navigation, state.screen),

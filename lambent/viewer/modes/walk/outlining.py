@@ -11,7 +11,7 @@ from lambent.store.contract import ObjectRecord
 
 
 class Outlining:
-    """`images` has the line around the selected object as the camera sees it, drawn anew where either changes."""
+    """`images` has the outline of the selected object as the camera sees it, drawn again after changes."""
 
     def __init__(self, renderer: Renderer) -> None:
         self._renderer, self._outline = renderer, renderer.outline()
@@ -19,7 +19,7 @@ class Outlining:
         self.images: Mapping[str, Any] = {}
 
     def update(self, frame: FrameState, selected: ObjectRecord | None) -> None:
-        """Outline the object `selected` in the picture that `frame` asks for; nothing with None."""
+        """Outline the object `selected` in the picture of `frame`; None: no outline."""
         wanted = (frame.camera, frame.size, frame.near_m, selected)
         if wanted == self._drawn_for:
             return

@@ -1,4 +1,4 @@
-"""The drawing of the walk mode: the picture, its comparison with another integrator's, marks, readings and films."""
+"""The drawing of the walk mode: the picture, comparisons, marks, meter readings and films."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ from lambent.viewer.picture import Pair, Picture, size_px
 from lambent.viewer.screen import Rect, least
 from lambent.viewer.work import POLL_S
 
-METER_S = 0.2  # between two readings of the meter while something moves
-SHARED = 0.5  # of the frame time that each of two pictures may take
+METER_S = 0.2  # time between two meter readings in motion
+SHARED = 0.5  # share of the frame time for each of two pictures
 
 
 class Pictures(Pair):
-    """The picture A; B, its renderer and that of films are made when they are first wanted."""
+    """Draws the picture A; the renderers of B and of films are made at their first use."""
 
     def __init__(self, renderer: Renderer, state: WalkState, answering: AnsweringLight | None = None) -> None:
         super().__init__(renderer.device)
         self._state = state
         self._lane = Lane.of(renderer, state.screen, answering, state.answering)
-        self._beside: Lane | None = None  # of the state that the room is compared with
+        self._beside: Lane | None = None  # lane of the state that the room is compared with
         self._rebaked = (
             None if state.store is None else RebakedLight(state.store, renderer.scene, state.screen, state.rebaking)
         )
@@ -68,14 +68,14 @@ class Pictures(Pair):
 
     @property
     def images(self) -> Mapping[str, Any]:
-        """Mirror balls, the outline of what is selected, its light field, and the error map in the picture's place."""
+        """Mirror balls, the selection's outline and light field, and the error map in place of the picture."""
         error = self._state.comparison.map
         own = {} if error is None else {"picture A": error}
         return {**self._state.marks.images, **self._outlining.images, **self._fields.images, **own}
 
     @property
     def views(self) -> tuple[Any, ...]:
-        """Of A and B; where B is not there yet, another view of A's texture: Dear ImGui drops views one by one."""
+        """Views of A and B; before B exists, a second view of A's texture: Dear ImGui drops views one by one."""
         if any(picture.view is None for picture in self.shown) and self._stands_for is not self._a.view:
             self._stands_for, self._stand_in = self._a.view, self._a.view.texture.create_view()
         return tuple(self._stand_in if picture.view is None else picture.view for picture in self.shown)
@@ -85,7 +85,7 @@ class Pictures(Pair):
         return self._state.divider if len(self.shown) == 2 else None
 
     def update(self, place: Rect, pixel_ratio: float) -> None:
-        """Draw what is due, and read the picture for the meter where it is looked at."""
+        """Draw the due frames, and read the picture for an open meter."""
         state = self._state
         self._film()
         self._follow_exchange()
@@ -111,10 +111,10 @@ class Pictures(Pair):
             self.shown = (self._a,)
             still = state.films.under_way is not None or shows_choice(
                 wanted
-            )  # a mean of points' colours is none of them
+            )  # averaging would mix the colours of points
             self._a.update(wanted, refine=False if still else None)
         look, size = state.look, (max(1, place.width), max(1, place.height))
-        exposure_ev = look.exposure_ev + math.log2(self._renderer.scene.unit)  # probes' light is in these units
+        exposure_ev = look.exposure_ev + math.log2(self._renderer.scene.unit)  # probes have these units
         state.marks.update(state.navigation.camera, size, look.display_transform, exposure_ev)
         state.fields.follow(state.selected_parts)
         self._fields.update(wanted, look.display_transform, exposure_ev, pixel_ratio)
@@ -138,12 +138,12 @@ class Pictures(Pair):
         return least(super().wait_s(), loading, self._lane.wait_s(), beside, compares, rebakes)
 
     def work(self) -> bool:
-        """Go on with the frame under way that has come less far."""
+        """Continue the unfinished frame that has accumulated less."""
         busy = [picture for picture in self.shown if picture.under_way]
         return bool(busy) and min(busy, key=lambda picture: picture.samples).work()
 
     def save(self) -> None:
-        """Write the picture A, and the error map where one is shown."""
+        """Write the picture A, and a shown error map."""
         name = self._a.save(self._state.scene.name)
         screen, error_map = self._state.screen, self._state.comparison.map
         if name is None or error_map is None:
@@ -156,7 +156,7 @@ class Pictures(Pair):
             screen.say(f"saved {name}-error.png")
 
     def close(self) -> None:
-        """Cancel FLIP, path tracing, the film under way, and light that is being computed."""
+        """Cancel FLIP, path tracing, the running film, and light computations."""
         if self._rebaked is not None:
             self._rebaked.close()
         for lane in (self._lane, self._beside):
@@ -171,28 +171,28 @@ class Pictures(Pair):
     # comparing
 
     def _follow_exchange(self) -> None:
-        """Where the room and the state beside it have changed places, so do their lanes."""
+        """Swap the lanes where the room and the state beside it were swapped."""
         edits, lane, beside = self._state.materials.edits, self._lane, self._beside
         if beside is None or edits.room == edits.other:
             return
         if beside.room == edits.room and lane.room == edits.other:
             self._lane, self._beside, self._state.answering = beside, lane, beside.shown
-            self._b = self._film_renderer = self._glare_renderer = None  # which share the light of the lane before
+            self._b = self._film_renderer = self._glare_renderer = None  # they share the light of the previous lane
 
     def _compare_states(self, wanted: FrameState) -> None:
-        """The room left of the divider, the other state right of it; each has half of a frame's time."""
+        """Draw the room and the other state, each in half of a frame's time."""
         state, edits = self._state, self._state.materials.edits
         state.comparison.forget()
         state.comparison.figures = None
         if self._beside is None:
             self._beside = self._lane.another(state.screen)
         other, beside = edits.other, self._beside
-        assert other is not None, "there is no split without"
+        assert other is not None, "no split without a second lane"
         beside.shown.on = state.answering.on
         beside.answer(other.only(state.scene.materials))
         self.shown = (self._a, beside.picture)
         beside.picture.update(beside.frame(wanted, state.lights.known(other.light.factors)), share=SHARED)
-        self._a.update(wanted, share=SHARED)  # last: its statistics are the window's
+        self._a.update(wanted, share=SHARED)  # last, because the window shows its statistics
         state.states.label()
 
     def _compare(self, wanted: FrameState) -> None:
@@ -203,13 +203,13 @@ class Pictures(Pair):
             self._b = Picture(renderer, self._state.screen)
         a, b = self._a, self._b
         self.shown = (a, b)
-        # A looks through the middle of each pixel: so does B where the difference is to be that of the integrators.
+        # A samples pixel centres; so must B, for the difference of the integrators only.
         edges = comparison.mode == "side by side"
         beside = replace(wanted, integrator=comparison.integrator, antialias=edges)
         if comparison.look_up != AS_A:
             beside = replace(beside, lookup=comparison.look_up, lookups={})
         b.update(beside, refine=comparison.integrator == REFERENCE, share=SHARED)
-        a.update(wanted, refine=False, share=SHARED)  # last: its statistics are the window's
+        a.update(wanted, refine=False, share=SHARED)  # last, because the window shows its statistics
         comparison.divider.a_label = wanted.integrator
         comparison.divider.b_label = ", ".join(
             [comparison.integrator]
@@ -219,12 +219,12 @@ class Pictures(Pair):
         self._measure(a, b, (a.version, comparison.integrator, comparison.look_up, comparison.mode))
 
     def _compare_traced(self, wanted: FrameState) -> None:
-        """B by the path tracer, which has the processor's time that drawing leaves."""
+        """Show B by the path tracer, which uses the CPU time that drawing leaves."""
         comparison, a = self._state.comparison, self._a
         if self._traced is None:
             state = self._state
             if state.store is None:
-                comparison.fault = "There is no store whose scene could be traced."
+                comparison.fault = "There is no scene file to trace."
                 self.shown = (a,)
                 a.update(wanted, refine=False)
                 return
@@ -243,7 +243,7 @@ class Pictures(Pair):
         return Renderer(self.device, self._renderer.scene, beside=self._renderer)
 
     def _measure(self, a: Picture, b: Picture | TracedPicture, of: object) -> None:
-        """Compare A and B, the pictures of `of`, where both are whole and at rest."""
+        """Compare A and B, the pictures of `of`, where both are complete and at rest."""
         comparison, look = self._state.comparison, self._state.look
         done = not a.under_way and a.wait_s() is None
         at_rest = done and (b.samples > 0 or (isinstance(b, Picture) and not b.under_way and b.wait_s() is None))
@@ -263,7 +263,7 @@ class Pictures(Pair):
             return
         wanted, meter.wanted = meter.wanted, False
         if look.is_false_coloured and look.shows_noise not in meter.fitted:
-            meter.fit_wanted = True  # for the first time
+            meter.fit_wanted = True  # the first time
         asked = meter.expose_wanted or (meter.fit_wanted and look.is_false_coloured)
         if asked or (wanted and a.version != self._read_version and now_s - self._read_s >= METER_S):
             meter.reading = read(a.read(), look.quantity)
@@ -278,7 +278,7 @@ class Pictures(Pair):
                 meter.under_cursor = triple(picture.read((x, y))[0, 0])
 
     def _apply(self) -> None:
-        """Set the exposure and the range that were to follow the reading."""
+        """Set the exposure and the range that wait for this reading."""
         meter, look, say = self._state.meter, self._state.look, self._state.screen.say
         if meter.expose_wanted and look.shows_noise:
             say("nothing to meter: the picture shows noise, not light")
@@ -303,7 +303,7 @@ class Pictures(Pair):
             except UserError as error:
                 screen.say(f"no film: {error}")
         film = films.under_way
-        # A frame of a film can be slow: events are answered first, so that it can be cancelled.
+        # A film's frame can be slow: handle events first, so that it can be cancelled.
         if film is None or screen.pace.answering or not film.step():
             return
         films.under_way = None
@@ -313,7 +313,7 @@ class Pictures(Pair):
         films = self._state.films
         file = film_file(self._state.screen.folder, films.file_name)
         if self._film_renderer is None:
-            # A film's light may change with its time, and so is not that of the window.
+            # A film's light may change over time and needs its own copy.
             scene = self._renderer.scene
             self._film_renderer = self._another_renderer() if scene.groups is None else Renderer(self.device, scene)
         if self._film_renderer.resources is not self._renderer.resources:

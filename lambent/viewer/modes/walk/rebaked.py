@@ -1,4 +1,4 @@
-"""What the window shows of light that is baked anew beside it."""
+"""State of a background rebake, for the panel."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from dataclasses import dataclass
 
 @dataclass
 class Rebaking:
-    """What the panel shows: whether light is baked anew, and how far that is.
+    """Whether edits are rebaked, and the progress.
 
     Attributes
     ----------
     on : bool
         Whether edits are baked in the background.
     possible : bool
-        Whether there is a store to bake beside.
+        Whether there is a store and a scene file to bake from.
     line : str
-        What the bake does, in a line; empty where it does nothing.
+        Line on the bake; empty without one.
     share : float or None
-        How far the step under way is, 0 to 1; None where there is none.
+        Progress of the present step, 0 to 1; None without one.
     exact : bool
-        Whether the picture has the light of a bake for the materials as they are.
+        Whether the picture has the light of a bake for the present materials.
     said : bool
         Whether the line says so.
     """

@@ -1,7 +1,7 @@
-"""Light that was baked anew, brought into the picture region by region: what each step of it uploads.
+"""Rebaked light, blended into the picture region by region: the upload of each step.
 
-A region is the texels and the probe of an object. Texels go over in a few frames each, those of what is in view and
-near first, then the probes in the same order. Arrays are made in a thread; nothing here waits for the GPU.
+A region is the texels and the probe of an object. Texels are blended over a few frames, objects in view and near
+first, then the probes in the same order. Arrays are computed in a thread; nothing here waits for the GPU.
 """
 
 from __future__ import annotations
@@ -29,24 +29,24 @@ from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, Scen
 from lambent.store.store import Store
 from lambent.viewer.modes.walk.arrivals import Arrived
 
-FADE_STEPS = 8  # frames in which one region goes over
-STAGGER = 2  # frames from the begin of one region to that of the next
-MOST_BATCHES = 16  # of regions that go over together
+FADE_STEPS = 8  # frames in which one region is blended
+STAGGER = 2  # frames between the starts of two regions
+MOST_BATCHES = 16  # most batches of regions that are blended together
 PROBE_STEPS = 3
-REACH = 0.5  # texels around a square from which look-ups touch it
+REACH = 0.5  # reach of a look-up around a texel, in texels
 Layers = list[NDArray[np.float16]]
 Step = Callable[[SceneResources], None]  # what one frame uploads
 
 
 @dataclass(frozen=True, eq=False)
 class Rebaked:
-    """The scene that is shown, in as much light of the copy as has arrived.
+    """The shown scene with the arrived light of the copy.
 
     Attributes
     ----------
     scene : BakedScene
-        With light map, probes and light by group of the copy, in the units of the scene that is shown. Probes are
-        those that have arrived; without the light map `region` is of use.
+        Light map, probes and light by group from the copy, in the units of the shown scene. It has the arrived probes;
+        before the light map arrives, `region` has a part of it.
     texel_object : (H, W) int64
         Number of the object that each texel of the light map belongs to; the count of objects where there is none.
     arrived : Arrived
@@ -61,9 +61,9 @@ class Rebaked:
 
     @classmethod
     def read(cls, copy: Path, shown: BakedScene, arrived: Arrived, before: Rebaked | None = None) -> Rebaked:
-        """The light that has arrived in the copy in a folder; what was read `before` is not read again.
+        """Read the arrived light from the copy, except what was read `before`.
 
-        All of it is in memory then: another bake may change the copy.
+        Everything is read into memory, because another bake may change the copy.
         """
         texel_object = texel_objects(shown) if before is None else before.texel_object
         count = len(shown.record.objects)
@@ -83,11 +83,11 @@ class Rebaked:
             if name not in probes and arrived.has_probe(name, by_group=groups is not None):
                 probes[name] = read_probe(store, name, shown.unit)
                 if groups is not None:
-                    groups.probe(name)  # which keeps it
+                    groups.probe(name)  # caches it
         return cls(replace(scene, probes=probes, groups=groups), texel_object, arrived, np.ones(count, bool))
 
     def layers(self, light: Factors, shown: Layers) -> Layers:
-        """Layers (H, W, 4) as `resources.light_layers` has them, in a mix of light groups; `shown` where none is."""
+        """Layers (H, W, 4), as of `resources.light_layers`, for a light mix; `shown` where no light has arrived."""
         scene, groups, region = self.scene, self.scene.groups, self.arrived.region
         if not self.arrived.light_map:
             if region is None:
@@ -103,7 +103,7 @@ class Rebaked:
         return list(light_layers(sides[0], sides[1], scene.dominant_direction))
 
     def probe(self, name: str, light: Factors) -> Probe | None:
-        """The probe of an object without the sun's disc, in a mix of light groups; None where it is not there."""
+        """An object's probe without the sun's disc, for a light mix; None where it has not arrived."""
         scene, groups = self.scene, self.scene.groups
         found = scene.probes.get(name)
         if found is None:
@@ -113,13 +113,13 @@ class Rebaked:
 
 
 def _with_light_map(store: Store, shown: BakedScene) -> BakedScene:
-    """The scene that is shown with the light map of a store, without probes."""
+    """The shown scene with the light map of a store, without probes."""
     scale = np.float32(1 / shown.unit)
     front, back = (finite(store.read(name))[0] * scale if name in store else None for name in map(light_name, SIDES))
     direction = store.read(DOMINANT_DIRECTION) if DOMINANT_DIRECTION in store else None
     groups = groups_in(store, shown.unit)
     if groups is not None:
-        _ = groups.lit_sides  # in memory from now on
+        _ = groups.lit_sides  # read into memory
     return replace(
         shown, irradiance=front, irradiance_back=back, dominant_direction=direction, probes={}, groups=groups
     )
@@ -131,7 +131,7 @@ def light_name(side: str) -> str:
 
 
 def texel_objects(scene: BakedScene) -> Indices:
-    """(H, W) number of the object on each texel of the light map; the count of objects where there is none."""
+    """(H, W) index of the object on each texel of the light map; the number of objects where there is none."""
     assert scene.irradiance is not None, "there is a light map"
     height, width = scene.irradiance.shape[:2]
     geometry: dict[str, Any] = {"positions": scene.positions, "faces": scene.faces, "uv2": scene.uv2}
@@ -140,13 +140,13 @@ def texel_objects(scene: BakedScene) -> Indices:
     for number, record in enumerate(scene.record.objects):
         owner[record.first_face : record.first_face + record.face_count] = number
     found = np.full(height * width, len(scene.record.objects), np.int64)
-    order = np.argsort(pieces.area, kind="stable")  # the largest piece of a texel is written last
+    order = np.argsort(pieces.area, kind="stable")  # the largest piece of a texel wins
     found[pieces.cell[order]] = owner[pieces.face[order]]
     return found.reshape(height, width)
 
 
 def in_view_order(record: SceneRecord, camera: Camera, size: tuple[int, int]) -> list[int]:
-    """Numbers of the objects: those in view first, the nearest first among them and among the others."""
+    """Indices of the objects: those in view first, each part sorted by distance."""
     across, up, forward = image_plane(camera, *size)
 
     def place(o: ObjectRecord) -> tuple[bool, float]:
@@ -160,7 +160,7 @@ def in_view_order(record: SceneRecord, camera: Camera, size: tuple[int, int]) ->
 
 
 def _meets(rays: Floats, across: Floats, up: Floats, forward: Floats) -> bool:
-    """Whether a box whose corners are seen along these rays (n, 3) may be in the picture."""
+    """Whether a box with corners along these rays (n, 3) may be in the picture."""
     depth = rays @ forward / (forward @ forward)
     x, y = rays @ across / (across @ across), rays @ up / (up @ up)
     beyond = [depth <= 0, x > depth, x < -depth, y > depth, y < -depth]
@@ -168,14 +168,14 @@ def _meets(rays: Floats, across: Floats, up: Floats, forward: Floats) -> bool:
 
 
 def texel_steps(before: Layers, after: Layers, batch: Indices) -> Iterator[Layers]:
-    """Light maps frame by frame, texels (H, W) of one batch after the other going over from one to the other.
+    """Light maps, frame by frame, in which one batch of texels (H, W) after the other is blended to `after`.
 
-    The last is `after`, to the bit.
+    The last one equals `after` bit for bit.
     """
     last = STAGGER * int(batch.max()) + FADE_STEPS
     for frame in range(1, last):
         share = np.clip((frame - STAGGER * batch) / FADE_STEPS, 0, 1).astype(np.float32)[..., None]
-        share = share * share * (3 - 2 * share)  # begins and ends gently
+        share = share * share * (3 - 2 * share)  # smoothstep
         yield [_between(a, b, share) for a, b in zip(before, after, strict=True)]
     yield after
 
@@ -186,7 +186,7 @@ def _between(a: NDArray[np.float16], b: NDArray[np.float16], share: Floats) -> N
 
 
 def batches_of(texel_object: Indices, order: Sequence[int], objects: int) -> Indices:
-    """(H, W) number of the batch in which each texel goes over; texels of none of the objects in `order` go last."""
+    """(H, W) batch in which each texel is blended; texels of no object in `order` come last."""
     count = len(order)
     rank = np.full(objects + 1, min(count, MOST_BATCHES) - 1 if count else 0)
     for place, number in enumerate(order):
@@ -203,7 +203,7 @@ def steps(
     camera: Camera,
     size: tuple[int, int],
 ) -> Iterator[Step]:
-    """All uploads of what has arrived `since`, in order, a frame each. Iterate in a thread: each takes a while."""
+    """All uploads of light that arrived `since`, in order, one per frame. Iterate in a thread: each takes a while."""
     order = in_view_order(shown.record, camera, size)
     if since is None or not since.arrived.light_map:
         before = list(resources.light_layers)
@@ -237,7 +237,7 @@ def _relights(users: Sequence[ObjectResources], light: ProbeLight) -> Step:
 def probe_users(
     shown: BakedScene, resources: SceneResources, order: Sequence[int]
 ) -> Mapping[str, list[ObjectResources]]:
-    """By owner of a probe, the objects that show it, in the order of the first of these."""
+    """Objects that show each probe, by its owner, in the order of their first object."""
     names = {id(probe.radiance): name for name, probe in shown.probes.items()}
     found: dict[str, list[ObjectResources]] = {}
     for number in order:

@@ -1,4 +1,4 @@
-"""A process of its own that bakes a store's light anew for edited materials, into a copy beside the store.
+"""Worker process that rebakes a store's light for edited materials, into a copy beside the store.
 
 python -m lambent.viewer.modes.walk.rebaking_worker STORE COPY
 
@@ -28,12 +28,12 @@ from lambent.core.arrays import Flags
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 
-NICENESS = 10  # the window comes first
-REGION_PAUSE = 10.0  # so at most a tenth of the time goes to regions that are finished early
+NICENESS = 10  # the window has priority
+REGION_PAUSE = 10.0  # pause after sending a region, in multiples of the sending time
 
 
 class Told(Watch):
-    """Writes what arrives to a stream, each in a line, the light of regions after it."""
+    """Reports finished arrays and regions to a stream, one line each, followed by the light of a region."""
 
     region_pause: float | None = REGION_PAUSE
 
@@ -58,7 +58,7 @@ class Told(Watch):
 
 
 def main(store: Path, copy: Path, asked: bytes, out: BinaryIO) -> None:
-    """Bake, and say how far it is."""
+    """Bake, and report progress."""
     wanted = json.loads(asked)
     materials = {name: Material.model_validate(said) for name, said in wanted["materials"].items()}
 
@@ -76,7 +76,7 @@ def main(store: Path, copy: Path, asked: bytes, out: BinaryIO) -> None:
 
 
 def _end_with(stream: BinaryIO) -> None:
-    """End the process where the window has ended, however that was: a store may be left at any moment."""
+    """End the process when the window has ended: a store may be left at any moment."""
     while stream.read(1):
         pass
     os._exit(0)
@@ -86,7 +86,7 @@ if __name__ == "__main__":
     if hasattr(os, "nice"):
         os.nice(NICENESS)
     own = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what libraries print is none of the lines
+    os.dup2(2, 1)  # libraries' output must not mix with the lines
     words = os.fdopen(os.dup(0), "rb", buffering=0)
     first = words.readline()
     if first:

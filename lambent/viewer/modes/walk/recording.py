@@ -1,4 +1,4 @@
-"""Recording a walk: the camera and its times, made smooth, as a path that films and the window follow; saving it."""
+"""Recording of walks: cameras and times, smoothed to a path for films and playback; saving of views and paths."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from lambent.viewer.modes.walk.views import Kind, SavedViews, write_alone
 from lambent.viewer.navigation import Navigation, PathPlay
 from lambent.viewer.screen import Screen
 
-KEY_S = 0.1  # between two keys of a path
-STILL_S = LONGEST_STEP_S  # what moves longer than this between two frames stood still before
+KEY_S = 0.1  # time between two keys of a path
+STILL_S = LONGEST_STEP_S  # a longer gap between two frames counts as standing still
 LONGEST_S = 600.0
 DRAFT = "recorded"
-SMOOTH_S = 0.3  # standard deviation of the bell that takes the jerks out
+SMOOTH_S = 0.3  # standard deviation of the smoothing Gaussian
 
 
 @dataclass
 class Recording:
-    """Cameras and their times in seconds, as they were drawn."""
+    """Drawn cameras and their times in seconds."""
 
     times_s: list[float] = field(default_factory=list)
     cameras: list[Camera] = field(default_factory=list)
-    still_s: float = 0.0  # when the last camera was seen last
+    still_s: float = 0.0  # last time at which the last camera was seen
 
     def take(self, camera: Camera, time_s: float) -> None:
-        """The camera at this moment. Each frame is told of, so that a slow one is not taken for standing still."""
+        """Record the camera. Call it every frame, so that a slow frame is not taken for standing still."""
         if self.cameras and camera == self.cameras[-1]:
             self.still_s = max(time_s, self.still_s)
             return
@@ -50,20 +50,20 @@ class Recording:
 
     @property
     def seconds(self) -> float:
-        """From the first movement to the last."""
+        """Duration from the first movement to the last."""
         return self.times_s[-1] - self.start_s if len(self.times_s) > 1 else 0.0
 
     @property
     def start_s(self) -> float:
-        """When the first movement began; the time before it is left out."""
+        """Start of the first movement; the time before it is left out."""
         waited = len(self.cameras) > 1 and self.cameras[1] == self.cameras[0]
         return self.times_s[1] if waited else self.times_s[0]
 
     def path(self, name: str, smooth_s: float = SMOOTH_S) -> CameraPath | None:
         """The recorded path; None where nothing moved.
 
-        Keys stand `KEY_S` apart. Positions, lines of sight and angles of view are averaged with a bell of standard
-        deviation `smooth_s`; the ends stay where they were.
+        Keys are `KEY_S` apart. Positions, lines of sight and fields of view are smoothed with a Gaussian of standard
+        deviation `smooth_s`; the ends stay in place.
         """
         if self.seconds <= 0:
             return None
@@ -79,7 +79,7 @@ class Recording:
 
 @dataclass
 class Recorder:
-    """Follows the camera while `on`; then `draft` is smoothed and tried out, until it is saved or dropped."""
+    """Records the camera while `on`; then `draft` can be smoothed and played until it is saved or discarded."""
 
     on: bool = False
     recording: Recording = field(default_factory=Recording)
@@ -88,42 +88,42 @@ class Recorder:
     smooth_s: float = SMOOTH_S
     began_s: float = 0.0
     name: str = ""
-    suggested: str = ""  # the name as it stands before anything is typed
+    suggested: str = ""  # the suggested name
 
     def begin(self, now_s: float) -> None:
-        """Follow the camera from now on; a draft is dropped."""
+        """Start to record; discard a draft."""
         self.drop()
         self.on, self.began_s = True, now_s
 
     def take(self, camera: Camera, now_s: float) -> bool:
-        """The camera at this moment; whether the recording has become too long to go on."""
+        """Record the camera; return whether the recording has reached its longest duration."""
         if self.on:
             self.recording.take(camera, now_s - self.began_s)
         return self.on and now_s - self.began_s > LONGEST_S
 
     def stop(self) -> CameraPath | None:
-        """Make a draft of the recording; None where nothing moved."""
+        """End the recording and make a draft of it; None where nothing moved."""
         self.on = False
         self.smooth(self.smooth_s)
         return self.draft
 
     def smooth(self, smooth_s: float) -> None:
-        """Make the draft anew, smoothed more or less."""
+        """Smooth the draft again, with another `smooth_s`."""
         self.smooth_s, self.draft = smooth_s, self.recording.path(DRAFT, smooth_s)
 
     def drop(self) -> None:
-        """Forget the draft."""
+        """Discard the draft."""
         self.recording, self.light, self.draft = Recording(), RecordedLight(), None
 
     @property
     def track(self) -> MixTrack | None:
-        """The light of the draft over its time; None where it was as baked."""
+        """The light of the draft over time; None where it was as baked."""
         return self.light.track(self.recording.start_s) if self.recording.times_s else None
 
 
 @dataclass
 class Recordings:
-    """Saves where the camera stands and how it moves."""
+    """Saves views and camera paths."""
 
     views: SavedViews
     navigation: Navigation
@@ -131,23 +131,23 @@ class Recordings:
     lights: Lights = field(default_factory=Lights)
     recorder: Recorder = field(default_factory=Recorder)
     view_name: str = ""  # typed for the next saved view
-    written: dict[str, MixTrack | None] = field(default_factory=dict)  # light along paths that was saved from here
-    keying: bool = False  # keys of light are being set: a path that rests shows the mix, not its own light
+    written: dict[str, MixTrack | None] = field(default_factory=dict)  # light along paths saved by this window
+    keying: bool = False  # light keys are being set: a paused path shows the mix, not its own light
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
-        """Cameras of the scene, then saved ones."""
+        """Cameras of the scene, then saved cameras."""
         return self.views.all.cameras
 
     @property
     def paths(self) -> tuple[CameraPath, ...]:
-        """Paths of the scene, saved ones, and the one just recorded."""
+        """Paths of the scene, saved paths, and the draft."""
         paths = self.views.all.paths
         return paths if self.recorder.draft is None else (*paths, self.recorder.draft)
 
     @property
     def light(self) -> dict[str, Triple]:
-        """Factors of the light groups that the picture shows: of the walk that is followed, else of the mix."""
+        """Factors of the light groups in the picture: of the played walk, else of the mix."""
         play = self.navigation.path
         keying = self.keying and play is not None and not play.playing
         track = None if play is None or keying else self.track_of(play.path)
@@ -155,28 +155,28 @@ class Recordings:
         return self.lights.known(found)
 
     def track_of(self, path: CameraPath) -> MixTrack | None:
-        """The light over time of a saved path, or of the one just recorded."""
+        """The light over time of a saved path or of the draft."""
         return self.recorder.track if path == self.recorder.draft else self.views.saved.tracks.get(path.name)
 
     def set_key(self) -> None:
-        """Keep the mix as it is now as the light of the path at this moment, as a step of undo."""
+        """Set the present mix as the path's light at the present time, as one step of undo."""
         play = self.navigation.path
         if play is None:
             return
         groups = [group.name for group in self.lights.groups]
         before = self.track_of(play.path)
         if self._light_path(play.path.name, before, with_key(before, play.time_s, self.lights.mix, groups)):
-            self.screen.say(f"the light of {play.path.name} at {play.time_s:.1f} s is the present mix")
+            self.screen.say(f"set the light of {play.path.name} at {play.time_s:.1f} s to the present mix")
 
     def drop_key(self, time_s: float) -> None:
-        """Remove a key of the path's light, as a step of undo."""
+        """Remove a key of the path's light, as one step of undo."""
         play = self.navigation.path
         track = None if play is None else self.track_of(play.path)
         if play is not None and track is not None:
             self._light_path(play.path.name, track, without_key(track, time_s))
 
     def _light_path(self, path: str, before: MixTrack | None, track: MixTrack | None) -> bool:
-        """Save other light along a path, as a step of undo; whether that was possible."""
+        """Save changed light along a path, as one step of undo; return whether it was saved."""
         if not self.views.set_track(path, track):
             return False
         self.lights.edits.light_path(path, before, track)
@@ -184,19 +184,19 @@ class Recordings:
         return True
 
     def _follow_undo(self) -> None:
-        """Save the light along paths that undo or redo has changed."""
+        """Save light along paths after undo or redo has changed it."""
         for path, track in self.lights.edits.tracks.items():
             if track == self.written.get(path):
                 continue
             self.written[path] = track
             if path not in {one.name for one in self.paths}:
-                self.screen.say(f"the light of {path} is not changed: there is no path of this name")
+                self.screen.say(f"light not changed: there is no path {path}")
             elif self.views.set_track(path, track):
                 keys = len(key_times(track))
-                self.screen.say(f"the light of {path} has {keys} key{'' if keys == 1 else 's'} again")
+                self.screen.say(f"restored {keys} light key{'' if keys == 1 else 's'} of {path}")
 
     def go_to_key(self, time_s: float) -> None:
-        """Stand at a key of the path's light, with its mix at hand, as a step of undo."""
+        """Go to a key of the path's light and apply its mix, as one step of undo."""
         play = self.navigation.path
         track = None if play is None else self.track_of(play.path)
         if play is not None and track is not None:
@@ -207,7 +207,7 @@ class Recordings:
             self.lights.edits.end_stroke()
 
     def save_view(self) -> None:
-        """Save where the camera stands, under the typed name or the next free one."""
+        """Save the camera as a view, under the typed name or the next free one."""
         mix = self.lights.mix if self.lights.groups else None
         added = self.views.add(self.navigation.camera, self.view_name if self.view_name.strip() else None, mix)
         if added is not None:
@@ -215,7 +215,7 @@ class Recordings:
             self.screen.say(f"saved the view {added.name}")
 
     def rename(self, kind: Kind, name: str) -> None:
-        """Give a saved camera or path the typed name, and show it."""
+        """Rename a saved camera or path to the typed name, and show it."""
         if self.views.rename(kind, name, self.views.typed_name):
             new, self.views.renaming = self.views.typed_name.strip(), None
             if kind == "camera":
@@ -232,7 +232,7 @@ class Recordings:
             self.screen.say(f"deleted the {'view' if kind == 'camera' else kind} {name}")
 
     def record(self) -> None:
-        """Begin to record the camera's path, or stop."""
+        """Start to record the camera's path, or stop."""
         recorder, navigation = self.recorder, self.navigation
         if not recorder.on:
             if navigation.path is not None:
@@ -240,13 +240,13 @@ class Recordings:
             recorder.begin(self.screen.clock())
         elif (draft := recorder.stop()) is not None:
             recorder.name = recorder.suggested = self.views.free_name("path")
-            navigation.path = PathPlay(draft, draft.seconds, playing=False)  # chosen, and ready to be played
+            navigation.path = PathPlay(draft, draft.seconds, playing=False)  # selected and ready to play
             self.screen.say(f"recorded {draft.seconds:.1f} s")
         else:
             self.screen.say("nothing recorded: the camera did not move")
 
     def follow(self) -> None:
-        """Take the camera of this frame into a recording, which ends where it becomes too long."""
+        """Record the camera of this frame; end a recording that is too long."""
         self._follow_undo()
         now_s = self.screen.clock()
         if self.recorder.on:
@@ -255,7 +255,7 @@ class Recordings:
             self.record()
 
     def save(self) -> None:
-        """Save the draft under the typed name; in the place of a suggested name, the next free one is as good."""
+        """Save the draft under the typed name; a suggested name may become the next free one."""
         recorder = self.recorder
         if recorder.draft is not None:
             name = None if recorder.name == recorder.suggested else recorder.name
@@ -269,12 +269,12 @@ class Recordings:
 
     @property
     def unsaved(self) -> bool:
-        """Whether there is a recording that closing would lose."""
+        """Whether there is an unsaved recording."""
         recorder = self.recorder
         return recorder.draft is not None or (recorder.on and recorder.recording.path(DRAFT) is not None)
 
     def keep(self) -> str | None:
-        """Save an unsaved recording because the window closes; returns the path's name."""
+        """Save an unsaved recording because the window closes; return the path's name."""
         if self.recorder.on:
             self.record()
         draft = self.recorder.draft
@@ -282,13 +282,13 @@ class Recordings:
             return None
         typed = self.recorder.name if self.recorder.name.strip() not in ("", self.recorder.suggested) else None
         added = self.views.add(draft, typed, self.recorder.track)
-        if added is None and typed is not None:  # the name is taken, or none: the walk is worth more
+        if added is None and typed is not None:  # the name is used or empty: save the walk under another
             added = self.views.add(draft, light=self.recorder.track)
         self._saved(added)
         return added.name if added is not None else None
 
     def rescue(self) -> tuple[str, ...]:
-        """Where the recording was kept: in the store, or, where that takes nothing, in a file of its own."""
+        """Save the recording in the store, or, where that fails, in a file of its own; yield the place."""
         name = self.keep()
         if name is not None:
             return (f"the store as {name!r}",)
@@ -301,7 +301,7 @@ class Recordings:
         return (f"{file}, a views.json for a store",)
 
     def drop(self) -> None:
-        """Forget the draft, or what is being recorded."""
+        """Discard the draft or the present recording."""
         self.recorder.on = False
         path = self.navigation.path
         if path is not None and path.path == self.recorder.draft:
@@ -310,9 +310,9 @@ class Recordings:
 
 
 def smoothed(values: Floats, sigma: float) -> Floats:
-    """Columns of (N, C), averaged with a bell of `sigma` rows; the first and last row stay.
+    """Columns of (N, C), smoothed with a Gaussian of `sigma` rows; the first and last row stay.
 
-    Beyond the ends the values go on mirrored through the end point, so that a straight path stays straight.
+    Beyond the ends the values are mirrored through the end point, so that a straight path stays straight.
     """
     reach = min(round(3 * sigma), len(values) - 1)
     if reach < 1:

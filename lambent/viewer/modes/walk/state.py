@@ -34,15 +34,15 @@ from lambent.viewer.screen import Screen
 
 @dataclass
 class Selection:
-    """The selected object, by `name`; `reveal`: the list of objects has yet to scroll to it.
+    """The selected object `name`; `reveal`: the list of objects must scroll to it.
 
-    Objects are whole, also those that the bake has cut.
+    Objects are whole, also those that the bake has cut into parts.
     """
 
     objects: tuple[ObjectRecord, ...]
     name: str | None = None
     reveal: bool = False
-    pointed: Triple | None = None  # where it was clicked, if its middle is not to be turned about
+    pointed: Triple | None = None  # the clicked point, where orbit does not turn about the object's middle
 
     def choose(self, name: str | None, pointed: Triple | None = None) -> None:
         self.name, self.reveal, self.pointed = name, name is not None, pointed
@@ -53,7 +53,7 @@ class Selection:
 
     @property
     def pivot(self) -> Triple | None:
-        """What orbit turns about: the middle of the object, or where it was clicked."""
+        """Centre of orbit: the middle of the object, or the clicked point."""
         found = self.record
         return self.pointed if found is None or self.pointed else triple(np.mean(found.bounds, axis=0))
 
@@ -65,22 +65,22 @@ class Selection:
 
 @dataclass
 class Materials:
-    """Edits of the scene's materials, their files, and the editor that is open on one of them, if any."""
+    """Edits of the scene's materials, their files, and an open editor, if any."""
 
     edits: MaterialEdits
     screen: Screen
-    file_names: dict[str, str] = field(default_factory=dict)  # material -> where it is saved, as typed
+    file_names: dict[str, str] = field(default_factory=dict)  # typed file name by material
     linked_roughness: bool = True  # mx and my keep their ratio
     typed_measurement: str = ""  # path of a file to compare the selected material with
     editor: Editor | None = None
-    may_replace: set[Path] = field(default_factory=set)  # written from here, or asked for twice
+    may_replace: set[Path] = field(default_factory=set)  # files written here, or confirmed by saving twice
 
     def file_name(self, material: str) -> str:
-        """File that `material` will be saved as: the typed one, else its name."""
+        """File name of a saved material: as typed, else from its name."""
         return self.file_names.get(material, f"{plain_name(material)}.json")
 
     def save(self, name: str) -> None:
-        """Write the material as it is now into the screen's folder, and say so, or say why not.
+        """Write the material into the screen's folder, and report success or failure.
 
         Its provenance stays, with a note where numbers were changed by hand.
         """
@@ -100,7 +100,7 @@ class Materials:
             self.screen.say(f"saved {file_name}")
 
     def rescue(self, names: Iterable[str]) -> Iterator[Path]:
-        """Write materials to files of new names."""
+        """Write materials to new files."""
         return rescue(self.edits, names, self.screen.folder)
 
     def open_editor(self, name: str) -> None:
@@ -139,30 +139,30 @@ class WalkState:
     films: Films = field(default_factory=Films)
     fields: FieldView = field(default_factory=FieldView)
     lights: Lights = field(default_factory=Lights)
-    store: Path | None = None  # its folder
-    sky_turn_deg: float = 0.0  # under which the scene was opened
-    replaced: tuple[str, ...] = ()  # meshes that it was opened with, as `scenes.replacement` reads them
+    store: Path | None = None  # folder of the store
+    sky_turn_deg: float = 0.0  # rotation of the sky, as opened
+    replaced: tuple[str, ...] = ()  # replacement meshes, as `scenes.replacement` reads them
     store_name: str = "STORE"
-    missing: tuple[str, ...] = ()  # artefacts that the store lacks
-    notes: tuple[str, ...] = ()  # on the light map
-    knows_noise: bool = False  # whether the store says how exact its light map is
+    missing: tuple[str, ...] = ()  # lines on arrays that the store lacks
+    notes: tuple[str, ...] = ()  # lines on the light map
+    knows_noise: bool = False  # whether the store has the noise of its light map
 
     @property
     def selected_parts(self) -> frozenset[str]:
-        """What the bake has cut the selected object into; or its own name where it is whole."""
+        """Parts of the selected object where the bake has cut it, else its name."""
         name = self.selection.name
         return frozenset(o.name for o in self.scene.objects if name is not None and name in (o.name, o.part_of))
 
     @property
     def divider(self) -> Divider | None:
-        """The line that can be dragged between two pictures, where two are shown."""
+        """The divider, where two pictures are shown."""
         if self.states.split:
             return self.states.divider
         return self.comparison.divider if self.comparison.mode == "side by side" else None
 
     @property
     def unsaved_materials(self) -> tuple[str, ...]:
-        """Materials that neither the session nor a document has as they are now."""
+        """Materials that are saved neither in the session nor as a document."""
         return tuple(name for name in self.session.unsaved if name in self.scene.materials)
 
     @classmethod
@@ -178,5 +178,5 @@ class WalkState:
             Marks({}, scene.reflectors), SessionKeeper(edits, store, screen), States(edits, scene),
             meter=meter, lights=lights,
             store=store, store_name="STORE" if store is None else store.name,
-            missing=() if fault is None else (fault,),  # stays in sight: a message is gone before the window is there
+            missing=() if fault is None else (fault,),  # a message would vanish before the window is open
         )  # fmt: skip

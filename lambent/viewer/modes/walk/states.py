@@ -1,4 +1,4 @@
-"""States of the room, materials and mix of light: stored by name, variants of the scene, two beside each other."""
+"""States of the room, materials and light mix: stored states, variants of the scene, two states side by side."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from lambent.viewer.edits import MaterialEdits
 from lambent.viewer.mode import Divider
 
 AS_BAKED = RoomState()
-NOW, OTHER, BAKED = "as it is now", "the other", "as baked"
+NOW, OTHER, BAKED = "the room now", "other state", "as baked"
 
 
 class States:
-    """What the States panel holds; the states themselves are in the `edits`, with their undo.
+    """State of the States panel; the room states are in the `edits`, with their undo.
 
     Attributes
     ----------
     split : bool
-        Whether the room is shown left of a divider, and the state that it is compared with right of it.
+        Whether the room is shown left of a divider, and another state right of it.
     """
 
     def __init__(self, edits: MaterialEdits, scene: SceneRecord) -> None:
@@ -32,7 +32,7 @@ class States:
 
     @property
     def split(self) -> bool:
-        """Undo can take the state away that the room is compared with."""
+        """Whether the split view is on; undo can remove the other state."""
         return self._split and self.edits.other is not None
 
     @split.setter
@@ -42,18 +42,18 @@ class States:
             self.edits.put_beside(AS_BAKED)
 
     def exchange(self) -> None:
-        """The room becomes the state beside it, or as it was baked, and that becomes the room as it was."""
+        """Swap the room with the state beside it, or with the bake."""
         if self.edits.other is None:
             self.edits.put_beside(AS_BAKED)
         self.edits.exchange()
 
     def store(self) -> str:
-        """Store the room under the typed name, else the next free one; the name.
+        """Store the room under the typed name, else the next free one; return the name.
 
         Raises
         ------
         UserError
-            Where no state can have that name.
+            Where the name cannot be used.
         """
         typed, stored = self.typed_name, self.edits.stored
         name = checked_name(typed, {BAKED}) if typed.strip() else free_name("state", set(stored))
@@ -62,7 +62,7 @@ class States:
         return name
 
     def compare(self, name: str) -> None:
-        """Show the room beside a stored state, or as it was baked."""
+        """Show the room beside a stored state or the bake."""
         self.show_beside(self.all[name])
 
     def show_beside(self, room: RoomState) -> None:
@@ -72,7 +72,7 @@ class States:
 
     @property
     def variants(self) -> dict[str, RoomState]:
-        """The room in each of the scene's variants, by name; what none of them names stays as it is now."""
+        """The room in each of the scene's variants, by name; materials in no variant keep their present state."""
         if not self._variants:
             return {}
         room = self.edits.room
@@ -91,7 +91,7 @@ class States:
         }
 
     def _textures_of(self, variant: Variant) -> dict[str, str]:
-        """Those of its looks that a material does not have by itself."""
+        """Textures of a variant that are not a material's own."""
         own = {name: name if name in self._textured else "" for name in variant.looks}
         return {name: look.textures for name, look in variant.looks.items() if look.textures != own[name]}
 
@@ -101,11 +101,11 @@ class States:
         return {BAKED: AS_BAKED, **self.edits.stored}
 
     def name_of(self, room: RoomState, otherwise: str) -> str:
-        """The name under which a state is stored."""
+        """The name of a stored state."""
         named = {**self.variants, **self.all}
         return next((name for name, stored in named.items() if stored == room), otherwise)
 
     def label(self) -> None:
-        """Write on the divider what is on its sides."""
+        """Label both sides of the divider."""
         self.divider.a_label = self.name_of(self.edits.room, NOW)
         self.divider.b_label = self.name_of(self.edits.other or AS_BAKED, OTHER)

@@ -1,4 +1,4 @@
-"""The picture B of a comparison by the path tracer: asked for at rest, shown as far as it is."""
+"""The path traced picture B of a comparison: requested at rest, shown while it refines."""
 
 from __future__ import annotations
 
@@ -17,20 +17,22 @@ from lambent.viewer.pacing import REST_S
 from lambent.viewer.screen import Screen
 from lambent.viewer.work import POLL_S
 
-ALL_LIGHT = "full"  # the only part of the light that paths have
+ALL_LIGHT = "full"  # the only part of the light that the path tracer has
 
 
 class TracedPicture:
-    """Shows what the path tracer has of a view; `view` is None until it has something."""
+    """Shows the present path traced picture; `view` is None before the first."""
 
-    under_way = False  # no part of it is drawn on the GPU
+    under_way = False  # nothing is drawn in parts on the GPU
 
     def __init__(
         self, given: Given, screen: Screen, store: Path, sky_turn_deg: float, replaced: tuple[str, ...]
     ) -> None:  # fmt: skip
         self._given, self._screen, self._tracing = given, screen, Tracing(store, sky_turn_deg, replaced)
-        self._of: tuple[FrameState, Mapping[str, str]] | None = None  # what is asked for, by what paths depend on
-        self._is_mixed = False  # the picture A has another mix of light than the scene
+        self._of: tuple[FrameState, Mapping[str, str]] | None = (
+            None  # the requested frame, reduced to what paths depend on
+        )
+        self._is_mixed = False  # whether the picture A has another light mix than the scene
         self._asked = False
         self._changed_s = 0.0
         self._taken: Traced | None = None
@@ -42,17 +44,17 @@ class TracedPicture:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height; 0, 0 where there is nothing, less than the picture's while it is coarse."""
+        """Width and height; 0, 0 before the first picture, reduced while it is coarse."""
         return (0, 0) if self._taken is None else size_of(self._taken)
 
     @property
     def samples(self) -> int:
-        """Paths a pixel; 0 while there is only a coarse picture, or none."""
+        """Paths per pixel; 0 while there is only a coarse picture, or none."""
         return self._taken.samples if self._taken is not None and self._is_whole else 0
 
     @property
     def accumulated(self) -> int:
-        """Passes that the picture is the mean of, one path a pixel each."""
+        """Passes in the picture's mean, one path per pixel each."""
         return self.samples
 
     @property
@@ -61,14 +63,14 @@ class TracedPicture:
 
     @property
     def fault(self) -> str:
-        """Why there is no picture, in a line; empty where there is one, or will be."""
+        """Why there is no picture, in one line; else empty."""
         if self._of is not None and self._of[0].show != ALL_LIGHT:
-            return "The path tracer shows all light: set *show* to full."
+            return "The path tracer shows all light: set 'show' to full."
         return self._tracing.error
 
     @property
     def label(self) -> str:
-        """What the picture is, for the divider."""
+        """Label of the picture, for the divider."""
         if self.fault:
             return "not path traced"
         if self._taken is None:
@@ -77,9 +79,9 @@ class TracedPicture:
         return f"path traced, {f'{self.samples} samples' if self.samples else 'coarse'}{mix}"
 
     def update(self, wanted: FrameState, textures: Mapping[str, str]) -> None:
-        """Ask for a view once it rests, and show what is there of it.
+        """Request a view once it rests, and show its present picture.
 
-        `textures` are those that materials wear in the place of their own. A mix of light groups is not traced.
+        `textures` replace those of materials. Light mixes are not traced.
         """
         self._tracing.tick()
         of, self._is_mixed = (_traced_of(wanted), dict(textures)), bool(wanted.light)
@@ -124,7 +126,7 @@ class TracedPicture:
         return np.asarray(light[row : row + 1, column : column + 1], np.float32)
 
     def rest(self) -> None:
-        """Trace nothing until the next `update`."""
+        """Pause until the next `update`."""
         if self._of is not None:
             self._of, self._asked, self._taken = None, False, None
             self._tracing.ask(None, (1, 1), {}, {})
@@ -145,5 +147,5 @@ def size_of(traced: Traced) -> tuple[int, int]:
 
 
 def _traced_of(frame: FrameState) -> FrameState:
-    """What of a frame paths depend on, in a frame of its own."""
+    """A frame reduced to what paths depend on."""
     return FrameState(frame.camera, *frame.size, materials=dict(frame.materials), show=frame.show)

@@ -1,4 +1,4 @@
-"""Path tracing beside the window: what is asked of the process that does it, and the last picture it sent."""
+"""Path tracing in another process: the requests, and the last picture."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from lambent.materials.document import Material
 from lambent.viewer.worker_process import WorkerProcess
 
 WORKER = "lambent.viewer.modes.walk.tracing_worker"
-MOST_SAMPLES = 1024  # a pixel: then it rests
+MOST_SAMPLES = 1024  # samples per pixel after which tracing stops
 
 
 @dataclass(frozen=True)
 class Wish:
     """A view to trace, numbered; without a `camera`, nothing.
 
-    `materials` stand in for the scene's, by name; `textures` are those that materials wear in the place of their own,
-    by the name of their material, "" for none.
+    `materials` replace the scene's, by name; `textures` replace those of materials, given as the name of the material
+    that owns them, "" for none.
     """
 
     number: int
@@ -53,7 +53,7 @@ class Wish:
 
 @dataclass(frozen=True, eq=False)
 class Traced:
-    """Mean radiance (height, width, 3) of `samples` paths a pixel, of the wish of that number."""
+    """Mean radiance (height, width, 3) of `samples` paths per pixel, for the wish `number`."""
 
     number: int
     samples: int
@@ -66,7 +66,7 @@ class Tracing:
     Attributes
     ----------
     what : str
-        What the process does before its first picture.
+        Step of the process before its first picture.
     """
 
     def __init__(self, store: Path, sky_turn_deg: float, replaced: Sequence[str] = ()) -> None:
@@ -78,25 +78,25 @@ class Tracing:
 
     @property
     def error(self) -> str:
-        """Why it ended, in a line; empty while it has not."""
+        """Why the process ended, in one line; empty while it runs."""
         return "" if self._process is None else self._process.error
 
     @property
     def last(self) -> Traced | None:
-        """The last picture of the wish that stands."""
+        """The last picture of the present wish."""
         found = self._last
         return found if found is not None and found.number == self._wish.number else None
 
     @property
     def busy(self) -> bool:
-        """Whether another picture is to come."""
+        """Whether another picture will come."""
         last = self.last
         samples = 0 if last is None else last.samples
         runs = self._process is not None and self._process.running
         return runs and self._wish.camera is not None and samples < MOST_SAMPLES
 
     def tick(self) -> None:
-        """Take the end of the process."""
+        """Handle the end of the process."""
         if self._process is not None:
             _ = self._process.running
 
@@ -107,7 +107,7 @@ class Tracing:
         materials: Mapping[str, Material],
         textures: Mapping[str, str],
     ) -> None:
-        """Trace this view from now on; without a camera, none."""
+        """Trace this view from now on; without a camera, stop tracing."""
         if self.error or (self._process is None and camera is None):
             return
         self._wish = Wish(self._wish.number + 1, camera, size, dict(materials), dict(textures))

@@ -1,4 +1,4 @@
-"""A process of its own that path traces views of a store's scene for the window, pass after pass.
+"""Worker process that path traces views of a store's scene for the window, pass after pass.
 
 python -m lambent.viewer.modes.walk.tracing_worker STORE DEGREES, by which the sky is turned
 
@@ -34,12 +34,12 @@ from lambent.store.source import SOURCE, scene_of
 from lambent.store.store import Store
 from lambent.viewer.modes.walk.tracing import MOST_SAMPLES, Wish
 
-NICENESS = 10  # the window comes first
-COARSE, COARSE_SAMPLES = 4, 4  # the first picture of a view has a share of the width and height, to be there at once
+NICENESS = 10  # the window has priority
+COARSE, COARSE_SAMPLES = 4, 4  # the first picture is reduced by this factor, to appear at once
 
 
 class Wishes:
-    """The last wish read from a stream; `newest` waits for one that is not `but`, None at the stream's end."""
+    """Reads wishes from a stream; `newest` waits for a wish other than `but`, None at the stream's end."""
 
     def __init__(self, stream: Iterable[bytes]) -> None:
         self._changed = threading.Condition()
@@ -53,7 +53,7 @@ class Wishes:
             return None if self._ended else self._last
 
     def stands(self, wish: Wish) -> bool:
-        """Whether nothing else was wished since."""
+        """Whether a wish is still the newest."""
         return not self._ended and self._last is wish
 
     def _read(self, stream: Iterable[bytes]) -> None:
@@ -75,13 +75,13 @@ class Views:
         self._built: Any = None
 
     def traced(self, camera: Camera, size: tuple[int, int], samples: int, seed: int) -> Floats:
-        """Mean radiance (height, width, 3) of so many paths a pixel."""
+        """Mean radiance (height, width, 3) of a number of paths per pixel."""
         from lambent.bake.reference.path_traced import traced
 
         return traced(self._built, camera, *size, samples, seed)[0]
 
     def wear(self, materials: Mapping[str, Material], textures: Mapping[str, str]) -> bool:
-        """Take these materials and textures in place of the scene's; whether the scene has to be built for it."""
+        """Set materials and textures in place of the scene's; return whether the scene must be built."""
         if self._built is not None and (materials, textures) == self._worn:
             return False
         from lambent.bake.reference.path_traced import built
@@ -95,12 +95,14 @@ class Views:
 
 
 def main(folder: Path, sky_turn_deg: float, replaced: Sequence[str], wishes: Wishes, out: BinaryIO) -> None:
-    """Trace what is wished until the wishes end; `replaced` as `scenes.replacement` reads it."""
+    """Trace wishes until the stream ends; `replaced` as `scenes.replacement` reads it."""
     from lambent.bake.engine import engine
 
     store = Store.open(folder)
     if not isinstance(store.documents.get(SOURCE), str):
-        raise UserError("the store does not say where its scene is", file=folder, hint="bake the scene from its file")
+        raise UserError(
+            "the store has no path of its scene file", file=folder, hint="bake the scene again from its file"
+        )
     say(out, what="loading the scene")
     engine()
     with TemporaryDirectory() as images:
@@ -113,7 +115,7 @@ def main(folder: Path, sky_turn_deg: float, replaced: Sequence[str], wishes: Wis
 
 
 def trace(views: Views, wish: Wish, camera: Camera, wishes: Wishes, out: BinaryIO) -> None:
-    """Write pictures of a wish, each of more samples, while it stands."""
+    """Write pictures of a wish with more and more samples, while it is the newest."""
     say(out, what="building the scene")
     views.wear(wish.materials, wish.textures)
     coarse = max(1, wish.size[0] // COARSE), max(1, wish.size[1] // COARSE)
@@ -130,7 +132,7 @@ def trace(views: Views, wish: Wish, camera: Camera, wishes: Wishes, out: BinaryI
 def say(out: BinaryIO, **words: object) -> None:
     """Write a line."""
     out.write(json.dumps(words).encode() + b"\n")
-    out.flush()  # to a window that is gone: BrokenPipeError ends this process, too
+    out.flush()  # BrokenPipeError ends this process when the window is gone
 
 
 def send(out: BinaryIO, wish: Wish, mean: Floats, samples: int) -> None:
@@ -145,7 +147,7 @@ if __name__ == "__main__":
     if hasattr(os, "nice"):
         os.nice(NICENESS)
     own = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what libraries print is none of the pictures
+    os.dup2(2, 1)  # libraries' output must not mix with the pictures
     try:
         main(
             Path(sys.argv[1]), float(sys.argv[2]), sys.argv[3:], Wishes(os.fdopen(os.dup(0), "rb", buffering=0)), own

@@ -1,4 +1,4 @@
-"""The views and camera paths that people save while they look at a store, as the window keeps them."""
+"""Saved views and camera paths of a store, as the window keeps them."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from lambent.store.views import Views, change_views, checked_name, free_name, re
 
 Kind = Literal["camera", "path"]
 Item = TypeVar("Item", Camera, CameraPath)
-STEMS: dict[Kind, str] = {"camera": "view", "path": "walk"}  # of names that nobody typed
+STEMS: dict[Kind, str] = {"camera": "view", "path": "walk"}  # stems of default names
 
 
 @dataclass
 class SavedViews:
-    """Saved cameras and paths of one store; every change is on disk at once, or said not to be."""
+    """Saved cameras and paths of one store; every change is written at once, or reported as failed."""
 
-    scene: SceneRecord  # whose names are taken
-    folder: Path | None = None  # of the store; without one nothing can be saved
+    scene: SceneRecord  # its names cannot be used
+    folder: Path | None = None  # folder of the store; without one nothing can be saved
     say: Callable[[str], None] = lambda text: None
-    saved: Views = field(default_factory=Views)  # as they were read last
-    renaming: tuple[Kind, str] | None = None  # kind and name, while another name is typed
+    saved: Views = field(default_factory=Views)  # as last read
+    renaming: tuple[Kind, str] | None = None  # kind and name while a new name is typed
     typed_name: str = ""
 
     def load(self) -> str | None:
-        """Read the file, or say, and return, why it cannot be used."""
+        """Read the file; on failure report and return the reason."""
         try:
             self.saved = Views() if self.folder is None else read_views(self.folder)
         except UserError as error:
@@ -49,12 +49,12 @@ class SavedViews:
         return free_name(STEMS[kind], self._names(kind, self.saved))
 
     def add(self, item: Item, name: str | None = None, light: LightMix | MixTrack | None = None) -> Item | None:
-        """Save a camera or path as `name`, or under the next free one, with its light; None where that cannot be."""
+        """Save a camera or path with its light as `name`, or under the next free name; None where that fails."""
         kind: Kind = "camera" if isinstance(item, Camera) else "path"
         named: list[Item] = []
 
         def change(views: Views) -> Views:
-            taken = self._names(kind, views)  # another window may have saved some meanwhile
+            taken = self._names(kind, views)  # another window may have saved views meanwhile
             free = free_name(STEMS[kind], taken)
             named.append(replace(item, name=free if name is None else checked_name(name, taken)))
             lit = _lit(views, kind, {**_lights(views, kind), **({} if light is None else {named[0].name: light})})
@@ -63,12 +63,12 @@ class SavedViews:
         return named[0] if self._change(change) else None
 
     def rename(self, kind: Kind, old: str, new: str) -> bool:
-        """Rename a saved camera or path; whether that was possible."""
+        """Rename a saved camera or path; return whether that was possible."""
 
         def change(views: Views) -> Views:
             names = self._names(kind, views)
             if old not in names:
-                raise UserError("is no longer there: another window deleted or renamed it", got=old)
+                raise UserError("is gone: another window deleted or renamed it", got=old)
             name = checked_name(new, names - {old})
             lit = _lit(views, kind, {name if key == old else key: one for key, one in _lights(views, kind).items()})
             return _with(lit, kind, (replace(i, name=name) if i.name == old else i for i in _of(views, kind)))
@@ -76,7 +76,7 @@ class SavedViews:
         return self._change(change)
 
     def delete(self, kind: Kind, name: str) -> bool:
-        """Delete a saved camera or path; whether that was possible."""
+        """Delete a saved camera or path; return whether that was possible."""
 
         def change(views: Views) -> Views:
             lit = _lit(views, kind, {key: one for key, one in _lights(views, kind).items() if key != name})
@@ -85,7 +85,7 @@ class SavedViews:
         return self._change(change)
 
     def set_track(self, path: str, track: MixTrack | None) -> bool:
-        """Save the light along a path, of the scene or saved, or none; whether that was possible."""
+        """Save or remove the light along a path; return whether that was possible."""
 
         def change(views: Views) -> Views:
             others = {name: one for name, one in views.tracks.items() if name != path}
@@ -97,16 +97,16 @@ class SavedViews:
         return {item.name for item in (*_of(self.scene, kind), *_of(views, kind))}
 
     def _change(self, change: Callable[[Views], Views]) -> bool:
-        """Apply a change to the file; whether it is there now."""
+        """Apply a change to the file; return whether it was written."""
         if self.folder is None:
             self.say("not saved: there is no store")
             return False
         if not self.folder.is_dir():
-            self.say(f"not saved: the store is gone: {self.folder}")  # and a folder with nothing but views is none
+            self.say(f"not saved: {self.folder} was deleted or moved")  # a folder with only views would not be a store
             return False
 
         def seen(views: Views) -> Views:
-            self.saved = views  # changes of another window are shown even where this one is refused
+            self.saved = views  # shows changes of another window even where this change is rejected
             return change(views)
 
         try:
@@ -134,6 +134,6 @@ def _lit(views: Views, kind: Kind, lights: Mapping[str, LightMix | MixTrack]) ->
 
 
 def write_alone(file: Path, path: CameraPath, track: MixTrack | None = None) -> None:
-    """A `views.json` of another name that holds one path, for a store that cannot take it."""
+    """Write one path to a `views.json` of another name, where the store cannot be written."""
     tracks = {} if track is None else {path.name: track}
     write_text(file, json.dumps(Views(paths=(path,), tracks=tracks).model_dump(mode="json"), indent=1) + "\n")

@@ -1,7 +1,7 @@
 """Floors that carry a walker, and obstacles between knee and eye, seen from above.
 
 The walker is a circle of `BODY_M` around the eye, obstacles are the triangles' outlines on the floor plan. A step that
-would come nearer than that to one slides along it; whoever stands too near already may always step away.
+would come nearer slides along the outline; a walker who is too near already may always step away.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from lambent.viewer.picking import first_hit, hits
 
 STEP_M = 0.35  # a floor higher above the feet than this is a table, not a stair
 BODY_M = 0.22
-SLIDES = 3  # a corner takes two
+SLIDES = 3  # most slides per step; a corner takes two
 _EDGES = ((0, 1), (1, 2), (2, 0))
 
 
 class Walls:
-    """Triangles (T, 3, 3) to stand on and to be stopped by."""
+    """Floors and obstacles from triangles (T, 3, 3)."""
 
     def __init__(self, triangles: Floats) -> None:
         self._triangles, self._plan = triangles, triangles[:, :, [0, 2]]
         self._low, self._high = triangles.min(axis=1), triangles.max(axis=1)
         normals = self._normals = area_vectors(triangles)
-        # Floors are at most 45 degrees steep, on either side: some are modelled upside down.
+        # Floors have slopes of at most 45 degrees, on either side: some are modelled upside down.
         level = np.abs(normals[:, 1]) > np.cos(np.pi / 4) * np.maximum(np.linalg.norm(normals, axis=-1), 1e-20)
         self._floors, self._floors_low, self._floors_high = triangles[level], self._low[level], self._high[level]
 
     def floor_below(self, eye: Sequence[float], eye_height_m: float) -> float | None:
-        """Height of the highest floor under the eye that one could step on; None where there is none."""
+        """Height of the highest floor below the eye within reach of a step; None where there is none."""
         x, y, z = eye
         reach = y - eye_height_m + STEP_M
         low, high = self._floors_low, self._floors_high
@@ -44,21 +44,21 @@ class Walls:
         return None if math.isinf(distance) else reach - distance
 
     def allowed(self, eye: Floats, step: Floats, eye_height_m: float) -> Floats:
-        """The part of a horizontal step (3,) from `eye` that can be walked."""
+        """The permitted part of a horizontal step (3,) from `eye`."""
         knee_y = eye[1] - eye_height_m + STEP_M
         start, move = eye[[0, 2]], step[[0, 2]]
         length = float(np.linalg.norm(move))
         outlines = self._near(start, BODY_M + length, knee_y, eye[1])
         if not len(outlines):
             return step
-        pieces = math.ceil(length / (BODY_M / 2))  # shorter than the body, so that none jumps over a wall
+        pieces = math.ceil(length / (BODY_M / 2))  # shorter than the body, so that no step jumps over a wall
         at = start
         for _ in range(pieces):
             at = at + _slid(at, move / pieces, outlines)
         return np.array([at[0] - start[0], 0.0, at[1] - start[1]])
 
     def share(self, pivot: Triple, before: Triple, after: Triple, bounds: Bounds) -> float:
-        """Share of the way from `pivot` to the eye `after` that is open to an eye that comes from `before`.
+        """Permitted share of the distance from `pivot` to the eye `after`, for an eye that comes from `before`.
 
         It ends `WALL_M` before the bounds, and before a triangle that the eye would pass through.
         """
@@ -92,7 +92,7 @@ class Walls:
 
 
 def _slid(at: Floats, move: Floats, outlines: Floats) -> Floats:
-    """`move` without its part into outlines; zero in a corner with no way out."""
+    """`move` without its part into outlines; zero in a dead end."""
     before, _ = nearest_points(at, outlines)
     for _ in range(SLIDES):
         distances, points = nearest_points(at + move, outlines)
@@ -100,7 +100,7 @@ def _slid(at: Floats, move: Floats, outlines: Floats) -> Floats:
         if not blocking.any():
             return move
         index = np.flatnonzero(blocking)[np.argmin(distances[blocking])]
-        # Inside an outline the nearest point is ahead: away is where the walker came from.
+        # Inside an outline the nearest point lies ahead; move back to where the walker came from.
         away = at + move - points[index] if distances[index] > 0 else at - points[index]
         away = away / max(float(np.linalg.norm(away)), 1e-9)
         move = move - min(float(move @ away), 0.0) * away

@@ -1,6 +1,6 @@
-"""The curves of a material, to be pulled: `CurveEditor` draws them and edits a session.
+"""The curve editor: `CurveEditor` draws the curves of a material and edits a session.
 
-`axes`, `regions`, `drags`, `lines`, `strokes` and `state` hold the logic, without Dear ImGui. `editor`, `plot`,
+`axes`, `regions`, `drags`, `lines`, `strokes` and `state` have the logic, without Dear ImGui. `editor`, `plot`,
 `toolbar`, `layers` and `quantities` draw.
 """
 

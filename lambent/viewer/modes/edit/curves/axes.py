@@ -8,19 +8,19 @@ from dataclasses import dataclass, replace
 END_DEG = 90.0
 LEAST_DEG = 0.05  # shortest range of angles: two knots of a curve
 MOST_DECADES = 30.0
-MARGIN = 4.0  # a drag reaches this many plots beyond the edge
+MARGIN = 4.0  # a drag may reach this many plot sizes beyond the edge
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A shown range, on a linear or a logarithmic scale; the share of its length runs from 0 to 1."""
+    """A shown range on a linear or logarithmic scale; positions are shares of its length, 0 to 1."""
 
     low: float
     high: float
     log: bool = False
 
     def share(self, value: float) -> float:
-        """Where a value stands; on a logarithmic axis what is not above 0 stands far below."""
+        """Position of a value; on a logarithmic axis, values of 0 and less are far below."""
         if not self.log:
             return (value - self.low) / (self.high - self.low)
         if value <= 0:
@@ -34,11 +34,11 @@ class Axis:
         return self.low * math.exp(share * math.log(self.high / self.low))
 
     def zoomed(self, about: float, factor: float) -> Axis:
-        """`factor` times as long, with the value at share `about` where it is."""
+        """Scale the range by `factor` about the value at share `about`."""
         return self._spread(about - about * factor, about + (1 - about) * factor)
 
     def panned(self, share: float) -> Axis:
-        """Moved by a share of its length."""
+        """Move the range by a share of its length."""
         return self._spread(share, 1 + share)
 
     def _spread(self, low: float, high: float) -> Axis:
@@ -51,7 +51,7 @@ class Axis:
 
 
 def within_curve(axis: Axis) -> Axis:
-    """The range of angles moved, and shortened where needed, so that it lies within 0 to 90 degrees."""
+    """Move the range of angles into 0 to 90 degrees, and shorten it where needed."""
     length = min(max(axis.high - axis.low, LEAST_DEG), END_DEG)
     low = min(max(axis.low, 0.0), END_DEG - length)
     return Axis(low, low + length)
@@ -81,7 +81,7 @@ class Axes:
         return self.y.low * 1e-6 if self.y.log else 0.0
 
     def at(self, x: float, y: float) -> tuple[float, float]:
-        """Angle in degrees, within 0 to 90, and value at a pixel, which may lie outside of the plot."""
+        """Angle in degrees, clamped to 0 to 90, and value at a pixel, which may be outside of the plot."""
         across, up = (x - self.place.x) / self.place.width, (self.place.y + self.place.height - y) / self.place.height
         return min(max(self.x.value(across), 0.0), END_DEG), self.y.value(up)
 

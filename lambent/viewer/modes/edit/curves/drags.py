@@ -1,6 +1,6 @@
-"""A drag over a plot as operators on its curve, or as a line drawn freehand. Nothing here draws or edits.
+"""Converts a drag over a plot to operators on its curve, or to a freehand line. Nothing here draws or edits.
 
-A drag is computed from its begin and its present end alone, so that it comes back exactly to where it was.
+A drag is computed from its start and its present end only, so that dragging back restores the curve exactly.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ Tool = Literal["translate", "amplify", "draw"]
 Direction = Literal["x and y", "x", "y"]
 Channels = tuple[Literal[0, 1, 2], ...]
 Point = tuple[float, float]  # angle in degrees, value
-STRETCH = (0.05, 20.0)  # factors of x
-NEAR = 0.05  # share of the axis: a grip closer to the base would amplify without bound
-STEPS = 16  # of bisection
-LEAST = 1e-30  # on a logarithmic axis
+STRETCH = (0.05, 20.0)  # range of the factor on x
+NEAR = 0.05  # least distance of grip and base, as a share of the axis: closer ones amplify without bound
+STEPS = 16  # steps of bisection
+LEAST = 1e-30  # least value on a logarithmic axis
 
 
 @dataclass(frozen=True)
 class Drag:
-    """What is dragged: by which tool, where it began, and the base that amplification leaves in place."""
+    """A drag: its tool, its start, and the base that amplification leaves in place."""
 
     tool: Tool
     region: Region
@@ -40,7 +40,7 @@ class Drag:
     base: Point = (0.0, 0.0)
 
     def operators(self, end: Point, direction: Direction) -> tuple[Operator, ...]:
-        """The layers of a drag that ends here; none where nothing changes. That in y is the lower one."""
+        """The layers of a drag that ends here, that in y first; none where nothing changes."""
         if self.tool == "translate":
             x = 0.0 if direction == "y" else float(np.radians(end[0] - self.begin[0]))
             y = 0.0 if direction == "x" else end[1] - self.begin[1]
@@ -61,7 +61,7 @@ class Drag:
         return min(max(1 + (angle_deg - self.begin[0]) / reach, STRETCH[0]), STRETCH[1])
 
     def _stretched(self, factor: float) -> Operator:
-        """Stretched by `factor`, or as far as the curve does not fold."""
+        """Stretch by `factor`, limited so that the curve does not fold."""
         base = float(np.radians(self.base[0]))
         possible, wanted = 1.0, factor
         for _ in range(STEPS):
@@ -81,12 +81,12 @@ class Drag:
 
 
 def locked(direction: Direction, *, shift: bool, ctrl: bool) -> Direction:
-    """The direction while modifier keys are held: Shift keeps angles, Ctrl keeps values."""
+    """The direction under modifier keys: Shift keeps angles, Ctrl keeps values."""
     return "y" if shift else "x" if ctrl else direction
 
 
 def resized(layer: Operator, size: float) -> Operator:
-    """A layer with another size, and with ramps as wide as it needs.
+    """A layer with another size, its ramps widened as far as needed.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def resized(layer: Operator, size: float) -> Operator:
 
 
 def painted(values: Floats, begin: Point, end: Point, channels: Channels, log: bool) -> Floats:
-    """A curve (KNOTS + 1, 3) with the line from `begin` to `end` drawn over it; straight on the axis that is shown."""
+    """A curve (KNOTS + 1, 3) overdrawn with a line from `begin` to `end`, straight on the shown axis."""
     low, high = sorted((begin, end)) if begin[0] != end[0] else (end, end)
     inside = np.flatnonzero((low[0] <= ANGLES_DEG) & (high[0] >= ANGLES_DEG))
     if not len(inside):
@@ -115,6 +115,6 @@ def painted(values: Floats, begin: Point, end: Point, channels: Channels, log: b
 
 
 def _away(distance: float, least: float, bounded: bool) -> float:
-    """A distance that is not 0, with its sign."""
+    """A signed distance, kept away from 0."""
     least = least if bounded else LEAST
     return distance if abs(distance) >= least else (-least if distance < 0 else least)

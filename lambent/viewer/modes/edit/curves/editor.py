@@ -1,4 +1,4 @@
-"""The curve editor: a material's curves, one of them on a plot to be pulled, its layers, colours and quantities."""
+"""The curve editor: a material's curves, one of them on a plot, its layers, colours and parameters."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from lambent.viewer.modes.edit.curves.axes import Axes
 from lambent.viewer.modes.edit.curves.state import CurveState, Shown
 from lambent.viewer.panels.widgets import AMBER, coloured, explain
 
-WIDE_PX, CONTROLS_PX = 680.0, 340.0  # wider than that, the controls stand left of the plot
-LEAST_PX, MOST_PX = 200.0, 420.0  # height of a plot in a column
+WIDE_PX, CONTROLS_PX = 680.0, 340.0  # least width for controls beside the plot, and their width
+LEAST_PX, MOST_PX = 200.0, 420.0  # range of a plot's height in a column
 MOST_ROWS = 7
 HINTS = {
-    "translate": "Drag in the region: Shift keeps angles, Ctrl values. Drag beside it: a new region.",
-    "amplify": "Drag in the region to scale it about the base. Drag beside it: a new region.",
-    "draw": "Draw with the left button. Esc drops the stroke.",
+    "translate": "Drag in the region: Shift changes values only, Ctrl angles only. Drag beside it: new region.",
+    "amplify": "Drag in the region to scale it about the base. Drag beside it: new region.",
+    "draw": "Draw with the left button. Esc cancels the stroke.",
 }
 
 
 class CurveEditor:
     """Draws the curves of one material of a session, and edits the session.
 
-    A drag is one step of undo. Errors of an edit appear as a line, and nothing is raised.
+    A drag is one step of undo. Errors of an edit are shown as a line, not raised.
     """
 
     def __init__(self) -> None:
         self.state = CurveState()
-        self.axes: Axes | None = None  # where the plot was drawn last
+        self.axes: Axes | None = None  # of the last drawn plot
         self._outlined: Region | None = None
 
     @property
     def active_curve(self) -> str | None:
-        """Name of the curve that is being pulled or drawn at this moment."""
+        """Name of the curve that is being dragged or drawn."""
         return self.state.active_curve
 
     def curve(self, session: Session, material: str) -> str:
@@ -48,11 +48,11 @@ class CurveEditor:
         self.state.chosen[material] = curve
 
     def transported(self, session: Session, material: str) -> None:
-        """Tell that transport was made for the material as it is now."""
+        """Note that transport was baked for the material as it is now."""
         self.state.transported(session, material)
 
     def draw(self, session: Session, material: str) -> None:
-        """Draw into the current window, as wide as there is room."""
+        """Draw into the current window, at its full width."""
         state = self.state
         if state.hold is not None and state.hold.material != material:
             state.release(session)
@@ -80,7 +80,7 @@ class CurveEditor:
         imgui.pop_id()
 
     def _curves(self, shown: Shown, material: str, chosen: str) -> None:
-        """The list of curves, with their angles and the terms that they act in."""
+        """Draw the list of curves, with their angles and the terms that use them."""
         editable, line = shown.editable, imgui.get_text_line_height_with_spacing()
         rows = min(len(editable.curves), MOST_ROWS) + 1
         flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y | imgui.TableFlags_.sizing_fixed_fit
@@ -120,7 +120,7 @@ class CurveEditor:
         self._status()
 
     def _status(self) -> None:
-        """Two lines below the plot: an error, what the drag does, or what the mouse can do."""
+        """Draw two lines below the plot: an error, the present drag, or help for the mouse."""
         state = self.state
         at, hold = imgui.get_cursor_pos_y(), state.hold
         imgui.push_text_wrap_pos()
@@ -142,7 +142,7 @@ class CurveEditor:
         toolbar.draw_region(state, state.view(material, name, curve), curve)
         imgui.separator_text("layers")
         self._outlined = layers.draw(state, session, material, shown, name)
-        imgui.separator_text("colours of the terms")
+        imgui.separator_text("colour of each term")
         quantities.draw_tints(state, session, material, shown)
         title = quantities.title(shown)
         if title is not None:
@@ -151,7 +151,7 @@ class CurveEditor:
 
 
 def _role(editable: Editable, curve: str) -> tuple[str, list[str]]:
-    """The angle that a curve runs over (a key of `PARAMETRISATIONS`), and the names of the terms that it is in."""
+    """The angle of a curve (a key of `PARAMETRISATIONS`), and the names of its terms."""
     terms = [term for term in editable.terms if curve in term.curves]
     over = next((factor.over for term in terms for factor in term.factors if factor.curve == curve), "theta_o")
     return over, [term.name for term in terms]

@@ -1,4 +1,4 @@
-"""The layers of a curve's edit as a list: what each does, taking one out, merging and dropping them."""
+"""The list of layers of a curve's edit: descriptions, sizes, removal, merging, reset."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LETTERS = "RGB"
 
 
 def words(layer: Operator) -> str:
-    """What an operator does, without its region."""
+    """Description of an operator, without its region."""
     size, base = layer.size, layer.base
     if layer.kind == "translate_x":
         return f"x {np.degrees(size):+.2f}°"
@@ -32,14 +32,14 @@ def words(layer: Operator) -> str:
 
 
 def where(layer: Operator) -> str:
-    """Its region and channels."""
+    """Description of a layer's region and channels."""
     _, b, c, _ = edges_deg(layer.region)
     channels = "" if layer.channels == ALL else " " + "".join(LETTERS[k] for k in sorted(layer.channels))
     return f"{b:.1f}..{c:.1f}°{channels}"
 
 
 def draw(state: CurveState, session: Session, material: str, shown: Shown, name: str) -> Region | None:
-    """The list; returns the region of the layer under the mouse."""
+    """Draw the list; return the region of the layer under the mouse."""
     edit = shown.edit(name)
     under = _list(state, session, material, name, edit.layers, edit.drawn is not None)
     edited = edit.drawn is not None or bool(edit.layers)
@@ -49,9 +49,19 @@ def draw(state: CurveState, session: Session, material: str, shown: Shown, name:
     reset: Callable[[], None] = partial(once, partial(session.reset, material))
     any_edit = bool(shown.document.curves or shown.document.tints)
     actions: list[tuple[str, bool, Callable[[], None], str]] = [
-        ("collapse", bool(edit.layers), collapse, "all layers become one drawn curve; numbers no longer change it"),
-        ("reset curve", edited, reset_curve, "drop all edits of this curve; can be undone"),
-        ("reset material", any_edit, reset, "drop the edits of all curves and colours of this material; can be undone"),
+        (
+            "collapse",
+            bool(edit.layers),
+            collapse,
+            "merges all layers into one drawn curve, which numbers no longer change",
+        ),
+        ("reset curve", edited, reset_curve, "removes all edits of this curve; undo restores them"),
+        (
+            "reset material",
+            any_edit,
+            reset,
+            "removes the edits of all curves and colours of this material; undo restores them",
+        ),
     ]
     room, space = imgui.get_content_region_avail().x, imgui.get_style().item_spacing.x
     buttons(actions, (room - (len(actions) - 1) * space) / len(actions))
@@ -64,7 +74,7 @@ def _list(
     under: Region | None = None
     count = len(layers) + drawn
     if not count:
-        imgui.text_disabled("none: drag the curve in its region")
+        imgui.text_disabled("no layers: drag the curve in its region")
         return None
     line = imgui.get_frame_height() + 2 * imgui.get_style().cell_padding.y
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y | imgui.TableFlags_.sizing_stretch_prop
@@ -74,7 +84,7 @@ def _list(
     for title, share in (("size", 0.5), ("where", 0.5)):
         imgui.table_setup_column(title, imgui.TableColumnFlags_.width_stretch, share)
     imgui.table_setup_column("out", imgui.TableColumnFlags_.width_fixed, imgui.get_frame_height())
-    for index in reversed(range(len(layers))):  # the last one acts on the others, and stands above them
+    for index in reversed(range(len(layers))):  # the last one acts on the others and is listed first
         layer = layers[index]
         imgui.table_next_row()
         imgui.table_next_column()
@@ -84,7 +94,7 @@ def _list(
             state.views[material, name].region = layer.region
         if imgui.is_item_hovered():
             under = layer.region
-        explain(f"{layer.kind.replace('_', ' in ')}: {words(layer)}, {where(layer)}\na click takes its region")
+        explain(f"{layer.kind.replace('_', ' in ')}: {words(layer)}, {where(layer)}\nclick to select its region")
         imgui.table_next_column()
         size = _size(f"##size {index}", layer, 0.002 * state.views[material, name].y.high)
         if size != layer.size:
@@ -95,20 +105,20 @@ def _list(
         imgui.table_next_column()
         if imgui.small_button(f"x##layer {index}"):
             state.strokes.once(session, partial(session.remove, material, name, index))
-        explain("take this layer out; those above it stay")
+        explain("removes this layer; the layers above it stay")
     if drawn:
         imgui.table_next_row()
         imgui.table_next_column()
         imgui.table_next_column()
         imgui.align_text_to_frame_padding()
         imgui.text_unformatted("drawn curve")
-        explain("drawn freehand, or collapsed from layers; reset curve drops it")
+        explain("drawn freehand, or collapsed from layers; 'reset curve' removes it")
     imgui.end_table()
     return under
 
 
 def resize(session: Session, material: str, curve: str, index: int, size: float) -> None:
-    """Give a layer another size; those above it stay."""
+    """Change the size of a layer; layers above it stay."""
     layers = session.document.materials[material].curves[curve].layers
     changed = resized(layers[index], size)
     for above in reversed(range(index, len(layers))):
@@ -117,7 +127,7 @@ def resize(session: Session, material: str, curve: str, index: int, size: float)
 
 
 def _size(label: str, layer: Operator, value_step: float) -> float:
-    """A control of a layer's size: degrees, values, or a factor."""
+    """Draw the control of a layer's size: degrees, a value, or a factor."""
     steps = {"translate_x": 0.02, "translate_y": value_step}
     turn = np.degrees(1.0) if layer.kind == "translate_x" else 1.0
     formats = {"translate_x": "x %+.2f°", "translate_y": "y %+.4g"}
@@ -126,5 +136,5 @@ def _size(label: str, layer: Operator, value_step: float) -> float:
     imgui.set_next_item_width(-1)
     flags = imgui.SliderFlags_.clamp_on_input | imgui.SliderFlags_.no_round_to_format
     changed, size = imgui.drag_float(label, layer.size * turn, steps.get(layer.kind, 0.005), low, high, pattern, flags)
-    explain(f"size of this layer; drag, or double click to type\n{words(layer)}")
+    explain(f"size of this layer; drag, or double-click to type\n{words(layer)}")
     return float(size / turn) if changed else layer.size

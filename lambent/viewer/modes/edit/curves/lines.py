@@ -1,4 +1,4 @@
-"""A curve as the points that a plot shows, and the ranges that show it well."""
+"""The points of a curve for a plot, and ranges that fit it."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from lambent.core.arrays import Floats
 from lambent.materials.factored.curve import angles_rad
 from lambent.viewer.modes.edit.curves.axes import END_DEG, Axis
 
-BUCKETS = 256  # two points each
+BUCKETS = 256  # buckets of a line, two points each
 ANGLES_DEG = np.degrees(angles_rad())
 ANGLES_DEG.flags.writeable = False
-SAME = 1e-12  # channels that differ by less, as a share of the largest value, are one line
+SAME = 1e-12  # largest difference of equal channels, as a share of the largest value
 FEATURE = 0.002  # share of a curve's span that counts as a change
-DECADES = 6.0  # shown at most below the largest value, on a logarithmic axis
+DECADES = 6.0  # most decades below the largest value on a logarithmic axis
 
 
 def decimated(values: Floats, low_deg: float, high_deg: float, buckets: int = BUCKETS) -> tuple[Floats, Floats]:
     """Angles in degrees and values of at most 2 `buckets` + 2 points of one channel (KNOTS + 1,) within a range.
 
-    Every bucket keeps its smallest and its largest value, so that no peak is lost; one knot beyond either end is there.
+    Every bucket keeps its smallest and its largest value, so that no peak is lost; one knot beyond each end is kept.
     """
     first = max(int(np.searchsorted(ANGLES_DEG, low_deg)) - 1, 0)
     last = min(int(np.searchsorted(ANGLES_DEG, high_deg, "right")), len(ANGLES_DEG) - 1)
@@ -52,13 +52,13 @@ def feature_deg(values: Floats) -> float:
 
 
 def fitted_x(values: Floats) -> Axis:
-    """Angles that show where a curve changes: all, unless that is a narrow peak at 0."""
+    """Range of angles in which a curve changes: all, except for a narrow peak at 0."""
     end = 1.4 * feature_deg(values)
     return Axis(0.0, max(end, 1.0) if end < 45.0 else END_DEG)
 
 
 def fitted_y(values: Floats, x: Axis, log: bool) -> Axis:
-    """Values of a curve (KNOTS + 1, 3) within a range of angles, with some air above."""
+    """Range of values of a curve (KNOTS + 1, 3) within a range of angles, with a margin above."""
     seen = values[(x.low <= ANGLES_DEG) & (x.high >= ANGLES_DEG)]
     top = float(seen.max()) if len(seen) else 0.0
     if top <= 1e-30:

@@ -27,15 +27,15 @@ _X, _Y = implot.ImAxis_.x1, implot.ImAxis_.y1
 _BUTTONS = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right
 _BUTTONS |= imgui.ButtonFlags_.mouse_button_middle
 PADDING_PX = 14.0  # half of the last angle's label
-TICKS_DEG = (0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30)  # steps of the axis of angles
+TICKS_DEG = (0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30)  # tick spacings of the angle axis
 Line = tuple[int | None, Floats, Floats]  # channel, or None for all; degrees; values
 
 
 def draw(state: CurveState, session: Session, material: str, shown: Shown, name: str, size: tuple[float, float],
          over: str, outlined: Region | None) -> Axes | None:  # fmt: skip
-    """The plot in a place of `size` pixels; `over` names its angle, `outlined` is another region to point at.
+    """Draw the plot at `size` pixels; `over` names its angle, `outlined` is a region to highlight.
 
-    Returns where everything is; None where there is no room.
+    Returns its axes; None where there is no room.
     """
     curve, original = shown.editable.curves[name], shown.original.curves[name]
     view = state.view(material, name, curve)
@@ -48,7 +48,7 @@ def draw(state: CurveState, session: Session, material: str, shown: Shown, name:
     place, extent = implot.get_plot_pos(), implot.get_plot_size()
     axes = Axes(view.x, view.y, Place(place.x, place.y, extent.x, extent.y))
     hovered = _mouse(state, session, material, shown, name, axes)
-    shown = state.shown(session, material)  # after what the mouse did
+    shown = state.shown(session, material)  # after the edits of this frame
     curve = shown.editable.curves[name]
     region = _region(state, view)
     implot.push_plot_clip_rect()
@@ -85,7 +85,7 @@ def number(value: float) -> str:
 
 @lru_cache(maxsize=8)
 def points(curve: Curve, low_deg: float, high_deg: float, least: float) -> tuple[Line, ...]:
-    """What is drawn of a curve: one line where its channels agree, else three; not below `least`."""
+    """Lines of a curve, clamped to `least`: one where its channels agree, else three."""
     if is_grey(curve.values):
         return ((None, *_kept(curve.values[:, 0], low_deg, high_deg, least)),)
     return tuple((k, *_kept(curve.values[:, k], low_deg, high_deg, least)) for k in range(3))
@@ -109,13 +109,13 @@ def _axes(view: View, over: str) -> None:
 
 
 def _region(state: CurveState, view: View) -> Region:
-    """The region that is shown: while the curve is pulled, that of its layer, which may be wider."""
+    """The shown region: during a drag that of the layer, which may be wider."""
     layers = state.hold.layers if state.hold is not None else ()
     return layers[-1].region if layers else view.region
 
 
 def _mouse(state: CurveState, session: Session, material: str, shown: Shown, name: str, axes: Axes) -> bool:
-    """Everything that the mouse and the keys do over the plot; whether it is there."""
+    """Handle mouse and keys over the plot; return whether the mouse is over it."""
     io, place = imgui.get_io(), axes.place
     view, before = state.views[material, name], imgui.get_cursor_screen_pos()
     imgui.set_cursor_screen_pos((place.x, place.y))
@@ -124,7 +124,7 @@ def _mouse(state: CurveState, session: Session, material: str, shown: Shown, nam
     mouse = io.mouse_pos
     if hovered:
         imgui.set_item_key_owner(imgui.Key.mouse_wheel_y)
-        steps = io.mouse_wheel or io.mouse_wheel_h  # macOS turns the wheel aside with Shift
+        steps = io.mouse_wheel or io.mouse_wheel_h  # macOS scrolls sideways with Shift
         if steps:
             view.zoom(axes, (mouse.x, mouse.y), steps, values=io.key_shift or io.key_ctrl)
     imgui.set_cursor_screen_pos(before)
@@ -147,7 +147,7 @@ def _mouse(state: CurveState, session: Session, material: str, shown: Shown, nam
 
 
 def keys(state: CurveState, session: Session, view: View, values: Floats) -> None:
-    """The keys that work while the mouse is over the plot."""
+    """Handle the keys that work while the mouse is over the plot."""
     io = imgui.get_io()
     if io.key_ctrl or io.key_alt:
         return
@@ -167,7 +167,7 @@ def keys(state: CurveState, session: Session, view: View, values: Floats) -> Non
 
 
 def _pointer(state: CurveState, view: View, axes: Axes) -> None:
-    """The mouse pointer says what a press does here."""
+    """Set the mouse pointer to what a press would do."""
     mouse = imgui.get_io().mouse_pos
     grip = state.hold.grip if state.hold is not None else grip_at(view.region, axes, mouse.x, mouse.y)
     if state.tool == "draw" or grip is None or grip == "paint":
@@ -181,7 +181,7 @@ def _pointer(state: CurveState, view: View, axes: Axes) -> None:
 
 
 def _lines(curve: Curve, axes: Axes, grey: Colour, channels: tuple[int, ...], weight: float) -> None:
-    """The curve's lines; those of channels that edits leave alone are dim."""
+    """Draw the curve's lines, dimmed for channels that are not edited."""
     ghost = weight < 2
     for channel, x, y in points(curve, axes.x.low, axes.x.high, axes.least):
         own = grey if channel is None else RGB[channel]
@@ -191,7 +191,7 @@ def _lines(curve: Curve, axes: Axes, grey: Colour, channels: tuple[int, ...], we
 
 
 def _band(axes: Axes, region: Region, colour: tuple[float, float, float]) -> None:
-    """A region as a shade that fades over its ramps."""
+    """Draw a region as a shade that fades over its ramps."""
     lines, place = implot.get_plot_draw_list(), axes.place
     full, none = imgui.get_color_u32((*colour, FULL)), imgui.get_color_u32((*colour, 0.0))
     a, b, c, d = (axes.pixel(edge, 1.0)[0] for edge in edges_deg(region))
@@ -203,7 +203,7 @@ def _band(axes: Axes, region: Region, colour: tuple[float, float, float]) -> Non
 
 
 def _flags(state: CurveState, axes: Axes, region: Region, hovered: bool) -> None:
-    """Handles: b and c above, with a bar between them that moves all, a and d below."""
+    """Draw the handles: b and c above, with a bar between them that moves all; a and d below."""
     lines, place, mouse = implot.get_plot_draw_list(), axes.place, imgui.get_io().mouse_pos
     grip = state.hold.grip if state.hold is not None else grip_at(region, axes, mouse.x, mouse.y) if hovered else None
     flags = flags_px(region, axes)
@@ -227,7 +227,7 @@ def _flags(state: CurveState, axes: Axes, region: Region, hovered: bool) -> None
 
 
 def _base(axes: Axes, view: View, direction: Direction) -> None:
-    """Lines that amplification leaves in place."""
+    """Draw the lines that amplification leaves in place."""
     lines, place, colour = implot.get_plot_draw_list(), axes.place, imgui.get_color_u32((*CHOSEN[:3], 0.7))
     x, y = axes.pixel(*view.base)
     if direction != "x":
@@ -237,7 +237,7 @@ def _base(axes: Axes, view: View, direction: Direction) -> None:
 
 
 def _cross(axes: Axes, curve: Curve, state: CurveState) -> None:
-    """A line at the mouse's angle, dots on the curve, and its numbers."""
+    """Draw a line at the mouse's angle, dots on the curve, and their values."""
     lines, place, mouse = implot.get_plot_draw_list(), axes.place, imgui.get_io().mouse_pos
     angle, value = axes.at(mouse.x, mouse.y)
     lines.add_line((mouse.x, place.y), (mouse.x, place.y + place.height), imgui.get_color_u32((1, 1, 1, 0.16)))

@@ -1,4 +1,4 @@
-"""The colours of a material's terms, and the numbers that it began with, where it has some."""
+"""The colours of a material's terms, and the parameters of its original document or model."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from lambent.viewer.panels.widgets import rgb, slider, wrapped
 
 MOST_TINT = 2.0
 LABEL_PX = 88.0
-NO_TRANSPORT = "More than curves and colours has changed: this material needs transport of its own."
+NO_TRANSPORT = "The material's parameters have changed: its transport must be baked again."
 
 
 def draw_tints(state: CurveState, session: Session, material: str, shown: Shown) -> None:
-    """A colour by which each term is multiplied."""
+    """Draw the colour that multiplies each term."""
     longest = max((imgui.calc_text_size(term.name).x for term in shown.original.terms), default=0.0)
     labels = min(longest + 2 * imgui.get_style().item_spacing.x, 0.5 * imgui.get_content_region_avail().x)
     imgui.push_item_width(-max(labels, LABEL_PX))
     for term in shown.original.terms:
         tint = triple(shown.document.tints.get(term.name, (1.0, 1.0, 1.0)))
-        meaning = f"linear colour by which the term {term.name} is multiplied; 1, 1, 1 is as it was"
+        meaning = f"linear colour that multiplies the term {term.name}; 1, 1, 1 leaves it unchanged"
         changed = rgb(term.name, tint, max(MOST_TINT, *tint), meaning)
         if changed != tint:
             state.strokes.replace(session, partial(session.tint, material, term.name, changed))
@@ -35,7 +35,7 @@ def draw_tints(state: CurveState, session: Session, material: str, shown: Shown)
 
 
 def draw_numbers(state: CurveState, session: Session, material: str, shown: Shown) -> None:
-    """Parameters of a model, or numbers of a document; a measured table has none."""
+    """Draw the parameters of a model or document; a measured table has none."""
     source = shown.document.source
     if not shown.serves:
         wrapped([NO_TRANSPORT])
@@ -48,7 +48,7 @@ def draw_numbers(state: CurveState, session: Session, material: str, shown: Show
 
 
 def title(shown: Shown) -> str | None:
-    """Over the numbers; None where there are none."""
+    """Title above the parameters; None where there are none."""
     source = shown.document.source
     if isinstance(source, OfTable):
         return None

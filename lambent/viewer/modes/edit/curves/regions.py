@@ -17,9 +17,9 @@ Grip = Literal["a", "b", "c", "d", "bar", "curve"]
 EDGES: tuple[Edge, ...] = ("a", "b", "c", "d")
 PAIRS: tuple[tuple[Edge, Edge], ...] = (("b", "c"), ("a", "d"))  # handles at the top and at the bottom of the plot
 MEANINGS = {
-    "a": "the edit begins here",
-    "b": "full strength from here",
-    "c": "full strength up to here",
+    "a": "the edit starts here",
+    "b": "full strength starts here",
+    "c": "full strength ends here",
     "d": "the edit ends here",
 }
 GAP_DEG = 0.05  # shortest ramp
@@ -30,7 +30,7 @@ LIMITS = {  # the ends of ramps may lie outside of the curve
     "d": (GAP_DEG, 2 * END_DEG),
 }
 FLAG_PX, STRIP_PX = 10.0, 14.0  # width of a handle; height of the strips that hold them
-_GAPS = (GAP_DEG, 0.0, GAP_DEG)  # at least, between a and b, b and c, c and d
+_GAPS = (GAP_DEG, 0.0, GAP_DEG)  # least distances from a to b, b to c, c to d
 
 
 def region_of(a: float, b: float, c: float, d: float) -> Region:
@@ -45,7 +45,7 @@ def edges_deg(region: Region) -> tuple[float, float, float, float]:
 
 
 def with_edge(region: Region, edge: Edge, angle_deg: float) -> Region:
-    """An edge put elsewhere; it pushes the others along where they would cross."""
+    """Move an edge; it pushes the other edges along where they would cross."""
     edges, index = list(edges_deg(region)), EDGES.index(edge)
     low, high = LIMITS[edge]
     edges[index] = min(max(angle_deg, low), high)
@@ -57,7 +57,7 @@ def with_edge(region: Region, edge: Edge, angle_deg: float) -> Region:
 
 
 def moved(region: Region, by_deg: float) -> Region:
-    """All four edges moved, as far as b and c stay within the curve."""
+    """Move all four edges, as far as b and c stay within the curve."""
     a, b, c, d = edges_deg(region)
     by = min(max(by_deg, -b), END_DEG - c) if b >= 0 and c <= END_DEG else 0.0
     return region_of(a + by, b + by, c + by, d + by)
@@ -75,13 +75,13 @@ def whole() -> Region:
 
 
 def shown(axis: Axis) -> Region:
-    """The middle of what a plot shows."""
+    """The middle of the plot's range."""
     step = (axis.high - axis.low) / 4
     return region_of(axis.low, axis.low + step, axis.high - step, axis.high)
 
 
 def peak(values: Floats) -> Region | None:
-    """About the largest value of a curve (KNOTS + 1, 3): b and c at its half, a and d at a tenth; None for a line."""
+    """Region around the peak of a curve (KNOTS + 1, 3): b and c at 1/2, a and d at 1/10; None for a flat one."""
     mean = values.mean(axis=1)
     least, span = float(mean.min()), float(np.ptp(mean))
     if span <= 1e-9 * float(mean.max()):
@@ -94,7 +94,7 @@ def peak(values: Floats) -> Region | None:
 
 
 def tail(values: Floats) -> Region | None:
-    """All beyond the largest value, from where a curve has fallen to a tenth of it; None where it does not fall."""
+    """Region from where a curve has fallen to a tenth of its largest value; None where it does not fall."""
     mean = values.mean(axis=1)
     least, span = float(mean.min()), float(np.ptp(mean))
     top = int(mean.argmax())
@@ -107,14 +107,14 @@ def tail(values: Floats) -> Region | None:
 
 
 def first(values: Floats) -> Region:
-    """Where a curve is grabbed at first: at its peak, or in the middle."""
+    """The first region of a curve: its peak, or the middle."""
     return peak(values) or region_of(20.0, 35.0, 55.0, 70.0)
 
 
 def flags_px(region: Region, axes: Axes) -> dict[Edge, tuple[float, float]]:
     """Left and right of each handle in pixels: a and b point to the left of their angle, c and d to the right.
 
-    Handles of angles outside of the plot stand at its edge, so that all four can be grabbed.
+    Handles of angles outside of the plot are drawn at its edge, so that all four can be grabbed.
     """
     left, right = axes.place.x, axes.place.x + axes.place.width
     x = {edge: axes.pixel(angle, 1.0)[0] for edge, angle in zip(EDGES, edges_deg(region), strict=True)}
@@ -127,7 +127,7 @@ def flags_px(region: Region, axes: Axes) -> dict[Edge, tuple[float, float]]:
 
 
 def grip_at(region: Region, axes: Axes, x: float, y: float) -> Grip | None:
-    """What is at a pixel: b and c at the top of the plot with the bar between, a and d at its bottom, or the curve."""
+    """The grip at a pixel: b, c and the bar between them at the top, a and d at the bottom, or the curve."""
     top, bottom = axes.place.y, axes.place.y + axes.place.height
     if not (axes.place.x <= x <= axes.place.x + axes.place.width and top <= y <= bottom):
         return None

@@ -1,6 +1,6 @@
-"""What the curve editor knows besides the session: tool, regions, shown ranges, and what the mouse holds.
+"""State of the curve editor beside the session: tool, regions, shown ranges, and the present drag.
 
-Positions are pixels of the window. A drag of the curve is done anew from its begin at every move (`Strokes.replace`).
+Positions are pixels of the window. Every move repeats a drag from its start (`Strokes.replace`).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ ALL: Channels = (0, 1, 2)
 
 @dataclass
 class View:
-    """How one curve is shown and where it is grabbed; `base` stays in place when the curve is amplified."""
+    """Shown range and region of one curve; `base` stays in place when the curve is amplified."""
 
     region: Region
     x: Axis
@@ -45,7 +45,7 @@ class View:
         return cls(regions.first(values), x, fitted_y(values, x, log=False))
 
     def fit(self, values: Floats, x: Axis | None = None) -> None:
-        """Show all values within a range of angles; without one, where the curve changes."""
+        """Fit all values within a range of angles; by default, where the curve changes."""
         self.x = x or fitted_x(values)
         self.y = fitted_y(values, self.x, self.y.log)
 
@@ -53,7 +53,7 @@ class View:
         self.y = fitted_y(values, self.x, log)
 
     def zoom(self, axes: Axes, at: Point, steps: float, *, values: bool) -> None:
-        """Nearer by steps of the wheel, about a pixel: angles, or values."""
+        """Zoom angles or values by steps of the wheel, about a pixel."""
         factor = 0.85**steps
         if values:
             below = (axes.place.y + axes.place.height - at[1]) / axes.place.height
@@ -62,16 +62,16 @@ class View:
             self.x = within_curve(self.x.zoomed((at[0] - axes.place.x) / axes.place.width, factor))
 
     def pan(self, axes: Axes, dx: float, dy: float) -> None:
-        """The plot's content moved by pixels."""
+        """Pan the plot's content by pixels."""
         self.x = within_curve(self.x.panned(-dx / axes.place.width))
         self.y = self.y.panned(dy / axes.place.height)
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A material as it is and as it was before its edits; `serves`: transport made for it still does.
+    """A material with and without its edits; `serves`: whether its transport still applies.
 
-    `model` has the present parameters of a material that began as one."""
+    `model` has the present parameters of a material whose original is a model."""
 
     document: EditedMaterial
     editable: Editable
@@ -85,7 +85,7 @@ class Shown:
 
 @dataclass
 class Hold:
-    """What the mouse holds from press to release; `layers` are those of the drag as it is now."""
+    """What the mouse holds from press to release; `layers` are the present layers of the drag."""
 
     material: str
     curve: str
@@ -96,18 +96,18 @@ class Hold:
     painted: Floats
     last: Point
     layers: tuple[Operator, ...] = ()
-    seen: tuple[float, float, bool, bool] | None = None  # mouse and keys of the last move
+    seen: tuple[float, float, bool, bool] | None = None  # mouse position and modifier keys of the last move
 
 
 @dataclass
 class CurveState:
-    """Tool, channels and views of the curve editor; edits go to the session that is passed in."""
+    """Tool, channels and views of the curve editor; edits go to the given session."""
 
     strokes: Strokes = field(default_factory=Strokes)
     tool: Tool = "translate"
     direction: Direction = "x and y"
     channels: Channels = ALL
-    ghost: bool = True  # the original curve
+    ghost: bool = True  # whether the original curve is drawn
     linked_roughness: bool = True
     hold: Hold | None = None
     chosen: dict[str, str] = field(default_factory=dict)  # curve by material
@@ -117,11 +117,11 @@ class CurveState:
 
     @property
     def active_curve(self) -> str | None:
-        """The curve that is being pulled or drawn."""
+        """The curve that is being dragged or drawn."""
         return self.hold.curve if self.hold is not None and self.hold.grip in ("curve", "paint") else None
 
     def shown(self, session: Session, material: str) -> Shown:
-        """The material of the session as it is now; made anew only when it has changed."""
+        """The session's material as it is now; computed again only after a change."""
         document = session.document.materials[material]
         kept = self._shown.get(material)
         if kept is not None and kept[0] is not session:
@@ -136,7 +136,7 @@ class CurveState:
         return kept[1]
 
     def transported(self, session: Session, material: str) -> None:
-        """Transport was made for the material as it is now."""
+        """Note that transport was baked for the material as it is now."""
         self._shown.pop(material, None)
         self._served[material] = session.original(material)
 
@@ -155,12 +155,12 @@ class CurveState:
         return self.views[key]
 
     def toggle(self, channel: Literal[0, 1, 2]) -> None:
-        """Let edits act on a channel, or not; on all where none would be left."""
+        """Toggle whether edits act on a channel; all act where none would be left."""
         kept: Channels = tuple(one for one in ALL if (one in self.channels) != (one == channel))
         self.channels = kept or ALL
 
     def press(self, session: Session, material: str, axes: Axes, x: float, y: float) -> None:
-        """The mouse takes what is under it: a handle, the curve, or an end of a new region."""
+        """Grab what is under the mouse: a handle, the curve, or an end of a new region."""
         shown = self.shown(session, material)
         name = self.curve(material, shown)
         curve = shown.editable.curves[name]
@@ -175,7 +175,7 @@ class CurveState:
             self.move(session, x, y)
 
     def move(self, session: Session, x: float, y: float, *, shift: bool = False, ctrl: bool = False) -> None:
-        """The mouse is here with what it holds."""
+        """Drag what the mouse holds to this pixel."""
         hold = self.hold
         if hold is None or hold.seen == (x, y, shift, ctrl):
             return
@@ -193,7 +193,7 @@ class CurveState:
             view.region = regions.with_edge(hold.drag.region, hold.grip, end[0])
 
     def release(self, session: Session) -> None:
-        """Let go. The region follows what was moved across."""
+        """Release the mouse; the region follows a curve moved along the angles."""
         hold, self.hold = self.hold, None
         if hold is None:
             return
@@ -204,7 +204,7 @@ class CurveState:
         self.strokes.end(session)
 
     def cancel(self, session: Session) -> None:
-        """Let go, and leave all as it was."""
+        """Cancel the drag and restore the state before it."""
         if self.hold is not None:
             if self.strokes.is_open(session):
                 self.strokes.replace(session, lambda: None)
@@ -223,7 +223,7 @@ class CurveState:
             hold.painted, hold.last = values, end
 
     def _edited(self, session: Session, act: Callable[[], object]) -> bool:
-        """Edit within the stroke; where an undo came between, let go instead. Whether it was done."""
+        """Edit within the stroke; where an undo came between, release instead. Return whether the edit was made."""
         if self.strokes.has_left(session):
             self.hold = None
             self.strokes.end(session)

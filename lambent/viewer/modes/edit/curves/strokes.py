@@ -1,4 +1,4 @@
-"""Edits of a session as strokes: what one drag does is one step of undo, and an error is one line of text."""
+"""Edits of a session as strokes: one drag is one step of undo, and an error is one line of text."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ class Strokes:
     Attributes
     ----------
     message
-        The last edit's error; empty where there was none.
+        Error of the last edit; empty without one.
     """
 
     def __init__(self) -> None:
         self.message = ""
-        self._left: SessionDocument | None = None  # the state as the open stroke left it
+        self._left: SessionDocument | None = None  # the state after the last edit of the open stroke
 
     def once(self, session: Session, act: Callable[[], object]) -> None:
-        """An edit that is a step of its own."""
+        """Make an edit as one step of undo."""
         self.end(session)
         self.message = ""
         try:
@@ -33,9 +33,9 @@ class Strokes:
             self.message = str(error)
 
     def replace(self, session: Session, act: Callable[[], object]) -> None:
-        """The open stroke done anew, from the state before it; begins one where none is open.
+        """Repeat the open stroke from the state before it, or open one.
 
-        An edit that fails leaves the state that the stroke had.
+        A failing edit keeps the state of the stroke.
         """
         history = session.history
         if not self.is_open(session):
@@ -54,7 +54,7 @@ class Strokes:
         return self._left is not None and self._left is session.document
 
     def has_left(self, session: Session) -> bool:
-        """Whether the session went elsewhere while a stroke was open."""
+        """Whether the session was changed from elsewhere while a stroke was open."""
         return self._left is not None and not self.is_open(session)
 
     def end(self, session: Session) -> None:

@@ -1,4 +1,4 @@
-"""Tools, channels, axes and the region in numbers."""
+"""Tools, channels, axes and the region's numbers."""
 
 from __future__ import annotations
 
@@ -21,38 +21,38 @@ from lambent.viewer.modes.edit.curves.state import CurveState, View, whole_x
 from lambent.viewer.panels.widgets import Colour, explain
 
 TOOLS: dict[Tool, str] = {
-    "translate": "drag the curve within its region: by angle and value (T, over the plot)",
-    "amplify": "scale the curve within its region about a base (A, over the plot)",
-    "draw": "draw the curve freehand; its layers become a part of it (D, over the plot)",
+    "translate": "translate: drag the curve within its region, by angle and value (T, over the plot)",
+    "amplify": "amplify: scale the curve within its region about a base (A, over the plot)",
+    "draw": "draw: draw the curve freehand, which merges its layers (D, over the plot)",
 }
 DIRECTIONS: dict[Direction, str] = {
-    "x and y": "a drag changes angles and values",
-    "x": "a drag changes angles alone (Ctrl while dragging)",
-    "y": "a drag changes values alone (Shift while dragging)",
+    "x and y": "dragging changes angles and values",
+    "x": "dragging changes angles only (hold Ctrl)",
+    "y": "dragging changes values only (hold Shift)",
 }
 CHANNELS: tuple[tuple[Literal[0, 1, 2], str, str], ...] = ((0, "R", "red"), (1, "G", "green"), (2, "B", "blue"))
 KEYS = """Over the plot:
-left drag in the region: pull the curve; Shift keeps angles, Ctrl keeps values
-left drag beside the region: a new region
+left drag in the region: pull the curve; Shift: values only, Ctrl: angles only
+left drag beside the region: new region
 handles a b c d, the bar between b and c: the region
-wheel: angles nearer; with Shift or Ctrl: values
-right or middle drag: shift what is shown
-double click: all angles and values
-T A D: translate, amplify, draw;  L: log;  F: fit;  Esc: drop the drag"""
+wheel: zoom angles; with Shift or Ctrl: zoom values
+right or middle drag: pan
+double-click: show all angles and values
+T A D: translate, amplify, draw;  L: log;  F: fit;  Esc: cancel the drag"""
 ON = (0.24, 0.42, 0.66, 1.0)
 GROUP_PX = 14.0  # between groups of buttons
 PRESETS_PER_ROW = 4
 
 
 class _Flow:
-    """Puts groups of buttons beside each other, as many as there is room for."""
+    """Lays out groups of buttons in lines, as many per line as fit."""
 
     def __init__(self) -> None:
         self.right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
         self.begun = False
 
     def group(self, labels: Sequence[str]) -> None:
-        """Go on in this line if a group of these buttons fits, else in the next."""
+        """Place a group of these buttons in this line if it fits, else in the next."""
         style = imgui.get_style()
         width = sum(imgui.calc_text_size(label).x + 2 * style.frame_padding.x for label in labels)
         width += (len(labels) - 1) * 2
@@ -62,7 +62,7 @@ class _Flow:
 
 
 def draw(state: CurveState, view: View, values: Floats, edited: bool) -> None:
-    """Tool, direction, channels, and what the plot shows."""
+    """Draw tool, direction, channels, and the shown range."""
     flow = _Flow()
     flow.group(list(TOOLS))
     for index, (tool, meaning) in enumerate(TOOLS.items()):
@@ -82,12 +82,12 @@ def draw(state: CurveState, view: View, values: Floats, edited: bool) -> None:
     flow.group(["log", "fit", "0..90°", "original"])
     if _toggle("log", view.y.log, "logarithmic axis of values (L, over the plot)", first=True):
         view.set_log(values, not view.y.log)
-    if _toggle("fit", False, "show where the curve changes, with all its values (F, over the plot)"):
+    if _toggle("fit", False, "fits the plot to the part where the curve changes (F, over the plot)"):
         view.fit(values)
-    if _toggle("0..90°", False, "show all angles and values (double click on the plot)"):
+    if _toggle("0..90°", False, "shows all angles and values (double-click on the plot)"):
         view.fit(values, whole_x())
     imgui.begin_disabled(not edited)
-    if _toggle("original", state.ghost, "a thin line: the curve as it was before its edits"):
+    if _toggle("original", state.ghost, "shows the unedited curve as a thin line"):
         state.ghost = not state.ghost
     imgui.end_disabled()
     flow.group(["?"])
@@ -98,12 +98,12 @@ def draw(state: CurveState, view: View, values: Floats, edited: bool) -> None:
 
 @lru_cache(maxsize=8)
 def presets(curve: Curve) -> tuple[Region | None, Region | None]:
-    """About the peak, and the tail."""
+    """Region presets: peak and tail."""
     return regions.peak(curve.values), regions.tail(curve.values)
 
 
 def draw_region(state: CurveState, view: View, curve: Curve) -> None:
-    """The four angles of the region, its presets, and the base of amplification."""
+    """Draw the four angles of the region, its presets, and the base of amplification."""
     imgui.begin_disabled(state.tool == "draw")
     space, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
     width = (room - (len(EDGES) - 1) * space) / len(EDGES)
@@ -113,14 +113,14 @@ def draw_region(state: CurveState, view: View, curve: Curve) -> None:
         imgui.set_next_item_width(width)
         flags = imgui.SliderFlags_.always_clamp
         changed, typed = imgui.drag_float(f"##{edge}", angle, 0.05, *LIMITS[edge], f"{edge} %.2f°", flags)
-        explain(f"{MEANINGS[edge]}; drag, or double click to type")
+        explain(f"{MEANINGS[edge]}; drag, or double-click to type")
         if changed:
             view.region = regions.with_edge(view.region, edge, typed)
     peak, tail = presets(curve)
     options = (
-        ("peak", peak, "about the largest value, down to its half"),
+        ("peak", peak, "around the largest value, down to half of it"),
         ("tail", tail, "from where the curve has fallen to a tenth, to 90°"),
-        ("shown", regions.shown(view.x), "what the plot shows now"),
+        ("shown", regions.shown(view.x), "the range that the plot shows"),
         ("all", regions.whole(), "the whole curve evenly"),
     )
     for index, (label, region, meaning) in enumerate(options):
@@ -142,17 +142,17 @@ def _base(view: View, width: float) -> None:
     changed, typed = imgui.drag_float(
         "##base x", angle, 0.1, 0.0, END_DEG, "about %.1f°", imgui.SliderFlags_.always_clamp
     )
-    explain("angle that stays in place while angles are amplified")
+    explain("centre about which angles are scaled")
     angle = typed if changed else angle
     imgui.same_line()
     imgui.set_next_item_width(width)
     _, value = imgui.drag_float("##base y", value, 0.002 * max(view.y.high, 1e-6), 0.0, 0.0, "about %.4g")
-    explain("value that stays in place while values are amplified: 0 scales them")
+    explain("value about which values are scaled; 0 multiplies them")
     view.base = angle, max(value, 0.0) if np.isfinite(value) else 0.0
 
 
 def _toggle(label: str, on: bool, meaning: str, *, first: bool = False, text: Colour | None = None) -> bool:
-    """A button of a group that shows whether it is on; returns whether it was pressed."""
+    """Draw a toggle button; return whether it was pressed."""
     if not first:
         imgui.same_line(0, 2)
     if on:

@@ -1,4 +1,4 @@
-"""The Compare panel: the picture beside another integrator's, or how far the two are apart."""
+"""The Compare panel: the picture beside another integrator's, or a map of their differences."""
 
 from __future__ import annotations
 
@@ -11,14 +11,17 @@ from lambent.viewer.panels.widgets import choice, rows, wrapped
 
 def draw(comparison: Comparison) -> None:
     comparison.mode = choice(
-        "compare", comparison.mode, MODES, "shows this picture beside another integrator's, or how far they are apart"
+        "compare",
+        comparison.mode,
+        MODES,
+        "compares this picture A with another integrator's B: side by side, or as an error map",
     )
     if not comparison.on:
-        imgui.text_wrapped("Off: the picture refines by itself while nothing moves.")
+        imgui.text_wrapped("Off: the picture refines at rest.")
         return
     meaning = (
-        "integrator of B; qmc is unbiased and accumulates while nothing moves, path traces the scene itself, beside "
-        "the window; A stays that of motion"
+        "integrator of B; qmc is unbiased and accumulates at rest; path traces the scene in another process; A is "
+        "drawn as in motion"
     )
     comparison.integrator = choice("with B", comparison.integrator, (*INTEGRATORS, TRACED), meaning)
     if comparison.is_traced:
@@ -27,17 +30,17 @@ def draw(comparison: Comparison) -> None:
             return
     else:
         meaning = (
-            "where B finds reflected light: as A, or of all objects by one look-up, as of the single probe by plain"
+            "where B looks up reflected light: as A does, or with one look-up for all objects; plain: a single probe"
         )
         comparison.look_up = choice("look-up of B", comparison.look_up, (AS_A, *LOOKUPS), meaning)
     if comparison.mode == "error map":
-        meaning = "the difference of luminance in percent of B's, or what a viewer notices (FLIP)"
+        meaning = "difference in luminance in per cent of B, or the difference that a viewer notices (FLIP)"
         comparison.kind = choice("map", comparison.kind, KINDS, meaning)
     figures = comparison.figures
     if figures is None:
-        imgui.text_disabled("figures come while nothing moves")
+        imgui.text_disabled("figures are computed at rest")
         return
-    flip = "being computed" if comparison.busy and figures.flip_mean is None else "-"
+    flip = "computing" if comparison.busy and figures.flip_mean is None else "-"
     if figures.flip_mean is not None:
         half = " at half size" if figures.flip_step > 1 else ""
         older = f", of {figures.flip_of} samples" if figures.flip_of != figures.of else ""

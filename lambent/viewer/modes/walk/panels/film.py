@@ -1,4 +1,4 @@
-"""The Film panel: size, rate and quality of a film along a camera path, its progress, and how to cancel it."""
+"""The Film panel: size, rate and quality of a film along a camera path, its progress, and cancelling."""
 
 from __future__ import annotations
 
@@ -21,25 +21,27 @@ def draw(films: Films, recordings: Recordings, navigation: Navigation, screen: S
         return
     paths, followed = recordings.paths, navigation.path
     if not paths:
-        imgui.text_wrapped("There is no camera path: record one.")
+        imgui.text_wrapped("No camera path: record one in the Scene panel.")
         return
     path = followed.path if followed and followed.path.name in [p.name for p in paths] else paths[0]
     imgui.text_disabled(f"along {path.name}, {path.seconds:.1f} s (chosen under Scene)")
     films.size = choice("size", films.size, tuple(SIZES), "width and height of the film in pixels")
     films.fps = int(choice("frames/s", str(films.fps), tuple(map(str, FPS)), "frames of the film per second"))
-    meaning = "the integrator and samples chosen under Drawing, or the unbiased one: slow, without grain at 256"
+    meaning = (
+        "as in motion: integrator and samples from the Drawing panel; refined: unbiased and slow, free of grain at 256"
+    )
     films.quality = choice("quality", films.quality, tuple(QUALITIES), meaning)
     text = films.file_name or f"{plain_name(path.name)}.mp4"
     hint = "tour.mp4, tour-####.png or .exr"
-    meaning = "draws the film into an .mp4, or pictures in a row: tour-####.png as shown, .exr as linear radiance"
+    meaning = "draws the film as .mp4, or as numbered images: tour-####.png as shown, .exr with linear radiance"
     films.file_name, wanted = path_field("film file", text, "make film", hint, meaning)
     if wanted:
         films.wanted = path
 
 
 def _progress(film: Filming) -> bool:
-    """Whether the film is to be cancelled."""
+    """Draw the progress; return whether to cancel the film."""
     left = "" if film.left_s is None else f", {int(film.left_s) // 60}:{int(film.left_s) % 60:02} left"
     imgui.progress_bar(film.done / film.total, (-1, 0), f"frame {film.done} of {film.total}{left}")
     imgui.text_disabled(film.file.name)
-    return press("cancel the film", "ends the film; a sequence of images keeps those that are done", -1)
+    return press("cancel the film", "stops the film; finished images of a sequence are kept", -1)

@@ -11,7 +11,7 @@ from lambent.viewer.panels.widgets import AMBER, check, choice, explain, rows, s
 from lambent.viewer.screen import Rect
 
 MARGIN_PX = 12
-MAP_SHARE = 0.4  # of the picture's shorter side
+MAP_SHARE = 0.4  # side of the map, as a share of the picture's shorter side
 
 
 def draw(state: WalkState) -> None:
@@ -22,37 +22,37 @@ def draw(state: WalkState) -> None:
         imgui.text_wrapped(without(name, tuple(view.fields), state.store_name))
         return
     count, side = light_field.inverse_distance.shape[:2]
-    view.points_on = check("points", view.points_on, "a disc at each point that light was taken at; click one")
+    view.points_on = check("points", view.points_on, "marks each point of the light field; click one to choose it")
     imgui.same_line()
-    view.map_on = check("map", view.map_on, "what the chosen point sees in all directions, over the picture")
+    view.map_on = check("map", view.map_on, "shows the chosen point's map over the picture")
     changed, point = imgui.slider_int("point", view.point, 0, count - 1)
-    explain("the point whose map is shown, by its number")
+    explain("number of the chosen point")
     if changed:
         view.point = min(max(point, 0), count - 1)
-    view.shows = choice("of it", view.shows, SHOWS, "its light, or how far it sees: red near, blue far, black the sky")
+    view.shows = choice("show", view.shows, SHOWS, "light, or distances: red near, blue far, black sky")
     x, y, z = light_field.points[view.point]
     far, near = distances_m(light_field, view.point)
     table = [
         ("light field of", str(view.owner)),
         ("points", str(count)),
         ("maps", f"{side} x {side} texels"),
-        ("off the surface", f"{1e3 * light_field.offset_m:.1f} mm"),
-        ("place", f"{x:.3f}, {y:.3f}, {z:.3f} m"),
-        ("sees", f"{near:.3g} to {far:.3g} m"),
+        ("offset", f"{1e3 * light_field.offset_m:.1f} mm"),
+        ("position", f"{x:.3f}, {y:.3f}, {z:.3f} m"),
+        ("distances", f"{near:.3g} to {far:.3g} m"),
     ]
     rows(table, "light field")
 
 
 def without(name: str | None, others: tuple[str, ...], store: str) -> str:
-    """What to do where the selected object has no light field."""
-    has = f" These have one: {', '.join(others)}." if others else ""
+    """Text for a selection without a light field."""
+    has = f" Objects with a light field: {', '.join(others)}." if others else ""
     if name is None:
         return f"Select an object.{has}"
-    return f"{name} has no light field; `lambent bake SCENE -o {store} --light-fields {name}` makes one.{has}"
+    return f"{name} has no light field; `lambent bake SCENE -o {store} --light-fields {name}` adds one.{has}"
 
 
 def warn_of_look_up(state: WalkState) -> None:
-    """Under the look-up of an object that was to be drawn with a light field and has none."""
+    """Warn where a light field is chosen as the look-up of an object that has none."""
     name, parts = state.selection.name, state.selected_parts
     wanted = state.look.lookups.get(name or "", state.look.lookup)
     if name is not None and wanted.startswith("light_field") and not any(part in state.fields.fields for part in parts):
@@ -60,7 +60,7 @@ def warn_of_look_up(state: WalkState) -> None:
 
 
 def draw_over(view: FieldView, picture: Rect, textures: Textures) -> None:
-    """Discs over the picture, and the map in its upper left corner."""
+    """Draw discs over the picture, and the map in its upper left corner."""
     behind = imgui.get_background_draw_list()
     if (discs := textures.get("points")) is not None:
         behind.add_image(discs, picture.point(0, 0), picture.point(1, 1))

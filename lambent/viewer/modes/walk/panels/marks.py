@@ -15,7 +15,7 @@ LINE = (0.35, 0.8, 1.0, 1.0)
 
 
 def draw(marks: Marks, selected: Collection[str], picture: Rect, textures: Textures) -> None:
-    """Mirror balls and outlines, behind the panels."""
+    """Draw mirror balls and outlines, behind the panels."""
     behind = imgui.get_background_draw_list()
     behind.push_clip_rect((picture.x, picture.y), (picture.x + picture.width, picture.y + picture.height), True)
     for line in marks.lines:

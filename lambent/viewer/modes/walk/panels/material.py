@@ -1,4 +1,4 @@
-"""The Material panel: the objects, and every number of the selected object's material."""
+"""The Material panel: the objects, and every parameter of the selected object's material."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def draw(selection: Selection, materials: Materials) -> None:
         edits.change(name, edited)
     imgui.separator()
     buttons([
-        ("reset", name in edits.edited, partial(edits.reset, name), "returns to the material that the store has"),
+        ("reset", name in edits.edited, partial(edits.reset, name), "restores the store's material"),
     ])  # fmt: skip
     _save(materials, name)
     _compare(materials, name)
@@ -57,17 +57,17 @@ def _objects(selection: Selection) -> None:
 def _save(materials: Materials, name: str) -> None:
     imgui.set_next_item_width(-64)
     changed, file_name = imgui.input_text("##file", materials.file_name(name))
-    explain("name of the file that the material is saved as")
+    explain("file name of the material document")
     if changed:
         materials.file_names[name] = file_name
     imgui.same_line()
-    if press("save", "writes the material as a document, and leaves the store as it is (Ctrl+S)", -1):
+    if press("save", "saves the material as a document; the store does not change", -1):
         materials.save(name)
 
 
 def _compare(materials: Materials, name: str) -> None:
-    """The door to the editor: a measured file to hold against this material."""
-    meaning = "opens the material editor: disks, curves and error of this material against a measurement, and the fit"
+    """Draw the field of a measured file that opens the material editor."""
+    meaning = "opens the material editor: disks, curves and error against a measurement, and the fit"
     hint = "compare with a measured file..."
     materials.typed_measurement, wanted = path_field(
         "measurement", materials.typed_measurement, "compare", hint, meaning

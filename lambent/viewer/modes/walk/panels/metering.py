@@ -33,7 +33,7 @@ def draw(meter: Meter, look: Look, navigation: Navigation) -> None:
         ("mean", f"{number(reading.mean)} {unit}"),
         ("log-average", f"{number(reading.log_mean)} {unit}"),
         ("darkest, brightest", f"{number(reading.low)}, {number(reading.high)} {unit}"),
-        *([] if look.shows_noise else [("middle is grey at", f"EV100 {ev100_of(reading.exposure_ev):.2f}")]),
+        *([] if look.shows_noise else [("exposure for grey", f"EV100 {ev100_of(reading.exposure_ev):.2f}")]),
     ]
     rows(table, "meter")
     counts = np.asarray(reading.counts, np.float32)
@@ -43,12 +43,12 @@ def draw(meter: Meter, look: Look, navigation: Navigation) -> None:
     imgui.text_disabled(first)
     imgui.same_line(width - imgui.calc_text_size(last).x)
     imgui.text_disabled(last)
-    explain("pixels by luminance, in even steps of its logarithm; what is black is left out")
+    explain("histogram of luminance on a logarithmic axis, without black pixels")
 
 
 def _glare(meter: GlareMeter, camera: Camera) -> None:
-    """Button and ratings; those of an eye that has moved on are dim."""
-    if press("Glare at the eye", "rate what a person glares at who stands here and looks ahead: DGP and UGR"):
+    """Draw button and ratings; ratings of an earlier position are dim."""
+    if press("Glare at the eye", "rates the glare for a person at this place and direction of view: DGP and UGR"):
         meter.wanted = True
     if meter.share is not None:
         imgui.same_line()
@@ -63,14 +63,14 @@ def _glare(meter: GlareMeter, camera: Camera) -> None:
         ("DGP", f"{found.dgp:.2f}, {found.comfort}"),
         ("UGR", f"{found.ugr:.0f}"),
         ("at the eye", f"{number(found.illuminance_lx)} lx"),
-        ("sources of glare", str(len(found.sources))),
+        ("glare sources", str(len(found.sources))),
     ]
     rows(table, "glare")
     imgui.pop_style_color()
 
 
 def draw_readout(meter: Meter, look: Look, picture: Rect) -> None:
-    """The light under the mouse, beside it."""
+    """Draw the luminance under the mouse beside it."""
     if meter.under_cursor is None or meter.cursor is None:
         return
     light = float(photometric(np.array(meter.under_cursor), look.quantity))

@@ -1,4 +1,4 @@
-"""Above all panels: undo and redo, saving the session, and how exact the light of the edited room is."""
+"""Lines above all panels: undo and redo, saving the session, and how exact the light of the edited room is."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ def draw(state: WalkState) -> None:
     def save() -> None:
         session.save()
 
-    what = session.fault or "keeps materials, light and stored states with the store; the next window begins with them"
+    what = session.fault or "saves materials, light and stored states in the store; the next window starts with them"
     buttons([
-        ("undo", edits.can_undo, edits.undo, "takes back the last change of a material or the light (Ctrl+Z)"),
-        ("redo", edits.can_redo, edits.redo, "does the change again (Ctrl+Shift+Z)"),
+        ("undo", edits.can_undo, edits.undo, "undoes the last change of a material or the light (Ctrl+Z)"),
+        ("redo", edits.can_redo, edits.redo, "redoes the change (Ctrl+Shift+Z)"),
         ("save session", not session.fault, save, f"{what} (Ctrl+S)"),
     ])  # fmt: skip
     if session.unsaved:
@@ -27,14 +27,14 @@ def draw(state: WalkState) -> None:
 
 
 def _light(state: WalkState) -> None:
-    """How exact the light of other surfaces is in one line, and whether it follows an edit, at once and exactly."""
+    """Draw whether light on other surfaces follows edits, estimated or rebaked, and how exact it is."""
     answering, rebaking = state.answering, state.rebaking
     if answering.possible:
-        meaning = "other surfaces get the light of edited colours, estimated at once"
-        answering.on = check("light answers", answering.on, meaning)
+        meaning = "estimates at once how edited materials change the light on other surfaces"
+        answering.on = check("light follows", answering.on, meaning)
         imgui.same_line()
     if rebaking.possible:
-        meaning = "bakes the light of edited materials anew beside the window, and brings it into the picture"
+        meaning = "bakes the light of edited materials again in the background and updates the picture"
         rebaking.on = check("bake edits", rebaking.on, meaning)
     for line in ("" if rebaking.exact else answering.note, rebaking.line):
         if line:

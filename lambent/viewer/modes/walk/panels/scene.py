@@ -1,4 +1,4 @@
-"""The Scene panel: walking or orbiting, cameras and saved views, camera paths; warnings."""
+"""The Scene panel: walking or orbiting, cameras and saved views, camera paths, warnings."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from lambent.viewer.panels.widgets import check, explain, listed, path_field, pr
 LISTED = 6
 SMOOTHEST_S = 2.0
 RED = (1.0, 0.35, 0.3, 1.0)
-UNFOLDS = "unfolds what the loader said about the scene's file"
-WARNINGS = 3  # more are folded away: the panels below them would be out of sight
+UNFOLDS = "shows what the loader said about the scene file"
+WARNINGS = 3  # more warnings are folded, to keep the panels below in sight
 
 
 def draw(navigation: Navigation, recordings: Recordings, missing: Sequence[str], warnings: Sequence[str]) -> None:
-    """`missing` is what the store lacks, `warnings` are of the scene's loader."""
+    """Draw the panel; `missing`: lines on data that the store lacks, `warnings`: from the scene's loader."""
     _movement(navigation)
     if recordings.cameras:
         _cameras(navigation, recordings)
@@ -31,7 +31,7 @@ def draw(navigation: Navigation, recordings: Recordings, missing: Sequence[str],
     wrapped(missing)
     if len(warnings) <= WARNINGS:
         wrapped(warnings)
-    elif imgui.tree_node(f"{len(warnings)} notes on the scene's file###warnings"):
+    elif imgui.tree_node(f"{len(warnings)} notes on the scene file###warnings"):
         explain(UNFOLDS)
         wrapped(warnings)
         imgui.tree_pop()
@@ -42,14 +42,14 @@ def draw(navigation: Navigation, recordings: Recordings, missing: Sequence[str],
 def _movement(navigation: Navigation) -> None:
     if imgui.radio_button("walk", navigation.movement == "walk"):
         navigation.movement = "walk"
-    explain("the mouse looks around and the keys walk (O)")
+    explain("the mouse looks around, the keys walk (O)")
     imgui.same_line()
     if imgui.radio_button("orbit", navigation.movement == "orbit"):
         navigation.movement = "orbit"
-    explain("the mouse turns about the selected object, or the camera's target (O)")
+    explain("the mouse turns about the selected object or the camera's target (O)")
     if navigation.movement == "walk":
         imgui.same_line()
-        navigation.flying = check("fly", navigation.flying, "leaves the ground, and passes through walls (G)")
+        navigation.flying = check("fly", navigation.flying, "leaves the floor and passes through walls (G)")
 
 
 def _cameras(navigation: Navigation, recordings: Recordings) -> None:
@@ -68,7 +68,7 @@ def _cameras(navigation: Navigation, recordings: Recordings) -> None:
 
 def _saving(navigation: Navigation, recordings: Recordings) -> None:
     views, hint = recordings.views, "name of this view..."
-    meaning = "keeps where you stand, beside the store (V); `lambent render --camera NAME` shows it"
+    meaning = "saves this view in the store (V); `lambent render --camera NAME` draws it"
     recordings.view_name, wanted = path_field("view name", recordings.view_name, "save view", hint, meaning)
     if wanted:
         recordings.save_view()
@@ -78,20 +78,20 @@ def _saving(navigation: Navigation, recordings: Recordings) -> None:
 
 
 def _rename_or_delete(recordings: Recordings, kind: Kind, name: str) -> None:
-    """Two buttons, or the field where a new name is typed."""
+    """Draw two buttons, or the field for a new name."""
     views = recordings.views
     if views.renaming == (kind, name):
-        meaning = f"renames {name}; Esc leaves its name"
+        meaning = f"renames {name}; Esc cancels"
         views.typed_name, wanted = path_field(f"new {kind} name", views.typed_name, "rename", "new name", meaning)
         if imgui.is_key_pressed(imgui.Key.escape):
             views.renaming = None
         if wanted:
             recordings.rename(kind, name)
         return
-    if press(f"rename...##{kind}", f"gives {name} another name", small=True):
+    if press(f"rename...##{kind}", f"renames {name}", small=True):
         views.renaming, views.typed_name = (kind, name), name
     imgui.same_line()
-    if press(f"delete##{kind}", f"removes {name} from the store's views; this cannot be undone", small=True):
+    if press(f"delete##{kind}", f"deletes {name} from the store; this cannot be undone", small=True):
         recordings.delete(kind, name)
     imgui.same_line()
     imgui.text_disabled(name)
@@ -102,19 +102,19 @@ def _follow(recordings: Recordings) -> None:
     names = [path.name for path in paths]
     name = navigation.path.path.name if navigation.path else names[0]
     changed, index = imgui.combo("path", names.index(name) if name in names else 0, names)
-    explain("the camera path to play, and to film")
+    explain("the camera path to play and to film")
     chosen = paths[index]
     if changed:
         navigation.scrub(chosen, 0.0)
     imgui.begin_disabled(recordings.recorder.on)
-    if press("pause" if navigation.playing else "play", "follows the camera path, or halts on it", 64):
+    if press("pause" if navigation.playing else "play", "plays or pauses the camera path", 64):
         navigation.toggle(chosen)
     imgui.end_disabled()
     imgui.same_line()
     imgui.set_next_item_width(-1)
     time_s = min(navigation.path.time_s, chosen.seconds) if navigation.path else 0.0
     moved, time_s = imgui.slider_float("##time", time_s, 0.0, chosen.seconds, "%.1f s", imgui.SliderFlags_.always_clamp)
-    explain("moment of the camera path; drag to stand there")
+    explain("time along the camera path; drag to go there")
     if moved:
         navigation.scrub(chosen, time_s)
     if chosen.name in [path.name for path in recordings.views.saved.paths]:
@@ -130,20 +130,22 @@ def _record(recordings: Recordings) -> None:
         imgui.pop_style_color()
     else:
         pressed = imgui.button("record a walk###record", (-1, 0))
-    explain("follows the camera until it is pressed again (R); standing still before the first step is left out")
+    explain("records the camera until pressed again (R); leaves out the rest before the first step")
     if pressed:
         recordings.record()
     if recorder.draft is None:
         return
-    smooth_s = slider("smooth", recorder.smooth_s, 0.0, SMOOTHEST_S, "how far jerks are averaged out", unit=" s")
+    smooth_s = slider(
+        "smooth", recorder.smooth_s, 0.0, SMOOTHEST_S, "time over which the motion is averaged", unit=" s"
+    )
     if smooth_s != recorder.smooth_s:
         played = navigation.path if navigation.path and navigation.path.path == recorder.draft else None
         recorder.smooth(smooth_s)
         if played is not None:
             navigation.scrub(recorder.draft, played.time_s)
-    meaning = "keeps the recorded walk beside the store"
+    meaning = "saves the recorded walk in the store"
     recorder.name, wanted = path_field("path name", recorder.name, "save path", "name of the path", meaning)
     if wanted:
         recordings.save()
-    if recorder.draft is not None and press("throw the recording away", "forgets the recorded walk", -1):
+    if recorder.draft is not None and press("discard the recording", "discards the recorded walk", -1):
         recordings.drop()

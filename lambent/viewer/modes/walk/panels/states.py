@@ -1,4 +1,4 @@
-"""The States panel: store the room as it is, go back to a stored state, show two beside each other."""
+"""The States panel: store the room's state, apply a stored state, show two states side by side."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HINT = "name of this state..."
 
 
 def draw(states: States, comparison: Comparison, screen: Screen) -> None:
-    meaning = "keeps materials and light as they are now under this name; a name that is there gets them instead"
+    meaning = "stores the present materials and light under this name; replaces a state of the same name"
     states.typed_name, wanted = path_field("state name", states.typed_name, "store", HINT, meaning)
     if wanted:
         try:
@@ -26,30 +26,30 @@ def draw(states: States, comparison: Comparison, screen: Screen) -> None:
         _row(states, name, room, name)
         if name != BAKED:
             imgui.same_line()
-            if press(f"x##{name}", f"drops the stored state {name}; undo brings it back", small=True):
+            if press(f"x##{name}", f"deletes the stored state {name}; undo restores it", small=True):
                 states.edits.forget(name)
     if variants := states.variants:
         imgui.separator_text("variants of the scene")
         for name, room in variants.items():
             _row(states, name, room, f"variant {name}")
         imgui.separator()
-    split = check("split view", states.split, "shows the room left of a divider, and the other state right of it")
+    split = check("split view", states.split, "shows the room left of a divider and another state right of it")
     if split != states.split:
         states.split = split
     if states.split and comparison.on:
-        comparison.mode = "off"  # of two integrators: a picture has one divider
+        comparison.mode = "off"  # a picture has only one divider
     imgui.same_line()
-    if press("exchange", "the room and the state beside it change places (X)"):
+    if press("swap", "swaps the room with the state beside it (X)"):
         states.exchange()
 
 
 def _row(states: States, name: str, room: RoomState, own: str) -> None:
-    """A state: take it, or compare with it; `own` tells its buttons from others."""
+    """Draw a state with its buttons, whose ids end with `own`."""
     edits = states.edits
-    if press(f"take##{own}", f"shows {name} and goes on from it; undo brings back the room as it was", small=True):
+    if press(f"apply##{own}", f"sets the room to {name}; undo restores the room", small=True):
         edits.take(room)
     imgui.same_line()
-    if press(f"beside##{own}", f"shows the room and {name} beside each other", small=True):
+    if press(f"split##{own}", f"shows the room and {name} side by side", small=True):
         states.show_beside(room)
     imgui.same_line()
     marks = [mark for mark, here in (("now", edits.room == room), ("beside", edits.other == room)) if here]

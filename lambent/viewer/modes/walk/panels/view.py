@@ -17,14 +17,14 @@ from lambent.viewer.panels.widgets import check, choice, explain, press, slider,
 FOV_DEG = (10.0, 120.0)
 SPEED_M_S, EYE_M = (0.1, 10.0), (0.1, 3.0)
 NEAR_M = (0.001, 5.0)
-NO_NOISE = "the store lacks it; `lambent bake` of the same scene adds it from the samples that it keeps"
+NO_NOISE = "the store lacks it; `lambent bake` of the same scene adds it from the stored samples"
 
 
 def draw(state: WalkState) -> None:
-    """What the picture shows, and how bright."""
+    """Draw the choice of the shown light, exposure and view transform."""
     look, meter, screen = state.look, state.meter, state.screen
     draw_exposure(look)
-    if press("meter", "sets the exposure: the log-average of the picture becomes middle grey"):
+    if press("meter", "sets the exposure so that the picture's log-average becomes middle grey"):
         meter.expose_wanted = True
     imgui.same_line()
     if press("save picture", "writes a PNG as shown, and an EXR of linear radiance (P)"):
@@ -35,14 +35,14 @@ def draw(state: WalkState) -> None:
     if look.is_false_coloured:
         draw_range(look, screen)
         imgui.same_line()
-        if press("fit to the picture", "sets the range to what the picture holds"):
+        if press("fit to the picture", "fits the range to the picture"):
             meter.fit_wanted = True
 
 
 def draw_camera(state: WalkState) -> None:
-    """The camera, the walker, and marks over the picture."""
+    """Draw the controls of camera, walker, and marks over the picture."""
     navigation, look = state.navigation, state.look
-    meaning = "the whole vertical angle that the picture shows"
+    meaning = "vertical field of view"
     fov = slider("field of view", navigation.camera.fov_y_deg, *FOV_DEG, meaning, unit=" deg")
     if fov != navigation.camera.fov_y_deg:
         navigation.set_fov(fov)
@@ -52,7 +52,7 @@ def draw_camera(state: WalkState) -> None:
 
 
 def draw_drawing(state: WalkState) -> None:
-    """How reflections are drawn, and at which pace."""
+    """Draw the controls of reflections and pacing."""
     draw_reflections(state.look, planar=bool(state.scene.reflectors))
     if state.selection.name is not None:
         _look_up_of(state.selection.name, state.look)
@@ -61,8 +61,8 @@ def draw_drawing(state: WalkState) -> None:
 
 
 def _look_up_of(name: str, look: Look) -> None:
-    """The selected object's own look-up: auto is the one of all objects."""
-    meaning = f"for {name} alone; light_field ones where the bake gave it a light field, else its probe's best"
+    """Draw the selected object's own look-up; auto: the look-up of all objects."""
+    meaning = f"look-up for {name} only; auto: its light field where it has one, else its probe"
     chosen = choice("selected##look-up", look.lookups.get(name, LOOKUPS[0]), LOOKUPS, meaning)
     if chosen != LOOKUPS[0]:
         look.lookups[name] = chosen
@@ -72,29 +72,29 @@ def _look_up_of(name: str, look: Look) -> None:
 
 def _walker(navigation: Navigation) -> None:
     walker = navigation.walker
-    meaning = "pace of walking and flying; with Shift three times that"
+    meaning = "speed of walking and flying; three times as fast with Shift"
     walker.speed_m_s = slider("speed", walker.speed_m_s, *SPEED_M_S, meaning, log=True, unit=" m/s")
     low, high = min(EYE_M[0], walker.eye_height_m), max(EYE_M[1], walker.eye_height_m)
-    height = slider("eye height", walker.eye_height_m, low, high, "height of the eye above the floor", unit=" m")
+    height = slider("eye height", walker.eye_height_m, low, high, "eye height above the floor", unit=" m")
     if height != walker.eye_height_m:
         navigation.set_eye_height(height)
 
 
 def _near_plane(look: Look) -> None:
-    changed, automatic = imgui.checkbox("near plane by the scene's size", look.near_m is None)
-    explain("cuts away what is very near to the eye, as far as the scene's size suggests")
+    changed, automatic = imgui.checkbox("near plane by scene size", look.near_m is None)
+    explain("chooses the near clipping plane by the scene's size")
     if changed:
         look.near_m = None if automatic else 0.01
     if look.near_m is not None:
-        meaning = "what is nearer is cut away: to look through a wall"
+        meaning = "clips everything nearer, for instance to look through a wall"
         look.near_m = slider("near", look.near_m, *NEAR_M, meaning, log=True, unit=" m")
 
 
 def _marks(marks: Marks, meter: Meter, reflectors: bool) -> None:
-    marks.probes = check("probes", marks.probes, "shows a mirror ball where each probe stands, with what it holds")
+    marks.probes = check("probes", marks.probes, "shows each probe as a mirror ball at its place")
     imgui.same_line()
     imgui.begin_disabled(not reflectors)
-    meaning = "outlines the planar reflectors" if reflectors else "the store names no planar reflectors"
+    meaning = "outlines the planar reflectors" if reflectors else "the store has no planar reflectors"
     marks.reflectors = check("reflectors", marks.reflectors, meaning)
     imgui.end_disabled()
     imgui.same_line()
