@@ -100,7 +100,7 @@ class Rebaked:
         if groups is not None:
             mixed = GroupLight(scene, groups).light_map(groups.factors(light))
             sides = [None if side is None else side[..., :3] for side in mixed]
-        return list(light_layers(sides[0], sides[1], scene.dominant_direction))
+        return list(light_layers(sides[0], sides[1], scene.dominant_direction, scene.probe_share))
 
     def probe(self, name: str, light: Factors) -> Probe | None:
         """The probe of an object without the sun's disc, in a mix of light groups; None where it is not there."""
@@ -121,7 +121,7 @@ def _with_light_map(store: Store, shown: BakedScene) -> BakedScene:
     if groups is not None:
         _ = groups.lit_sides  # in memory from now on
     return replace(
-        shown, irradiance=front, irradiance_back=back, dominant_direction=direction, probes={}, groups=groups
+        shown, irradiance=front, irradiance_back=back, dominant_direction=direction, probes={}, groups=groups,
     )
 
 
