@@ -57,7 +57,7 @@ def bake(context: BakeContext) -> None:
 def _shown(context: BakeContext) -> Iterator[Shown]:
     """The opaque objects that show a probe; reflectors find by distances what their mirrored views do not hold."""
     from lambent.bake.probes.device_lookup import DeviceProbe
-    from lambent.bake.probes.selection import largest_r0
+    from lambent.bake.probes.selection import largest_r0, widest_lobe
     from lambent.bake.probes.shares import Shown
 
     store, scene, owners = context.store, context.scene, shared_probes(context.store)
@@ -75,6 +75,6 @@ def _shown(context: BakeContext) -> Iterator[Shown]:
         radiance = store.read(name).astype(np.float32) * np.float32(radiance_unit(store, name))
         irradiance = np.array(probe_irradiance(store, whose))
         yield Shown(
-            number, largest_r0(material), DeviceProbe(centre, radiance, planes, distance),
+            number, largest_r0(material), widest_lobe(material), DeviceProbe(centre, radiance, planes, distance),
             irradiance if len(irradiance) else None, occlusion_gain(store, whose),
         )  # fmt: skip

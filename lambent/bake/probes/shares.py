@@ -12,7 +12,8 @@ penalty draws r to the same share in all directions. Equations of texels are ave
 solved: numbers that are averaged afterwards would be those of the noise.
 
 An object takes its shares only where they lower the error of the rays below that of the specular occlusion that its
-probe has otherwise (`selection`).
+probe has otherwise (`selection`). Lobes wider than WIDE blur the rays, so that their squared errors count: of white
+rays between black ones, a grey mean is right there, and wrong in a mirror.
 """
 
 from __future__ import annotations
@@ -42,9 +43,10 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.lobes import fresnel
 from lambent.store.occlusion import MOST_SHARE
 
-RAYS = 32  # from each texel, a multiple of POINTS
-SMOOTH = 2  # rounds of averaging the texels' equations over their charts
+RAYS = 64  # from each texel, a multiple of POINTS
+SMOOTH = 4  # rounds of averaging the texels' equations over their charts
 PENALTY = 0.01  # of a share that changes with the direction, relative to the mean of the equations' diagonal
+WIDE = 0.1  # roughness of a lobe
 WORTH = 0.95  # times the error without, that shares must lower it to
 JUDGED = 1 << 16  # rays of an object by which its shares are judged
 RAYS_AT_ONCE = 1 << 21
@@ -54,7 +56,7 @@ EQUATIONS = len(UPPER[0]) + 4  # of a texel: upper triangle of the matrix, right
 
 @dataclass(frozen=True)
 class Shown:
-    """An object, by number, its reflectance at normal incidence, and the probe that it shows.
+    """An object, by number, its reflectance at normal incidence, its widest lobe's roughness, and the probe it shows.
 
     `irradiance` (9,) is the probe's alone, by which the light map scales it, with a `gain`, where there are no shares;
     None where it is not scaled.
@@ -62,6 +64,7 @@ class Shown:
 
     number: int
     r0: float
+    roughness: float
     probe: DeviceProbe
     irradiance: Floats | None
     gain: float
@@ -146,8 +149,9 @@ class ShareTracer:
         if one.irradiance is not None:
             whole = np.maximum(basis_of(self._sides.sign * texels.normals[some.row, 0]) @ one.irradiance, 1e-6)
             plain = plain * (one.gain * self._luminous[some.row] / whole).clip(0, 1)
+        power = 2 if one.roughness > WIDE else 1
         by_shares, without = (
-            float((some.fresnel * difference(light, some.light)).sum()) for light in (some.probe * r, plain)
+            float((some.fresnel * difference(light, some.light) ** power).sum()) for light in (some.probe * r, plain)
         )
         return by_shares < WORTH * without
 
