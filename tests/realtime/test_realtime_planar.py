@@ -368,7 +368,7 @@ def test_the_light_map_scales_what_the_mirrored_view_does_not_hold(device: Any, 
         return Renderer(device, replace(scene, probes=probes, **more)).image(asked)
 
     dark, bright = shown(scene.probes["floor"], None), shown(white, None)
-    assert (bright - dark).max() > 0.2, "some of the lobe is not in the mirrored view"
+    assert (bright - dark).max() > 0.05, "some of the lobe is not in the mirrored view"
     np.testing.assert_allclose(shown(white, 0.0), dark, atol=5e-3)
     np.testing.assert_allclose(shown(white, 1.0), bright, atol=5e-3)
 
