@@ -100,9 +100,7 @@ class SceneResources:
         vertices = np.concatenate([scene.positions, scene.normals, scene.tangents, scene.uv2, uv], axis=1)
         self.vertices = layouts.buffer("VERTEX", np.nan_to_num(vertices).astype(np.float32))
         self.indices = layouts.buffer("INDEX", scene.faces.astype(np.uint32))
-        layers = light_layers(
-            scene.irradiance, scene.irradiance_back, scene.dominant_direction, scene.probe_share
-        )
+        layers = light_layers(scene.irradiance, scene.irradiance_back, scene.dominant_direction, scene.probe_share)
         self._light_layers, self._drawn_over = list(layers), None  # type: list[NDArray[np.float16]], Any
         self._light_texture = upload(device, [layers], "rgba16float", LIGHT_MAP_USAGE)
         self.light_view = self._light_texture.create_view(dimension="2d-array")
@@ -125,7 +123,11 @@ class SceneResources:
                 )
             self.objects.append(
                 ObjectResources(
-                    layouts, record, lights[probe], scene.unit, beyond.get(record.name, []),
+                    layouts,
+                    record,
+                    lights[probe],
+                    scene.unit,
+                    beyond.get(record.name, []),
                     record.name in scene.share_objects,
                 )
             )

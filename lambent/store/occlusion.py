@@ -34,4 +34,8 @@ def probe_shares(store: Store) -> tuple[Floats | None, frozenset[str]]:
     names = store.artefact(PROBE_SHARE).meta.get("objects")
     if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
         raise UserError("broken store", file=store.folder, field=f"{PROBE_SHARE}: objects", got=str(names)[:80])
+    of_light = store.artefact("light_map/irradiance").shape[:2] if "light_map/irradiance" in store else None
+    if (shape := store.artefact(PROBE_SHARE).shape[:2]) != of_light:
+        expected = f"{of_light}, as the light map"
+        raise UserError("broken store", file=store.folder, field=PROBE_SHARE, got=str(shape), expected=expected)
     return store.read(PROBE_SHARE), frozenset(names)

@@ -72,9 +72,9 @@ def test_below_a_roof_no_light_comes_from_above_and_all_from_the_side(tmp_path: 
     assert values is not None and names == {"floor"}
     uv2, positions = store.read("geometry/uv2"), store.read("geometry/positions")
     of_floor = np.flatnonzero(positions[:, 1] == 0)
-    to_uv2 = np.linalg.lstsq(
-        np.c_[positions[of_floor][:, [0, 2]], np.ones(len(of_floor))], uv2[of_floor], rcond=None
-    )[0]
+    to_uv2 = np.linalg.lstsq(np.c_[positions[of_floor][:, [0, 2]], np.ones(len(of_floor))], uv2[of_floor], rcond=None)[
+        0
+    ]
 
     def share(x: float, w: tuple[float, float, float]) -> float:
         column, row = (np.array([x, 0.0, 1.0]) @ to_uv2) * values.shape[1::-1]

@@ -25,6 +25,7 @@ TOWARDS = normalize(np.array([0.3, 0.8, 0.5]))
 
 FIFTH = np.full((8, 8), 0.2)  # of each texel is surface
 
+
 def lit(mesh: Mesh, texels_along: int, noise: float) -> tuple[Floats, Floats, Cuts, Floats]:
     """Light maps of a body under one lamp and an even sky before and after, its cuts, and its charts."""
     atlas = unwrap(Scene("body", (SceneObject("body", mesh, "grey"),), {"grey": GREY}), texels_along)

@@ -148,7 +148,9 @@ def test_the_light_map_says_from_where_a_probes_light_arrives(device, integrator
     expected = np.clip(a + w @ b, 0, 2)
     state = FrameState(CAMERA, 16, 12, integrator=integrator, antialias=False, show="specular")
     found = Renderer(device, replace(shares, share_objects=frozenset(["wall"]))).image(state)[..., 0]
-    whole = Renderer(device, replace(scene, probes={n: replace(p, irradiance=()) for n, p in probes.items()})).image(state)
+    whole = Renderer(device, replace(scene, probes={n: replace(p, irradiance=()) for n, p in probes.items()})).image(
+        state
+    )
     np.testing.assert_allclose(found / whole[..., 0], expected, rtol=0.03)
     others = Renderer(device, shares).image(state)  # the niche's share, as without
     np.testing.assert_allclose(others, whole / 4, rtol=5e-3)

@@ -363,7 +363,7 @@ def test_the_light_map_scales_what_the_mirrored_view_does_not_hold(device: Any, 
         probes = {**scene.probes, "floor": probe}
         more: dict[str, Any] = {}
         if share is not None:
-            values = np.tile(np.array([share, 0, 0, 0], np.float32), (2, 2, 1))
+            values = np.tile(np.array([share, 0, 0, 0], np.float32), (*scene.irradiance.shape[:2], 1))
             more = {"probe_share": values, "share_objects": frozenset(["floor"])}
         return Renderer(device, replace(scene, probes=probes, **more)).image(asked)
 

@@ -25,7 +25,10 @@ SMOOTH = 0.98  # least cosine between the normals on both sides of a cut: elsewh
 PER_TEXEL = 2.0  # samples along a cut
 MOST_SAMPLES = 64  # of one edge
 AGREE = 30.0  # weight of a sample's agreement, over that of a texel's own light
-FILLED, COVERED = 0.05, 5.0  # weight of the light of texels that hold none of their own; more for a whole texel of surface
+FILLED, COVERED = (
+    0.05,
+    5.0,
+)  # weight of the light of texels that hold none of their own; more for a whole texel of surface
 NARROW = 0.25  # a side whose texels hold less than this share of the other side's area follows that
 DARK = 0.01  # of the mean light: differences below it do not matter
 STEPS, RESIDUE = 100, 1e-3  # of conjugate gradients
@@ -65,8 +68,8 @@ def cuts_of(geometry: dict[str, Floats], width: int, height: int) -> Cuts:
 def stitched(irradiance: Floats, cuts: Cuts, labels: Indices, area_m2: Floats, covered: Floats) -> Floats:
     """(H, W, 3) light map whose look-ups agree along cuts; parts of charts that no viewer sees (BEYOND) stay.
 
-    `area_m2` (H, W) is the surface in each texel, `covered` (H, W) the share of its square that has any. Sides alike meet half-way; then slivers follow the sides beside them,
-    which stay.
+    `area_m2` (H, W) is the surface in each texel, `covered` (H, W) the share of its square that has any. Sides alike
+    meet half-way; then slivers follow the sides beside them, which stay.
     """
     height, width = irradiance.shape[:2]
     here, there = (_footprint(uv, width, height) for uv in (cuts.here, cuts.there))

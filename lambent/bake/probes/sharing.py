@@ -5,8 +5,8 @@ in points all over each object, and two shares of them are wrong in a neighbour'
 hide from its centre, and those that meet an object that the probe leaves out, as it does all that share it. An object
 is served where both together stay below a limit: HIDDEN at MEDIUM size, as the median viewer sees it, and with the
 inverse root of the size above and below. No object larger than SMALL and its lobe's roughness, which blurs as much,
-shares another's probe, nor one whose centre is further off than NEAR of what is mirrored, or less for narrow lobes: look-ups
-from far away are turned wrongly. Groups are found greedily, the largest first.
+shares another's probe, nor one whose centre is further off than NEAR of what is mirrored, or less for narrow lobes:
+look-ups from far away are turned wrongly. Groups are found greedily, the largest first.
 
 Objects that fill a few pixels from nearby, or that nobody sees, have no probe: they show the nearest. So do the groups
 that fill least of the view where a scene has very many (leaves, say): there are MOST probes.

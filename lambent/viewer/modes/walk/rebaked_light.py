@@ -121,7 +121,12 @@ def _with_light_map(store: Store, shown: BakedScene) -> BakedScene:
     if groups is not None:
         _ = groups.lit_sides  # in memory from now on
     return replace(
-        shown, irradiance=front, irradiance_back=back, dominant_direction=direction, probes={}, groups=groups,
+        shown,
+        irradiance=front,
+        irradiance_back=back,
+        dominant_direction=direction,
+        probes={},
+        groups=groups,
     )
 
 
