@@ -21,7 +21,7 @@ from lambent.store import contract
 from lambent.store.consistency import numbers_of, read_geometry
 from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, SceneRecord, SunRecord, noise_name
 from lambent.store.light_fields import has_light_field, light_name, read_light_field
-from lambent.store.occlusion import occlusion_gain
+from lambent.store.occlusion import occlusion_gain, probe_shares
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
 
@@ -78,6 +78,8 @@ class BakedScene:
     noise: Floats | None = None  # (H, W), relative standard error of the light map
     noise_back: Floats | None = None
     dominant_direction: Floats | None = None  # (H, W, 3), that light comes from; may be absent
+    probe_share: Floats | None = None  # (H, W, 4), of the probes' light (`store.occlusion`); may be absent
+    share_objects: frozenset[str] = frozenset()  # that it counts for
     unit: float = 1.0
     light_field_mb: float | None = None  # that the maps of all light fields may take on the GPU; None: any
     policy: str = LEAST_RECENT  # of their caches
@@ -163,6 +165,7 @@ def read_baked(store: Store, light_field_mb: float | None = None, policy: str = 
         radiance = light(name, "the nearest probe or the environment is used" if wanted else None)
         if radiance is not None:
             probes[obj.name] = _probe(store, obj.name, radiance)
+    shares, share_objects = probe_shares(store)
     back = "light through two-sided sheets is black" if two_sided else None
     return BakedScene(
         record,
@@ -178,6 +181,8 @@ def read_baked(store: Store, light_field_mb: float | None = None, policy: str = 
         noise=noise(SIDES[0]),
         noise_back=noise(SIDES[1]),
         dominant_direction=store.read(DOMINANT_DIRECTION) if DOMINANT_DIRECTION in store else None,
+        probe_share=shares,
+        share_objects=share_objects,
         unit=unit,
         light_field_mb=light_field_mb,
         policy=policy,

@@ -79,6 +79,7 @@ def _replaced(scene: BakedScene, one: Replacement) -> BakedScene:
         noise=room.joined(scene.noise),
         noise_back=room.joined(scene.noise_back),
         dominant_direction=room.joined(scene.dominant_direction),
+        probe_share=room.joined(scene.probe_share),
         light_fields={name: room.moved_field(f) for name, f in scene.light_fields.items()} | {record.name: own},
         groups=None,
         replaced=True,

@@ -28,7 +28,7 @@ from lambent.realtime.structs import OBJECT_DTYPE
 from lambent.realtime.sun import SunLight, sun_light
 from lambent.realtime.sun_disc import without_sun
 from lambent.realtime.textures import TextureCache
-from lambent.realtime.uploads import layers_of, upload, with_alpha
+from lambent.realtime.uploads import half, layers_of, upload, with_alpha
 from lambent.scenes.scene import Look
 from lambent.store.contract import MOST_BORDERS, ObjectRecord
 
@@ -49,7 +49,12 @@ class ObjectResources:
     `beyond` has the ranges [begin, end) of faces of other parts that its light is added to.
     """
 
-    def __init__(self, layouts: Layouts, record: ObjectRecord, light: ProbeLight, unit: float, beyond: Ranges) -> None:
+    def __init__(
+        self, layouts: Layouts, record: ObjectRecord, light: ProbeLight, unit: float, beyond: Ranges,
+        has_shares: bool = False,
+    ) -> None:  # fmt: skip
+        """`has_shares`: the light map says how much of the probe's light arrives, by direction."""
+        self._has_shares = has_shares
         self.record, self.light, self._layouts, self._unit, self.beyond = record, light, layouts, unit, beyond
         self.emission = record.emission
         self.group = cache(self._new_group)
@@ -71,7 +76,7 @@ class ObjectResources:
             view = self.light.change_view()
         data = np.zeros(1, OBJECT_DTYPE)
         data["centre"][0] = (*probe.centre, self.light.half_log2_texels("box" if shows_change else cube))
-        data["sky_change"][0, :3] = self.light.sky_change
+        data["sky_change"][0] = (*self.light.sky_change, self._has_shares)
         data["emission"][0, :3] = 0 if dark else np.array(self.emission) / self._unit
         data["irradiance"].reshape(-1)[: len(probe.irradiance)] = np.array(probe.irradiance) / (self._unit * probe.gain)
         data["borders"][0] = [*self.record.borders, *[WITHIN] * (MOST_BORDERS - len(self.record.borders))]
@@ -95,7 +100,7 @@ class SceneResources:
         vertices = np.concatenate([scene.positions, scene.normals, scene.tangents, scene.uv2, uv], axis=1)
         self.vertices = layouts.buffer("VERTEX", np.nan_to_num(vertices).astype(np.float32))
         self.indices = layouts.buffer("INDEX", scene.faces.astype(np.uint32))
-        layers = light_layers(scene.irradiance, scene.irradiance_back, scene.dominant_direction)
+        layers = light_layers(scene.irradiance, scene.irradiance_back, scene.dominant_direction, scene.probe_share)
         self._light_layers, self._drawn_over = list(layers), None  # type: list[NDArray[np.float16]], Any
         self._light_texture = upload(device, [layers], "rgba16float", LIGHT_MAP_USAGE)
         self.light_view = self._light_texture.create_view(dimension="2d-array")
@@ -117,7 +122,14 @@ class SceneResources:
                     layouts, probe and without_sun(probe, scene.sun, scene.unit), self.sampler, known
                 )
             self.objects.append(
-                ObjectResources(layouts, record, lights[probe], scene.unit, beyond.get(record.name, []))
+                ObjectResources(
+                    layouts,
+                    record,
+                    lights[probe],
+                    scene.unit,
+                    beyond.get(record.name, []),
+                    record.name in scene.share_objects,
+                )
             )
         textures = TextureCache(device)
         self._textured = {
@@ -149,7 +161,7 @@ class SceneResources:
     def show_light_map(self, sides: Sequence[NDArray[np.float16] | None]) -> None:
         """Show other light maps (H, W, 4) on the front and the back; None of a side that stays.
 
-        A third map is the dominant direction.
+        A third map is the dominant direction, a fourth the shares of probes' light.
         """
         replaced = sum(texels is not None for texels in sides[:2])
         if self._drawn_over is not None and replaced == len(self._drawn_over):
@@ -201,17 +213,19 @@ class SceneResources:
         return self._layouts.group(self._layouts.light, view, dark.uniform, dark.nowhere)
 
 
-def light_layers(front: Floats | None, back: Floats | None, direction: Floats | None = None) -> NDArray[np.float16]:
-    """(n, H, W, 4) of maps (H, W, 3): light on the front, on the back, dominant direction.
+def light_layers(
+    front: Floats | None, back: Floats | None, direction: Floats | None = None, share: Floats | None = None
+) -> NDArray[np.float16]:
+    """(n, H, W, 4) of maps (H, W, 3): light on the front, on the back, dominant direction; of shares (H, W, 4).
 
     Layers end with the last map there is, missing ones before it are black, and the shader reads all others as black.
     """
     maps = [None if light is None else finite(light)[0] for light in (front, back)]
-    maps.append(None if direction is None else np.nan_to_num(direction))
+    maps += [None if values is None else np.nan_to_num(values) for values in (direction, share)]
     count = max((i + 1 for i, values in enumerate(maps) if values is not None), default=1)
     height, width = max((values.shape[:2] for values in maps if values is not None), default=(1, 1))
     layers = np.zeros((count, height, width, 4), np.float16)
     for layer, values in zip(layers, maps, strict=False):
         if values is not None:
-            layer[...] = with_alpha(values)
+            layer[...] = with_alpha(values) if values.shape[-1] == 3 else half(values)
     return layers

@@ -8,14 +8,14 @@
                                            meta["sun"], may be absent: the SunRecord whose direct light is left out, for
                                            a shadow map to add; its light from other surfaces is in the map
     light_map/irradiance_back              same, on the other side; zero but for two-sided objects; may be absent
-    light_map/noise, noise_back            (H, W) float16, relative standard error of irradiance and irradiance_back
-                                           before denoising; may be absent
+    light_map/noise, noise_back            (H, W) float16, relative standard error before denoising; may be absent
     light_map/groups, groups_back          (n, H, W, 3) float16, irradiance by light group, in order of meta["groups"],
                                            store.light_groups; irradiance, irradiance_back are the sums; may be absent
     light_map/direct, direct_back          (n, H, W, 3) float16, the part straight from the group's emitters and, with
                                            final gathering, by lobes alone; n = 1 without groups, absent of photons
     light_map/lean                         (H, W, 3) float16, dominant light direction, world space: mean direction of
                                            the incident light, weighted by its irradiance; 0 without a normal map
+    light_map/probe_share                  (H, W, 4) float16, a and b of meta["objects"]: store.occlusion; may be absent
     environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap) of radiance, sun disc included,
                                            in units of meta["unit"] W/(sr m^2): a power of two; 1 where it is absent
     probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"] in meta["unit"] as

@@ -1,11 +1,19 @@
-"""How far the light map scales a probe's light: `seen_irradiance` and `occlusion_gain` in the notes of its radiance."""
+"""How much of a probe's light arrives where it is shown.
+
+`light_map/probe_share` says it by direction: at a texel, a + b.w of the light that the probe has along unit w, held
+within 0 and MOST_SHARE. It counts for the objects in its notes. All others scale their probe's light by the light map's
+share of the irradiance that the probe alone would give: `seen_irradiance` and `occlusion_gain` in its notes.
+"""
 
 from __future__ import annotations
 
+from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.store.contract import probe_name
 from lambent.store.store import Store
 
+PROBE_SHARE = "light_map/probe_share"
+MOST_SHARE = 2.0
 MOST_GAIN = 8.0
 
 
@@ -17,3 +25,17 @@ def occlusion_gain(store: Store, object_name: str) -> float:
         expected = f"a number from 1 to {MOST_GAIN:g}"
         raise UserError("broken store", file=store.folder, field=f"{name}: occlusion_gain", got=gain, expected=expected)
     return float(gain)
+
+
+def probe_shares(store: Store) -> tuple[Floats | None, frozenset[str]]:
+    """Numbers (H, W, 4) of the texels, and the objects that they count for; None and nothing where they are absent."""
+    if PROBE_SHARE not in store:
+        return None, frozenset()
+    names = store.artefact(PROBE_SHARE).meta.get("objects")
+    if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
+        raise UserError("broken store", file=store.folder, field=f"{PROBE_SHARE}: objects", got=str(names)[:80])
+    of_light = store.artefact("light_map/irradiance").shape[:2] if "light_map/irradiance" in store else None
+    if (shape := store.artefact(PROBE_SHARE).shape[:2]) != of_light:
+        expected = f"{of_light}, as the light map"
+        raise UserError("broken store", file=store.folder, field=PROBE_SHARE, got=str(shape), expected=expected)
+    return store.read(PROBE_SHARE), frozenset(names)

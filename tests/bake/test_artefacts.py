@@ -104,7 +104,16 @@ def test_the_command_offers_every_kind_there_is(toy: str) -> None:
         own = {str(kind) for kind in importlib.reload(command).Kind}
         artefacts.__path__.append(toy)
     of_views = {"view_points", "visibility", "transport", "relighting", "interreflection"}
-    assert own == {"geometry", "environment", "light_map", "probe", "light_field", "answer", *of_views} and offered == {
+    assert own == {
+        "geometry",
+        "environment",
+        "light_map",
+        "probe",
+        "probe_share",
+        "light_field",
+        "answer",
+        *of_views,
+    } and offered == {
         *own,
         toy,
     }

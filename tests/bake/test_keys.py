@@ -48,7 +48,7 @@ from lambent.store.store import Store
 from tests.bake.small_scenes import GREY, MIRROR, TINY
 
 NOTHING: tuple[str, ...] = ()
-PROBES = ("probe/", "answer/probe/")
+PROBES = ("probe/", "answer/probe/", "light_map/probe_share")
 FIELDS = ("light_field/",)
 ANSWER = ("answer/",)
 BAKED = ("light_map/", *PROBES, *FIELDS, *ANSWER)
@@ -246,6 +246,7 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
     },
     "interreflection": {},
     "probe": {"texels": (32, PROBES), "samples": (17, PROBES), "noise": (0.2, PROBES)},
+    "probe_share": {},
     "light_field": {
         "points": (15, NOTHING),  # the scene says how many
         "texels": (12, FIELDS),

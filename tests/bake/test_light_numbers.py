@@ -18,7 +18,7 @@ from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Material
 from lambent.scenes.scene import DirectionalLight, SunSky
 from tests.bake.small_scenes import TINY, furnace, plane
-from tests.bake.test_seams import two_charts
+from tests.bake.test_seams import CUT, two_charts
 
 
 def test_noise_is_half_the_difference_over_the_mean() -> None:
@@ -86,7 +86,7 @@ def test_sides_of_a_sheet_are_not_blended() -> None:
     texels, labels, image = two_charts(height=0.0)
     second = texels.index % labels.shape[1] >= 20
     texels = replace(texels, normals=np.where(second[:, None, None], -texels.normals, texels.normals))
-    assert np.allclose(blend_seams(image, labels >= 0, texels, labels)[:, :20], 1.0)
+    assert np.allclose(blend_seams(image, labels >= 0, texels, labels, CUT)[:, :20], 1.0)
 
 
 def test_a_coupled_diffuse_reflectance_falls_with_the_viewers_cosine() -> None:

@@ -7,9 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from lambent.bake.light.seams import blend_seams
+from lambent.bake.light.stitching import Cuts
 from lambent.bake.surfaces.texels import BEYOND, POINTS, Texels
 
 N, GAP = 20, 4
+ROWS = (np.arange(N) + 0.5) / N
+EDGES = (N - 1e-3) / (2 * N + GAP), (N + GAP + 1e-3) / (2 * N + GAP)
+CUT = Cuts(*(np.stack([np.full(N, edge), ROWS], axis=-1) for edge in EDGES))
+NO_CUT = Cuts(np.zeros((0, 2)), np.zeros((0, 2)))
 
 
 def two_charts(height: float) -> tuple[Texels, np.ndarray, np.ndarray]:
@@ -31,7 +36,7 @@ def two_charts(height: float) -> tuple[Texels, np.ndarray, np.ndarray]:
 
 def test_a_step_at_a_seam_becomes_a_slope() -> None:
     texels, labels, image = two_charts(height=0.0)
-    blended = blend_seams(image, labels >= 0, texels, labels)
+    blended = blend_seams(image, labels >= 0, texels, labels, CUT)
     left, right = blended[:, N - 1], blended[:, N + GAP]
     assert np.abs(right - left).max() < 0.1 < 0.2
     assert np.allclose(blended[5:-5, 5:14], 1.0) and np.allclose(blended[5:-5, N + GAP + 6 : -5], 1.2)
@@ -39,18 +44,24 @@ def test_a_step_at_a_seam_becomes_a_slope() -> None:
 
 def test_what_lies_above_is_not_mixed_in() -> None:
     texels, labels, image = two_charts(height=2.0)
-    assert np.allclose(blend_seams(image, labels >= 0, texels, labels)[:, :N], 1.0, atol=1e-3)
+    assert np.allclose(blend_seams(image, labels >= 0, texels, labels, CUT)[:, :N], 1.0, atol=1e-3)
 
 
 def test_texels_that_were_not_sampled_do_not_count() -> None:
     texels, labels, image = two_charts(height=0.0)
-    assert np.allclose(blend_seams(image, labels == 0, texels, labels)[:, :N], 1.0)
+    assert np.allclose(blend_seams(image, labels == 0, texels, labels, CUT)[:, :N], 1.0)
 
 
 def test_triangles_without_area_and_hidden_parts_are_left_alone() -> None:
     texels, labels, image = two_charts(height=0.0)
     with np.errstate(all="raise"):
         bare = replace(texels, spacing=np.zeros(len(texels.index)))
-        assert (blend_seams(image, labels >= 0, bare, labels) == image).all()
+        assert (blend_seams(image, labels >= 0, bare, labels, CUT) == image).all()
     hidden = np.where(labels == 1, 1 + BEYOND, labels)
-    assert np.allclose(blend_seams(image, labels >= 0, texels, hidden)[:, :N], 1.0)
+    assert np.allclose(blend_seams(image, labels >= 0, texels, hidden, CUT)[:, :N], 1.0)
+
+
+def test_charts_that_no_cut_parts_keep_their_light() -> None:
+    """Mouldings side by side, which face the same way, are two surfaces."""
+    texels, labels, image = two_charts(height=0.0)
+    np.testing.assert_allclose(blend_seams(image, labels >= 0, texels, labels, NO_CUT), image)

@@ -23,6 +23,9 @@ Floats = NDArray[np.floating]
 TOWARDS = normalize(np.array([0.3, 0.8, 0.5]))
 
 
+FIFTH = np.full((8, 8), 0.2)  # of each texel is surface
+
+
 def lit(mesh: Mesh, texels_along: int, noise: float) -> tuple[Floats, Floats, Cuts, Floats]:
     """Light maps of a body under one lamp and an even sky before and after, its cuts, and its charts."""
     atlas = unwrap(Scene("body", (SceneObject("body", mesh, "grey"),), {"grey": GREY}), texels_along)
@@ -70,11 +73,21 @@ def test_hidden_parts_darkness_and_nothing_stay() -> None:
     cuts = Cuts(np.array([[0.2, 0.3]]), np.array([[0.8, 0.7]]))
     hidden = np.full((8, 8), BEYOND)
     full = np.ones((8, 8))
-    assert np.array_equal(stitched(image, cuts, hidden, full), image)
-    assert not stitched(0 * image, cuts, np.zeros((8, 8), int), full).any()
-    moved = stitched(image, cuts, np.zeros((8, 8), int), full)
+    assert np.array_equal(stitched(image, cuts, hidden, full, FIFTH), image)
+    assert not stitched(0 * image, cuts, np.zeros((8, 8), int), full, FIFTH).any()
+    moved = stitched(image, cuts, np.zeros((8, 8), int), full, FIFTH)
     assert steps(moved, cuts)[0] < 0.1 * steps(image, cuts)[0] and np.isfinite(moved).all()
     assert (moved != image).any(axis=-1).sum() <= 8
+
+
+def test_a_whole_texel_of_surface_keeps_more_of_its_light_than_the_rim_of_one() -> None:
+    image, along = np.ones((8, 8, 3)), (np.arange(1, 7) + 0.5) / 8
+    image[:, 4:] = 0.5
+    covered = np.ones((8, 8))
+    covered[:, :4] = 0.3
+    cuts = Cuts(*(np.stack([np.full(6, (column + 0.5) / 8), along], axis=1) for column in (2, 5)))
+    moved = stitched(image, cuts, np.zeros((8, 8), int), np.ones((8, 8)), covered)
+    assert np.abs(moved[1:7, 5] - 0.5).mean() < 0.6 * np.abs(moved[1:7, 2] - 1).mean()
 
 
 def test_a_sliver_follows_the_broad_side() -> None:
@@ -84,10 +97,10 @@ def test_a_sliver_follows_the_broad_side() -> None:
     area_m2 = np.ones((8, 8))
     area_m2[:, 4:] = 0.1
     cuts = Cuts(*(np.stack([np.full(6, (column + 0.5) / 8), along], axis=1) for column in (2, 5)))
-    moved = stitched(image, cuts, np.zeros((8, 8), int), area_m2)
+    moved = stitched(image, cuts, np.zeros((8, 8), int), area_m2, FIFTH)
     assert np.array_equal(moved[:, :4], image[:, :4])
     assert steps(moved, cuts).max() < 0.04
-    both = stitched(image, cuts, np.zeros((8, 8), int), np.ones((8, 8)))
+    both = stitched(image, cuts, np.zeros((8, 8), int), np.ones((8, 8)), FIFTH)
     assert np.allclose(both[1:7, 2], both[1:7, 5], rtol=0.05) and 0.4 < both[1:7, 2].mean() < 0.7
 
 
@@ -98,7 +111,7 @@ def test_the_fit_does_not_swing_beyond_the_light_beside_it() -> None:
     along = (np.arange(1, 60) / 4 + 0.5) / 16
     cuts = Cuts(*(np.stack([np.full(59, (column + 0.5) / 16), along], axis=1) for column in (2.3, 7.6)))
     area = np.where(np.arange(16) < 6, 1.0, 0.05) * np.ones((16, 1))
-    moved = stitched(image, cuts, np.zeros((16, 16), int), area)
+    moved = stitched(image, cuts, np.zeros((16, 16), int), area, 0.2 * np.ones((16, 16)))
     assert (moved != image).any()
     assert moved.min() >= image.min() and moved.max() <= image.max()
     assert steps(moved, cuts).mean() < 0.5 * steps(image, cuts).mean()

@@ -135,6 +135,27 @@ def test_a_niche_is_shown_the_share_of_the_probe_that_its_light_map_has(device) 
     np.testing.assert_allclose(shown(np.pi / 3, 0, 0, np.pi / 3, 0, 0, np.pi / 6, 0, 0), whole / 4, rtol=2e-3)
 
 
+@pytest.mark.parametrize("integrator", ["rings", "lamps", "qmc", "qmc-lobe", "split-sum"])
+def test_the_light_map_says_from_where_a_probes_light_arrives(device, integrator: str) -> None:
+    """Shares a + b.w of the mirrored direction w, on fronts of the objects that they count for; at most 2."""
+    mirror = Material(name="m", lobes=(Lobe(mx=0.003, my=0.003, r0=1.0, alpha=0.5),))
+    scene = wall_scene(mirror, np.ones((6, 8, 8, 3), np.float32), irradiance=(np.pi / 4,) * 3)
+    probes = {name: replace(probe, irradiance=(np.pi, *[0] * 8)) for name, probe in scene.probes.items()}
+    scene = replace(scene, probes=probes)
+    a, b = 0.6, np.array([0.5, -0.3, 2.0])
+    shares = replace(scene, probe_share=np.tile([a, *b], (4, 4, 1)).astype(np.float32))
+    w = pixel_rays(CAMERA, 16, 12) * [1, 1, -1]
+    expected = np.clip(a + w @ b, 0, 2)
+    state = FrameState(CAMERA, 16, 12, integrator=integrator, antialias=False, show="specular")
+    found = Renderer(device, replace(shares, share_objects=frozenset(["wall"]))).image(state)[..., 0]
+    whole = Renderer(device, replace(scene, probes={n: replace(p, irradiance=()) for n, p in probes.items()})).image(
+        state
+    )
+    np.testing.assert_allclose(found / whole[..., 0], expected, rtol=0.03)
+    others = Renderer(device, shares).image(state)  # the niche's share, as without
+    np.testing.assert_allclose(others, whole / 4, rtol=5e-3)
+
+
 def test_show_splits_the_light(device) -> None:
     both = Material(name="m", kd=0.5, lobes=(Lobe(mx=0.2, my=0.2),))
     scene = baked_scene(sphere_and_torus(), both, studio(32), irradiance=(1, 1, 1))

@@ -350,3 +350,41 @@ def test_the_eye_lies_as_far_under_a_raised_floor_as_it_stands_over_it() -> None
     assert view.plan is not None
     assert float(view.plan["below"]) == pytest.approx(1.3 - 0.5)
     np.testing.assert_allclose(view.frame["eye"][:3], (0.4, 2 * 0.5 - 1.3, 3.0), atol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["marched", "interleaved", "fixed"])
+def test_the_light_map_scales_what_the_mirrored_view_does_not_hold(device: Any, method: str) -> None:
+    """A floor that the probe's light does not reach looks as with a dark probe, beside its mirrored view as well."""
+    scene = scene_of(mirror(0.2))
+    white = Probe((0.0, 0.5, 0.0), np.ones((6, 4, 4, 3), np.float32))
+    asked = state(n=7, planar=method, show="specular")
+
+    def shown(probe: Probe, share: float | None) -> np.ndarray:
+        probes = {**scene.probes, "floor": probe}
+        more: dict[str, Any] = {}
+        if share is not None:
+            values = np.tile(np.array([share, 0, 0, 0], np.float32), (*scene.irradiance.shape[:2], 1))
+            more = {"probe_share": values, "share_objects": frozenset(["floor"])}
+        return Renderer(device, replace(scene, probes=probes, **more)).image(asked)
+
+    dark, bright = shown(scene.probes["floor"], None), shown(white, None)
+    assert (bright - dark).max() > 0.05, "some of the lobe is not in the mirrored view"
+    np.testing.assert_allclose(shown(white, 0.0), dark, atol=5e-3)
+    np.testing.assert_allclose(shown(white, 1.0), bright, atol=5e-3)
+
+
+def test_what_the_mirrored_view_does_not_hold_is_looked_up_by_distances(device: Any) -> None:
+    """Planes leave out what stands in a room: with a distance map they change nothing on a reflector."""
+    scene = scene_of(mirror(0.2))
+    light = np.zeros((6, 8, 8, 3), np.float32)
+    light[0] = 3.0
+    probe = Probe((0.0, 0.5, 0.0), light, np.full((6, 8, 8), 1.5, np.float32))
+    walled = replace(probe, planes=np.array([[-1, 0, 0, 9.0], [0, 0, -1, 9.0]], np.float32))
+    one, other = (
+        Renderer(device, replace(scene, probes={**scene.probes, "floor": which})).image(state(n=7, show="specular"))
+        for which in (probe, walled)
+    )
+    dark = Renderer(device, scene).image(state(n=7, show="specular"))
+    assert (one - dark).max() > 0.1
+    floor = Renderer(device, scene).image(state(planar="off"))[..., 2] == 0
+    np.testing.assert_allclose(one[floor], other[floor], atol=5e-3)

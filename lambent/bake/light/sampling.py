@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from lambent.bake.light.denoise import denoise_charts, fill
 from lambent.bake.light.seams import blend_seams
 from lambent.bake.light.stitching import Cuts, stitched
-from lambent.bake.surfaces.texels import POINTS, Sides, Texels, area_of_texels
+from lambent.bake.surfaces.texels import POINTS, Sides, Texels, area_of_texels, covered_share
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.rays import block_sums, independent, vectors
 from lambent.bake.tracing.sun import Sun
@@ -191,7 +191,7 @@ def cleaned(irradiance: Floats, known: Flags, texels: Texels, labels: Indices, c
 def closed(clean: Floats, known: Flags, texels: Texels, labels: Indices, cuts: Cuts) -> NDArray[np.float16]:
     """Denoised light maps (n, H, W, 3), filled where they are unknown, their seams blended and closed."""
     together = np.concatenate(list(clean), axis=-1)
-    together = fill(blend_seams(together, known, texels, labels), known, labels)
+    together = fill(blend_seams(together, known, texels, labels, cuts), known, labels)
     each = np.split(together, len(clean), axis=-1)
-    area_m2 = area_of_texels(texels)
-    return np.array([np.minimum(stitched(one, cuts, labels, area_m2), HALF_MAX) for one in each], np.float16)
+    areas = area_of_texels(texels), covered_share(texels)
+    return np.array([np.minimum(stitched(one, cuts, labels, *areas), HALF_MAX) for one in each], np.float16)

@@ -3,13 +3,15 @@
 Charts are denoised apart, so two that share an edge in the scene disagree a little along it. Near the border of its
 chart a texel therefore takes the mean of the texels around it in the scene, whichever chart they belong to: both sides
 of a seam take the same mean. Texels count by the area of the surface in them: the chamfer of a tile has as many texels
-along an edge as the tile, and hardly any area.
+along an edge as the tile, and hardly any area. Only charts that a cut of a smooth surface parts are averaged: mouldings
+of a frame, a texel apart and facing the same way, have light of their own.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from lambent.bake.light.stitching import Cuts
 from lambent.bake.surfaces.texels import BEYOND, Texels
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import normalize
@@ -20,8 +22,8 @@ LIFT = 0.3  # texels: standard deviation off the surface, so that a rug does not
 NEIGHBOURS = 24
 
 
-def blend_seams(irradiance: Floats, known: Flags, texels: Texels, labels: Indices) -> Floats:
-    """Irradiance (H, W, C) with seams blended; hidden parts of charts (`texels.BEYOND`) only among themselves.
+def blend_seams(irradiance: Floats, known: Flags, texels: Texels, labels: Indices, cuts: Cuts) -> Floats:
+    """Irradiance (H, W, C) with seams at `cuts` blended; hidden parts of charts (`BEYOND`) only among themselves.
 
     `known` (H, W) are the texels that were sampled.
     """
@@ -46,13 +48,31 @@ def blend_seams(irradiance: Floats, known: Flags, texels: Texels, labels: Indice
     facing = np.maximum(np.einsum("nkx,nx->nk", normal[others], normal[near]), 0) ** 8
     weight = np.exp(-(lift**2 + along**2) / 2) * facing
     weight *= np.minimum(texels.area_m2[lit][others] / spacing**2, 1)
-    beyond = labels.reshape(-1)[index] >= BEYOND
+    chart = labels.reshape(-1)[index]
+    row, column = np.nonzero((chart[others] != chart[near, None]) & (weight > 0))
+    weight[row, column] *= _parted(chart[near[row]], chart[others[row, column]], labels, cuts)
+    beyond = chart >= BEYOND
     weight *= beyond[others] == beyond[near][:, None]
     weight[:, 0] += 1e-6  # the texel itself, or its twin at the same place: never a sum of nothing
     mean = np.einsum("nk,nkx->nx", weight, values[others]) / weight.sum(axis=1, keepdims=True)
     blended = irradiance.reshape(-1, channels).copy()
     blended[index[near]] += share[near, None] * (mean - values[near])
     return blended.reshape(irradiance.shape)
+
+
+def _parted(one: Indices, other: Indices, labels: Indices, cuts: Cuts) -> Flags:
+    """Whether a cut parts charts `one` and `other` (n,) of a map of `labels` (H, W)."""
+    height, width = labels.shape
+    sides = []
+    for uv in (cuts.here, cuts.there):
+        column, row = (uv * [width, height]).astype(int).clip(0, [width - 1, height - 1]).T
+        sides.append(labels[row, column])
+    names = np.unique(labels)
+
+    def pairs(a: Indices, b: Indices) -> Indices:
+        return np.searchsorted(names, np.minimum(a, b)) * len(names) + np.searchsorted(names, np.maximum(a, b))
+
+    return np.isin(pairs(one, other), np.unique(pairs(*sides)))
 
 
 def _borders(labels: Indices) -> Flags:

@@ -3,6 +3,7 @@
 Charts of a few texels differ along their cuts whatever their texels hold, because each side interpolates its own. The
 texels that look-ups along cuts touch are moved as little as possible, relative to their light, so that the look-ups
 agree: linear least squares (Iwanicki 2013, "Lighting technology of The Last of Us", has the same for light maps).
+Texels hold on to their own light the more, the more of them is surface: what is moved shows on all of that.
 
 Where one side is a sliver, such as the chamfer of a tile, it follows the broad side: a chamfer's texels hold the dark
 of the joint as well, which the broad side would show as a line.
@@ -24,7 +25,10 @@ SMOOTH = 0.98  # least cosine between the normals on both sides of a cut: elsewh
 PER_TEXEL = 2.0  # samples along a cut
 MOST_SAMPLES = 64  # of one edge
 AGREE = 30.0  # weight of a sample's agreement, over that of a texel's own light
-FILLED = 0.05  # weight of the light of texels that hold none of their own
+FILLED, COVERED = (
+    0.05,
+    5.0,
+)  # weight of the light of texels that hold none of their own; more for a whole texel of surface
 NARROW = 0.25  # a side whose texels hold less than this share of the other side's area follows that
 DARK = 0.01  # of the mean light: differences below it do not matter
 STEPS, RESIDUE = 100, 1e-3  # of conjugate gradients
@@ -61,11 +65,11 @@ def cuts_of(geometry: dict[str, Floats], width: int, height: int) -> Cuts:
     return Cuts(*(side[edge, 0] * (1 - t) + side[edge, 1] * t for side in (a, b)))
 
 
-def stitched(irradiance: Floats, cuts: Cuts, labels: Indices, area_m2: Floats) -> Floats:
+def stitched(irradiance: Floats, cuts: Cuts, labels: Indices, area_m2: Floats, covered: Floats) -> Floats:
     """(H, W, 3) light map whose look-ups agree along cuts; parts of charts that no viewer sees (BEYOND) stay.
 
-    `area_m2` (H, W) is the surface in each texel. Sides alike meet half-way; then slivers follow the sides beside them,
-    which stay.
+    `area_m2` (H, W) is the surface in each texel, `covered` (H, W) the share of its square that has any. Sides alike
+    meet half-way; then slivers follow the sides beside them, which stay.
     """
     height, width = irradiance.shape[:2]
     here, there = (_footprint(uv, width, height) for uv in (cuts.here, cuts.there))
@@ -76,7 +80,7 @@ def stitched(irradiance: Floats, cuts: Cuts, labels: Indices, area_m2: Floats) -
     sides = np.stack([on_surface[:, :4].sum(axis=1), on_surface[:, 4:].sum(axis=1)], axis=1)
     narrow = sides < NARROW * sides[:, ::-1]
     like, unlike = keep & ~narrow.any(axis=1), keep & narrow.any(axis=1)
-    own = np.where(labels.reshape(-1) >= 0, 1.0, FILLED)
+    own = FILLED + COVERED * np.where(labels >= 0, covered, 0.0).reshape(-1)
     met = _close(irradiance, texel[like], share[like], own, np.ones(own.shape, bool))
     of_sliver, counts = np.repeat(narrow[unlike], 4, axis=1), share[unlike] != 0
     moving = np.zeros(own.shape, bool)

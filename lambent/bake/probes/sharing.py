@@ -5,8 +5,8 @@ in points all over each object, and two shares of them are wrong in a neighbour'
 hide from its centre, and those that meet an object that the probe leaves out, as it does all that share it. An object
 is served where both together stay below a limit: HIDDEN at MEDIUM size, as the median viewer sees it, and with the
 inverse root of the size above and below. No object larger than SMALL and its lobe's roughness, which blurs as much,
-shares another's probe, nor one whose centre is further off than NEAR of what is mirrored: look-ups from far away are
-turned wrongly. Groups are found greedily, the largest first.
+shares another's probe, nor one whose centre is further off than NEAR of what is mirrored, or less for narrow lobes:
+look-ups from far away are turned wrongly. Groups are found greedily, the largest first.
 
 Objects that fill a few pixels from nearby, or that nobody sees, have no probe: they show the nearest. So do the groups
 that fill least of the view where a scene has very many (leaves, say): there are MOST probes.
@@ -37,7 +37,8 @@ POINTS = 256  # on each object
 NEIGHBOURS = 12  # whose probes are tried for it
 MOST = 64  # probes of a scene, some two CPU seconds each at `preview`; more only where it places more itself
 MEDIUM, SMALL = 0.1, 0.06  # radians
-NEAR, REACH = 0.5, 0.75  # of the distance of what is mirrored, and the quantile of that
+NEAR, REACH = 0.5, 0.75  # of the distance of what is mirrored, for wide lobes, and the quantile of that
+NEAR_MIRROR, PER_BLUR = 0.2, 2.0  # for mirrors, and how much more by a lobe's roughness: what it blurs may be turned
 FEW = 0.006  # radians: six pixels of a picture of 60 degrees and 1080 rows
 SEEN = 4  # of the points, from anywhere: with fewer, nobody sees the object
 CLOSEST = 0.05  # quantile of the distances of viewers
@@ -87,7 +88,8 @@ def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[
     pairs = pairs[(clear[pairs[:, 0]] == clear[pairs[:, 1]]) & ~given[pairs[:, 0]] & ~alone[pairs].any(axis=1)]
     blur = np.array([widest_lobe(scene.materials[scene.object(name).material]) for name in names])
     one, other = pairs.T
-    close = np.linalg.norm(centres[one] - centres[other], axis=1) < NEAR * looked.reach[one]
+    near = np.minimum(NEAR_MIRROR + PER_BLUR * blur, NEAR)
+    close = np.linalg.norm(centres[one] - centres[other], axis=1) < near[one] * looked.reach[one]
     pairs = pairs[(one != other) & close & (looked.size[one] < SMALL + blur[one])]
     limits = np.minimum(HIDDEN * np.sqrt(MEDIUM / np.maximum(looked.size, 1e-9)), 1)
     lost = _lost(looked, len(names))

@@ -86,6 +86,13 @@ def area_of_texels(texels: Texels) -> Floats:
     return found.reshape(texels.height, texels.width)
 
 
+def covered_share(texels: Texels) -> Floats:
+    """(H, W) share of each texel's square that surface covers, 0 to 1."""
+    found = np.zeros(texels.width * texels.height)
+    found[texels.index] = np.minimum(texels.area_m2 / np.maximum(texels.spacing, 1e-12) ** 2, 1)
+    return found.reshape(texels.height, texels.width)
+
+
 def _points(
     pieces: Pieces, corners: Floats, width: int, reach: float, chosen: Flags
 ) -> tuple[Indices, Indices, Floats]:

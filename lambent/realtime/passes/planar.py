@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache, lru_cache
 from typing import Any
 
 from lambent.realtime.context import FrameContext
+from lambent.realtime.draws import Draw
+from lambent.realtime.incident import distance
 from lambent.realtime.integrators import Integrator
 from lambent.realtime.layouts import LIGHT, Layouts
 from lambent.realtime.passes.depth import DepthPass
@@ -24,15 +27,23 @@ FOUND, CLEANED = 2, 3  # layers (shaders/planar_layers.wgsl) that planar.wgsl dr
 STAGE = Stage("planar_main")  # of the shader of a planar integrator
 
 
+def beyond_view(draw: Draw) -> Draw:
+    """A reflector that looks up what its mirrored view does not hold by its probe's distances, if these are there.
+
+    Planes around a whole room leave out what stands in it, which is near to a floor's places.
+    """
+    return replace(draw, look_up=distance) if distance.serves(draw.item.light.probe) else draw
+
+
 class PlanarPass:
     """Draws the planar reflection buffers of a frame, and the specular light that its pixels get from them."""
 
     def __init__(self, layouts: Layouts, depth: DepthPass) -> None:
         self._layouts = layouts
         self._buffers, self._cells = PlanarBufferPass(layouts, depth), PlanarCells(layouts)
-        # Bindings without gaps: a software Vulkan (Mesa 22.3) dies of them. The light maps of shading, which have the
-        # same number, are not read here.
-        self._hits = layouts.of("uniform", "layers", "exact", "exact", "uniform", "storage")
+        # Bindings without gaps: a software Vulkan (Mesa 22.3) dies of them. The light maps have another number than in
+        # shading.
+        self._hits = layouts.of("uniform", "layers", "exact", "exact", "uniform", "storage", "layers")
         self._lamps = cache(lambda index: layouts.uniform(PLANE_LAMPS_DTYPE.itemsize))
         self._shading = Shading(layouts, STAGE, self._hits)
         self.reflections = layouts.of(*LIGHT, "exact layers")
@@ -90,9 +101,10 @@ class PlanarPass:
             self._cells.encode(context, buffer.planes, view.size, uniform)
         cells = self._cells.views(view.size)[0]
         seen = self._layouts.empty if lamps is None else lamps.map
-        group = self._layouts.group(self._hits, uniform, buffer.light, buffer.planes, cells, of_lamps, seen)
+        light_maps = context.resources.light_view
+        group = self._layouts.group(self._hits, uniform, buffer.light, buffer.planes, cells, of_lamps, seen, light_maps)
         mine = (draw for draw in context.draws if draw.lobes and view.has(draw.item.record))
-        draws = [draw.by(how, context.resources, draw.planar_n) for draw in mine]
+        draws = [beyond_view(draw).by(how, context.resources, draw.planar_n) for draw in mine]
         for band in context.slicing.bands("planar", context.state.size):
             render = context.begin("planar", layers, "load" if index else band.load_op, band=band)
             self._shading.draw(render, context, draws, context.seen(band.shares), (FORMAT,) * FOUND, group)

@@ -40,15 +40,16 @@ fn lamps_light(lobe: LambentLobe, wo: vec3f, s: Surface, out: f32) -> vec3f {
         let b = rejection((to_local * second.xyz) * per_t, wi);
         let light = lambent_lamp_response(lobe, wo, wi, a, b);
         let share = clamp(out - flux.w, 0.0, 1.0) * select(1.0, facing, place.w > 0.0);
-        sum += share * s.occlusion * flux.rgb * light;
+        sum += share * arriving(s, to * per_t) * flux.rgb * light;
     }
     return sum;
 }
 
 fn cleaned_light(s: Surface, w: vec3f, half_log2_omega: f32, layer: u32) -> vec3f {
-    let found = incident_look_up(s.x, to_world(s, w));
+    let along = to_world(s, w);
+    let found = incident_look_up(s.x, along);
     let level = level_of_look_up(found, half_log2_omega);
-    return s.occlusion * textureSampleLevel(cleaned_cubes, linear_sampler, found.direction, layer, level).rgb;
+    return arriving(s, along) * textureSampleLevel(cleaned_cubes, linear_sampler, found.direction, layer, level).rgb;
 }
 
 fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {

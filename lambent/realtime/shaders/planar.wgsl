@@ -11,6 +11,8 @@
 @group(3) @binding(2) var buffer_planes: texture_2d<f32>;
 @group(3) @binding(3) var buffer_cells: texture_2d<f32>; // of planar_cells.wgsl
 
+@group(3) @binding(6) var reflector_light_maps: texture_2d_array<f32>; // `light_maps` of shade.wgsl, whose number is taken
+
 override HIDDEN_DROP: f32 = 0.0; // of a hit's weight where the buffer shows something else before it
 
 const FARTHEST = 2e4; // m
@@ -196,8 +198,10 @@ struct PlanarLight {
     let upright = dot(normalize(v.n_world), mirrored.plane.xyz);
     let view = normalize(frame.eye.xyz - v.p_world);
     // seen from right above, so that no normal is bent as those of rounded things are at grazing angles
-    let s = shading_frame(v, select(-1.0, 1.0, upright > 0.0), mirrored.plane.xyz);
+    var s = shading_frame(v, select(-1.0, 1.0, upright > 0.0), mirrored.plane.xyz);
     if (abs(dot(mirrored.plane.xyz, v.p_world) + mirrored.plane.w) > mirrored.tolerance || abs(upright) < 0.998) { discard; }
+    let e = layer_of(reflector_light_maps, select(BACK, FRONT, front), v.uv2).rgb;
+    s.shares = shares_of(reflector_light_maps, v.uv2, front, s.n, e);
     let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), max(dot(view, s.n), 1e-3)));
     let place = place_of(v, s, to_world(s, vec3f(-wo.xy, wo.z)));
     var result = PlanarLight(vec4f(0.0, 0.0, 0.0, min(place.t, HALF_MAX)), vec4f(0.0));

@@ -20,8 +20,8 @@ fn counted(lobe: LambentLobe, at: Sample, wo: vec3f, light: vec3f, aimed: f32, a
     return gain(lobe, at.wi, wo, at.h) * light * (pdf / max(mix(pdf, aimed, aim_share), 1e-30));
 }
 
-fn probe_light(s: Surface, direction: vec3f) -> vec3f {
-    return s.occlusion * textureSampleLevel(radiance_cube, linear_sampler, direction, 0.0).rgb;
+fn probe_light(s: Surface, w: vec3f, direction: vec3f) -> vec3f {
+    return arriving(s, to_world(s, w)) * textureSampleLevel(radiance_cube, linear_sampler, direction, 0.0).rgb;
 }
 
 fn of_lobe(u: vec2f, lobe: LambentLobe, wo: vec3f, s: Surface, aim_share: f32) -> vec3f {
@@ -30,18 +30,19 @@ fn of_lobe(u: vec2f, lobe: LambentLobe, wo: vec3f, s: Surface, aim_share: f32) -
     let w = on_side(lobe, at.wi);
     let found = aimed_look_up(s.x, to_world(s, w));
     let aimed = aim_probability(found.direction) * found.density;
-    return counted(lobe, at, wo, probe_light(s, found.direction), aimed, aim_share);
+    return counted(lobe, at, wo, probe_light(s, w, found.direction), aimed, aim_share);
 }
 
 fn of_lamps(u: vec2f, lobe: LambentLobe, wo: vec3f, s: Surface, aim_share: f32) -> vec3f {
     let drawn = aim_draw(u);
     let to = aim_towards(s.x, drawn.xyz);
-    let wi = on_side(lobe, vec3f(dot(to.w, s.t), dot(to.w, s.b), dot(to.w, s.n)));
+    let w = vec3f(dot(to.w, s.t), dot(to.w, s.b), dot(to.w, s.n));
+    let wi = on_side(lobe, w);
     let h = lambent_half_vector(wi, wo);
     let cos_d = dot(wo, h);
     if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { return vec3f(0.0); }
     let at = Sample(h, cos_d, wi, true);
-    return counted(lobe, at, wo, probe_light(s, drawn.xyz), drawn.w * to.density, aim_share);
+    return counted(lobe, at, wo, probe_light(s, w, drawn.xyz), drawn.w * to.density, aim_share);
 }
 
 // Which samples of the two sequences a frame takes: first and past, of the lobe's and of those that aim.

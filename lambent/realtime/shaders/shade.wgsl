@@ -11,6 +11,7 @@
 const FRONT = 0u;     // irradiance on the side of the normal
 const BACK = 1u;      // on the other
 const DIRECTION = 2u; // dominant direction of front light, world space; 0 where it is not known
+const SHARES = 3u;    // a, b of the shares of the probe's light on the front
 
 // Least cos_o. A lobe with alpha > 0 returns without bound towards grazing, several times what arrives below a tenth;
 // measured tables end at 84 degrees as well (GRAZING_DEG of materials/measured/protocol.py).
@@ -41,14 +42,24 @@ fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
     let n = normalize(given + max(GRAZING - dot(given, view), 0.0) * view);
     let along = rejection(brushed, n);
     let t = normalize(select(perpendicular(n), along, dot(along, along) > 1e-8));
-    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown, 1.0, points_near(v.uv2), exit_near(v.uv2, facing > 0.0));
+    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown, vec4f(0.0, 0.0, 0.0, 1.0), points_near(v.uv2), exit_near(v.uv2, facing > 0.0));
 }
 
 // Layers past the last are black.
+fn layer_of(maps: texture_2d_array<f32>, layer: u32, uv2: vec2f) -> vec4f {
+    let last = textureNumLayers(maps) - 1u;
+    let found = textureSampleLevel(maps, linear_sampler, uv2, min(layer, last), 0.0);
+    return select(vec4f(0.0), found, layer <= last);
+}
+
 fn light_map(layer: u32, uv2: vec2f) -> vec3f {
-    let last = textureNumLayers(light_maps) - 1u;
-    let found = textureSampleLevel(light_maps, linear_sampler, uv2, min(layer, last), 0.0).rgb;
-    return select(vec3f(0.0), found, layer <= last);
+    return layer_of(light_maps, layer, uv2).rgb;
+}
+
+// Shares of the probe's light where the irradiance is e: by direction where the light map has them, else the same for all.
+fn shares_of(maps: texture_2d_array<f32>, uv2: vec2f, front: bool, n: vec3f, e: vec3f) -> vec4f {
+    if (object.sky_change.w > 0.5 && front) { return layer_of(maps, SHARES, uv2).yzwx; }
+    return vec4f(0.0, 0.0, 0.0, specular_occlusion(n, e));
 }
 
 fn surface_light(v: Varyings, front: bool) -> vec3f {
@@ -70,7 +81,7 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
         e_bent = e_here * bent_share(light_map(DIRECTION, v.uv2), mesh[2], bent);
         sun_cos = select(0.0, max(dot(bent, sun.towards.xyz), 0.0), facing > 0.0);
     }
-    s.occlusion = specular_occlusion(s.n, e_bent); // of light without the sun, as probes have it
+    if (LOBES > 0u) { s.shares = shares_of(light_maps, v.uv2, front, s.n, e_bent); } // of light without the sun, as probes have it
     e_bent += sun_cos * direct;
     e_here += max(facing, 0.0) * direct;
     let diffuse = own_light(s, diffuse_light(wo.z, e_bent, e_beyond, s.painted));

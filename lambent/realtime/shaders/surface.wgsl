@@ -24,7 +24,7 @@ struct Object {
     emission: vec4f,
     irradiance: array<vec4f, 3>, // luminance that the probe alone would give, see probe_irradiance; 0 where it is not asked
     borders: array<vec4f, 2>, // of a part, see ObjectRecord of store/contract.py
-    sky_change: vec4f, // how many times brighter the sky is than as baked
+    sky_change: vec4f, // how many times brighter the sky is than as baked; w: 1 where the light map has shares
 }
 
 @group(1) @binding(1) var<storage, read> lobes: array<PlacedLobe>;
@@ -42,7 +42,7 @@ struct Surface {
     x: vec3f,      // position about the probe's centre
     pixel: vec2u,
     painted: Painted,
-    occlusion: f32, // share of the probe's light that reaches the pixel
+    shares: vec4f, // a + b.w of the probe's light along w arrives at the pixel: (b, a)
     points: vec4u,  // of a light field, near the pixel
     exit: vec4f,    // of glass with a light field: the face behind the pixel
 }
@@ -79,6 +79,13 @@ fn specular_occlusion(n: vec3f, e: vec3f) -> f32 {
     let whole = dot(i[0], vec4f(1.0, n)) + dot(i[1], vec4f(n.xy * n.yz, 3.0 * n.z * n.z - 1.0, n.x * n.z))
         + i[2].x * (n.x * n.x - n.y * n.y);
     return select(1.0, clamp(luminance(e) / max(whole, 1e-6), 0.0, 1.0), whole > 0.0);
+}
+
+const MOST_SHARE = 2.0; // as in store/occlusion.py
+
+// Share of the probe's light along world direction w that arrives.
+fn arriving(s: Surface, w: vec3f) -> f32 {
+    return clamp(dot(s.shares, vec4f(w, 1.0)), 0.0, MOST_SHARE);
 }
 
 // Level at which a texel has the solid angle omega, seen from the surface; half_log2_omega = log2(omega)/2.

@@ -100,7 +100,7 @@ class Rebaked:
         if groups is not None:
             mixed = GroupLight(scene, groups).light_map(groups.factors(light))
             sides = [None if side is None else side[..., :3] for side in mixed]
-        return list(light_layers(sides[0], sides[1], scene.dominant_direction))
+        return list(light_layers(sides[0], sides[1], scene.dominant_direction, scene.probe_share))
 
     def probe(self, name: str, light: Factors) -> Probe | None:
         """An object's probe without the sun's disc, for a light mix; None where it has not arrived."""
@@ -121,7 +121,12 @@ def _with_light_map(store: Store, shown: BakedScene) -> BakedScene:
     if groups is not None:
         _ = groups.lit_sides  # read into memory
     return replace(
-        shown, irradiance=front, irradiance_back=back, dominant_direction=direction, probes={}, groups=groups
+        shown,
+        irradiance=front,
+        irradiance_back=back,
+        dominant_direction=direction,
+        probes={},
+        groups=groups,
     )
 
 

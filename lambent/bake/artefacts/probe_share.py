@@ -1,0 +1,80 @@
+"""Shares of probes' light by direction, in texels of the light map (`probes.shares`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lambent.bake.artefacts.light_map import finished_maps
+from lambent.bake.context import BakeContext
+from lambent.bake.engine import engine
+from lambent.bake.keys import key_of
+from lambent.bake.tiles import seed_of
+from lambent.core.colour import luminance
+from lambent.store.contract import (
+    needs_probe,
+    probe_irradiance,
+    probe_name,
+    radiance_unit,
+    scene_record,
+    shared_probes,
+)
+from lambent.store.occlusion import PROBE_SHARE, occlusion_gain
+
+if TYPE_CHECKING:
+    from lambent.bake.probes.shares import Shown
+
+KIND = "probe_share"
+NEEDS = ("geometry", "light_map", "probe")
+REVISION = 1
+
+
+def keys(context: BakeContext) -> dict[str, str]:
+    probes = context.keys("probe")
+    light = context.keys("light_map")["light_map/irradiance"]
+    return {PROBE_SHARE: key_of(KIND, REVISION, light, sorted(probes.items()), context.seed)} if probes else {}
+
+
+def bake(context: BakeContext) -> None:
+    engine()  # before Mitsuba is imported
+    from lambent.bake.probes.shares import ShareTracer
+
+    traced, maps = context.traced, finished_maps(context)
+    sides, labels = traced.in_view(1.0)
+    counts = [len(o.mesh.faces) for o in traced.scene.objects]
+    owner = np.repeat(np.arange(len(counts)), counts)[sides.texels.face[:, 0]]
+    luminous = luminance(maps[0].reshape(-1, 3)[sides.texels.index].astype(float))
+    cache, unseen = traced.cache(*maps), traced.unseen(diffuse=False)
+    tracer = ShareTracer(traced.whole(diffuse=False), cache, sides, owner, luminous, unseen)
+    seed = seed_of(context.seed, KIND)
+    values, worth = tracer.shares(list(_shown(context)), labels, seed, context.progress)
+    names = [traced.scene.objects[number].name for number in worth]
+    context.put(KIND, PROBE_SHARE, values, context.provenance(objects=names))
+
+
+def _shown(context: BakeContext) -> Iterator[Shown]:
+    """The opaque objects that show a probe; reflectors find by distances what their mirrored views do not hold."""
+    from lambent.bake.probes.device_lookup import DeviceProbe
+    from lambent.bake.probes.selection import largest_r0, widest_lobe
+    from lambent.bake.probes.shares import Shown
+
+    store, scene, owners = context.store, context.scene, shared_probes(context.store)
+    reflecting = {part.object for reflector in scene_record(store).reflectors for part in reflector.parts}
+    for number, o in enumerate(scene.objects):
+        material, whose = scene.materials[o.material], owners.get(o.name, o.name)
+        name = probe_name(whose, "radiance")
+        if not needs_probe(material) or material.transmits or name not in store:
+            continue
+        centre = np.array(store.artefact(name).meta["centre"], float)
+        planes = store.read(probe_name(whose, "planes")).reshape(-1, 4).astype(float)
+        planes[:, 3] += planes[:, :3] @ centre
+        by_distance = not len(planes) or o.name in reflecting
+        distance = store.read(probe_name(whose, "distance")) if by_distance else None
+        radiance = store.read(name).astype(np.float32) * np.float32(radiance_unit(store, name))
+        irradiance = np.array(probe_irradiance(store, whose))
+        yield Shown(
+            number, largest_r0(material), widest_lobe(material), DeviceProbe(centre, radiance, planes, distance),
+            irradiance if len(irradiance) else None, occlusion_gain(store, whose),
+        )  # fmt: skip

@@ -1,0 +1,104 @@
+"""Look-ups in a probe on the device: `core.probe_lookups` in Dr.Jit, for many rays at once.
+
+Sizes and numbers of planes are data or padded, so that all probes share their kernels.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from lambent.core.arrays import Floats
+from lambent.core.colour import luminance
+from lambent.core.probe_lookups import (
+    FIRST,
+    GROWTH,
+    INVERSE_MIN,
+    NEARNESS_MIN,
+    PLANE_ACTIVE_M,
+    SECANTS,
+    STEPS,
+    inverse_depth,
+)
+
+PADDED = 6  # planes are padded to multiples of this
+
+
+class DeviceProbe:
+    """Luminance that rays find in a probe of radiance (6, N, N, 3), by planes (P, 4) about its centre, or distances.
+
+    Parameters
+    ----------
+    distance : (6, N, N), optional
+        Where given, rays are looked up by it instead of by the planes.
+    """
+
+    def __init__(self, centre: Floats, radiance: Floats, planes: Floats, distance: Floats | None) -> None:
+        self._centre = mi.Point3f(*(dr.opaque(mi.Float, float(x)) for x in centre))
+        self._light = _Cube(luminance(radiance.astype(float)))
+        self._inverse = None if distance is None else _Cube(inverse_depth(distance.astype(float))[..., 0])
+        padded = np.zeros((max(1, -(-len(planes) // PADDED)) * PADDED, 4), np.float32)
+        padded[: len(planes)] = planes
+        self._planes, self._count = mi.Float(padded.ravel()), len(padded)
+
+    def luminance(self, p: Any, w: Any) -> Any:
+        """mi.Float along unit w (mi.Vector3f) from points p (mi.Point3f) of the scene."""
+        x = mi.Vector3f(p - self._centre)
+        return self._light(self._by_planes(x, w) if self._inverse is None else self._by_distance(x, w, self._inverse))
+
+    def _by_planes(self, x: Any, w: Any) -> Any:
+        nearness = mi.Float(0.0)
+        for i in range(self._count):
+            n = mi.Vector3f(*(dr.gather(mi.Float, self._planes, 4 * i + k) for k in range(3)))
+            height = dr.dot(x, n) + dr.gather(mi.Float, self._planes, 4 * i + 3)
+            nearness = dr.maximum(nearness, dr.select(height > PLANE_ACTIVE_M, -dr.dot(w, n) / height, 0.0))
+        return dr.select(nearness > NEARNESS_MIN, x + w / dr.maximum(nearness, NEARNESS_MIN), w)
+
+    @staticmethod
+    def _by_distance(x: Any, w: Any, inverse: _Cube) -> Any:
+        def behind(t: Any) -> Any:
+            p = x + t * w
+            return dr.max(dr.abs(p)) * inverse(p) - 1
+
+        near, f_near = mi.Float(0.0), mi.Float(-1.0)
+        far = dr.maximum(dr.norm(x), FIRST / dr.maximum(inverse(w), INVERSE_MIN))
+        f_far = behind(far)
+        for _ in range(STEPS - 1):
+            on = f_far < 0
+            near, f_near = dr.select(on, far, near), dr.select(on, f_far, f_near)
+            far = dr.select(on, far * GROWTH, far)
+            f_far = dr.select(on, behind(far), f_far)
+        met, t = f_far >= 0, mi.Float(0.0)
+        for low, high in SECANTS:
+            t = near + (far - near) * dr.clip(f_near / dr.minimum(f_near - f_far, -1e-9), low, high)
+            f = behind(t)
+            near, f_near = dr.select(f < 0, t, near), dr.select(f < 0, f, f_near)
+            far, f_far = dr.select(f < 0, far, t), dr.select(f < 0, f_far, f)
+        return dr.select(met, x + t * w, w)
+
+
+class _Cube:
+    """A cube map of numbers (6, N, N), bilinear within each face as `core.cubemap.sample`."""
+
+    def __init__(self, values: Floats) -> None:
+        self._values = mi.Float(np.asarray(values, np.float32).ravel())
+        self._n = dr.opaque(mi.UInt32, values.shape[1])
+
+    def __call__(self, w: Any) -> Any:
+        a = dr.abs(w)
+        along_x, along_y = (a.x >= a.y) & (a.x >= a.z), a.y >= a.z
+        major = dr.select(along_x, w.x, dr.select(along_y, w.y, w.z))
+        negative = major < 0
+        face = dr.select(along_x, mi.UInt32(0), dr.select(along_y, 2, 4)) + dr.select(negative, mi.UInt32(1), 0)
+        s = dr.select(along_x, dr.select(negative, w.z, -w.z), dr.select(along_y, w.x, dr.select(negative, -w.x, w.x)))
+        t = dr.select(along_x | ~along_y, -w.y, dr.select(negative, -w.z, w.z))
+        n, scale = mi.Float(self._n), dr.rcp(dr.maximum(dr.abs(major), 1e-20))
+        column, row = (dr.clip((v * scale + 1) / 2 * n - 0.5, 0, n - 1) for v in (s, t))
+        c0, r0 = mi.UInt32(column), mi.UInt32(row)
+        c1, r1 = (dr.minimum(v + 1, self._n - 1) for v in (c0, r0))
+        fc, fr = column - mi.Float(c0), row - mi.Float(r0)
+        at = [dr.gather(mi.Float, self._values, (face * self._n + r) * self._n + c) for r in (r0, r1) for c in (c0, c1)]
+        return (at[0] * (1 - fc) + at[1] * fc) * (1 - fr) + (at[2] * (1 - fc) + at[3] * fc) * fr

@@ -1,0 +1,201 @@
+"""Which share of a probe's light arrives at each texel of the light map, by direction.
+
+A probe is seen from one place. At a texel things nearby hide some of what it sees, and show other light instead. Rays
+from the texel are path traced, and looked up in the probe as the renderer does. With L the light that arrives along w
+and P that of the probe (luminances), the texel keeps the four numbers of the share
+
+    r(w) = a + b . w
+
+for which the sum of g (L - r P)^2 over the rays is least, g = F / (m + P). Fresnel's term F gives grazing directions
+their part in what viewers see mirrored, and m, the median of L, keeps bright windows from counting alone. A small
+penalty draws r to the same share in all directions. Equations of texels are averaged over their charts before they are
+solved: numbers that are averaged afterwards would be those of the noise.
+
+An object takes its shares only where they lower the error of the rays below that of the specular occlusion that its
+probe has otherwise (`selection`). Lobes wider than WIDE blur the rays, so that their squared errors count: of white
+rays between black ones, a grey mean is right there, and wrong in a mirror.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.light.cache import LightMapCache
+from lambent.bake.light.denoise import fill
+from lambent.bake.light.sampling import points_of
+from lambent.bake.probes.device_lookup import DeviceProbe
+from lambent.bake.probes.probe import MIRROR_DEPTH
+from lambent.bake.probes.selection import difference
+from lambent.bake.surfaces.texels import POINTS, Sides
+from lambent.bake.tiles import slices
+from lambent.bake.tracing import path_tracer, rays
+from lambent.bake.tracing.rays import array_of, independent
+from lambent.bake.tracing.sun import Sun
+from lambent.core.arrays import Floats, Indices
+from lambent.core.irradiance import basis_of
+from lambent.core.progress import Progress, silent
+from lambent.materials.lobes import fresnel
+from lambent.store.occlusion import MOST_SHARE
+
+RAYS = 64  # from each texel, a multiple of POINTS
+SMOOTH = 4  # rounds of averaging the texels' equations over their charts
+PENALTY = 0.01  # of a share that changes with the direction, relative to the mean of the equations' diagonal
+WIDE = 0.1  # roughness of a lobe
+WORTH = 0.95  # times the error without, that shares must lower it to
+JUDGED = 1 << 16  # rays of an object by which its shares are judged
+RAYS_AT_ONCE = 1 << 21
+UPPER = np.triu_indices(4)
+EQUATIONS = len(UPPER[0]) + 4  # of a texel: upper triangle of the matrix, right side
+
+
+@dataclass(frozen=True)
+class Shown:
+    """An object, by number, its reflectance at normal incidence, its widest lobe's roughness, and the probe it shows.
+
+    `irradiance` (9,) is the probe's alone, by which the light map scales it, with a `gain`, where there are no shares;
+    None where it is not scaled.
+    """
+
+    number: int
+    r0: float
+    roughness: float
+    probe: DeviceProbe
+    irradiance: Floats | None
+    gain: float
+
+
+@dataclass(frozen=True)
+class _Rays:
+    """Rays of texels, by row: unit directions w (n, 3), light and that of the probe (n,), Fresnel's term (n,)."""
+
+    row: Indices
+    w: NDArray[np.float32]
+    light: NDArray[np.float32]
+    probe: NDArray[np.float32]
+    fresnel: NDArray[np.float32]
+
+
+class ShareTracer:
+    """Traces rays of texels in a scene without diffuse terms, whose surfaces show the light map (`cache`).
+
+    `owner` (K,) is the number of the object on each row of the texels, `luminous` (K,) the light map's luminance there.
+    The sun `unseen` is left out, as the renderer leaves it out of probes.
+    """
+
+    def __init__(
+        self, scene: Any, cache: LightMapCache, sides: Sides, owner: Indices, luminous: Floats, unseen: Sun | None
+    ) -> None:
+        self._scene, self._cache, self._sides, self._owner, self._unseen = scene, cache, sides, owner, unseen
+        self._luminous = luminous
+        self._lit = sides.valid.any(axis=1)
+
+    def shares(
+        self, shown: list[Shown], labels: Indices, seed: int, progress: Progress = silent
+    ) -> tuple[NDArray[np.float16], list[int]]:
+        """Shares (H, W, 4), a before b, and the numbers of the objects that are to take theirs."""
+        texels = self._sides.texels
+        sums = np.zeros((texels.height * texels.width, EQUATIONS), np.float32)
+        kept: list[_Rays] = []
+        for i, one in enumerate(shown):
+            progress(i, len(shown), "shares of probes' light")
+            rows = np.flatnonzero((self._owner == one.number) & self._lit)
+            traced = [self._traced(one, rows[mine], seed + i) for mine in slices(len(rows), RAYS_AT_ONCE // RAYS)]
+            m = max(float(np.median(np.concatenate([part.light for part in traced]))), 1e-6) if traced else 1.0
+            for part in traced:
+                first = part.row.reshape(-1, RAYS)[:, 0]
+                sums[texels.index[first]] = _equations(part, m)
+            kept.append(_some(traced, np.random.default_rng(seed + i)))
+        known = sums.any(axis=1).reshape(texels.height, texels.width)
+        whole = fill(sums.reshape(texels.height, texels.width, -1), known, labels, smooth=SMOOTH)
+        found = solved(whole)
+        flat = found.reshape(-1, 4)
+        progress(1, 1, "shares of probes' light")
+        worth = [one.number for one, some in zip(shown, kept, strict=True) if self._pays(one, some, flat)]
+        return found.astype(np.float16), worth
+
+    def _traced(self, one: Shown, rows: Indices, seed: int) -> _Rays:
+        points, count = points_of(self._sides, rows), len(rows) * RAYS
+        thread = dr.arange(mi.UInt32, count)
+        at = thread // RAYS * POINTS + thread % POINTS
+        p, n, flat = (dr.gather(mi.Vector3f, v, at) for v in (points.position, points.normal, points.flat))
+        sampler = independent(seed & 0xFFFFFFFF, count)
+        u = sampler.next_2d()
+        cosine = (mi.Float(thread % RAYS) + u.x) / RAYS  # even over the hemisphere, each in a ring of its own
+        sine, (sin_phi, cos_phi) = dr.safe_sqrt(1 - cosine * cosine), dr.sincos(2 * dr.pi * u.y)
+        w = mi.Frame3f(n).to_world(mi.Vector3f(sine * cos_phi, sine * sin_phi, cosine))
+        ray = rays.leaving(self._scene, p, flat, w)
+        origin = dr.zeros(mi.SurfaceInteraction3f, count)
+        start = path_tracer.Start(ray, origin, mi.Float(1.0), True, self._unseen)
+        value = path_tracer.radiance(self._scene, sampler, start, MIRROR_DEPTH, self._cache)
+        seen = dr.dot(w, flat) > 0
+        light = dr.select(seen & dr.all(dr.isfinite(value)), mi.luminance(value), 0.0)
+        probe = dr.select(seen, one.probe.luminance(p, w), 0.0)
+        weight = dr.select(seen, fresnel(cosine, dr.opaque(mi.Float, one.r0), dr), 0.0)
+        dr.eval(light, probe, weight, w)
+        return _Rays(np.repeat(rows, RAYS), array_of(w), *(np.array(v) for v in (light, probe, weight)))
+
+    def _pays(self, one: Shown, some: _Rays, found: Floats) -> bool:
+        if not len(some.row):
+            return False
+        texels = self._sides.texels
+        r = share_along(found[texels.index[some.row]], some.w)
+        plain = some.probe
+        if one.irradiance is not None:
+            whole = np.maximum(basis_of(self._sides.sign * texels.normals[some.row, 0]) @ one.irradiance, 1e-6)
+            plain = plain * (one.gain * self._luminous[some.row] / whole).clip(0, 1)
+        power = 2 if one.roughness > WIDE else 1
+        by_shares, without = (
+            float((some.fresnel * difference(light, some.light) ** power).sum()) for light in (some.probe * r, plain)
+        )
+        return by_shares < WORTH * without
+
+
+def share_along(shares: Floats, w: Floats) -> Floats:
+    """Shares (n,) of a probe's light along unit w (n, 3), of numbers (n, 4), as the renderer takes them."""
+    return np.asarray((shares[:, 0] + (shares[:, 1:] * w).sum(axis=1)).clip(0, MOST_SHARE))
+
+
+def solved(sums: Floats) -> Floats:
+    """(..., 4) numbers of shares, of the sums (..., EQUATIONS) of their equations; 1 and 0 where there are none."""
+    matrix = np.zeros((*sums.shape[:-1], 4, 4))
+    matrix[..., UPPER[0], UPPER[1]] = matrix[..., UPPER[1], UPPER[0]] = sums[..., : len(UPPER[0])]
+    right = sums[..., len(UPPER[0]) :].astype(float)
+    even = np.divide(right[..., 0], matrix[..., 0, 0], out=np.ones(sums.shape[:-1]), where=matrix[..., 0, 0] > 0)
+    even = even.clip(0, MOST_SHARE)
+    weight = PENALTY * np.trace(matrix, axis1=-2, axis2=-1) / 4
+    right[..., 0] += weight * even
+    weight = np.where(weight > 0, weight, 1.0)
+    matrix += weight[..., None, None] * np.eye(4)
+    right[..., 0] = np.where(sums[..., 0] > 0, right[..., 0], 1.0)
+    found = np.linalg.solve(matrix, right[..., None])[..., 0]
+    return np.asarray(found.clip(-2 * MOST_SHARE, 2 * MOST_SHARE))  # where the probe is black, its share is any number
+
+
+def _equations(traced: _Rays, m: float) -> NDArray[np.float32]:
+    """(k, EQUATIONS) of the texels of rays, RAYS of each, one texel after the other."""
+    basis = np.concatenate([np.ones((len(traced.w), 1), np.float32), traced.w], axis=1) * traced.probe[:, None]
+    g = (traced.fresnel / (m + traced.probe))[:, None]
+    matrix = basis[:, UPPER[0]] * basis[:, UPPER[1]] * g
+    right = basis * (g * traced.light[:, None])
+    rows = np.concatenate([matrix, right], axis=1) / (m * RAYS)  # numbers about 1, whatever the unit of the light
+    return np.asarray(rows.reshape(-1, RAYS, EQUATIONS).sum(axis=1), np.float32)
+
+
+def _some(traced: list[_Rays], rng: np.random.Generator) -> _Rays:
+    """JUDGED rays at random, at most."""
+    if not traced:
+        empty = np.zeros(0, np.float32)
+        return _Rays(np.zeros(0, np.int64), np.zeros((0, 3), np.float32), empty, empty, empty)
+    whole = _Rays(*(np.concatenate(parts) for parts in zip(*map(_fields, traced), strict=True)))
+    chosen = rng.permutation(len(whole.row))[:JUDGED]
+    return _Rays(*(values[chosen] for values in _fields(whole)))
+
+
+def _fields(traced: _Rays) -> tuple[Any, ...]:
+    return traced.row, traced.w, traced.light, traced.probe, traced.fresnel
