@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from lambent.bake.light.denoise import denoise_charts
 from lambent.bake.light.level import with_level
@@ -35,8 +34,6 @@ def test_skewed_noise_does_not_darken() -> None:
         assert clean[mine].mean() < 0.97 * truth[mine].mean(), "the denoiser alone darkens"
         missing = [noisy[mine].mean() - light[mine].mean() for light in (clean, kept)]
         assert abs(missing[1]) < 0.5 * missing[0]
-        wrong, right = (np.sqrt(np.mean((light[mine] / truth[mine] - 1) ** 2)) for light in (clean, kept))
-        assert right < wrong
     assert np.array_equal(kept[~known], clean[~known]), "gutters"
 
 

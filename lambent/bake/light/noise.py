@@ -38,7 +38,7 @@ def noise_map(halves: Floats, known: Flags, labels: Indices) -> NDArray[np.float
 
 
 def chart_means(values: Floats, known: Flags, labels: Indices, reach: int = REACH) -> tuple[Floats, Floats]:
-    """Means of values (H, W, C) over the known texels of the same chart within `reach`, and how many (H, W) these are."""
+    """Means of values (H, W, C) over the known texels of the same chart within `reach`, and their numbers (H, W)."""
     means, count = _chart_means(np.ascontiguousarray(values), known, np.ascontiguousarray(labels), reach)
     return np.asarray(means), np.asarray(count)
 
