@@ -1,4 +1,4 @@
-"""How far the light map scales a probe's light: `seen_irradiance` and `occlusion_gain` in the notes of its radiance."""
+"""How far the light map scales a probe's light: the notes of its radiance, as the head of `store.contract` has them."""
 
 from __future__ import annotations
 
@@ -17,3 +17,13 @@ def occlusion_gain(store: Store, object_name: str) -> float:
         expected = f"a number from 1 to {MOST_GAIN:g}"
         raise UserError("broken store", file=store.folder, field=f"{name}: occlusion_gain", got=gain, expected=expected)
     return float(gain)
+
+
+def has_even_niches(store: Store, object_name: str) -> bool:
+    """Whether niches show the light map's light from all directions where they hide the probe's."""
+    name = probe_name(object_name, "radiance")
+    said = store.artefact(name).meta.get("even_niches", False)
+    if not isinstance(said, bool):
+        expected = "true or false"
+        raise UserError("broken store", file=store.folder, field=f"{name}: even_niches", got=said, expected=expected)
+    return said

@@ -14,13 +14,13 @@ fn exit_near(uv2: vec2f, front: bool) -> vec4f {
 fn incident(s: Surface, w: vec3f, half_log2_omega: f32) -> vec3f {
     let found = incident_look_up(s.x, to_world(s, w));
     let level = level_of_look_up(found, half_log2_omega);
-    return s.occlusion * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
+    return s.niche + s.occlusion * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
 }
 
 // The same from a cube that is prefiltered by roughness.
 fn incident_at_level(s: Surface, w: vec3f, level: f32) -> vec3f {
     let found = incident_look_up(s.x, to_world(s, w));
-    return s.occlusion * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
+    return s.niche + s.occlusion * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
 }
 
 // Weights of the points of a light field for a mirror direction, and light as one of them sees it; here there are none.
@@ -40,5 +40,5 @@ fn own_light(s: Surface, of_light_map: vec3f) -> vec3f {
 // Light from local direction w without a filter.
 fn incident_ray(s: Surface, w: vec3f) -> vec3f {
     let found = incident_look_up(s.x, to_world(s, w));
-    return s.occlusion * textureSampleLevel(radiance_cube, linear_sampler, found.direction, 0.0).rgb;
+    return s.niche + s.occlusion * textureSampleLevel(radiance_cube, linear_sampler, found.direction, 0.0).rgb;
 }

@@ -48,7 +48,7 @@ fn lamps_light(lobe: LambentLobe, wo: vec3f, s: Surface, out: f32) -> vec3f {
 fn cleaned_light(s: Surface, w: vec3f, half_log2_omega: f32, layer: u32) -> vec3f {
     let found = incident_look_up(s.x, to_world(s, w));
     let level = level_of_look_up(found, half_log2_omega);
-    return s.occlusion * textureSampleLevel(cleaned_cubes, linear_sampler, found.direction, layer, level).rgb;
+    return s.niche + s.occlusion * textureSampleLevel(cleaned_cubes, linear_sampler, found.direction, layer, level).rgb;
 }
 
 fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {

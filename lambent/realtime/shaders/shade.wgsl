@@ -41,7 +41,7 @@ fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
     let n = normalize(given + max(GRAZING - dot(given, view), 0.0) * view);
     let along = rejection(brushed, n);
     let t = normalize(select(perpendicular(n), along, dot(along, along) > 1e-8));
-    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown, 1.0, points_near(v.uv2), exit_near(v.uv2, facing > 0.0));
+    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown, 1.0, vec3f(0.0), points_near(v.uv2), exit_near(v.uv2, facing > 0.0));
 }
 
 // Layers past the last are black.
@@ -70,7 +70,7 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
         e_bent = e_here * bent_share(light_map(DIRECTION, v.uv2), mesh[2], bent);
         sun_cos = select(0.0, max(dot(bent, sun.towards.xyz), 0.0), facing > 0.0);
     }
-    s.occlusion = specular_occlusion(s.n, e_bent); // of light without the sun, as probes have it
+    s = in_niche(s, e_bent); // of light without the sun, as probes have it
     e_bent += sun_cos * direct;
     e_here += max(facing, 0.0) * direct;
     let diffuse = own_light(s, diffuse_light(wo.z, e_bent, e_beyond, s.painted));

@@ -22,7 +22,7 @@ struct PlacedLobe {
 struct Object {
     centre: vec4f, // of the probe; w: half the log2 of texels per unit area of the cube [-1, 1]^3
     emission: vec4f,
-    irradiance: array<vec4f, 3>, // luminance that the probe alone would give, see probe_irradiance; 0 where it is not asked
+    irradiance: array<vec4f, 3>, // luminance that the probe alone would give, see probe_irradiance; 0 where it is not asked. The tenth number: even niches
     borders: array<vec4f, 2>, // of a part, see ObjectRecord of store/contract.py
     sky_change: vec4f, // how many times brighter the sky is than as baked
 }
@@ -43,6 +43,7 @@ struct Surface {
     pixel: vec2u,
     painted: Painted,
     occlusion: f32, // share of the probe's light that reaches the pixel
+    niche: vec3f,   // light of near walls besides, from all directions alike
     points: vec4u,  // of a light field, near the pixel
     exit: vec4f,    // of glass with a light field: the face behind the pixel
 }
@@ -79,6 +80,17 @@ fn specular_occlusion(n: vec3f, e: vec3f) -> f32 {
     let whole = dot(i[0], vec4f(1.0, n)) + dot(i[1], vec4f(n.xy * n.yz, 3.0 * n.z * n.z - 1.0, n.x * n.z))
         + i[2].x * (n.x * n.x - n.y * n.y);
     return select(1.0, clamp(luminance(e) / max(whole, 1e-6), 0.0, 1.0), whole > 0.0);
+}
+
+// Share of the probe's light, and light of the niche that hides the rest (Scaling of bake/probes/selection.py), where the
+// light map has e.
+fn in_niche(s: Surface, e: vec3f) -> Surface {
+    var found = s;
+    let share = specular_occlusion(s.n, e);
+    let even = object.irradiance[2].y;
+    found.occlusion = mix(share, share * share, even);
+    found.niche = even * (1.0 - share) / LAMBENT_PI * e;
+    return found;
 }
 
 // Level at which a texel has the solid angle omega, seen from the surface; half_log2_omega = log2(omega)/2.
