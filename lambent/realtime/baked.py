@@ -21,7 +21,7 @@ from lambent.store import contract
 from lambent.store.consistency import numbers_of, read_geometry
 from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, SceneRecord, SunRecord, noise_name
 from lambent.store.light_fields import has_light_field, light_name, read_light_field
-from lambent.store.occlusion import occlusion_gain, probe_shares
+from lambent.store.occlusion import has_even_niches, occlusion_gain, probe_shares
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
 
@@ -47,6 +47,7 @@ class Probe:
     most_bytes: float | None = None  # that the maps of the light field may take on the GPU
     policy: str = LEAST_RECENT  # of the cache that they are in, where they do not fit
     gain: float = 1.0  # on the light map's share of `irradiance`
+    even_niches: bool = False  # what that share leaves is the light map's, from all directions alike
 
 
 DARK = Probe((0.0, 0.0, 0.0), np.zeros((6, 1, 1, 3), np.float32))
@@ -209,4 +210,5 @@ def _probe(store: Store, name: str, radiance: Floats) -> Probe:
         store.read(planes).reshape(-1, 4) if planes in store else np.zeros((0, 4), np.float32),
         contract.probe_irradiance(store, name),
         gain=occlusion_gain(store, name),
+        even_niches=has_even_niches(store, name),
     )

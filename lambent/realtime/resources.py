@@ -34,6 +34,8 @@ from lambent.store.contract import MOST_BORDERS, ObjectRecord
 
 LIGHT_MAP_USAGE = wgpu.TextureUsage.STORAGE_BINDING | wgpu.TextureUsage.COPY_SRC  # besides those of all textures
 
+EVEN_NICHES = 9  # of the numbers of an object's `irradiance`, whether its probe has them
+
 
 def device_needs(scene: BakedScene) -> dict[str, int]:
     """Limits above WebGPU's defaults that a scene needs, for `device.open_device`."""
@@ -79,6 +81,7 @@ class ObjectResources:
         data["sky_change"][0] = (*self.light.sky_change, self._has_shares)
         data["emission"][0, :3] = 0 if dark else np.array(self.emission) / self._unit
         data["irradiance"].reshape(-1)[: len(probe.irradiance)] = np.array(probe.irradiance) / (self._unit * probe.gain)
+        data["irradiance"].reshape(-1)[EVEN_NICHES] = probe.even_niches
         data["borders"][0] = [*self.record.borders, *[WITHIN] * (MOST_BORDERS - len(self.record.borders))]
         uniform = self._layouts.buffer("UNIFORM", data)
         lamps = self.light.table(table, look_up) if table else self._layouts.empty

@@ -39,7 +39,7 @@ class SunLight:
         self, layouts: Layouts, sun: SunRecord | None = None, parts: SunParts = (), depths: Any = None,
         panes: PaneLayers | None = None,
     ) -> None:  # fmt: skip
-        self.exists = len(parts) > 0
+        self.exists, self.is_wide = len(parts) > 0, len(parts) > 1
         panes = panes or no_panes(layouts.device)
         self.pane_layers = panes.count
         self._data, self._queue = sun_data(sun, parts), layouts.device.queue

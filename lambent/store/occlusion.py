@@ -2,7 +2,8 @@
 
 `light_map/probe_share` says it by direction: at a texel, a + b.w of the light that the probe has along unit w, held
 within 0 and MOST_SHARE. It counts for the objects in its notes. All others scale their probe's light by the light map's
-share of the irradiance that the probe alone would give: `seen_irradiance` and `occlusion_gain` in its notes.
+share of the irradiance that the probe alone would give: `seen_irradiance`, `occlusion_gain` and `even_niches` in its
+notes, as the head of `store.contract` has them.
 """
 
 from __future__ import annotations
@@ -39,3 +40,13 @@ def probe_shares(store: Store) -> tuple[Floats | None, frozenset[str]]:
         expected = f"{of_light}, as the light map"
         raise UserError("broken store", file=store.folder, field=PROBE_SHARE, got=str(shape), expected=expected)
     return store.read(PROBE_SHARE), frozenset(names)
+
+
+def has_even_niches(store: Store, object_name: str) -> bool:
+    """Whether niches show the light map's light from all directions where they hide the probe's."""
+    name = probe_name(object_name, "radiance")
+    said = store.artefact(name).meta.get("even_niches", False)
+    if not isinstance(said, bool):
+        expected = "true or false"
+        raise UserError("broken store", file=store.folder, field=f"{name}: even_niches", got=said, expected=expected)
+    return said

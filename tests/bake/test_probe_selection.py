@@ -11,7 +11,9 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.probes.probe import Probe
 from lambent.bake.probes.selection import (
+    UNSCALED,
     Mirrored,
+    Scaling,
     by_distance,
     by_planes,
     error,
@@ -41,9 +43,9 @@ def test_error_and_share_by_hand() -> None:
     assert error(rays(), np.ones(1)) == pytest.approx(0, abs=1e-4)
     assert error(rays(), np.full(1, 3.0)) == pytest.approx(np.log(2), abs=1e-3)  # log((1 + 3)/(1 + 1))
     whole = np.array([4.0, *[0] * 8])
-    assert specular_occlusion(rays(), whole) == pytest.approx(0.25) and specular_occlusion(
-        rays(), whole / 100
-    ) == pytest.approx(1)
+    lit, up = np.ones(1), rays().normals
+    assert specular_occlusion(lit, up, whole) == pytest.approx(0.25)
+    assert specular_occlusion(lit, up, whole / 100) == pytest.approx(1)
 
 
 @pytest.mark.parametrize(("niches", "open_share", "gain"), [(20, 0.6, 2.0), (90, 1.0, 1.0), (0, 0.9, 0.0)])
@@ -57,8 +59,21 @@ def test_gain_leaves_what_is_no_niche_its_light(niches: int, open_share: float, 
     )
     sky = np.ones((6, 8, 8, 3), np.float32)
     found = judged(seen, Probe(sky, np.full((6, 8, 8), FAR, np.float32), sky), np.zeros(3), np.zeros((0, 4)))
-    assert found.gain == gain and found.best == pytest.approx(0, abs=1e-3)
-    assert judged(seen, Probe(sky, sky[..., 0], sky), np.zeros(3), np.zeros((0, 4)), through=True).gain == 0
+    assert found.scaling == Scaling(gain) and found.best == pytest.approx(0, abs=1e-3)
+    assert judged(seen, Probe(sky, sky[..., 0], sky), np.zeros(3), np.zeros((0, 4)), through=True).scaling == UNSCALED
+
+
+def test_walls_of_a_niche_shine_where_they_hide_the_sky() -> None:
+    """A shelf with the sky over .16 of its directions: it has .4 of the irradiance, the rest by its bright walls."""
+    ratio = np.repeat([0.4, 1.0], 50)
+    up = np.tile([0.0, 0.0, 1.0], (100, 1))
+    shown = ratio**2 + (1 - ratio) * ratio
+    seen = Mirrored(
+        0 * up, up, up, np.repeat(shown[:, None], 3, axis=1), np.pi * ratio, np.ones(100), np.zeros(100, bool)
+    )
+    sky = np.ones((6, 8, 8, 3), np.float32)
+    found = judged(seen, Probe(sky, np.full((6, 8, 8), FAR, np.float32), sky), np.zeros(3), np.zeros((0, 4)))
+    assert found.scaling == Scaling(1.0, even=True) and found.best == pytest.approx(0, abs=1e-3)
 
 
 def test_planes_turn_the_look_up_as_the_renderer_does() -> None:

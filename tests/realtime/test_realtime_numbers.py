@@ -102,6 +102,28 @@ def test_the_probes_irradiance_is_that_of_the_bake() -> None:
     np.testing.assert_allclose(found, np.clip(luminance(e) / (basis_of(n) @ numbers), 0, 1), rtol=1e-4)
 
 
+@pytest.mark.parametrize("even", [0.0, 1.0])
+def test_light_in_niches_is_that_of_the_bake(even: float) -> None:
+    count = 200
+    n = normalize(RNG.normal(size=(count, 3)))
+    e = RNG.uniform(0, 3.0, (count, 3))
+    declared = f"""struct Object {{ irradiance: array<vec4f, 3> }}
+const object = Object(array<vec4f, 3>(vec4f(4.0, 0.0, 0.0, 0.0), vec4f(0.0), vec4f(0.0, {even}, 0.0, 0.0)));
+const LAMBENT_PI = 3.14159265;
+struct Surface {{ n: vec3f, shares: vec4f, niche: vec3f }}
+"""
+    source = assemble("colour.wgsl") + "".join(
+        part("surface.wgsl", "fn", name) for name in ("specular_occlusion", "in_niche")
+    )
+    inputs = {"n": n, "e": e}
+    call = "in_niche(Surface(n, vec4f(0.0, 0.0, 0.0, 1.0), vec3f(0.0)), e)"
+    occlusion = run_wgsl(source, f"{call}.shares.w", inputs, declarations=declared)
+    niche = run_wgsl(source, f"{call}.niche", inputs, components=3, declarations=declared)
+    share = np.clip(luminance(e) / 4, 0, 1)
+    np.testing.assert_allclose(occlusion, share**2 if even else share, rtol=1e-4)
+    np.testing.assert_allclose(niche, even * ((1 - share) / np.pi)[:, None] * e, rtol=1e-4, atol=1e-6)
+
+
 def test_widths_of_a_lobe_about_its_mirror_direction() -> None:
     """2 m in the plane of incidence and 2 m cos_o across it; a brushed lobe has its axes there."""
     theta = np.radians(60)

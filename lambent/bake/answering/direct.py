@@ -26,7 +26,7 @@ def cleaned_direct(halves: Floats, known: Flags, light: Floats, labels: Indices)
         Chart of each texel.
     """
     given = np.asarray(light, np.float32) * known[..., None]
-    one, other = (chart_means(np.minimum(half, 2 * given), known, labels) for half in halves)
+    one, other = (chart_means(np.minimum(half, 2 * given), known, labels)[0] for half in halves)
     same = np.abs(one - other) < SAME * (one + other)
     clean = denoise_charts(np.minimum(halves.mean(axis=0), given * (1 + same)), known, labels)
     return np.asarray(np.minimum(clean.astype(np.float16), np.asarray(light, np.float16)), np.float16)

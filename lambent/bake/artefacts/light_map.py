@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 KIND = "light_map"
 NEEDS = ("geometry",)
-REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 4, 4, 3, 1, 1
+REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 5, 5, 3, 1, 1
 REVISION_OF_DIRECT = 3
 IRRADIANCE = tuple(f"light_map/{side}" for side in SIDES)
 NOISE = tuple(noise_name(side) for side in SIDES)
@@ -64,8 +64,8 @@ class Settings:
 
 
 SETTINGS = {
-    QualityName.preview: Settings((32, 32), 0.30, 8, gather_samples=128),
-    QualityName.normal: Settings((64, 192), 0.15, 12, gather_samples=512, photons_per_texel=512, gather_noise=0.04),
+    QualityName.preview: Settings((32, 32), 0.30, 24, gather_samples=128),
+    QualityName.normal: Settings((64, 192), 0.15, 24, gather_samples=512, photons_per_texel=512, gather_noise=0.04),
     QualityName.final: Settings((256, 8192), 0.015, 24, photons_per_texel=4096),
 }
 

@@ -22,7 +22,7 @@ from lambent.store.contract import SHARED_PROBES, needs_probe, probe_name, share
 
 KIND = "probe"
 NEEDS = ("geometry", "light_map")
-REVISION = 5
+REVISION = 6
 SHARING = "sharing"  # the step that finds whose probe each object shows
 PARTS = ("radiance", "distance", "planes")
 GROUPS = "groups"  # a further part, where light is sorted

@@ -21,7 +21,7 @@ from lambent.store.contract import (
     scene_record,
     shared_probes,
 )
-from lambent.store.occlusion import PROBE_SHARE, occlusion_gain
+from lambent.store.occlusion import PROBE_SHARE, has_even_niches, occlusion_gain
 
 if TYPE_CHECKING:
     from lambent.bake.probes.shares import Shown
@@ -57,7 +57,7 @@ def bake(context: BakeContext) -> None:
 def _shown(context: BakeContext) -> Iterator[Shown]:
     """The opaque objects that show a probe; reflectors find by distances what their mirrored views do not hold."""
     from lambent.bake.probes.device_lookup import DeviceProbe
-    from lambent.bake.probes.selection import largest_r0, widest_lobe
+    from lambent.bake.probes.selection import UNSCALED, Scaling, largest_r0, widest_lobe
     from lambent.bake.probes.shares import Shown
 
     store, scene, owners = context.store, context.scene, shared_probes(context.store)
@@ -74,7 +74,8 @@ def _shown(context: BakeContext) -> Iterator[Shown]:
         distance = store.read(probe_name(whose, "distance")) if by_distance else None
         radiance = store.read(name).astype(np.float32) * np.float32(radiance_unit(store, name))
         irradiance = np.array(probe_irradiance(store, whose))
+        scaling = Scaling(occlusion_gain(store, whose), has_even_niches(store, whose))
         yield Shown(
             number, largest_r0(material), widest_lobe(material), DeviceProbe(centre, radiance, planes, distance),
-            irradiance if len(irradiance) else None, occlusion_gain(store, whose),
+            irradiance, scaling if len(irradiance) else UNSCALED,
         )  # fmt: skip

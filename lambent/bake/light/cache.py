@@ -61,16 +61,19 @@ class LightMapCache:
         by_front, by_back = dr.select(outside, reflected, transmitted), dr.select(outside, transmitted, reflected)
         return [by_front * front + by_back * back for front, back in irradiance]
 
-    def irradiance(self, si: Any, active: Any) -> Any:
-        """Irradiance on the side that a ray came from; on backs without a light map, that of the front."""
+    def irradiance(self, si: Any, active: Any, *, sun: bool = True) -> Any:
+        """Irradiance on the side that a ray came from, with or without the `sun` that the light map leaves out.
+
+        On backs without a light map it is that of the front.
+        """
         outside, uv2 = mi.Frame3f.cos_theta(si.wi) > 0, light_map_uv(si, active)
         found = mi.Color3f(self._front.eval(uv2, active))
         if self._back is not None:
             found = dr.select(outside, found, mi.Color3f(self._back.eval(uv2, active)))
-        if self._sun is None:
+        if self._sun is None or not sun:
             return found
-        sun = self._sun(si, active)
-        return found + dr.maximum(dr.select(outside, sun, -sun), 0)
+        direct = self._sun(si, active)
+        return found + dr.maximum(dr.select(outside, direct, -direct), 0)
 
 
 class GroupedCache(LightMapCache):

@@ -37,7 +37,7 @@ def dominant_direction(raw: Floats, irradiance: Floats, labels: Indices) -> NDAr
     known = count > 0
     moment = raw[..., :3].sum(axis=0) / np.maximum(count, 1)[..., None]
     light = np.where(known, luminance(np.asarray(irradiance, np.float32)), 0)
-    means = chart_means(np.concatenate([moment, light[..., None]], axis=-1), known, labels)
+    means, _ = chart_means(np.concatenate([moment, light[..., None]], axis=-1), known, labels)
     direction = means[..., :3] / np.maximum(means[..., 3:], 1e-12)
     direction /= np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1)
     bumpy = np.isin(labels, np.unique(labels[known])) & (labels >= 0)

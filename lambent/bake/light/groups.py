@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from lambent.bake.light.denoise import denoise_charts, fill
 from lambent.bake.light.direct import direct_part
+from lambent.bake.light.level import with_level
 from lambent.bake.light.sampling import SMOOTH, closed, relative_noise, sampled_halves
 from lambent.bake.light.stitching import Cuts
 from lambent.bake.surfaces.texels import Texels
@@ -91,7 +92,7 @@ def finished_groups(
     for number, one in enumerate(clean):
         progress(number, len(by_group), "denoising by group")
         if known.any() and one.any():
-            clean[number] = denoise_charts(one, known, labels, smooth=SMOOTH)
+            clean[number] = with_level(denoise_charts(one, known, labels, smooth=SMOOTH), one, known, labels)
     light, direct = np.zeros((count, *known.shape, 3), np.float16), None
     lit = np.flatnonzero(clean.any(axis=(1, 2, 3)))
     if len(by_group) == count:

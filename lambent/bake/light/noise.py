@@ -30,31 +30,33 @@ def noise_map(halves: Floats, known: Flags, labels: Indices) -> NDArray[np.float
     """
     light = luminance(np.asarray(halves, np.float32))
     squares, mean = np.where(known, (light[0] - light[1]) ** 2 / 4, 0), np.where(known, light.mean(axis=0), 0)
-    around = chart_means(np.stack([squares, mean], axis=-1), known, labels)
+    around, _ = chart_means(np.stack([squares, mean], axis=-1), known, labels)
     total, level = around[..., 0], around[..., 1]
     error = np.divide(np.sqrt(total), level, out=np.zeros_like(level), where=level > 0)
     filled = fill(error[..., None], known, labels)[..., 0]
     return np.minimum(filled, HALF_MAX).astype(np.float16)
 
 
-def chart_means(values: Floats, known: Flags, labels: Indices) -> Floats:
-    """Means of values (H, W, C) over the known texels of the same chart within REACH."""
-    return np.asarray(_chart_means(np.ascontiguousarray(values), known, np.ascontiguousarray(labels)))
+def chart_means(values: Floats, known: Flags, labels: Indices, reach: int = REACH) -> tuple[Floats, Floats]:
+    """Means of values (H, W, C) over the known texels of the same chart within `reach`, and their numbers (H, W)."""
+    means, count = _chart_means(np.ascontiguousarray(values), known, np.ascontiguousarray(labels), reach)
+    return np.asarray(means), np.asarray(count)
 
 
 @numba.njit(parallel=True, cache=True)
-def _chart_means(values, known, labels):  # type: ignore[no-untyped-def]
+def _chart_means(values, known, labels, reach):  # type: ignore[no-untyped-def]
     height, width, channels = values.shape
-    means = np.zeros_like(values)
+    means, counts = np.zeros_like(values), np.zeros((height, width), np.float32)
     for row in numba.prange(height):
         for column in range(width):
             count = np.float32(0)
-            for y in range(max(row - REACH, 0), min(row + REACH + 1, height)):
-                for x in range(max(column - REACH, 0), min(column + REACH + 1, width)):
+            for y in range(max(row - reach, 0), min(row + reach + 1, height)):
+                for x in range(max(column - reach, 0), min(column + reach + 1, width)):
                     if known[y, x] and labels[y, x] == labels[row, column]:
                         count += 1
                         for channel in range(channels):
                             means[row, column, channel] += values[y, x, channel]
+            counts[row, column] = count
             for channel in range(channels):
                 means[row, column, channel] /= max(count, np.float32(1))
-    return means
+    return means, counts

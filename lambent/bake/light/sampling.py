@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.light.denoise import denoise_charts, fill
+from lambent.bake.light.level import with_level
 from lambent.bake.light.seams import blend_seams
 from lambent.bake.light.stitching import Cuts, stitched
 from lambent.bake.surfaces.texels import POINTS, Sides, Texels, area_of_texels, covered_share
@@ -184,7 +185,7 @@ def cleaned(irradiance: Floats, known: Flags, texels: Texels, labels: Indices, c
     """A noisy light map (H, W, 3), denoised, filled where it is unknown, its seams blended and closed."""
     if not known.any():
         return np.zeros(irradiance.shape, np.float16)
-    clean = denoise_charts(irradiance, known, labels, smooth=SMOOTH)
+    clean = with_level(denoise_charts(irradiance, known, labels, smooth=SMOOTH), irradiance, known, labels)
     return np.asarray(closed(clean[None], known, texels, labels, cuts)[0], np.float16)
 
 

@@ -28,7 +28,7 @@ from lambent.store.contract import (
     scene_record,
     shared_probes,
 )
-from lambent.store.occlusion import occlusion_gain
+from lambent.store.occlusion import has_even_niches, occlusion_gain
 from lambent.store.store import Store
 
 REFLECTED = 0.9  # of an object's area: then planar reflectors show it
@@ -116,4 +116,6 @@ def probe_light(store: Store, name: str) -> ProbeLight:
     centre = np.array(store.artefact(at).meta["centre"], float)
     unit, whole = radiance_unit(store, at), probe_irradiance(store, owner)
     scaled = np.array(whole) / occlusion_gain(store, owner) if len(whole) else None
-    return ProbeLight(radiance.astype(float) * unit, distance.astype(float), planes, centre, scaled)
+    even = has_even_niches(store, owner)
+    light = radiance.astype(float) * unit
+    return ProbeLight(light, distance.astype(float), planes, centre, scaled, even_niches=even)

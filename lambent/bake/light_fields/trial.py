@@ -29,10 +29,18 @@ class ProbeLight:
     """Look-ups of a probe: radiance (6, N, N, 3), distance (6, N, N), planes (P, 4) in world space, or none."""
 
     def __init__(
-        self, radiance: Floats, distance: Floats, planes: Floats, centre: Floats, irradiance: Floats | None = None
+        self,
+        radiance: Floats,
+        distance: Floats,
+        planes: Floats,
+        centre: Floats,
+        irradiance: Floats | None = None,
+        *,
+        even_niches: bool = False,
     ) -> None:
-        """`irradiance`, nine numbers, is what the probe alone would give, where its light is scaled by it."""
+        """`irradiance`, nine numbers, is what the probe alone would give, where its light is scaled (`Scaling`)."""
         self._radiance, self._centre, self._irradiance = radiance, centre, irradiance
+        self._even_niches = even_niches
         self._planes = planes + np.outer(planes[:, :3] @ centre, [0, 0, 0, 1])
         self._inverse = None if len(planes) else inverse_depth(distance)
 
@@ -42,7 +50,10 @@ class ProbeLight:
         if self._irradiance is None:
             return found
         whole = np.maximum(basis_of(watched.normals) @ self._irradiance, 1e-6)
-        return np.asarray(found * np.clip(watched.irradiance / whole, 0, 1)[:, None, None])
+        share = np.clip(watched.irradiance / whole, 0, 1)[:, None, None]
+        if not self._even_niches:
+            return np.asarray(found * share)
+        return np.asarray(found * share**2 + (1 - share) * watched.irradiance[:, None, None] / np.pi)
 
     def along(self, origins: Floats, w: Floats) -> Floats:
         """Radiance (..., 3) along rays, as the renderer finds it."""

@@ -129,8 +129,8 @@ class ProbeSet:
         """Arrays radiance, distance and planes of one object's probe, which others are `sharing`, and its notes.
 
         Noted are the centre, whether the object was left out, and how well one centre stands for the whole surface:
-        `hidden_share` and `parallax_deg` (`hidden`), `mirror_error`, `seen_irradiance` and
-        `occlusion_gain` (`selection`).
+        `hidden_share` and `parallax_deg` (`hidden`), `mirror_error`, `seen_irradiance`,
+        `occlusion_gain` and `even_niches` (`selection`).
 
         Planes that the scene gives are taken as they are; others are found from the probe itself.
         """
@@ -166,8 +166,8 @@ class ProbeSet:
             if found.needs_distance and given is None:
                 arrays["planes"] = planes[:0]
             meta["mirror_error"] = round(found.best, 3)
-            if found.gain:
-                meta["occlusion_gain"] = found.gain
+            if found.scaling.gain:
+                meta["occlusion_gain"], meta["even_niches"] = found.scaling.gain, found.scaling.even
                 meta["seen_irradiance"] = [float(value) for value in found.irradiance]
         if rays is None:
             of_surface = seen_from(*spread(self._scene.object(name).mesh, HIDDEN_RAYS), seen)

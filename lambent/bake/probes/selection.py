@@ -11,6 +11,9 @@ probe. The error decides three things, each where a choice lowers it to WORTH of
   the probe alone, at most 1 (Lazarov 2013, "Getting more physical in Call of Duty: Black Ops II"). Near things hide
   from a surface within a niche most of the probe's light. Sharp mirrors do not gain by it and are left as they are.
   Where only some places are niches (shelves under a table of metal), twice the ratio leaves the rest its light.
+- What a niche does not see of the probe, it sees of its own walls, about as bright everywhere (`even`): where the open
+  share is the square of that ratio r, the walls shine with (1 - r)/(1 - r^2) E/pi, and the light along a ray is the
+  mean of both, r^2 L + (1 - r) E/pi. Its irradiance is the light map's, and so is its colour.
 """
 
 from __future__ import annotations
@@ -49,8 +52,8 @@ WORTH = 0.85
 class Mirrored:
     """Rays that viewers see mirrored: origins, unit directions and normals (n, 3), radiance (n, 3).
 
-    `irradiance` (n,) is the light map's luminance there, `fresnel` (n,) Schlick's term, and `own` (n,) bool whether the
-    ray meets the object itself.
+    `irradiance` (n,) is the light map's luminance there, without the sun, `fresnel` (n,) Schlick's term, and `own` (n,)
+    bool whether the ray meets the object itself.
     """
 
     origins: Floats
@@ -82,7 +85,8 @@ def mirrored(
     met = scene.ray_intersect_preliminary(ray).shape
     own = np.isin(np.array(dr.reinterpret_array(mi.UInt32, met)), family)
     below = scene.ray_intersect(rays_from(array_of(leaving(scene, at, n, n).o), -n))
-    irradiance = array_of(cache.irradiance(below, below.is_valid())).astype(float)
+    lit = array_of(cache.irradiance(below, below.is_valid(), sun=False)).astype(float)
+    irradiance = np.nan_to_num(lit, posinf=0.0)
     share = np.asarray(fresnel(np.abs((view * n).sum(axis=1)), r0[found]))
     return Mirrored(array_of(ray.o).astype(float), directions, n, radiance, luminance(irradiance), share, own)
 
@@ -161,24 +165,48 @@ def _found(radiance: Floats, directions: Floats) -> Floats:
     return np.asarray(luminance(sample(radiance.astype(float), normalize(directions))))
 
 
-def specular_occlusion(rays: Mirrored, irradiance: Floats) -> Floats:
-    """Ratio (n,) of the light map's irradiance to that of the probe alone (9,), at most 1."""
-    whole = np.maximum(basis_of(rays.normals) @ irradiance, 1e-6)
-    return np.asarray(np.clip(rays.irradiance / whole, 0, 1))
+def specular_occlusion(lit: Floats, normals: Floats, irradiance: Floats) -> Floats:
+    """Ratio (n,), at most 1, of the light map's irradiance `lit` (n,) to the probe's (9,), for normals (n, 3)."""
+    whole = np.maximum(basis_of(normals) @ irradiance, 1e-6)
+    return np.asarray(np.clip(lit / whole, 0, 1))
 
 
-GAINS = {1.0: WORTH, 2.0: 0.95}  # times the ratio, and what each must lower the error to
+@dataclass(frozen=True)
+class Scaling:
+    """How the light map scales a probe's light: by `gain` times `specular_occlusion`; `even` adds niches' walls.
+
+    A gain of 0 leaves light as it is.
+    """
+
+    gain: float
+    even: bool = False
+
+    def shown(self, light: Floats, lit: Floats, normals: Floats, irradiance: Floats) -> Floats:
+        """Luminance (n,) along rays that find `light` (n,) in a probe of `irradiance` (9,).
+
+        The rays begin where surfaces have `normals` (n, 3) and the light map has the luminance `lit` (n,).
+        """
+        if self.gain == 0:
+            return light
+        share = specular_occlusion(lit, normals, irradiance / self.gain)
+        if not self.even:
+            return light * share
+        return np.asarray(light * share**2 + (1 - share) * lit / np.pi)
+
+
+UNSCALED = Scaling(0.0)
+SCALINGS = {Scaling(1.0): WORTH, Scaling(2.0): 0.95, Scaling(1.0, even=True): 0.95}  # what each must lower the error to
 
 
 @dataclass(frozen=True)
 class Judged:
-    """Errors of a probe: looked up by planes, and by the distance map, with the `gain` on `specular_occlusion`.
+    """Errors of a probe: looked up by planes, and by the distance map, with the `scaling`.
 
-    `gain` is 0 where light is not scaled; `irradiance` (9,) is the probe's.
+    `irradiance` (9,) is the probe's.
     """
 
     by_planes: float
-    gain: float
+    scaling: Scaling
     irradiance: Floats
     distance: float
 
@@ -202,10 +230,12 @@ def judged(
         planes = bounding_planes(probe.distance, probe.normals)
     light = by_planes(rays, probe.radiance, centre, planes.astype(float))
     irradiance = irradiance_of(probe.radiance)
-    shares = {} if through else {gain: specular_occlusion(rays, irradiance / gain) for gain in GAINS}
-    plain = error(rays, light)
-    scaled = {gain: error(rays, light * share) for gain, share in shares.items()}
-    worth = {gain: found for gain, found in scaled.items() if found < GAINS[gain] * plain}
-    gain = min(worth, key=lambda one: worth[one]) if worth else 0.0
+    errors = {UNSCALED: error(rays, light)}
+    for scaling, most in () if through else SCALINGS.items():
+        found = error(rays, scaling.shown(light, rays.irradiance, rays.normals, irradiance))
+        if found < most * errors[UNSCALED]:
+            errors[scaling] = found
+    best = min(errors, key=lambda one: round(errors[one], 4))  # of equals the simplest
     marched = by_distance(rays, probe.radiance, centre, probe.distance.astype(float))
-    return Judged(worth.get(gain, plain), gain, irradiance, error(rays, marched * shares.get(gain, 1.0)))
+    by_distances = error(rays, best.shown(marched, rays.irradiance, rays.normals, irradiance))
+    return Judged(errors[best], best, irradiance, by_distances)

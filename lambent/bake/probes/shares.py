@@ -31,14 +31,13 @@ from lambent.bake.light.denoise import fill
 from lambent.bake.light.sampling import points_of
 from lambent.bake.probes.device_lookup import DeviceProbe
 from lambent.bake.probes.probe import MIRROR_DEPTH
-from lambent.bake.probes.selection import difference
+from lambent.bake.probes.selection import Scaling, difference
 from lambent.bake.surfaces.texels import POINTS, Sides
 from lambent.bake.tiles import slices
 from lambent.bake.tracing import path_tracer, rays
 from lambent.bake.tracing.rays import array_of, independent
 from lambent.bake.tracing.sun import Sun
 from lambent.core.arrays import Floats, Indices
-from lambent.core.irradiance import basis_of
 from lambent.core.progress import Progress, silent
 from lambent.materials.lobes import fresnel
 from lambent.store.occlusion import MOST_SHARE
@@ -58,16 +57,15 @@ EQUATIONS = len(UPPER[0]) + 4  # of a texel: upper triangle of the matrix, right
 class Shown:
     """An object, by number, its reflectance at normal incidence, its widest lobe's roughness, and the probe it shows.
 
-    `irradiance` (9,) is the probe's alone, by which the light map scales it, with a `gain`, where there are no shares;
-    None where it is not scaled.
+    Without shares, `scaling` scales the probe's light by the light map and the probe's own `irradiance` (9,).
     """
 
     number: int
     r0: float
     roughness: float
     probe: DeviceProbe
-    irradiance: Floats | None
-    gain: float
+    irradiance: Floats
+    scaling: Scaling
 
 
 @dataclass(frozen=True)
@@ -145,10 +143,8 @@ class ShareTracer:
             return False
         texels = self._sides.texels
         r = share_along(found[texels.index[some.row]], some.w)
-        plain = some.probe
-        if one.irradiance is not None:
-            whole = np.maximum(basis_of(self._sides.sign * texels.normals[some.row, 0]) @ one.irradiance, 1e-6)
-            plain = plain * (one.gain * self._luminous[some.row] / whole).clip(0, 1)
+        normals = self._sides.sign * texels.normals[some.row, 0]
+        plain = one.scaling.shown(some.probe, self._luminous[some.row], normals, one.irradiance)
         power = 2 if one.roughness > WIDE else 1
         by_shares, without = (
             float((some.fresnel * difference(light, some.light) ** power).sum()) for light in (some.probe * r, plain)

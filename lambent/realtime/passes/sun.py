@@ -32,9 +32,9 @@ class SunPass:
         module = layouts.device.create_shader_module(code=assemble("sun.wgsl"))
         groups = [layouts.frame, layouts.of(*SHADOW_MAP)]
         self._pipeline = cache(
-            lambda is_pane, transmits, panes: pipeline(
+            lambda is_pane, transmits, panes, wide: pipeline(
                 layouts.device, module, "sun_main", groups, [FORMAT], compare="greater" if is_pane else "equal",
-                front_face=front_face, constants={"TRANSMITS": transmits, "PANES": panes},
+                front_face=front_face, constants={"TRANSMITS": transmits, "PANES": panes, "WIDE": wide},
             )
         )  # fmt: skip
         self._texture = lru_cache(2 * MOST_REFLECTORS)(
@@ -62,7 +62,7 @@ class SunPass:
             seen = context.seen(band.shares)
             for draw in draws:
                 record = draw.item.record
-                render.set_pipeline(self._pipeline(draw.is_pane, draw.material.transmits, sun.pane_layers))
+                render.set_pipeline(self._pipeline(draw.is_pane, draw.material.transmits, sun.pane_layers, sun.is_wide))
                 context.counts["draw_calls"] += draw_seen(render, seen, record.first_face, record.face_count)
             render.end()
             yield

@@ -15,14 +15,14 @@ fn incident(s: Surface, w: vec3f, half_log2_omega: f32) -> vec3f {
     let along = to_world(s, w);
     let found = incident_look_up(s.x, along);
     let level = level_of_look_up(found, half_log2_omega);
-    return arriving(s, along) * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
+    return s.niche + arriving(s, along) * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
 }
 
 // The same from a cube that is prefiltered by roughness.
 fn incident_at_level(s: Surface, w: vec3f, level: f32) -> vec3f {
     let along = to_world(s, w);
     let found = incident_look_up(s.x, along);
-    return arriving(s, along) * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
+    return s.niche + arriving(s, along) * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
 }
 
 // Weights of the points of a light field for a mirror direction, and light as one of them sees it; here there are none.
@@ -43,5 +43,5 @@ fn own_light(s: Surface, of_light_map: vec3f) -> vec3f {
 fn incident_ray(s: Surface, w: vec3f) -> vec3f {
     let along = to_world(s, w);
     let found = incident_look_up(s.x, along);
-    return arriving(s, along) * textureSampleLevel(radiance_cube, linear_sampler, found.direction, 0.0).rgb;
+    return s.niche + arriving(s, along) * textureSampleLevel(radiance_cube, linear_sampler, found.direction, 0.0).rgb;
 }

@@ -49,7 +49,7 @@ fn cleaned_light(s: Surface, w: vec3f, half_log2_omega: f32, layer: u32) -> vec3
     let along = to_world(s, w);
     let found = incident_look_up(s.x, along);
     let level = level_of_look_up(found, half_log2_omega);
-    return arriving(s, along) * textureSampleLevel(cleaned_cubes, linear_sampler, found.direction, layer, level).rgb;
+    return s.niche + arriving(s, along) * textureSampleLevel(cleaned_cubes, linear_sampler, found.direction, layer, level).rgb;
 }
 
 fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {

@@ -201,7 +201,7 @@ struct PlanarLight {
     var s = shading_frame(v, select(-1.0, 1.0, upright > 0.0), mirrored.plane.xyz);
     if (abs(dot(mirrored.plane.xyz, v.p_world) + mirrored.plane.w) > mirrored.tolerance || abs(upright) < 0.998) { discard; }
     let e = layer_of(reflector_light_maps, select(BACK, FRONT, front), v.uv2).rgb;
-    s.shares = shares_of(reflector_light_maps, v.uv2, front, s.n, e);
+    s = with_shares(s, reflector_light_maps, v.uv2, front, e);
     let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), max(dot(view, s.n), 1e-3)));
     let place = place_of(v, s, to_world(s, vec3f(-wo.xy, wo.z)));
     var result = PlanarLight(vec4f(0.0, 0.0, 0.0, min(place.t, HALF_MAX)), vec4f(0.0));

@@ -21,7 +21,7 @@ fn counted(lobe: LambentLobe, at: Sample, wo: vec3f, light: vec3f, aimed: f32, a
 }
 
 fn probe_light(s: Surface, w: vec3f, direction: vec3f) -> vec3f {
-    return arriving(s, to_world(s, w)) * textureSampleLevel(radiance_cube, linear_sampler, direction, 0.0).rgb;
+    return s.niche + arriving(s, to_world(s, w)) * textureSampleLevel(radiance_cube, linear_sampler, direction, 0.0).rgb;
 }
 
 fn of_lobe(u: vec2f, lobe: LambentLobe, wo: vec3f, s: Surface, aim_share: f32) -> vec3f {

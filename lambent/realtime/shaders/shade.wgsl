@@ -42,7 +42,7 @@ fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
     let n = normalize(given + max(GRAZING - dot(given, view), 0.0) * view);
     let along = rejection(brushed, n);
     let t = normalize(select(perpendicular(n), along, dot(along, along) > 1e-8));
-    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown, vec4f(0.0, 0.0, 0.0, 1.0), points_near(v.uv2), exit_near(v.uv2, facing > 0.0));
+    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown, vec4f(0.0, 0.0, 0.0, 1.0), vec3f(0.0), points_near(v.uv2), exit_near(v.uv2, facing > 0.0));
 }
 
 // Layers past the last are black.
@@ -56,10 +56,14 @@ fn light_map(layer: u32, uv2: vec2f) -> vec3f {
     return layer_of(light_maps, layer, uv2).rgb;
 }
 
-// Shares of the probe's light where the irradiance is e: by direction where the light map has them, else the same for all.
-fn shares_of(maps: texture_2d_array<f32>, uv2: vec2f, front: bool, n: vec3f, e: vec3f) -> vec4f {
-    if (object.sky_change.w > 0.5 && front) { return layer_of(maps, SHARES, uv2).yzwx; }
-    return vec4f(0.0, 0.0, 0.0, specular_occlusion(n, e));
+// The surface with its share of the probe's light, where the light map has irradiance e: by direction where it has shares.
+fn with_shares(found: Surface, maps: texture_2d_array<f32>, uv2: vec2f, front: bool, e: vec3f) -> Surface {
+    if (object.sky_change.w > 0.5 && front) {
+        var s = found;
+        s.shares = layer_of(maps, SHARES, uv2).yzwx;
+        return s;
+    }
+    return in_niche(found, e);
 }
 
 fn surface_light(v: Varyings, front: bool) -> vec3f {
@@ -81,7 +85,7 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
         e_bent = e_here * bent_share(light_map(DIRECTION, v.uv2), mesh[2], bent);
         sun_cos = select(0.0, max(dot(bent, sun.towards.xyz), 0.0), facing > 0.0);
     }
-    if (LOBES > 0u) { s.shares = shares_of(light_maps, v.uv2, front, s.n, e_bent); } // of light without the sun, as probes have it
+    if (LOBES > 0u) { s = with_shares(s, light_maps, v.uv2, front, e_bent); } // of light without the sun, as probes have it
     e_bent += sun_cos * direct;
     e_here += max(facing, 0.0) * direct;
     let diffuse = own_light(s, diffuse_light(wo.z, e_bent, e_beyond, s.painted));

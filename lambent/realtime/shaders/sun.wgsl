@@ -2,9 +2,10 @@
 // squares, the smallest first, and the least and greatest depths of blocks of texels. Layers of clear glass beside it
 // (realtime/panes.py) tint what they let through.
 //
-// A wide sun's disc is cut into parts, each with a map of its own: in one map blockers hide others behind them, and no one
-// filter fits all of their penumbras. Those are as wide as a part's disc makes them behind the mean of the blockers
-// (Fernando 2005, "Percentage-closer soft shadows"). The plane of the surface is followed from texel to texel, so that it
+// A wide sun's disc is cut into parts, each with a map of its own: in one map blockers hide others behind them. Penumbras
+// are as wide as a part's disc makes them behind the mean of the blockers (Fernando 2005, "Percentage-closer soft
+// shadows"). Blockers of a wide sun are too far apart for one mean: each tap is a place of the disc, hidden by what lies
+// on the way there (Guennebaud, Barthe and Paulin 2006, "Real-time soft shadow mapping by backprojection"). The plane of the surface is followed from texel to texel, so that it
 // does not shadow itself. Under the edge of a sheet that touches the surface, texels beyond that edge do not count: what
 // they show is farther from the sun.
 
@@ -19,6 +20,7 @@
 @group(1) @binding(4) var pane_colours: texture_2d_array<f32>;
 
 override PANES: u32 = 0u;        // layers of clear glass
+override WIDE: bool = false;      // the sun's disc is cut into parts
 override TRANSMITS: bool = false; // surfaces show light from behind them
 
 const SUN_BLOCK = 8.0;       // texels along the side of the smallest block: BLOCK of realtime/sun.py
@@ -26,6 +28,7 @@ const SUN_SEARCH = 8u;       // taps that look for blockers
 const SUN_TAPS = 16u;        // taps that are compared
 const SUN_LEAST_PX = 1.5;    // texels: least radius of either
 const SUN_STEEPEST = 20.0;   // slope, depth over width, beyond which a surface is not followed
+const SUN_APART_PX = 0.75;   // texels, by which a blocker may miss the place that it hides
 const SUN_BIAS_PX = 0.3;     // texels, by which what is nearer to the sun casts no shadow
 const SUN_BEYOND_PX = 2.0;   // texels, by which what is farther from the sun is no part of the surface
 const SUN_ROUNDING = 4e-7;   // of the depths' span
@@ -128,6 +131,18 @@ fn sun_place(p_world: vec3f, n_world: vec3f) -> SunPlace {
     return at;
 }
 
+const SUN_HIDDEN = 1.0;
+const SUN_DOUBTFUL = 0.5; // something nearer to the sun hides from the map what is on the way
+
+// Whether a place of the part's disc, `across` times its radius, is hidden by what lies about `guess_m` away: looked for
+// as far away as that, and once more as far as what was found.
+fn sun_hides(at: SunPlace, across: vec2f, px_per_m: f32, guess_m: f32, bias_m: f32) -> f32 {
+    let first_m = sun_rise(at, max(px_per_m * guess_m, SUN_LEAST_PX) * across);
+    let second_m = sun_rise(at, max(px_per_m * first_m, SUN_LEAST_PX) * across);
+    let apart_px = px_per_m * abs(second_m - first_m) * length(across);
+    return select(0.0, select(SUN_DOUBTFUL, SUN_HIDDEN, apart_px < SUN_APART_PX), min(first_m, second_m) > bias_m);
+}
+
 // The share of the sun's disc that a point sees; n is the normal of the flat surface there, on either side.
 //
 // Adapters in software skip loops of no turns, but neither branches nor what follows a return, and a loop within another
@@ -154,6 +169,7 @@ fn sun_visibility(p_world: vec3f, n_world: vec3f) -> f32 {
 
     var blockers = 0.0;
     var rise_m = 0.0;
+    var farthest_m = 0.0;
     var nearest_m = 1e30;
     var touches = false;
     var open = 0.0;
@@ -167,18 +183,27 @@ fn sun_visibility(p_world: vec3f, n_world: vec3f) -> f32 {
         let reach = select(spread, min(spread, SUN_LEAST_PX), k == 0u); // the first finds what touches the surface
         let rise = sun_rise(at, reach * sqrt(tap.order) * tap.across);
         let blocks = select(0.0, 1.0, rise > bias_m);
-        tap = next_sun_tap(tap);
         if (k < SUN_SEARCH) {
             blockers += blocks;
             rise_m += blocks * rise;
             nearest_m = select(nearest_m, min(nearest_m, rise), rise > bias_m);
+            farthest_m = max(farthest_m, rise);
             touches |= k == 0u && rise > bias_m && px_per_m * rise < SUN_LEAST_PX;
         } else {
             let on_surface = select(0.0, 1.0, rise > -SUN_BEYOND_PX * at.texel_m);
-            open += 1.0 - blocks;
+            var hidden = blocks > 0.0;
+            if (WIDE) {
+                let place = sqrt(tap.order / f32(SUN_TAPS)) * tap.across;
+                let by_nearest = sun_hides(at, place, px_per_m, nearest_m, bias_m);
+                let by_mean = sun_hides(at, place, px_per_m, rise_m / max(blockers, 1.0), bias_m);
+                let by_farthest = sun_hides(at, place, px_per_m, farthest_m, bias_m);
+                hidden = max(by_nearest, by_farthest) == SUN_HIDDEN || by_mean > 0.0;
+            }
+            open += select(1.0, 0.0, hidden);
             open_here += (1.0 - blocks) * on_surface;
             here += on_surface;
         }
+        tap = next_sun_tap(tap);
         if (k == SUN_SEARCH - 1u) {
             let behind_m = select(rise_m / max(blockers, 1.0), 0.0, touches);
             spread = max(px_per_m * behind_m, SUN_LEAST_PX) * inverseSqrt(f32(SUN_TAPS));

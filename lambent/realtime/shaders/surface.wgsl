@@ -22,7 +22,7 @@ struct PlacedLobe {
 struct Object {
     centre: vec4f, // of the probe; w: half the log2 of texels per unit area of the cube [-1, 1]^3
     emission: vec4f,
-    irradiance: array<vec4f, 3>, // luminance that the probe alone would give, see probe_irradiance; 0 where it is not asked
+    irradiance: array<vec4f, 3>, // luminance that the probe alone would give, see probe_irradiance; 0 where it is not asked. The tenth number: even niches
     borders: array<vec4f, 2>, // of a part, see ObjectRecord of store/contract.py
     sky_change: vec4f, // how many times brighter the sky is than as baked; w: 1 where the light map has shares
 }
@@ -43,6 +43,7 @@ struct Surface {
     pixel: vec2u,
     painted: Painted,
     shares: vec4f, // a + b.w of the probe's light along w arrives at the pixel: (b, a)
+    niche: vec3f,  // light of near walls besides, from all directions alike
     points: vec4u,  // of a light field, near the pixel
     exit: vec4f,    // of glass with a light field: the face behind the pixel
 }
@@ -86,6 +87,17 @@ const MOST_SHARE = 2.0; // as in store/occlusion.py
 // Share of the probe's light along world direction w that arrives.
 fn arriving(s: Surface, w: vec3f) -> f32 {
     return clamp(dot(s.shares, vec4f(w, 1.0)), 0.0, MOST_SHARE);
+}
+
+// Share of the probe's light, the same for all directions, and light of the niche that hides the rest (Scaling of
+// bake/probes/selection.py), where the light map has e.
+fn in_niche(found: Surface, e: vec3f) -> Surface {
+    var s = found;
+    let share = specular_occlusion(s.n, e);
+    let even = object.irradiance[2].y;
+    s.shares = vec4f(0.0, 0.0, 0.0, mix(share, share * share, even));
+    s.niche = even * (1.0 - share) / LAMBENT_PI * e;
+    return s;
 }
 
 // Level at which a texel has the solid angle omega, seen from the surface; half_log2_omega = log2(omega)/2.
