@@ -23,8 +23,8 @@
                                            may be absent: luminance of the irradiance it would give, coefficients of
                                            1, x, y, z, xy, yz, 3zz - 1, xz, xx - yy of the normal; scale its light by
                                            the light map's share r of that (times meta["occlusion_gain"]), at most 1.
-                                           With meta["even_niches"] scale by r^2 and add (1 - r) E/pi of the light map
-                                           An object in the document SHARED_PROBES has no probe; it shows another's
+                                           With meta["even_niches"] scale by r^2 and add (1 - r) E/pi of the light map.
+                                           Objects in the document SHARED_PROBES show the probe of another
     probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
     probe/OBJECT/groups                    (n, 6, N, N, 3) float16, its radiance by light group, units as above; absent
                                            where light_map/groups is
@@ -76,8 +76,8 @@ To edit the materials of a view, with the image's size in its key:
 Radiance of a term at a point, W/(sr m^2): scale f_q f_o(theta_o) times the sum over wavelets, or pairs, of the array
 times the curves' coefficients. Coefficients of pairs are the curves' values at nodes (Curve.node_values), the
 centres of equal bands from 0 to 90 degrees, with straight lines between; those of rows are their wavelets; f_q and f_o
-are the term's. Textures are in the array. The first set of LIGHTS is small and soon
-there; `transport_lights` lists those that are complete, the last being the best, and `forget_lights` drops one.
+are the term's. Textures are in the array. The first set of LIGHTS is small and soon there; `transport_lights` lists
+the complete ones, the last being the best, and `forget_lights` drops one.
 
 To relight a view with its materials as they are, with the image's size in its key; N triangles of the icosahedron cut
 into four again and again, in the order of scenes.triangle_wavelets:
@@ -95,7 +95,7 @@ Light that met other surfaces first, of the same points:
 
     view/KEY/interreflection/tails         (Z,) uint32, surfaces on the path of each tail; meta["tails"] is the document
                                            of `store.tails`, which numbers them, meta["series"] that of the bands,
-                                           meta["environment"] what lit it instead of the scene's own, if anything
+                                           meta["environment"] the image that lit it instead of the scene's own
     view/KEY/interreflection/MATERIAL/TERM/TILE    uint32, the TILE-th 4096 points of a material, P: number of entries
                                            of each point (P,), then of all entries tail * bands + band (N,), rising, and
                                            their light (N,), RGB9E5 times meta["unit"] W/(sr m^2). meta["points"] is P,
@@ -397,5 +397,4 @@ def scene_record(store: Store) -> SceneRecord:
 
 
 def write_scene_record(store: Store, record: SceneRecord) -> None:
-    value: dict[str, Any] = record.model_dump(mode="json")
-    store.set_document(SCENE, value)
+    store.set_document(SCENE, record.model_dump(mode="json"))
