@@ -16,6 +16,7 @@ from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.resources import ObjectResources, SceneResources
 from lambent.realtime.textures import WIDENING, bits_that_show
 
+FAINT_N = 5  # samples per lobe that serve where no lamp shows by itself
 LampUse = Literal["", "aim", "lamps"]  # samples aim at lamps, or lamps are outside of the cube map
 
 
@@ -113,6 +114,11 @@ def lamp_use(how: Integrator, light: ProbeLight, look_up: LookUp, material: Mate
     return "lamps" if how.lamps and light.lamps.serve(material, widened) else ""
 
 
+def shows_no_lamp(how: Integrator, light: ProbeLight, look_up: LookUp, material: Material, textures: int) -> bool:
+    """Whether lamps stay in the cube map because their highlights on a material are faint."""
+    return bool(how.lamps) and not brings_light(look_up) and light.lamps.are_faint(material, bool(textures & WIDENING))
+
+
 def panes_of(state: FrameState, resources: SceneResources) -> frozenset[str]:
     """Names of the objects of clear glass (`materials.clear`), if the frame shows specular light.
 
@@ -158,6 +164,8 @@ def draws_of(
         alone = table == "lamps" and light.lamps.all_out(material, bool(bits & WIDENING))
         rough = buffers.textures.rough
         n = how.rows or (state.samples(material, rough, alone) if how.specular else 1)
+        if state.n is None and not table and shows_no_lamp(how, light, look_up, material, bits):
+            n = min(n, FAINT_N)
         is_pane, has_holes = item.record.name in panes, item.record.name in resources.masked
         mirrors = how.specular and item.record.name in reflecting and not is_pane
         on_planes = state.planar_samples(material, rough) if mirrors else 0

@@ -17,13 +17,14 @@ with |n.(p - x)|/e^3, as a surface of that normal does.
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.core.colour import luminance
+from lambent.core.cubemap import texel_solid_angles
 from lambent.core.directions import normalize
 from lambent.core.lamps import MOST, Lamp, corners, find_lamps, moments
 from lambent.materials.document import Lobe, Material
@@ -35,6 +36,7 @@ GROUPS = 4
 GROUP_RATIO = 1.25  # of radii, from which on two lamps may be in two groups
 FIRST, LAST = 0.47, 0.54  # widths of a lobe, in radii of a group, between which the group leaves
 NONE = 1e9
+FAINT = 0.1  # of the mean radiance of a probe: highlights that no picture shows by themselves
 HEAD_ROWS, LAMP_ROWS = 2, 4
 
 
@@ -45,6 +47,9 @@ class ProbeLamps:
         self.radiance = finite(radiance)[0]
         self.lamps = find_lamps(self.radiance)
         self.group = group_of([lamp.radius_rad for lamp in self.lamps])
+        self._power = np.array([lamp.power for lamp in self.lamps])
+        self._peak = np.array([luminance(lamp.excess).max() for lamp in self.lamps])
+        self._highlight = lru_cache(64)(self._brightest_highlight)  # asked for by every draw of every frame
 
     @property
     def groups(self) -> int:
@@ -61,8 +66,32 @@ class ProbeLamps:
         return radii
 
     def serve(self, material: Material, textured: bool) -> bool:
-        """Whether a lamp leaves the cube for any lobe of a material, whose widths textures may change."""
-        return self.groups > 0 and (textured or any(groups_out(lobe, self.radii) > 0 for lobe in material.lobes))
+        """Whether a lamp leaves the cube for any lobe of a material, whose widths textures may change.
+
+        None does where all highlights are faint.
+        """
+        leave = self.groups > 0 and (textured or any(groups_out(lobe, self.radii) > 0 for lobe in material.lobes))
+        return leave and not self.are_faint(material, textured)
+
+    def are_faint(self, material: Material, textured: bool) -> bool:
+        """Whether no lamp shows by itself in any lobe of a material: its highlight is dark beside all that is lit.
+
+        A lamp of flux E and radiance L has in a lobe of reflectance F a highlight of F E / (4 pi mx my), at most F L,
+        along the normal. Textures may narrow a lobe, and so make it brighter.
+        """
+        return not textured and all(self._highlight(lobe) <= FAINT * self._mean for lobe in material.lobes)
+
+    @cached_property
+    def _mean(self) -> float:
+        """Luminance of the mean radiance."""
+        omega = np.tile(texel_solid_angles(self.radiance.shape[1]).ravel(), 6)
+        return float(luminance(self.radiance.reshape(-1, 3)) @ omega) / (4 * np.pi)
+
+    def _brightest_highlight(self, lobe: Lobe) -> float:
+        spread = self._power / (4 * np.pi * lobe.mx * lobe.my)
+        brightest = float(np.minimum(spread, self._peak).max(initial=self._mean))
+        tint = np.array(lobe.k) * (1.0 if lobe.side == "transmission" else np.array(lobe.r0))
+        return float(luminance(tint)) * brightest
 
     def all_out(self, material: Material, textured: bool) -> bool:
         """Whether no lamp is in the cube map of any lobe."""

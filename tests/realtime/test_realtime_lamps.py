@@ -150,6 +150,26 @@ def test_mirrors_keep_the_cube_map_and_its_samples(device) -> None:
         assert draw.shader == shader
 
 
+def test_faint_highlights_need_neither_lamps_nor_many_samples(device) -> None:
+    """A window on rough varnish adds little to what is lit; a lamp on it, or the window on metal, is seen."""
+    rough = Lobe(mx=0.2, my=0.2, r0=0.04)
+    window, lamp = (np.array([-0.7, -0.3, 1.0]), 0.15, 4.0), (np.array([-0.7, -0.3, 1.0]), 0.05, 200.0)
+    for lobe, light, is_faint in (
+        (rough, window, True), (rough, lamp, False), (rough.model_copy(update={"r0": (0.9,) * 3}), window, False),
+    ):  # fmt: skip
+        renderer = Renderer(device, wall_scene(material((lobe,)), lit(light, rest=0.5)))
+        (draw,) = draws_of(replace(STATE, n=None), renderer.resources)
+        assert (draw.table == "") == is_faint
+        (many,) = draws_of(replace(STATE, integrator="rings", n=None), renderer.resources)
+        assert many.n == 11 and draw.n == (5 if is_faint else 3)
+    faint, exact = (
+        renderer_of.image(replace(STATE, n=n, integrator=how))
+        for renderer_of in [Renderer(device, wall_scene(material((rough,)), lit(window, rest=0.5)))]
+        for n, how in ((None, "lamps"), (40, "rings"))
+    )
+    assert np.abs(faint - exact).max() < 0.1 * 0.5  # of the light around
+
+
 def test_groups_are_cut_at_the_widest_gaps() -> None:
     assert list(group_of([0.01, 0.011, 0.1, 0.11, 0.4])) == [0, 0, 1, 1, 2]
     assert list(group_of([])) == []

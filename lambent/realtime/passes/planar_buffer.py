@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Any
 
 from lambent.realtime.context import FrameContext
-from lambent.realtime.integrators import INTEGRATORS
+from lambent.realtime.integrators import INTEGRATORS, Integrator
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.depth import DepthPass, draw_seen, set_geometry
 from lambent.realtime.passes.light import Glazing, Shading, Stage
@@ -24,6 +24,7 @@ from lambent.realtime.shader_source import assemble
 from lambent.realtime.slices import Steps
 from lambent.realtime.structs import FRAME_DTYPE, MIRRORED_VIEW_DTYPE, PLAN_DTYPE
 from lambent.realtime.targets import DEPTH_FORMAT, Target, target_texture
+from lambent.realtime.textures import BITS
 from lambent.realtime.uploads import upload
 from lambent.store.contract import PlanRecord
 from lambent.store.plans import plan_of
@@ -33,6 +34,8 @@ FIRST_PX = 4  # side of the finest cells, CELL_PX of shaders/planar_view.wgsl
 MOST_LEVELS = 7  # of cells; the coarsest have 256 px
 FORMATS = LIGHT_FORMAT, PLANE_FORMAT = "rgba16float", "rgba32float"
 MIRRORED_N = 3  # samples per lobe of what is mirrored, from its probe
+BLURRED_N = 1  # where the reflector blurs what it mirrors
+BLURS_M = 0.04  # least roughness of such a reflector's lobes
 STAGE = Stage(
     "planar_buffer_main", "planar_buffer.wgsl", "cw", mixes_parts=True
 )  # mirrored triangles turn the other way
@@ -171,14 +174,12 @@ class PlanarBufferPass:
         `lamps` are those that leave each view.
         """
         write, layouts = self._layouts.device.queue.write_buffer, self._layouts
-        wanted = INTEGRATORS[context.state.integrator]
-        few = INTEGRATORS["lamps" if wanted.lamps or wanted.progressive else "rings"]  # published ones, as they were
-        diffuse = INTEGRATORS["diffuse"]
-        draws, panes = (
-            [d.by(few if d.material.lobes else diffuse, context.resources, MIRRORED_N) for d in of]
-            for of in (context.draws, context.panes)
-        )
         for index, (view, gone) in enumerate(zip(context.views, lamps, strict=True)):
+            how, n = _mirrored_by(context, view)
+            draws, panes = (
+                [d.by(how if d.material.lobes else INTEGRATORS["diffuse"], context.resources, n) for d in of]
+                for of in (context.draws, context.panes)
+            )
             write(self._frame(index), 0, view.frame.tobytes())
             write(self.uniform(index), 0, view.uniform.tobytes())
             group = layouts.group(layouts.frame, self._frame(index), context.resources.sampler)
@@ -218,3 +219,17 @@ class PlanarBufferPass:
         for finer, into in (pair for levels in buffer.layers for pair in pairwise(levels)):
             group = self._layouts.group(self._layouts.shown, finer, resources.sampler)
             context.cover("mips", [into], self._mips, [group])
+
+
+def _mirrored_by(context: FrameContext, view: PlanarView) -> tuple[Integrator, int]:
+    """Integrator of what a view mirrors, and its samples per lobe.
+
+    Where every lobe of the reflector is wide, one sample serves: the highlights in the view are blurred themselves.
+    """
+    wanted = INTEGRATORS[context.state.integrator]
+    mine = [draw for draw in context.draws if view.has(draw.item.record)]
+    narrowest = min((min(lobe.mx, lobe.my) for draw in mine for lobe in draw.material.lobes), default=0.0)
+    if wanted.lamps and narrowest >= BLURS_M and not any(draw.textures & BITS["roughness"] for draw in mine):
+        return INTEGRATORS["rings"], BLURRED_N
+    # published integrators draw what they mirror as they were published
+    return INTEGRATORS["lamps" if wanted.lamps or wanted.progressive else "rings"], MIRRORED_N
