@@ -139,6 +139,11 @@ class Pacer:
             return WHOLE
         return Plan(1.0, self.accumulated) if refine and self.accumulated < self.accumulate_to else None
 
+    def forget_refinement(self) -> None:
+        """Plan the frame in motion again, whole, in place of an accumulated one."""
+        if self.accumulated:
+            self.accumulated, self._last = 0, None
+
     def drawn(self, plan: Plan) -> None:
         self._last = plan
         self.accumulated = 0 if plan.accumulate is None else plan.accumulate + 1

@@ -51,6 +51,17 @@ def test_movement_and_cameras(panels, state):
     assert state.navigation.camera == state.scene.cameras[1]
 
 
+def test_the_line_on_a_bake_moves_no_control(panels, state):
+    """A bake starts seconds after an edit, while the mouse may hold the next slider."""
+    state.answering.possible = state.rebaking.possible = True
+    panels.frame()
+    places = dict(panels.rects)
+    for line, exact in (("baking again 0:07: starting", False), ("exact: baked again", True), ("", False)):
+        state.rebaking.line, state.rebaking.exact = line, exact
+        panels.frame()
+        assert panels.rects == places
+
+
 def test_a_camera_path_plays_pauses_and_is_scrubbed(panels, state):
     panels.click("play")
     assert state.navigation.path.playing

@@ -189,6 +189,17 @@ def test_an_integrator_agrees_with_itself(renderer, state):
     assert names == ["small-room-001-error.png", "small-room-001.exr", "small-room-001.png"]
 
 
+def test_a_comparison_leaves_the_refined_picture(renderer, state):
+    """A is the frame in motion, also where the picture had been refined before."""
+    pictures = Pictures(renderer, state)
+    drawn(pictures, state, SIZE, 6)
+    assert state.screen.statistics.accumulated > 0
+    state.comparison.mode, state.comparison.integrator = "error map", "lamps"
+    drawn(pictures, state, SIZE, 4)
+    assert state.screen.statistics.accumulated == 0
+    assert state.comparison.figures.psnr_db == np.inf
+
+
 def film(pictures, state, name):
     state.films.file_name, state.films.size = name, "640 x 360"
     state.films.wanted = CameraPath(name="short", keys=(FRONT, SIDE), seconds=0.1)

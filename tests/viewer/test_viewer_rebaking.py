@@ -32,6 +32,7 @@ from lambent.viewer.modes.walk.rebaked_light import (
     texel_objects,
     texel_steps,
 )
+from lambent.viewer.modes.walk.rebaking import clock_time
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.screen import Rect
 from tests.bake.small_scenes import TINY
@@ -479,3 +480,8 @@ def test_reading_takes_the_units_of_the_scene_that_is_shown(store, tmp_path):
     assert again.scene.probes.keys() == scene.probes.keys()
     for name, probe in scene.probes.items():
         np.testing.assert_allclose(again.probe(name, {}).radiance, probe.radiance, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("seconds", "shown"), [(0.9, "0:00"), (65, "1:05"), (3599, "59:59"), (14962, "4:09:22")])
+def test_clock_time_has_hours_where_there_are_some(seconds, shown):
+    assert clock_time(seconds) == shown

@@ -101,7 +101,8 @@ def test_the_walk_mode(walk):
     state.lights.groups = (LightGroupRecord(name="lamp", members=("bulb",), share=1.0),)
     state.navigation.scrub(state.scene.paths[0], 1.0)
     state.recordings.set_key()
-    state.answering.possible, state.rebaking.line = True, "baking again"
+    state.answering.possible = state.rebaking.possible = True
+    state.rebaking.line = "baking again"
     check(walk, seen)
     state.recordings.save_view()
     check(walk, seen)

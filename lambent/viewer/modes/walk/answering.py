@@ -26,8 +26,8 @@ from lambent.store.answer import has_answer, read_answer
 from lambent.store.store import Store
 from lambent.viewer.work import Work
 
-AS_BAKED = "light on other surfaces: as baked"
-ESTIMATED = "light on other surfaces: estimated"
+AS_BAKED = "indirect light: as baked"
+ESTIMATED = "indirect light: estimated"
 WITHOUT = "light on other surfaces stays as baked: the store has no answer data (`lambent bake --only answer`)"
 
 
@@ -45,7 +45,7 @@ class Answering:
         """A line for the panel."""
         if self.likely_error is None or not self.on:
             return self.said
-        return f"light on other surfaces: estimated, error up to about {100 * self.likely_error:.1f} %"
+        return f"indirect light: estimated, error up to {100 * self.likely_error:.1f} %"
 
 
 @dataclass(frozen=True, eq=False)

@@ -109,10 +109,8 @@ class Pictures(Pair):
             state.comparison.forget()
             state.comparison.figures = None
             self.shown = (self._a,)
-            still = state.films.under_way is not None or shows_choice(
-                wanted
-            )  # averaging would mix the colours of points
-            self._a.update(wanted, refine=False if still else None)
+            averages = state.films.under_way is None and not shows_choice(wanted)  # a mean would mix points' colours
+            self._a.update(wanted, refine=None if averages else False)
         look, size = state.look, (max(1, place.width), max(1, place.height))
         exposure_ev = look.exposure_ev + math.log2(self._renderer.scene.unit)  # probes have these units
         state.marks.update(state.navigation.camera, size, look.display_transform, exposure_ev)
@@ -209,6 +207,7 @@ class Pictures(Pair):
         if comparison.look_up != AS_A:
             beside = replace(beside, lookup=comparison.look_up, lookups={})
         b.update(beside, refine=comparison.integrator == REFERENCE, share=SHARED)
+        a.pacer.forget_refinement()
         a.update(wanted, refine=False, share=SHARED)  # last, because the window shows its statistics
         comparison.divider.a_label = wanted.integrator
         comparison.divider.b_label = ", ".join(
@@ -234,6 +233,7 @@ class Pictures(Pair):
         b = self._traced
         self.shown = (a, b)
         b.update(wanted, self._state.materials.edits.room.textures)
+        a.pacer.forget_refinement()
         a.update(wanted, refine=False)
         comparison.fault = b.fault
         comparison.divider.a_label, comparison.divider.b_label = wanted.integrator, b.label

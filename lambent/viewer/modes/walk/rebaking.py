@@ -176,8 +176,8 @@ class RebakedLight:
             return
         fade, lit = self._fade, self._light.lit if self._light is not None else np.zeros(0, bool)
         if self._process is not None:
-            passed = minutes(self._screen.clock() - self._began_s)
-            first = f" (first bake {minutes(self._first_s)})" if self._first_s else ""
+            passed = clock_time(self._screen.clock() - self._began_s)
+            first = f" (first bake {clock_time(self._first_s)})" if self._first_s else ""
             shown = f"; new light on {lit.sum()} of {len(lit)} objects" if fade is not None and lit.any() else ""
             self._shown.line = f"baking again {passed}{first}: {self._step}{shown}"
         elif fade is not None and fade.done and not self._shown.said:
@@ -211,6 +211,8 @@ def first_bake_s(store: Path) -> float:
     return float(sum(timings.get(kind, 0.0) for kind in KINDS))
 
 
-def minutes(seconds: float) -> str:
-    """Minutes and seconds, as in 1:05."""
-    return f"{int(seconds) // 60}:{int(seconds) % 60:02}"
+def clock_time(seconds: float) -> str:
+    """Minutes and seconds, as in 1:05, or hours, minutes and seconds, as in 4:09:22."""
+    minutes, rest_s = divmod(int(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest_s:02}" if hours else f"{minutes}:{rest_s:02}"

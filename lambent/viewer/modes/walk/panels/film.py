@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from lambent.core.plain import plain_name
 from lambent.viewer.modes.walk.filming import FPS, QUALITIES, SIZES, Filming, Films
+from lambent.viewer.modes.walk.rebaking import clock_time
 from lambent.viewer.modes.walk.recording import Recordings
 from lambent.viewer.navigation import Navigation
 from lambent.viewer.panels.widgets import choice, path_field, press
@@ -41,7 +42,7 @@ def draw(films: Films, recordings: Recordings, navigation: Navigation, screen: S
 
 def _progress(film: Filming) -> bool:
     """Draw the progress; return whether to cancel the film."""
-    left = "" if film.left_s is None else f", {int(film.left_s) // 60}:{int(film.left_s) % 60:02} left"
+    left = "" if film.left_s is None else f", {clock_time(film.left_s)} left"
     imgui.progress_bar(film.done / film.total, (-1, 0), f"frame {film.done} of {film.total}{left}")
     imgui.text_disabled(film.file.name)
     return press("cancel the film", "stops the film; finished images of a sequence are kept", -1)

@@ -36,7 +36,10 @@ def _light(state: WalkState) -> None:
     if rebaking.possible:
         meaning = "bakes the light of edited materials again in the background and updates the picture"
         rebaking.on = check("bake edits", rebaking.on, meaning)
-    for line in ("" if rebaking.exact else answering.note, rebaking.line):
+    lines = [rebaking.line if rebaking.exact else answering.note]
+    if rebaking.possible:  # the second line is always there: no control may move under the mouse
+        lines.append("" if rebaking.exact else rebaking.line)
+    for line in lines:
+        imgui.text_disabled(line)
         if line:
-            imgui.text_disabled(line)
             explain(line)

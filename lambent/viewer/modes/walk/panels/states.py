@@ -46,10 +46,10 @@ def draw(states: States, comparison: Comparison, screen: Screen) -> None:
 def _row(states: States, name: str, room: RoomState, own: str) -> None:
     """Draw a state with its buttons, whose ids end with `own`."""
     edits = states.edits
-    if press(f"apply##{own}", f"sets the room to {name}; undo restores the room", small=True):
+    if press(f"apply##{own}", f"sets the room to '{name}'; undo restores the room", small=True):
         edits.take(room)
     imgui.same_line()
-    if press(f"split##{own}", f"shows the room and {name} side by side", small=True):
+    if press(f"split##{own}", f"shows the room and '{name}' side by side", small=True):
         states.show_beside(room)
     imgui.same_line()
     marks = [mark for mark, here in (("now", edits.room == room), ("beside", edits.other == room)) if here]
