@@ -14,13 +14,13 @@ from lambent.store.contract import is_two_sided
 from lambent.store.store import Store
 
 BACKS = "backs"  # document: its key, and the objects
-LEAST = 2e-4  # share of all that viewers see, below which a back is left black
+LEAST = 4e-5  # share of all that viewers see, below which a back is left black: ten rays
 
 
 def find_backs(scene: Scene, store: Store, timed: Timed = untimed, *, anew: bool = False) -> None:
     """Note in the store whose backs are seen: as before where geometry is the same, whatever cameras, unless `anew`."""
     clear = sorted(name for name, material in scene.materials.items() if material.transmits)
-    key = key_of(BACKS, 1, clear, [o.material for o in scene.objects], *geometry_inputs(scene))
+    key = key_of(BACKS, 2, clear, [o.material for o in scene.objects], *geometry_inputs(scene))
     if not anew and store.documents.get(BACKS, {}).get("key") == key:
         return
     engine()  # before Mitsuba is imported
