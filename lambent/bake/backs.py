@@ -14,7 +14,7 @@ from lambent.store.contract import is_two_sided
 from lambent.store.store import Store
 
 BACKS = "backs"  # document: its key, and the objects
-LEAST = 5e-5  # share of all that viewers see, below which a back is left unlit: 500 pixels of 960 x 540
+LEAST = 4e-5  # share of all that viewers see, below which a back is left black: ten rays
 
 
 def find_backs(scene: Scene, store: Store, timed: Timed = untimed, *, anew: bool = False) -> None:

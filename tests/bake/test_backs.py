@@ -10,6 +10,7 @@ import pytest
 
 from lambent.bake.backs import backs_of
 from lambent.bake.bake import bake
+from lambent.bake.engine import engine
 from lambent.bake.surfaces.texels import texels_of
 from lambent.core.camera import Camera
 from lambent.scenes.geometry import box, patch, placed
@@ -65,6 +66,17 @@ def test_without_viewers_and_for_closed_objects_there_are_no_backs(tmp_path: Pat
     block = SceneObject("block", placed(box((0.4, 0.4, 0.4)), (0, 2, 0)), "black")
     store = bake(replace(scene(), objects=(block,)), tmp_path / "b", quality=LIGHT, only=("geometry",))
     assert not backs_of(store)
+
+
+def test_the_back_of_a_strip_that_fills_little_of_the_view_is_lit(tmp_path: Path) -> None:
+    """The inner side of a window's frame, which few rays meet, stands out black beside the window."""
+    strip = SceneObject("strip", patch((-0.015, 1.0, 0.5), (0.03, 0, 0), (0, 0, -0.03)), "black")
+    few = replace(scene(), objects=(*scene().objects, strip), cameras=scene().cameras[:1])
+    engine()
+    from lambent.bake.tracing.viewed import seen_from_behind
+
+    assert seen_from_behind(few, 2e-4) == ["crate", "shelf"]
+    assert backs_of(bake(few, tmp_path / "s", quality=LIGHT, only=("geometry",))) == {"crate", "shelf", "strip"}
 
 
 def test_backs_stay_as_found_when_a_camera_comes_later(tmp_path: Path) -> None:
