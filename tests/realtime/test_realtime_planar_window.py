@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,10 @@ import pytest
 
 import lambent.realtime.planar_view
 from lambent.core.camera import Camera
+from lambent.realtime.draws import draws_of
 from lambent.realtime.frame_state import QMC_N, FrameState
+from lambent.realtime.integrators import INTEGRATORS
+from lambent.realtime.passes.planar_buffer import mirrored_by
 from lambent.realtime.planar_view import MARGIN_PX, STEP_PX, on_screen, planar_views
 from lambent.realtime.renderer import Renderer
 from lambent.store.contract import ReflectorPart, ReflectorRecord
@@ -89,3 +93,20 @@ def test_a_tile_that_shares_a_lobe_needs_fewer_samples() -> None:
     assert shared.planar_samples(smooth) == shared.samples(smooth)
     assert FrameState(CAMERA, n=19).planar_samples(rough) == 19, "what is asked for"
     assert FrameState(CAMERA, integrator="qmc").planar_samples(rough) == QMC_N
+
+
+def test_one_sample_serves_what_a_reflector_blurs(device: Any) -> None:
+    """A glossy ball over a floor: highlights of its lamps matter in a sharp mirror alone."""
+    how = {}
+    for m in (0.003, 0.15):
+        renderer = Renderer(device, scene_of(mirror(m)))
+        state = FrameState(CAMERA, WIDTH, HEIGHT)
+        (view,) = planar_views(frame_of(CAMERA), [FLOOR], WIDTH, HEIGHT, 4, {"floor": m})
+        draws = draws_of(state, renderer.resources, {"floor"})
+        for integrator in ("lamps", "rings", "qmc"):
+            frame = SimpleNamespace(state=replace(state, integrator=integrator), draws=draws)
+            how[m, integrator] = mirrored_by(frame, view)
+    three = {"lamps": (INTEGRATORS["lamps"], 3), "rings": (INTEGRATORS["rings"], 3), "qmc": (INTEGRATORS["lamps"], 3)}
+    for integrator, expected in three.items():
+        assert how[0.003, integrator] == expected
+        assert how[0.15, integrator] == ((INTEGRATORS["rings"], 1) if integrator == "lamps" else expected)

@@ -175,7 +175,7 @@ class PlanarBufferPass:
         """
         write, layouts = self._layouts.device.queue.write_buffer, self._layouts
         for index, (view, gone) in enumerate(zip(context.views, lamps, strict=True)):
-            how, n = _mirrored_by(context, view)
+            how, n = mirrored_by(context, view)
             draws, panes = (
                 [d.by(how if d.material.lobes else INTEGRATORS["diffuse"], context.resources, n) for d in of]
                 for of in (context.draws, context.panes)
@@ -221,7 +221,7 @@ class PlanarBufferPass:
             context.cover("mips", [into], self._mips, [group])
 
 
-def _mirrored_by(context: FrameContext, view: PlanarView) -> tuple[Integrator, int]:
+def mirrored_by(context: FrameContext, view: PlanarView) -> tuple[Integrator, int]:
     """Integrator of what a view mirrors, and its samples per lobe.
 
     Where every lobe of the reflector is wide, one sample serves: the highlights in the view are blurred themselves.
