@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import typer
+    from typer.exceptions import TyperException
 
 INTERRUPTED = 130
 AGAIN_S = 0.02
@@ -82,8 +83,7 @@ def run(arguments: list[str]) -> int:
     except UserError as error:
         return _fail(str(error))
     except TyperException as error:  # unknown commands and options, missing arguments
-        message = error.format_message().replace("Value error, ", "").replace("Input should be", "it has to be")
-        return _fail(message)
+        return _fail(_usage_fault(error))
     except (Cancelled, KeyboardInterrupt):
         code = INTERRUPTED
     except BrokenPipeError:
@@ -102,6 +102,13 @@ def run(arguments: list[str]) -> int:
     if code == INTERRUPTED:
         sys.stderr.write(INTERRUPTION)
     return int(code)
+
+
+def _usage_fault(error: TyperException) -> str:
+    """The message of a wrong command line, and the command that shows the right one."""
+    message = error.format_message().replace("Value error, ", "").replace("Input should be", "it has to be")
+    context = getattr(error, "ctx", None)
+    return message if context is None else f"{message.removesuffix('.')} (see `{context.command_path} --help`)"
 
 
 def _is_interruption(error: BaseException | None) -> bool:

@@ -45,6 +45,7 @@ class Window:
         self._made_of: dict[str, Any] = {}  # the view or array that each texture shows
         self._popup_open = False
         self._extra_frames = 0
+        self._told: list[str] = []  # messages of the last frame
         self._drawn_s = self.screen.clock()
         self._beat = Beat(1 / MAX_FPS)
         self._moving = False  # whether something moves between this frame and the next
@@ -93,9 +94,7 @@ class Window:
         """Advance the mode to the present time."""
         now_s = self.screen.clock()
         since_last_s, self._drawn_s = now_s - self._drawn_s, now_s
-        self.mode.advance(
-            since_last_s if self._moving else 0.0
-        )  # a sleep before the first step must not count as walking
+        self.mode.advance(since_last_s if self._moving else 0.0)  # a sleep before the first step is no walking
         if self.screen.close_wanted or self.screen.closes:
             self._want_close()
         self.screen.drop_old_messages()
@@ -192,7 +191,12 @@ class Window:
                 loop.call_soon(self.canvas.close)
         # Dear ImGui takes quick typing and clicking up one by one, a frame each.
         unread = len(self._imgui.imgui_context.input_events_queue) > 0
-        self._extra_frames = SETTLE_FRAMES if unread else max(0, self._extra_frames - 1)
+        told = [message.text for message in self.screen.messages]
+        if unread or told != self._told:  # news from the background change the sizes of windows and tables, too
+            self._extra_frames = SETTLE_FRAMES
+        else:
+            self._extra_frames = max(0, self._extra_frames - 1)
+        self._told = told
         self._moving = self.mode.moving
         if self._moving or self._extra_frames or self._frames is not None:
             self.canvas.request_draw()

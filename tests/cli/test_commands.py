@@ -70,11 +70,12 @@ def test_missing_argument(refused, command):
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_unknown_option(refused, command):
-    assert "No such option: --bogus" in refused(command, "--bogus")
+    said = refused(command, "--bogus")
+    assert "No such option: --bogus" in said and f"(see `lambent {command} --help`)" in said
 
 
 def test_unknown_command(refused):
-    assert "No such command 'fitt'" in refused("fitt")
+    assert "Did you mean 'fit'? (see `lambent --help`)" in refused("fitt")
 
 
 @pytest.mark.parametrize(

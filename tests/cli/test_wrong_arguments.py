@@ -44,7 +44,7 @@ WRONG = {
     "render folder -o x.png --exposure 1e9": "--exposure: is out of range",
     "render folder -o x.png --range 5:1": "is not a luminance range; found 5:1",
     "render folder -o x.png --range a:b": "--range: not a range",
-    "render folder -o x.png --size 5": "--size: not a picture size",
+    "render folder -o x.png --size 5": "--size: cannot be read as a picture size",
     "render folder -o x.png --samples 0": "--samples': it has to be greater than or equal to 1",
     "render folder -o x.png --view pretty": "--view: unknown view transform",
     "render folder -o x.png --surfaces 2": "--surfaces",

@@ -69,6 +69,8 @@ def test_every_format_says_what_it_is() -> None:
 def test_what_no_loader_reads_is_told_with_every_ending(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"unknown scene format; found .fbx; expected .glb, .gltf, .*.ply, .toml"):
         load_scene(tmp_path / "a.fbx")
+    with pytest.raises(UserError, match=r"unknown scene format; found a folder; expected .glb"):
+        load_scene(tmp_path)
     with pytest.raises(
         UserError, match=r"found rom; expected box, cornell, .*, room, teatray, vase; did you mean 'room'"
     ):

@@ -1,5 +1,7 @@
 """A mode is a folder, found and opened: a toy one of a single panel and a drawing of one colour."""
 
+import time
+
 import pytest
 from PIL import ImageGrab
 
@@ -48,6 +50,35 @@ def start(path, name, screen, **options):
 '''
 
 
+ALARM = TOY.replace('STARTS = ("toy",)', 'STARTS = ("alarm",)').replace('".toy"', '".alarm"')
+ALARM = (
+    ALARM[: ALARM.index("    def draw():")]
+    + """
+    shown = []
+
+    def draw():
+        if screen.messages:
+            shown.append(None)
+        imgui.button(f"shown {len(shown)}")
+
+    class Alarm(Mode):
+        at_s = screen.clock() + 4.0
+
+        def advance(self, dt_s):
+            if screen.clock() >= self.at_s:
+                self.at_s = float("inf")
+                screen.say("it rings")
+
+        def wait_s(self):
+            return max(0.0, self.at_s - screen.clock()) if self.at_s < float("inf") else None
+
+    COLOUR = np.full((4, 4, 4), (30, 160, 90, 255), np.uint8)
+    panel = Panel("Alarm", draw, "an alarm", opened=True)
+    return Alarm(path.stem, screen, Input(screen, None, None), Plain(open_device()), [panel])
+"""
+)
+
+
 @pytest.fixture
 def toys(tmp_path, monkeypatch):
     """A folder of modes with one more."""
@@ -63,6 +94,26 @@ def test_modes_are_found(toys, tmp_path):
     assert edit.editing_mode(tmp_path / "brass.json") == edit.editing_mode(tmp_path / "missing.bsdf") == "material"
     with pytest.raises(UserError, match=r"unknown mode.*toy"):
         app.run(tmp_path, "toi")
+
+
+@pytest.mark.slow
+def test_a_message_from_the_background_settles(adapter, toys, tmp_path):
+    """Dear ImGui finds the size of what is new one frame later: without another frame, a message is cut off."""
+    if missing_tools():
+        pytest.skip(f"not installed: {', '.join(missing_tools())}")
+    (toys / "alarm").mkdir()
+    (toys / "alarm" / "__init__.py").write_text(ALARM)
+    screen = VirtualScreen()
+    session = WindowSession(screen, tmp_path / "clock.alarm", tmp_path, (480, 320), f"found:{toys}")
+    try:
+        session.wait_for(lambda state: "shown 1" in state["rects"])
+        end = time.monotonic() + 3
+        while "shown 3" not in session.state()["rects"]:
+            assert time.monotonic() < end, "the window sleeps too soon"
+            time.sleep(0.05)
+    finally:
+        session.kill()
+        screen.close()
 
 
 @pytest.mark.slow

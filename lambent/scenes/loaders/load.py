@@ -121,7 +121,8 @@ def _format_of(path: Path) -> ModuleType:
     module = next((m for m in formats() if path.suffix.lower() in m.ENDINGS), None)
     if module is None:
         expected = ", ".join([*(ending for m in formats() for ending in m.ENDINGS), TOML])
-        raise UserError("unknown scene format", file=path, got=path.suffix or "no file extension", expected=expected)
+        got = "a folder" if path.is_dir() else path.suffix or "no file extension"
+        raise UserError("unknown scene format", file=path, got=got, expected=expected)
     return module
 
 
