@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.quality import Quality
+from lambent.bench.light_field_caches import caches
 from lambent.bench.light_field_view import Compared, LightFieldView
 from lambent.core import light_field_lookup as look
 from lambent.core.arrays import Floats
 from lambent.core.light_field import NO_POINT, LightField, Sky
 from lambent.core.light_field_lookup import March, Place
 from lambent.core.light_field_maps import radiance_along
-from lambent.core.map_cache import POLICIES, fewest_misses, misses
 from lambent.core.progress import Progress, part_of, silent
 from lambent.scenes import load_scene
 
@@ -31,8 +31,6 @@ NAME = "oslf"
 POWERS = (1, 4, 8, 16)
 ONE, FOUR = March(candidates=1), March()
 PER_POINT = FOUR.steps + 1 + FOUR.secants + 1  # distances, that at infinity among them, and the radiance
-SCATTERED = 100  # samples of a BRDF
-TILE = 16  # pixels: a renderer's order of shading
 PREVIEW = Quality("preview")
 SMALL = PREVIEW.changed("small", geometry={"texels": 64}, light_map={"gather_samples": 0}, environment={"texels": 16})
 
@@ -143,35 +141,6 @@ def surface_rows(
 def raw_mb(field: LightField) -> float:
     """Half floats of radiance and inverse distance, and the sample map, uncompressed."""
     return round((field.radiance.nbytes + field.inverse_distance.nbytes + field.sample_map.nbytes) / 1e6, 1)
-
-
-def caches(
-    field: LightField, place: Place, view: LightFieldView, capacities: tuple[int, ...]
-) -> Iterator[dict[str, Any]]:
-    """Misses in percent of what is read, pixel by pixel: in rows, as the thesis's renderer shades, or in tiles.
-
-    Maps are read whole: for the surface (the first point), for reflections (all four), and for SCATTERED samples of a
-    BRDF, with the points in the outer loop: each map is read so often in a row. Of the sample map, rows are read.
-    """
-    pixel, first = np.unique(view.shown.pixel, return_index=True)
-    row, column = np.divmod(pixel, view.size[0])
-    across = column // TILE
-    orders = {"rows": np.lexsort((column, row)), "tiles": np.lexsort((column, row, across, row // TILE))}
-    sample_rows = np.floor(view.shown.uv2[first, 1:] * field.grid[0]).astype(np.int64)
-    points = place.points[first]
-    for what, of, again in (
-        ("sample map", sample_rows, 1), ("surface", points[:, :1], 1), ("reflection", points, 1),
-        ("BRDF", points, SCATTERED),
-    ):  # fmt: skip
-        for order, pixels in orders.items():
-            wanted = of[pixels]
-            reads = wanted[wanted != NO_POINT].tolist()
-            for capacity in capacities:
-                missed = {name: misses(reads, make(capacity)) for name, make in POLICIES.items()}
-                missed["known future"] = fewest_misses(reads, capacity)
-                percent = {name: round(100 * found / (len(reads) * again), 4) for name, found in missed.items()}
-                count = len(reads) * again
-                yield {"reads": what, "order": order, "maps": capacity, "count": count, "miss_percent": percent}
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -34,6 +34,7 @@
                                            without the disc of meta["sun"] of light_map/irradiance
     light_field/OBJECT/blocks              in its place, (P, B, B, 4) uint32, blocks of BC6H: core.light_field_blocks
     light_field/OBJECT/inverse_distance    (P, E, E) float16, 1/m, 0 where nothing is hit; cover, uint8, see there
+    light_field/OBJECT/distances           in place of both, (P, R, B, 2) uint32, core.distance_blocks. meta["texels"]: E
     light_field/OBJECT/sample_map          (h, w, 4) uint16; written last. meta["corner"] and meta["grid"] place it on
                                            the light map's uv2, meta["offset_m"] is how far off the surface points are.
                                            meta["volume"]: points fill the box of OBJECT, maps are without it
