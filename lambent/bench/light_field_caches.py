@@ -57,31 +57,32 @@ def caches(
 
 
 def thesis_reads(
-    place: Place, w: Floats, pixels: NDArray[np.int64], capacities: tuple[int, ...]
+    place: Place, w: Floats, orders: dict[str, NDArray[np.int64]], capacities: tuple[int, ...]
 ) -> Iterator[dict[str, Any]]:
-    """Misses of reflections in the thesis's own count, pixel by pixel: each texel of bilinear look-ups in cube maps.
+    """Misses of reflections in the thesis's own count: of each texel of bilinear look-ups in cube maps.
 
-    An item is one face of a cube map, read on demand: from its start to the texel that is wanted (section 4.3).
+    An item is a face of a cube map, read on demand: from its first row to that of the texel (section 4.3; compressed
+    TIFF files have rows one after another).
     """
-    face, column, row = face_places(np.repeat(w[pixels, None], place.points.shape[1], axis=1), FACE_TEXELS)
-    texel = (row[..., None] + [0, 0, 1, 1]) * FACE_TEXELS + column[..., None] + [0, 1, 0, 1]
-    point = place.points[pixels]
-    item = np.broadcast_to((6 * point + face)[..., None], texel.shape)
-    known = point != NO_POINT
-    reads = list(zip(item[known].ravel().tolist(), texel[known].ravel().tolist(), strict=True))
-    for capacity in capacities:
-        missed = {"least-recent": round(100 * partial_misses(reads, capacity) / len(reads), 4)}
-        said = {"reads": "reflection, texels of faces", "order": "rows", "maps": capacity}
-        yield {**said, "count": len(reads), "miss_percent": missed}
+    for order, pixels in orders.items():
+        face, _, row = face_places(np.repeat(w[pixels, None], place.points.shape[1], axis=1), FACE_TEXELS)
+        known = place.points[pixels] != NO_POINT
+        item = (6 * place.points[pixels] + face)[known].repeat(4).tolist()
+        rows = (row[known][:, None] + [0, 0, 1, 1]).ravel().tolist()
+        reads = list(zip(item, rows, strict=True))
+        for capacity in capacities:
+            missed = {"least-recent": round(100 * partial_misses(reads, capacity) / len(reads), 4)}
+            said = {"reads": "reflection, texels of faces", "order": order, "maps": capacity}
+            yield {**said, "count": len(reads), "first": len(set(item)), "miss_percent": missed}
 
 
 def partial_misses(reads: list[tuple[int, int]], capacity: int) -> int:
-    """Reads (item, texel) that find their item missing, or read up to an earlier texel; the least recent goes."""
+    """Reads (item, row) that find their item missing, or read up to an earlier row; the least recent goes."""
     held, missed = OrderedDict[int, int](), 0
-    for item, texel in reads:
+    for item, row in reads:
         end = held.pop(item, -1)
-        missed += texel > end
-        held[item] = max(end, texel)
+        missed += row > end
+        held[item] = max(end, row)
         if len(held) > capacity:
             held.popitem(last=False)
     return missed

@@ -3,16 +3,17 @@
 Codes are logarithms of inverse distances: code c, 1 to 255, is the share (c - 1)/254 of the way from
 the least to the largest of a map, 0 the sky. A block is two numbers of 32 bits; its lowest bytes are codes a and b:
 
-    a > b                      texel i has a - (a - b) k/7, k its three bits from bit 16 + 3 i on
-    a <= b, kind (bit 16) 0    two bits from bit 32 + 2 i on: 0 is sky; 1, 2 and 3 are a, (a + b)/2 and b
-    a <= b, kind 1             texels that show the sky in part: an entry of the pool has cover and a + (b - a) k/15
-    a <= b, kind 2             any distances: an entry has a + (b - a) (k - 1)/254, k = 0 for the sky
+    a > b      texel i has a - (a - b) k/7, k its three bits from bit 16 + 3 i on
+    a <= b     two bits from bit 32 + 2 i on are the lowest of k; the kind, in bits 16 and 17, says what k is:
+      kind 0   0 is the sky; 1, 2 and 3 are a, (a + b)/2 and b
+      kind 1   a + (b - a) k/3; texels show the sky in part, and an entry of the pool has `LightField.cover`
+      kind 2   any distances: an entry has four more bits of k, 0 is the sky, others are a + (b - a) (k - 1)/62
+      kind 3   both: an entry with cover, another with four more bits of k; a + (b - a) k/63
 
-Bits 18 to 31 of kinds 1 and 2 number the entry, of 128 bits. Kind 1: 64 bits of k, then 64 of `LightField.cover`, four a
-texel; kind 2: 8 bits of k a texel. A map's blocks lie row by row, its entries in rows below them, two texels each; the last
-texel has the bits of the logarithms, base 2, of the least and the largest. Blocks
-with a mixed texel get entries first, then those whose distances are farthest off. A shader reads whole numbers alone:
-every adapter can. Importing this file imports numba.
+Bits 18 to 31 number the (first) entry, of 64 bits, four of each texel. A map's blocks lie row by row, its pool in rows
+below them; the last entry has the bits of the logarithms, base 2, of the least and the largest. Mixed texels come
+first, then blocks whose distances would be farthest off. A shader reads whole numbers alone: every adapter can.
+Importing this file imports numba.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from lambent.core.light_field_tiles import BLOCK, pool_rows
 LEAST_ERROR = 0.02  # in the logarithm, of a block's texels: below, it needs no entry
 MOST_ERROR = 0.3  # farther off is as bad
 LEAST_SPAN = 0.01  # octaves
-MIXED = 100.0  # added to what is wrong with a block that has texels of both
+MOST_ENTRIES = 1 << 14
 
 
 def encoded(inverse: NDArray[Any], cover: NDArray[np.uint8] | None) -> NDArray[np.uint32]:
@@ -111,79 +112,106 @@ def _ends(code: Any) -> tuple[int, int]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _in_line(code: Any, low: int, high: int, words: Any) -> float:
-    """Write a block without an entry; its squared error in code, each at most that of a texel without distance."""
+def _error(code: Any, low: int, high: int, steps: int, most: float) -> float:
+    """Squared error of a block's surfaces between two codes in so many steps, at most `most` a texel."""
+    wrong = 0.0
+    for i in range(16):
+        if code[i] > 0:
+            k = _step(code[i], low, high, steps)
+            wrong += min((low + (high - low) * k / steps - code[i]) ** 2, most)
+    return wrong
+
+
+@numba.njit(cache=True, nogil=True)
+def _step(code: float, low: int, high: int, steps: int) -> int:
+    return min(max(int((code - low) * steps / max(high - low, 1) + 0.5), 0), steps)
+
+
+@numba.njit(cache=True, nogil=True)
+def _put_in_line(code: Any, low: int, high: int, words: Any) -> None:
+    """Write a block without an entry."""
     sky = False
     for i in range(16):
         sky |= code[i] == 0
-    words[0], words[1] = np.uint32(0), np.uint32(0)
-    wrong = 0.0
     if not sky and low == high:
         if high < 255:
             high += 1
         else:
             low -= 1
     bits = np.uint64(low | high << 8) if sky else np.uint64(high | low << 8)
-    steps = 2 if sky else 7
     for i in range(16):
-        if code[i] == 0:
-            continue
-        k = min(max(int((code[i] - low) * steps / max(high - low, 1) + 0.5), 0), steps)
-        wrong += (low + (high - low) * k / steps - code[i]) ** 2
         if sky:
-            bits |= np.uint64(k + 1) << np.uint64(32 + 2 * i)
+            k = _step(code[i], low, high, 2) + 1 if code[i] > 0 else 0
+            bits |= np.uint64(k) << np.uint64(32 + 2 * i)
         else:
-            bits |= np.uint64(7 - k) << np.uint64(16 + 3 * i)
+            bits |= np.uint64(7 - _step(code[i], low, high, 7)) << np.uint64(16 + 3 * i)
     words[0], words[1] = np.uint32(bits & np.uint64(0xFFFFFFFF)), np.uint32(bits >> np.uint64(32))
-    return wrong
 
 
 @numba.njit(cache=True, nogil=True)
-def _with_entry(code: Any, cover: Any, mixed: bool, low: int, high: int, number: int, words: Any, entry: Any) -> None:
-    """Write a block that has an entry (2, 2) of the pool."""
-    words[0] = np.uint32(low | high << 8 | (1 if mixed else 2) << 16 | number << 18)
-    words[1] = np.uint32(0)
-    flat = np.zeros(4, np.uint32)
+def _put_with_entries(code: Any, cover: Any, kind: int, low: int, high: int, number: int, words: Any) -> None:
+    """Write a block (words 0) and its entries (words 1 and 2) of a kind with such."""
+    block = np.zeros((3, 2), np.uint32)
+    block[0, 0] = np.uint32(low | high << 8 | kind << 16 | number << 18)
+    of_cover, of_code = (1, 2) if kind == 3 else (1, 1)
     for i in range(16):
-        place = (code[i] - low) / max(high - low, 1)
-        if mixed:
-            k = min(max(int(place * 15 + 0.5), 0), 15) if code[i] > 0 else 0
-            flat[i >> 3] |= np.uint32(k << 4 * (i & 7))
-            flat[2 + (i >> 3)] |= np.uint32(int(cover[i]) << 4 * (i & 7))
-        elif code[i] > 0:
-            k = min(max(int(place * 254 + 0.5), 0), 254) + 1
-            flat[i >> 2] |= np.uint32(k << 8 * (i & 3))
-    entry[0, 0], entry[0, 1], entry[1, 0], entry[1, 1] = flat[0], flat[1], flat[2], flat[3]
+        k = 0
+        if code[i] > 0:
+            k = _step(code[i], low, high, 62) + 1 if kind == 2 else _step(code[i], low, high, 3 if kind == 1 else 63)
+        block[0, 1] |= np.uint32((k & 3) << 2 * i)
+        if kind != 2:
+            block[of_cover, i >> 3] |= np.uint32(int(cover[i]) << 4 * (i & 7))
+        if kind != 1:
+            block[of_code, i >> 3] |= np.uint32((k >> 2) << 4 * (i & 7))
+    for row in range(3):
+        words[row, 0], words[row, 1] = block[row, 0], block[row, 1]
+
+
+@numba.njit(cache=True, nogil=True)
+def _whole(code: Any, cover: Any, whole: Any) -> bool:
+    """Codes of texels that are the sky, or a surface, as most of their quarters are; whether any texel is both."""
+    mixed = False
+    for i in range(16):
+        mixed |= cover[i] != 0 and cover[i] != 15
+        bits = (cover[i] & 1) + (cover[i] >> 1 & 1) + (cover[i] >> 2 & 1) + (cover[i] >> 3)
+        whole[i] = code[i] if bits >= 2 else 0.0
+    return mixed
 
 
 @numba.njit(cache=True, nogil=True)
 def _encode(code: Any, cover: Any, words: Any, octaves: float) -> None:
     """A map: codes and cover (B, 16) to words (B + pool, 2). A code more is so many octaves."""
     count = len(code)
-    room = min((len(words) - count) // 2, 1 << 14)
-    wrong = np.zeros(count)
+    room = min(len(words) - count, MOST_ENTRIES)
     least, most = 16 * (LEAST_ERROR / (0.6931 * octaves)) ** 2, (MOST_ERROR / (0.6931 * octaves)) ** 2
+    gain, kind, mixed = np.zeros(count), np.zeros(count, np.int64), np.zeros(count, np.bool_)
     whole = np.zeros(16, np.float32)
     for b in range(count):
-        mixed = False
-        for i in range(16):
-            mixed |= cover[b, i] != 0 and cover[b, i] != 15
-            bits = (cover[b, i] & 1) + (cover[b, i] >> 1 & 1) + (cover[b, i] >> 2 & 1) + (cover[b, i] >> 3)
-            whole[i] = code[b, i] if bits >= 2 else 0.0
-        low, high = _ends(whole)
-        error = min(_in_line(whole, low, high, words[b]), 16 * most)
-        if mixed:
-            wrong[b] = MIXED * most + error
-        elif error > least:
-            wrong[b] = error
-    order = np.argsort(-wrong)
-    for number in range(min(room, count)):
-        b = order[number]
-        if wrong[b] == 0.0:
-            break
+        mixed[b] = _whole(code[b], cover[b], whole)
         low, high = _ends(code[b])
-        at = count + 2 * number
-        _with_entry(code[b], cover[b], wrong[b] >= MIXED * most, low, high, number, words[b], words[at : at + 2])
+        sky = (whole == 0).any()
+        gain[b] = _error(code[b], low, high, 3, most) if mixed[b] else _error(whole, low, high, 2 if sky else 7, most)
+    order = np.argsort(-gain)
+    for turn in range(2):  # cover, then distances
+        for b in order:
+            fits = mixed[b] if turn == 0 else gain[b] > least and (kind[b] == 1 or not mixed[b])
+            if fits and room > 0:
+                kind[b] += 1 if turn == 0 else 2
+                room -= 1
+    number = 0
+    for b in range(count):
+        taken = np.zeros((3, 2), np.uint32)
+        if kind[b]:
+            low, high = _ends(code[b])
+            _put_with_entries(code[b], cover[b], kind[b], low, high, number, taken)
+        else:
+            _whole(code[b], cover[b], whole)
+            low, high = _ends(whole)
+            _put_in_line(whole, low, high, taken[0])
+        words[b] = taken[0]
+        for k in range(2 if kind[b] == 3 else min(kind[b], 1)):
+            words[count + number] = taken[1 + k]
+            number += 1
 
 
 @numba.njit(cache=True, nogil=True)
@@ -193,22 +221,22 @@ def _decode(words: Any, code: Any, cover: Any) -> None:
     for b in range(count):
         first, second = int(words[b, 0]), int(words[b, 1])
         a, z = first & 255, first >> 8 & 255
-        kind = 3 if a > z else first >> 16 & 3
-        at = min(count + 2 * (first >> 18), len(words) - 2)
+        kind = first >> 16 & 3
+        at = min(count + (first >> 18), len(words) - (2 if kind == 3 else 1))
         for i in range(16):
-            found, bits = 0.0, 15
-            if kind == 3:
-                k = (first | second << 32) >> (16 + 3 * i) & 7
-                found = a - (a - z) * k / 7
+            found, bits, k = 0.0, 15, second >> 2 * i & 3
+            if a > z:
+                found = a - (a - z) * ((first | second << 32) >> (16 + 3 * i) & 7) / 7
             elif kind == 0:
-                k = second >> 2 * i & 3
                 found = a + (z - a) * (k - 1) / 2 if k else 0.0
-            elif kind == 1:
-                k = int(words[at, i >> 3]) >> 4 * (i & 7) & 15
-                bits = int(words[at + 1, i >> 3]) >> 4 * (i & 7) & 15
-                found = a + (z - a) * k / 15
             else:
-                k = int(words[at + (i >> 3), i >> 2 & 1]) >> 8 * (i & 3) & 255
-                found = a + (z - a) * (k - 1) / 254 if k else 0.0
+                if kind != 2:
+                    bits = int(words[at, i >> 3]) >> 4 * (i & 7) & 15
+                if kind != 1:
+                    k |= (int(words[at + kind - 2, i >> 3]) >> 4 * (i & 7) & 15) << 2
+                if kind == 2:
+                    found = a + (z - a) * (k - 1) / 62 if k else 0.0
+                else:
+                    found = a + (z - a) * k / (3 if kind == 1 else 63)
             cover[b, i] = bits if found > 0 else 0
             code[b, i] = found if bits else 0.0

@@ -1,4 +1,4 @@
-"""Maps of a light field in blocks: light as BC6H, a byte per texel, distances in five bits. Importing this file imports numba.
+"""Maps of a light field in blocks: light as BC6H, a byte per texel, distances in five bits. It imports numba.
 
 Blocks are of tiles, maps with a border of one texel and what fills the last blocks, so that a renderer can show them as
 they are: maps of 310 texels a side are 78 x 78 blocks, and nothing is filled.
@@ -34,7 +34,7 @@ def maps_of(blocks: NDArray[np.uint32], side: int) -> NDArray[np.float16]:
 
 
 def distance_blocks_of(inverse: NDArray[np.float16], cover: NDArray[np.uint8] | None) -> NDArray[np.uint32]:
-    """(P, R, B, 2) of inverse distances and cover (P, E, E): `core.distance_blocks`, of tiles as `blocks_of` has them."""
+    """(P, R, B, 2) of inverse distances and cover (P, E, E): `core.distance_blocks` of tiles as of `blocks_of`."""
     size = up(inverse.shape[1] + 2, BLOCK)
     bits = None if cover is None else tiled(cover[..., None], size)[..., 0]
     return distance_blocks.encoded(tiled(inverse[..., None], size)[..., 0], bits)

@@ -1,7 +1,7 @@
 """How the maps of a light field lie in tiles, whose borders hold what filters find beyond a map's edges.
 
-A tile of level k has a map of `sides[k]` texels from texel (1, 1) on. Each level has about a quarter of the texels a side
-of the one before: all but the finest take a fifteenth of its memory, where halves take a third.
+A tile of level k has a map of `sides[k]` texels from texel (1, 1) on. Each level has about a quarter of the texels a
+side of the one before: all but the finest take a fifteenth of its memory, where halves take a third.
 """
 
 from __future__ import annotations

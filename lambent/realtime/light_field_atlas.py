@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -42,7 +43,7 @@ class Layout:
             for columns in range(1, most + 1)
         ]
         fitting = [one for one in found if max(one.size[:2]) <= MOST_TEXELS]
-        return min(fitting, key=lambda one: (np.prod(one.size), abs(one.size[0] - one.size[1])))
+        return min(fitting, key=lambda one: (math.prod(one.size), abs(one.size[0] - one.size[1])))
 
     def across(self, level: int) -> int:
         """Tiles of a level in a row."""
@@ -161,15 +162,13 @@ class Atlas:
     @property
     def bytes(self) -> int:
         """Of both textures."""
-        return round(
-            self.radiance.size[0] * self.radiance.size[1] * self.radiance.size[2] * self._bytes_per_texel
-            + self.distances.size[0] * self.distances.size[1] * self.distances.size[2] * self._bytes_per_distance
-        )
+        texels, distances = (math.prod(texture.size) for texture in (self.radiance, self.distances))
+        return round(texels * self._bytes_per_texel + distances * self._bytes_per_distance)
 
     @property
     def map_bytes(self) -> float:
         """Of one map in both textures."""
-        return float(self.tiles.texels * self._bytes_per_texel + np.prod(self.cell) * self._bytes_per_distance)
+        return float(self.tiles.texels * self._bytes_per_texel + math.prod(self.cell) * self._bytes_per_distance)
 
     @property
     def _bytes_per_texel(self) -> float:

@@ -49,7 +49,7 @@ def test_what_is_no_distance_is_sky(bad: float) -> None:
 
 def test_quarters_are_exact_as_far_as_the_pool_reaches() -> None:
     """A skyline; where everything is mixed, what is left shows the sky or a surface as most of its quarters do."""
-    cover = np.where(Y > 0.52 + 0.1 * np.sin(9 * X), 15, 0).astype(np.uint8)
+    cover = np.where(0.52 + 0.1 * np.sin(9 * X) < Y, 15, 0).astype(np.uint8)
     line = np.diff(cover, axis=0, append=15) != 0
     cover[line] = RNG.integers(1, 15, line.sum())
     inverse = np.where(cover > 0, FLOOR, 0)
@@ -60,13 +60,12 @@ def test_quarters_are_exact_as_far_as_the_pool_reaches() -> None:
 
     everywhere = RNG.integers(0, 16, (N, N)).astype(np.uint8)
     _, bits = decoded(encoded(FLOOR[None].astype(np.float16), everywhere[None]), N // 4)
-    most = np.where(np.bitwise_count(everywhere) >= 2, 15, 0) if hasattr(np, "bitwise_count") else None
+    most = np.where(np.unpackbits(everywhere[..., None], axis=2).sum(axis=2) >= 2, 15, 0)
     exact = (bits[0] == everywhere).reshape(N // 4, 4, N // 4, 4).all(axis=(1, 3))
-    entries = (pool_rows(N // 4) * N // 4 - 1) // 2
-    assert exact.sum() == entries
-    if most is not None:
-        left = ~exact.repeat(4, 0).repeat(4, 1)
-        np.testing.assert_array_equal(bits[0][left], most[left])
+    assert exact.sum() >= pool_rows(N // 4) * N // 4 - 1
+    left = ~exact.repeat(4, 0).repeat(4, 1)
+    assert left.any()
+    np.testing.assert_array_equal(bits[0][left], most[left])
 
 
 @pytest.mark.parametrize("side", [8, 11, 30, 94, 310])

@@ -70,7 +70,7 @@ class Settings:
 SETTINGS = {
     QualityName.preview: Settings(196, 94),
     QualityName.normal: Settings(576, 158, onward=2),
-    QualityName.final: Settings(1156, 222, onward=4),
+    QualityName.final: Settings(1156, 310, onward=4),
 }
 
 

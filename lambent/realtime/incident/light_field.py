@@ -18,8 +18,8 @@ from lambent.core.light_field import NO_POINT
 from lambent.core.light_field_lookup import POWER, March
 from lambent.realtime.baked import DARK, BakedScene, Probe
 from lambent.realtime.cube_mips import finite, mip_chain
-from lambent.realtime.resident_maps import ResidentMaps, filled
 from lambent.realtime.light_field_atlas import Atlas, coding
+from lambent.realtime.resident_maps import ResidentMaps, filled
 from lambent.realtime.structs import LIGHT_FIELD_DTYPE, Record
 from lambent.realtime.uploads import cube_texture, upload
 

@@ -118,35 +118,30 @@ fn texel_of_block(map: Map, texel: vec2u) -> Texel {
     let words = textureLoad(distances, corner + (texel >> vec2u(2u)), map.layer, 0).rg;
     let i = 4u * (texel.y & 3u) + (texel.x & 3u);
     let ends = vec2f(vec2u(words.x, words.x >> 8u) & vec2u(255u));
+    let kind = (words.x >> 16u) & 3u;
+    var k = (words.y >> (2u * i)) & 3u;
     var cover = 15u;
-    var share = -1.0; // of the way between both ends; below 0 for the sky
+    var share = 0.5 * (f32(k) - 1.0); // of the way between both ends; below 0 for the sky
     if (ends.x > ends.y) {
         let bit = 16u + 3u * i;
         let low = (words.x >> min(bit, 31u)) | (words.y << (32u - min(bit, 31u)));
         share = f32(select(low, words.y >> (max(bit, 32u) - 32u), bit >= 32u) & 7u) / 7.0;
-    } else if (((words.x >> 16u) & 3u) == 0u) {
-        share = 0.5 * (f32((words.y >> (2u * i)) & 3u) - 1.0);
-    } else {
-        let mixed = ((words.x >> 16u) & 3u) == 1u;
-        let first = field.cell.x * (field.tile >> 2u) + 2u * (words.x >> 18u);
-        let a = textureLoad(distances, corner + cell_texel(first), map.layer, 0).rg;
-        let b = textureLoad(distances, corner + cell_texel(first + 1u), map.layer, 0).rg;
-        let entry = vec4u(a, b);
-        if (mixed) {
-            share = f32((entry[i >> 3u] >> (4u * (i & 7u))) & 15u) / 15.0;
-            cover = (entry[2u + (i >> 3u)] >> (4u * (i & 7u))) & 15u;
-        } else {
-            share = (f32((entry[i >> 2u] >> (8u * (i & 3u))) & 255u) - 1.0) / 254.0;
-        }
+    } else if (kind != 0u) {
+        let number = field.cell.x * (field.tile >> 2u) + (words.x >> 18u);
+        if (kind != 2u) { cover = of_entry(map, corner, number, i); }
+        if (kind != 1u) { k |= of_entry(map, corner, number + kind - 2u, i) << 2u; }
+        share = select(f32(k) / select(63.0, 3.0, kind == 1u), (f32(k) - 1.0) / 62.0, kind == 2u);
     }
     if (share < 0.0 || cover == 0u) { return Texel(0.0, 0u); }
     let code = mix(ends.x, ends.y, share);
     return Texel(exp2(mix(map.span.x, map.span.y, (code - 1.0) / 254.0)), cover);
 }
 
-fn cell_texel(number: u32) -> vec2u {
+// Four bits of the i-th texel from an entry of the pool.
+fn of_entry(map: Map, corner: vec2u, number: u32, i: u32) -> u32 {
     let row = whole_share(number, field.cell.x);
-    return vec2u(number - row * field.cell.x, row);
+    let words = textureLoad(distances, corner + vec2u(number - row * field.cell.x, row), map.layer, 0).rg;
+    return (select(words.x, words.y, i >= 8u) >> (4u * (i & 7u))) & 15u;
 }
 
 // 1/m, of the quarter of a texel that a direction from a point lies in; 0 for the sky.
