@@ -51,9 +51,7 @@ def caches(
                     "reads": what, "order": order, "maps": capacity, "count": count, "first": len(set(reads)),
                     "miss_percent": percent,
                 }  # fmt: skip
-    yield from thesis_reads(
-        Place(place.x[first], place.n[first], points), view.shown.w[first], orders["rows"], capacities
-    )
+    yield from thesis_reads(Place(place.x[first], place.n[first], points), view.shown.w[first], orders, capacities)
 
 
 def thesis_reads(

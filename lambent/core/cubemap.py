@@ -57,7 +57,7 @@ def sample(cube: Floats, w: Floats) -> Floats:
 
 
 def face_places(w: Floats, n: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Face, column and row (...) of the first of 2 x 2 texels, n a side of a face, that `sample` reads along w (..., 3)."""
+    """Face, column and row (...) of the first of 2 x 2 texels, n a side, that `sample` reads along w (..., 3)."""
     face, s, t = _on_face(w)
     column, row = np.floor(((np.stack([s, t]) + 1) / 2 * n - 0.5).clip(0, n - 2)).astype(np.int64)
     return face.astype(np.int64), column, row

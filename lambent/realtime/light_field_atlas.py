@@ -162,7 +162,7 @@ class Atlas:
     @property
     def bytes(self) -> int:
         """Of both textures."""
-        texels, distances = (math.prod(texture.size) for texture in (self.radiance, self.distances))
+        texels, distances = (int(math.prod(texture.size)) for texture in (self.radiance, self.distances))
         return round(texels * self._bytes_per_texel + distances * self._bytes_per_distance)
 
     @property

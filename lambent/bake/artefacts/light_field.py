@@ -261,7 +261,11 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
         BLOCKS: ((count, *blocks_shape(how.texels)), "uint32", radiance, 0.0, 0.9),
         DISTANCES: ((count, *distance_blocks_shape(how.texels)), "uint32", distances, 0.9, 1.0),
     }
-    notes = {"radiance": {"unit": traced.unit}, BLOCKS: {"unit": traced.unit}, DISTANCES: {"texels": [how.texels]}}
+    notes: dict[str, dict[str, Any]] = {
+        "radiance": {"unit": traced.unit},
+        BLOCKS: {"unit": traced.unit},
+        DISTANCES: {"texels": [how.texels]},
+    }
     for part in parts_of(how, wish):
         if part not in arrays:
             continue

@@ -65,10 +65,11 @@ def radiance_maps(
     Where the ray through a texel's middle meets no glossy surface, and its neighbours show nearly the same, its light
     is the texel's (Whitted 1980), unless, with `covers`, a lamp is seen through the middle of one of its quarters or
     beside it: lamps smaller than texels would be lost. In other texels, rays go through strata x strata parts, and
-    `onward` paths go on from each glossy surface that these meet first. Beneath points whose surface has `normals` (P, 3), where next to no
-    reflection looks, glossy surfaces are met through the middle alone. A path that is not finite counts as black. A
-    texel holds the light of surfaces or of the sky, as its middle does: as `inverse_distances` has it, and look-ups
-    tell them apart. With `covers`, it has that of surfaces where any of its quarters meets one: as `covered_distances`.
+    `onward` paths go on from each glossy surface that these meet first. Beneath points whose surface has `normals`
+    (P, 3), where next to no reflection looks, glossy surfaces are met through the middle alone. A path that is not
+    finite counts as black. A texel holds the light of surfaces or of the sky, as its middle does: as
+    `inverse_distances` has it, and look-ups tell them apart. With `covers`, it has that of surfaces where any of its
+    quarters meets one: as `covered_distances`.
     """
     found = np.empty((len(points), texels, texels, 3), np.float32)
     for mine in slices(len(points), max(1, PATHS_AT_ONCE // texels**2)):
@@ -77,7 +78,7 @@ def radiance_maps(
         first = _first(around, _rays(some, every, texels, mi.Point2f(0.5)))
         dr.eval(first.light, first.mirrors, first.met)
         light, solid, mirrors = array_of(first.light), np.array(first.met), np.array(first.mirrors)
-        lamps = np.zeros(shape[:3], bool)
+        lamps: Flags = np.zeros(shape[:3], bool)
         if covers:
             quarters, glow = _quarters(around.scene, some, texels)
             lamps = glow.any(axis=(3, 4))
@@ -200,9 +201,9 @@ def covered_distances(scene: Any, points: Floats, texels: int) -> tuple[NDArray[
 
 def _quarters(scene: Any, points: Floats, texels: int) -> tuple[NDArray[np.float16], Flags]:
     """(P, texels, texels, 2, 2) inverse distances through the middles of texels' quarters, and where a lamp is met."""
-    shape = len(points), texels, 2, texels, 2
-    inverse, glow = (fine.reshape(shape).transpose(0, 1, 3, 2, 4) for fine in _met(scene, points, 2 * texels))
-    return inverse, glow
+    inverse, glow = _met(scene, points, 2 * texels)
+    shape, order = (len(points), texels, 2, texels, 2), (0, 1, 3, 2, 4)
+    return inverse.reshape(shape).transpose(order), glow.reshape(shape).transpose(order)
 
 
 def _rays(points: Floats, place: Any, texels: int, within: Any) -> Any:
