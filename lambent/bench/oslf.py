@@ -22,6 +22,7 @@ from lambent.bench.light_field_view import Compared, LightFieldView
 from lambent.core import light_field_lookup as look
 from lambent.core.arrays import Floats
 from lambent.core.light_field import NO_POINT, LightField, Sky
+from lambent.core.light_field_blocks import in_blocks
 from lambent.core.light_field_lookup import March, Place
 from lambent.core.light_field_maps import radiance_along
 from lambent.core.progress import Progress, part_of, silent
@@ -29,6 +30,7 @@ from lambent.scenes import load_scene
 
 NAME = "oslf"
 POWERS = (1, 4, 8, 16)
+STORED = ("B_n 4", "march 1", "march 1, sky", "march 4", "march 4, sky")  # methods that are measured in blocks, too
 ONE, FOUR = March(candidates=1), March()
 PER_POINT = FOUR.steps + 1 + FOUR.secants + 1  # distances, that at infinity among them, and the radiance
 PREVIEW = Quality("preview")
@@ -43,7 +45,7 @@ class Effort:
     object: str = "teapot"
     camera: int = 0
     size: tuple[int, int] = (640, 480)
-    fields: tuple[tuple[int, int], ...] = ((1156, 112), (1156, 222), (1156, 312), (289, 222))
+    fields: tuple[tuple[int, int], ...] = ((1156, 112), (1156, 222), (1156, 310), (289, 222))
     strata: int = 2
     paths: int = 4
     capacities: tuple[int, ...] = (2, 4, 8, 16, 32, 64, 128)
@@ -83,6 +85,7 @@ def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
             for method in methods(field, single, place, view):
                 found = mirror.errors(method.radiance())
                 rows.append({**said, "method": method.name, "look_ups": method.look_ups, **found})
+            rows += stored_rows(field, single, view, mirror, said)
             rows += surface_rows(field, place, view, said)
             if number == 0:
                 rows += list(caches(field, place, view, effort.capacities))
@@ -126,6 +129,19 @@ def true_hit(field: LightField, place: Place, w: Floats, distance_m: Floats, sky
     seen = radiance_along(field, place.named(), q)
     seen[is_open] = radiance_along(field, place.named()[is_open], q[is_open], sky)
     return np.asarray(np.einsum("kj,kjc->kc", look.basis_weights(field, place, w, "normal"), seen))
+
+
+def stored_rows(
+    field: LightField, single: LightField, view: LightFieldView, mirror: Compared, said: dict[str, Any]
+) -> Iterator[dict[str, Any]]:
+    """Some of the methods with the light field in the blocks that a store and a GPU have, and their MB uncompressed."""
+    stored = in_blocks(field)
+    assert stored.blocks is not None and stored.distances is not None, "it is in blocks"
+    megabytes = {"light_mb": stored.blocks.nbytes / 1e6, "distances_mb": stored.distances.nbytes / 1e6}
+    for method in methods(stored, single, view.place(stored), view):
+        if method.name in STORED:
+            found = mirror.errors(method.radiance())
+            yield {**said, **megabytes, "method": f"{method.name}, in blocks", "look_ups": method.look_ups, **found}
 
 
 def surface_rows(

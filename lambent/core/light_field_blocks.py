@@ -6,6 +6,7 @@ they are: maps of 310 texels a side are 78 x 78 blocks, and nothing is filled.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from lambent.core import distance_blocks
 from lambent.core.bc6h import BLOCK, decoded, encoded
+from lambent.core.light_field import LightField
 from lambent.core.light_field_tiles import pool_rows, tiled, up
 
 
@@ -53,3 +55,14 @@ def distances_of(blocks: NDArray[np.uint32], side: int) -> tuple[NDArray[np.floa
     inverse, cover = distance_blocks.decoded(blocks, up(side + 2, BLOCK) // BLOCK)
     inner = np.s_[:, 1 : side + 1, 1 : side + 1]
     return inverse[inner], cover[inner]
+
+
+def in_blocks(field: LightField) -> LightField:
+    """A light field as it is read again where its store has blocks."""
+    side = field.radiance.shape[1]
+    blocks, distances = blocks_of(field.radiance), distance_blocks_of(field.inverse_distance, field.cover)
+    inverse, cover = distances_of(distances, side)
+    return replace(
+        field, radiance=maps_of(blocks, side), inverse_distance=inverse, blocks=blocks, distances=distances,
+        cover=None if field.volume else cover,
+    )  # fmt: skip

@@ -78,6 +78,8 @@ def test_reads_on_demand_miss_what_was_not_read_of_an_item() -> None:
 def test_the_whole_run_is_json(mi: Any) -> None:
     report = oslf.run(replace(oslf.QUICK, size=(48, 48), paths=1))
     assert json.loads(json.dumps(report))["summary"]["64 x 32"]["march 4"][0] < 1
+    by = {row["method"]: row for row in report["rows"] if "method" in row}
+    assert by["march 4, in blocks"]["psnr"] > by["march 4"]["psnr"] - 0.5 and by["march 4, in blocks"]["light_mb"] > 0
     cached = [row for row in report["rows"] if "reads" in row]
     assert len(cached) == 5 * 2 * len(oslf.QUICK.capacities)  # of five kinds of reads, in two orders
     for row in cached:

@@ -11,7 +11,7 @@ import pytest
 from lambent.core import light_field_lookup as numpy_twin
 from lambent.core.cubemap import sample
 from lambent.core.light_field import NO_POINT, LightField
-from lambent.core.light_field_blocks import blocks_of, distance_blocks_of, distances_of, maps_of
+from lambent.core.light_field_blocks import in_blocks
 from lambent.materials.document import Lobe, Material
 from lambent.realtime import light_field_atlas
 from lambent.realtime.device import BLOCKS
@@ -82,12 +82,7 @@ def test_shader_and_numpy_agree_on_blocks(
     side, (rows, columns) = field.inverse_distance.shape[1], np.indices(field.inverse_distance.shape[1:])
     patches = np.where(((rows // 12 + columns // 12) % 4 == 0) | (rows < side // 4), rows * columns % 16, 15)
     cover = np.where(field.inverse_distance > 0, patches, 0).astype(np.uint8)
-    blocks = blocks_of(field.radiance), distance_blocks_of(field.inverse_distance, cover)
-    inverse, cover = distances_of(blocks[1], side)
-    stored = replace(
-        field, radiance=maps_of(blocks[0], side), inverse_distance=inverse, cover=cover, blocks=blocks[0],
-        distances=blocks[1],
-    )  # fmt: skip
+    stored = in_blocks(replace(field, cover=cover))
     place, w, inside = mirrored(stored, SIZE)
     cube = cube_of(smooth_light)
     if look_up == "light_field":

@@ -78,10 +78,10 @@ def radiance_maps(
         first = _first(around, _rays(some, every, texels, mi.Point2f(0.5)))
         dr.eval(first.light, first.mirrors, first.met)
         light, solid, mirrors = array_of(first.light), np.array(first.met), np.array(first.mirrors)
-        lamps: Flags = np.zeros(shape[:3], bool)
+        lamps: Flags = np.full(shape[:3], False)
         if covers:
             quarters, glow = _quarters(around.scene, some, texels)
-            lamps = glow.any(axis=(3, 4))
+            lamps = np.asarray(glow.any(axis=(3, 4)))
             mixed = ~solid & (quarters > 0).any(axis=(3, 4)).ravel()
             light[mixed] = _parted(around, some, texels, np.flatnonzero(mixed), mixed[mixed], 2, onward, ~seed)
         edges = unlike(np.zeros(shape), lamps)
