@@ -17,22 +17,22 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.quality import Quality
+from lambent.bench.light_field_caches import caches
 from lambent.bench.light_field_view import Compared, LightFieldView
 from lambent.core import light_field_lookup as look
 from lambent.core.arrays import Floats
 from lambent.core.light_field import NO_POINT, LightField, Sky
+from lambent.core.light_field_blocks import in_blocks
 from lambent.core.light_field_lookup import March, Place
 from lambent.core.light_field_maps import radiance_along
-from lambent.core.map_cache import POLICIES, fewest_misses, misses
 from lambent.core.progress import Progress, part_of, silent
 from lambent.scenes import load_scene
 
 NAME = "oslf"
 POWERS = (1, 4, 8, 16)
+STORED = ("B_n 4", "march 1", "march 1, sky", "march 4", "march 4, sky")  # methods that are measured in blocks, too
 ONE, FOUR = March(candidates=1), March()
 PER_POINT = FOUR.steps + 1 + FOUR.secants + 1  # distances, that at infinity among them, and the radiance
-SCATTERED = 100  # samples of a BRDF
-TILE = 16  # pixels: a renderer's order of shading
 PREVIEW = Quality("preview")
 SMALL = PREVIEW.changed("small", geometry={"texels": 64}, light_map={"gather_samples": 0}, environment={"texels": 16})
 
@@ -45,7 +45,7 @@ class Effort:
     object: str = "teapot"
     camera: int = 0
     size: tuple[int, int] = (640, 480)
-    fields: tuple[tuple[int, int], ...] = ((1156, 112), (1156, 222), (1156, 312), (289, 222))
+    fields: tuple[tuple[int, int], ...] = ((1156, 112), (1156, 222), (1156, 310), (289, 222))
     strata: int = 2
     paths: int = 4
     capacities: tuple[int, ...] = (2, 4, 8, 16, 32, 64, 128)
@@ -85,6 +85,7 @@ def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
             for method in methods(field, single, place, view):
                 found = mirror.errors(method.radiance())
                 rows.append({**said, "method": method.name, "look_ups": method.look_ups, **found})
+            rows += stored_rows(field, single, view, mirror, said)
             rows += surface_rows(field, place, view, said)
             if number == 0:
                 rows += list(caches(field, place, view, effort.capacities))
@@ -130,6 +131,19 @@ def true_hit(field: LightField, place: Place, w: Floats, distance_m: Floats, sky
     return np.asarray(np.einsum("kj,kjc->kc", look.basis_weights(field, place, w, "normal"), seen))
 
 
+def stored_rows(
+    field: LightField, single: LightField, view: LightFieldView, mirror: Compared, said: dict[str, Any]
+) -> Iterator[dict[str, Any]]:
+    """Some of the methods with the light field in the blocks that a store and a GPU have, and their MB uncompressed."""
+    stored = in_blocks(field)
+    assert stored.blocks is not None and stored.distances is not None, "it is in blocks"
+    megabytes = {"light_mb": stored.blocks.nbytes / 1e6, "distances_mb": stored.distances.nbytes / 1e6}
+    for method in methods(stored, single, view.place(stored), view):
+        if method.name in STORED:
+            found = mirror.errors(method.radiance())
+            yield {**said, **megabytes, "method": f"{method.name}, in blocks", "look_ups": method.look_ups, **found}
+
+
 def surface_rows(
     field: LightField, place: Place, view: LightFieldView, said: dict[str, Any]
 ) -> Iterator[dict[str, Any]]:
@@ -143,35 +157,6 @@ def surface_rows(
 def raw_mb(field: LightField) -> float:
     """Half floats of radiance and inverse distance, and the sample map, uncompressed."""
     return round((field.radiance.nbytes + field.inverse_distance.nbytes + field.sample_map.nbytes) / 1e6, 1)
-
-
-def caches(
-    field: LightField, place: Place, view: LightFieldView, capacities: tuple[int, ...]
-) -> Iterator[dict[str, Any]]:
-    """Misses in percent of what is read, pixel by pixel: in rows, as the thesis's renderer shades, or in tiles.
-
-    Maps are read whole: for the surface (the first point), for reflections (all four), and for SCATTERED samples of a
-    BRDF, with the points in the outer loop: each map is read so often in a row. Of the sample map, rows are read.
-    """
-    pixel, first = np.unique(view.shown.pixel, return_index=True)
-    row, column = np.divmod(pixel, view.size[0])
-    across = column // TILE
-    orders = {"rows": np.lexsort((column, row)), "tiles": np.lexsort((column, row, across, row // TILE))}
-    sample_rows = np.floor(view.shown.uv2[first, 1:] * field.grid[0]).astype(np.int64)
-    points = place.points[first]
-    for what, of, again in (
-        ("sample map", sample_rows, 1), ("surface", points[:, :1], 1), ("reflection", points, 1),
-        ("BRDF", points, SCATTERED),
-    ):  # fmt: skip
-        for order, pixels in orders.items():
-            wanted = of[pixels]
-            reads = wanted[wanted != NO_POINT].tolist()
-            for capacity in capacities:
-                missed = {name: misses(reads, make(capacity)) for name, make in POLICIES.items()}
-                missed["known future"] = fewest_misses(reads, capacity)
-                percent = {name: round(100 * found / (len(reads) * again), 4) for name, found in missed.items()}
-                count = len(reads) * again
-                yield {"reads": what, "order": order, "maps": capacity, "count": count, "miss_percent": percent}
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -46,12 +46,7 @@ def texel_solid_angles(n: int) -> Floats:
 def sample(cube: Floats, w: Floats) -> Floats:
     """Bilinear look-up, clamped within each face: (..., C) of cube (6, n, n, C) at directions w (..., 3)."""
     n = cube.shape[1]
-    x, y, z = w[..., 0], w[..., 1], w[..., 2]
-    axis = np.argmax(np.abs(w), axis=-1)
-    major = np.take_along_axis(w, axis[..., None], axis=-1)[..., 0]
-    face = axis * 2 + (major < 0)
-    s = np.choose(face, [-z, z, x, x, x, -x]) / np.abs(major)
-    t = np.choose(face, [-y, -y, z, -z, -y, -y]) / np.abs(major)
+    face, s, t = _on_face(w)
     column, row = ((np.stack([s, t]) + 1) / 2 * n - 0.5).clip(0, n - 1)
     c0, r0 = np.floor(column).astype(int), np.floor(row).astype(int)
     c1, r1 = np.minimum(c0 + 1, n - 1), np.minimum(r0 + 1, n - 1)
@@ -59,3 +54,21 @@ def sample(cube: Floats, w: Floats) -> Floats:
     top = cube[face, r0, c0] * (1 - fc) + cube[face, r0, c1] * fc
     bottom = cube[face, r1, c0] * (1 - fc) + cube[face, r1, c1] * fc
     return np.asarray(top * (1 - fr) + bottom * fr)
+
+
+def face_places(w: Floats, n: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Face, column and row (...) of the first of 2 x 2 texels, n a side, that `sample` reads along w (..., 3)."""
+    face, s, t = _on_face(w)
+    column, row = np.floor(((np.stack([s, t]) + 1) / 2 * n - 0.5).clip(0, n - 2)).astype(np.int64)
+    return face.astype(np.int64), column, row
+
+
+def _on_face(w: Floats) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """Face, and its coordinates s, t (...) of directions w (..., 3)."""
+    x, y, z = w[..., 0], w[..., 1], w[..., 2]
+    axis = np.argmax(np.abs(w), axis=-1)
+    major = np.take_along_axis(w, axis[..., None], axis=-1)[..., 0]
+    face = axis * 2 + (major < 0)
+    s = np.choose(face, [-z, z, x, x, x, -x]) / np.abs(major)
+    t = np.choose(face, [-y, -y, z, -z, -y, -y]) / np.abs(major)
+    return face, s, t

@@ -66,6 +66,8 @@ class LightField:
         others show the sky, whatever the texel's distance is. A texel with a surface has its light and its distance.
     glass : what refracts the light that the object transmits, or None; maps are then without the object.
     blocks : (P, B, B, 4) uint32, or None: where a store has the radiance so, as `core.light_field_blocks` makes it.
+    distances : (P, R, B, 2) uint32, or None: where a store has inverse_distance and cover so, as
+        `core.light_field_blocks` makes it.
     """
 
     points: NDArray[np.float32]
@@ -81,6 +83,7 @@ class LightField:
     volume: bool = False
     glass: Glass | None = None
     cover: NDArray[np.uint8] | None = None
+    distances: NDArray[np.uint32] | None = None
 
     @property
     def without_object(self) -> bool:

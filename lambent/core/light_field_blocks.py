@@ -1,18 +1,21 @@
-"""Maps of a light field in blocks of BC6H: a byte per texel. Importing this file imports numba.
+"""Maps of a light field in blocks: light as BC6H, a byte per texel, distances in five bits. It imports numba.
 
 Blocks are of tiles, maps with a border of one texel and what fills the last blocks, so that a renderer can show them as
-they are: maps of 222 texels a side are 56 x 56 blocks, and nothing is filled.
+they are: maps of 310 texels a side are 78 x 78 blocks, and nothing is filled.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core import distance_blocks
 from lambent.core.bc6h import BLOCK, decoded, encoded
-from lambent.core.light_field_tiles import tiled, up
+from lambent.core.light_field import LightField
+from lambent.core.light_field_tiles import pool_rows, tiled, up
 
 
 def blocks_of(maps: NDArray[Any]) -> NDArray[np.uint32]:
@@ -30,3 +33,36 @@ def maps_of(blocks: NDArray[np.uint32], side: int) -> NDArray[np.float16]:
     if up(side + 2, BLOCK) != BLOCK * blocks.shape[1]:
         raise ValueError(f"{blocks.shape[1]} blocks in a row do not hold maps of {side} texels")
     return decoded(blocks)[:, 1 : side + 1, 1 : side + 1]
+
+
+def distance_blocks_of(inverse: NDArray[np.float16], cover: NDArray[np.uint8] | None) -> NDArray[np.uint32]:
+    """(P, R, B, 2) of inverse distances and cover (P, E, E): `core.distance_blocks` of tiles as of `blocks_of`."""
+    size = up(inverse.shape[1] + 2, BLOCK)
+    bits = None if cover is None else tiled(cover[..., None], size)[..., 0]
+    return distance_blocks.encoded(tiled(inverse[..., None], size)[..., 0], bits)
+
+
+def distance_blocks_shape(side: int) -> tuple[int, int, int]:
+    """(R, B, 2) of maps of so many texels a side."""
+    rows = up(side + 2, BLOCK) // BLOCK
+    return rows + pool_rows(rows), rows, 2
+
+
+def distances_of(blocks: NDArray[np.uint32], side: int) -> tuple[NDArray[np.float16], NDArray[np.uint8]]:
+    """Inverse distances and cover (P, E, E) of blocks (P, R, B, 2); `side` is E."""
+    if blocks.shape[1:] != distance_blocks_shape(side):
+        raise ValueError(f"blocks of shape {blocks.shape} do not hold distances of maps of {side} texels")
+    inverse, cover = distance_blocks.decoded(blocks, up(side + 2, BLOCK) // BLOCK)
+    inner = np.s_[:, 1 : side + 1, 1 : side + 1]
+    return inverse[inner], cover[inner]
+
+
+def in_blocks(field: LightField) -> LightField:
+    """A light field as it is read again where its store has blocks."""
+    side = field.radiance.shape[1]
+    blocks, distances = blocks_of(field.radiance), distance_blocks_of(field.inverse_distance, field.cover)
+    inverse, cover = distances_of(distances, side)
+    return replace(
+        field, radiance=maps_of(blocks, side), inverse_distance=inverse, blocks=blocks, distances=distances,
+        cover=None if field.volume else cover,
+    )  # fmt: skip

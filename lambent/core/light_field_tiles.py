@@ -1,7 +1,7 @@
 """How the maps of a light field lie in tiles, whose borders hold what filters find beyond a map's edges.
 
-A tile of `tile` texels has a map of E texels on level 0 from texel (1, 1) on. On level k it has tile/2^k texels, all
-but a border of one of them a map again: levels are filtered within maps, and never across tiles.
+A tile of level k has a map of `sides[k]` texels from texel (1, 1) on. Each level has about a quarter of the texels a
+side of the one before: all but the finest take a fifteenth of its memory, where halves take a third.
 """
 
 from __future__ import annotations
@@ -17,48 +17,59 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Floats
 from lambent.core.octahedral import bordered, texel_solid_angles
 
-LEAST_TILE = 7  # texels of the coarsest level: 5 of a map, 0.5 sr each
-WASTE = 1.06  # a tile may be longer than map and border by this factor, so that it can be halved more often
+BLOCK = 4  # sides of tiles are multiples of this many texels, which formats in blocks hold
+STEP = 4  # between the sides of levels
+COARSEST = 10  # texels of a side that none coarser follows
+MOST_LEVELS = 5  # of maps of `light_field.MOST_TEXELS`
+POOL = 0.31  # rows of the pool of a map's distances in blocks, of those of blocks
 
 
 @dataclass(frozen=True)
 class Tiles:
-    """Tiles of maps of `side` texels."""
+    """Tiles of maps; `sides` are the texels of a map's side by level, from fine to coarse."""
 
-    side: int
-    tile: int
-    levels: int
+    sides: tuple[int, ...]
 
     @classmethod
     def of(cls, side: int) -> Tiles:
-        """The tile that can be halved most often of those that are not much longer than the map and its border."""
-        least = side + 2
-        levels = max(
-            k for k in range(12) if k == 0 or (up(least, 1 << k) <= WASTE * least and least >> k >= LEAST_TILE)
-        )
-        return cls(side, up(least, 1 << levels), levels + 1)
+        """Tiles of maps of `side` texels."""
+        sides = [side]
+        while sides[-1] > COARSEST:
+            sides.append(up(up(sides[-1], STEP) // STEP + 2, BLOCK) - 2)
+        return cls(tuple(sides))
 
-    def inner(self, level: int) -> int:
-        """Texels of a map's side on a level."""
-        return self.side if level == 0 else (self.tile >> level) - 2
+    @property
+    def tiles(self) -> tuple[int, ...]:
+        """Texels of a tile's side by level."""
+        return tuple(up(side + 2, BLOCK) for side in self.sides)
+
+    @property
+    def texels(self) -> int:
+        """Of a map's tiles on all levels."""
+        return sum(tile**2 for tile in self.tiles)
 
     def chain(self, maps: NDArray[Any]) -> Iterator[NDArray[np.float32]]:
-        """Tiles (P, t, t, C) of every level of maps (P, E, E, C), from fine to coarse; t = tile/2^level.
+        """Tiles (P, t, t, C) of every level of maps (P, E, E, C), from fine to coarse.
 
         A texel is the mean of what it covers of the level before, weighted by solid angle: all levels have the same
         light.
         """
         level = np.asarray(maps, np.float32)
-        for k in range(self.levels):
-            if k:
-                level = _resampled(level, self.inner(k))
-            yield tiled(level, self.tile >> k)
+        for side, tile in zip(self.sides, self.tiles, strict=True):
+            if side != level.shape[1]:
+                level = _resampled(level, side)
+            yield tiled(level, tile)
 
 
 def tiled(maps: NDArray[Any], size: int) -> NDArray[Any]:
     """Tiles (P, size, size, C) with maps (P, E, E, C) from texel (1, 1) on, and what lies beyond them around."""
     beyond = size - maps.shape[1] - 1  # on the right and below, where a tile may be longer than map and border
     return np.asarray(bordered(maps, beyond)[:, beyond - 1 :, beyond - 1 :])
+
+
+def pool_rows(rows: int) -> int:
+    """Rows of the pool below so many rows of blocks."""
+    return int(np.ceil(POOL * rows))
 
 
 def up(number: int, step: int) -> int:

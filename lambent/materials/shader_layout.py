@@ -14,7 +14,10 @@ from lambent.materials.document import Lobe
 
 SIDES = {"reflection": 0, "transmission": 1}
 DISTRIBUTIONS = {"beckmann": 0, "ggx": 1}
-_PLAIN = {"f32": ("f4", 4), "u32": ("u4", 4), "vec2f": ("2f4", 8), "vec3f": ("3f4", 16), "vec4f": ("4f4", 16)}
+_PLAIN = {
+    "f32": ("f4", 4), "vec2f": ("2f4", 8), "vec3f": ("3f4", 16), "vec4f": ("4f4", 16),
+    "u32": ("u4", 4), "vec2u": ("2u4", 8), "vec4u": ("4u4", 16),
+}  # fmt: skip
 _FIELD = re.compile(r"^ +(\w+): (.+?),(?: *//.*)?$", re.MULTILINE)
 
 

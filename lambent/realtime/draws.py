@@ -95,7 +95,7 @@ class Draw:
             "SAMPLES": self.n,
             "LOBES": self.lobes,
             "TEXTURES": self.textures,
-            **self.look_up.constants(self.item.light.probe),
+            **self.look_up.constants(self.item.light.device, self.item.light.probe),
             **self._change,
             **self.integrator.constants,
             **self._layers,

@@ -23,6 +23,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "cubes": {"texture": {"sample_type": "float", "view_dimension": "cube-array"}},
     "exact": {"texture": {**_UNFILTERED, "view_dimension": "2d"}},  # loaded, never filtered
     "numbers": {"texture": {"sample_type": "uint", "view_dimension": "2d"}},
+    "number layers": {"texture": {"sample_type": "uint", "view_dimension": "2d-array"}},
     "depth layers": {"texture": {"sample_type": "depth", "view_dimension": "2d-array"}},
     "exact layers": {"texture": {**_UNFILTERED, "view_dimension": "2d-array"}},
     "written half layers": {

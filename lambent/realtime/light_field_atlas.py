@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,37 +14,69 @@ from numpy.typing import NDArray
 from lambent.core.errors import UserError
 from lambent.core.light_field import LightField, Sky
 from lambent.core.light_field_maps import whole_texels
-from lambent.core.light_field_tiles import Tiles, tiled
+from lambent.core.light_field_tiles import BLOCK, Tiles, pool_rows, tiled
 from lambent.core.shared_exponent import packed_rgb
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.device import BLOCKS, WEBGPU_LIMITS, adapter_info
 
 MOST_TEXELS = WEBGPU_LIMITS["max-texture-dimension-2d"]
+MOST_LAYERS = WEBGPU_LIMITS["max-texture-array-layers"]
 
 
 @dataclass(frozen=True)
-class Grid:
-    """Where tiles lie: row after row of `columns`, layer after layer of `rows`."""
+class Layout:
+    """Where tiles lie in the layers of an atlas: those of each level row by row, coarser levels below finer ones."""
 
-    columns: int
-    rows: int
+    tiles: tuple[int, ...]  # texels of a tile's side by level
+    columns: int  # of tiles of level 0
+    places: int  # maps of a layer
     layers: int
 
     @classmethod
-    def of(cls, count: int, tile: int) -> Grid:
-        """The grid of `count` tiles with the fewest empty places, of those that WebGPU has room for."""
-        most = MOST_TEXELS // tile
-        layers = -(-count // (most * most))
-        each = -(-count // layers)
-        columns = min(
-            range(-(-each // most), min(most, each) + 1), key=lambda c: (c * -(-each // c), abs(c * c - each))
-        )
-        return cls(columns, -(-each // columns), layers)
+    def of(cls, count: int, tiles: tuple[int, ...]) -> Layout:
+        """The smallest layout for the tiles of `count` maps that WebGPU has room for."""
+        most = MOST_TEXELS // tiles[0]
+        least = -(-count // (most * most))
+        found = [
+            cls(tiles, columns, -(-count // layers), layers)
+            for layers in range(least, min(2 * least + 2, MOST_LAYERS) + 1)
+            for columns in range(1, most + 1)
+        ]
+        fitting = [one for one in found if max(one.size[:2]) <= MOST_TEXELS]
+        return min(fitting, key=lambda one: (math.prod(one.size), abs(one.size[0] - one.size[1])))
 
-    def placed(self, tiles: NDArray[Any]) -> NDArray[Any]:
-        """Tiles (P, t, t, C), P at most `columns`, side by side: (t, P t, C)."""
-        count, t, _, channels = tiles.shape
-        return tiles.transpose(1, 0, 2, 3).reshape(t, count * t, channels)
+    def across(self, level: int) -> int:
+        """Tiles of a level in a row."""
+        return self.columns * self.tiles[0] // self.tiles[level]
+
+    def rows(self, level: int) -> int:
+        """Rows of tiles of a level in a layer."""
+        return -(-self.places // self.across(level))
+
+    def first_row(self, level: int) -> int:
+        """The first row of texels of a level."""
+        return sum(self.rows(k) * self.tiles[k] for k in range(level))
+
+    @property
+    def size(self) -> tuple[int, int, int]:
+        """Columns and rows of texels, and layers."""
+        return self.columns * self.tiles[0], self.first_row(len(self.tiles)), self.layers
+
+    def runs(self, place: int, count: int, level: int) -> Iterator[tuple[slice, int, int, int]]:
+        """Parts of `count` maps from a place on that lie side by side: which; column and row of tiles, and layer."""
+        done = 0
+        while done < count:
+            layer, within = divmod(place + done, self.places)
+            row, column = divmod(within, self.across(level))
+            more = min(count - done, self.across(level) - column, self.places - within)
+            yield slice(done, done + more), column, row, layer
+            done += more
+
+
+def beside(tiles: NDArray[Any]) -> NDArray[Any]:
+    """Tiles (P, h, w, C) side by side: (h, P w, C)."""
+    count, height, width, channels = tiles.shape
+    return np.ascontiguousarray(tiles.transpose(1, 0, 2, 3).reshape(height, count * width, channels))
 
 
 @dataclass(frozen=True)
@@ -61,38 +94,42 @@ def is_software(device: Any) -> bool:
     return adapter_info(device).is_software
 
 
-def coding(device: Any, tiles: Tiles) -> Coding:
-    """Blocks where the adapter reads them in hardware and tiles consist of them; they have a quarter of the bytes."""
-    if BLOCKS in device.features and not is_software(device) and tiles.tile % 4 == 0:
+def coding(device: Any) -> Coding:
+    """Blocks where the adapter reads them in hardware; they have a quarter of the bytes."""
+    if BLOCKS in device.features and not is_software(device):
         from lambent.core.bc6h import BLOCK, encoded  # which imports numba
 
         return Coding("bc6h-rgb-ufloat", BLOCK, 16, encoded)
     return Coding("rgb9e5ufloat", 1, 4, lambda texels: packed_rgb(texels)[..., None])
 
 
-def with_quarters(inverse: NDArray[np.float16], cover: NDArray[np.uint8]) -> NDArray[np.float16]:
-    """Inverse distances with the quarters of texels that show a surface: three lowest bits, and the sign.
+def with_quarters(inverse: NDArray[np.float16], cover: NDArray[np.uint8]) -> NDArray[np.uint16]:
+    """Bits of inverse distances with the quarters of texels that show a surface: three lowest bits, and the sign.
 
     What is left of the distance is right to .4 %.
     """
     rounded = np.minimum(inverse.view(np.uint16) + np.uint16(4), np.uint16(0x7BFF)) & np.uint16(0x7FF8)
     bits = (cover & 7).astype(np.uint16) | (cover.astype(np.uint16) >> 3 & 1) << 15
-    return np.asarray((rounded | bits).view(np.float16))
+    return np.asarray(rounded | bits)
 
 
 @dataclass(frozen=True)
 class Packed:
-    """Maps as they are written to an atlas: tiles of every level of radiance, and of inverse distance."""
+    """Maps as they are written to an atlas: tiles of every level of radiance, and distances."""
 
     levels: tuple[NDArray[Any], ...]
-    inverse: NDArray[Any]
+    distances: NDArray[Any]
 
     def __len__(self) -> int:
-        return len(self.inverse)
+        return len(self.distances)
+
+    def of(self, i: int) -> Packed:
+        """One of the maps."""
+        return Packed(tuple(level[i : i + 1] for level in self.levels), self.distances[i : i + 1])
 
 
 class Atlas:
-    """The textures of a light field: radiance with levels, and inverse distance.
+    """The textures of a light field: radiance with coarser levels, and inverse distance.
 
     Each map has a place, by number. With `most_bytes` there are places for as many maps as fit into them.
     """
@@ -100,8 +137,9 @@ class Atlas:
     def __init__(self, device: Any, field: LightField, most_bytes: float | None = None, sky: Sky | None = None) -> None:
         """`sky` is in coarser levels of texels that show a surface and the sky."""
         self.tiles = Tiles.of(field.radiance.shape[1])
-        self._how, self._field, self._sky = coding(device, self.tiles), field, sky
-        self.levels = sum((self.tiles.tile >> k) % self._how.block == 0 for k in range(self.tiles.levels))
+        self._how, self._field, self._sky = coding(device), field, sky
+        tile = self.tiles.tiles[0]
+        self.cell = (tile // BLOCK, tile // BLOCK + pool_rows(tile // BLOCK)) if self.in_blocks else (tile, tile)
         self.places = len(field.points)
         if most_bytes is not None:
             self.places = min(self.places, int(most_bytes / self.map_bytes))
@@ -110,68 +148,87 @@ class Atlas:
                 "is too small for one light field map", field="--light-field-mb",
                 got=f"{(most_bytes or 0) / 1e6:.3g} MB", expected=f"{self.map_bytes / 1e6:.2g} MB or more",
             )  # fmt: skip
-        self.grid = Grid.of(self.places, self.tiles.tile)
+        self.layout = Layout.of(self.places, self.tiles.tiles)
         self._device = device
-        self.radiance = self._texture(self._how.format, self.levels)
-        self.inverse_distance = self._texture("r16float", 1)
+        self.radiance = self._texture(self._how.format, self.layout.size)
+        columns, rows = self.layout.columns * self.cell[0], self.layout.rows(0) * self.cell[1]
+        self.distances = self._texture("rg32uint" if self.in_blocks else "r16uint", (columns, rows, self.layout.layers))
+
+    @property
+    def in_blocks(self) -> bool:
+        """Whether light and distances are in blocks."""
+        return self._how.block > 1
 
     @property
     def bytes(self) -> int:
         """Of both textures."""
-        width, height, layers = self.radiance.size
-        texels = sum((width >> k) * (height >> k) for k in range(self.levels))
-        return int(layers * (texels * self._how.bytes // self._how.block**2 + 2 * width * height))
-
-    def _texture(self, format: str, levels: int) -> Any:
-        grid, tile = self.grid, self.tiles.tile
-        usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
-        size = (grid.columns * tile, grid.rows * tile, grid.layers)
-        return self._device.create_texture(size=size, format=format, mip_level_count=levels, usage=usage)
+        texels, distances = (int(math.prod(texture.size)) for texture in (self.radiance, self.distances))
+        return round(texels * self._bytes_per_texel + distances * self._bytes_per_distance)
 
     @property
     def map_bytes(self) -> float:
         """Of one map in both textures."""
-        per_texel = self._how.bytes / self._how.block**2
-        return float(sum((self.tiles.tile >> k) ** 2 for k in range(self.levels)) * per_texel + 2 * self.tiles.tile**2)
+        return float(self.tiles.texels * self._bytes_per_texel + math.prod(self.cell) * self._bytes_per_distance)
+
+    @property
+    def _bytes_per_texel(self) -> float:
+        return self._how.bytes / self._how.block**2
+
+    @property
+    def _bytes_per_distance(self) -> int:
+        return 8 if self.in_blocks else 2
+
+    def _texture(self, format: str, size: tuple[int, int, int]) -> Any:
+        usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
+        return self._device.create_texture(size=size, format=format, usage=usage)
 
     def packed(self, part: slice | Sequence[int]) -> Packed:
         """Some maps, ready to be written; any thread may do this."""
         field, how = self._field, self._how
         light, _ = finite(field.radiance[part])
-        ready = field.blocks if how.block > 1 else None
-        if ready is not None and how.block * ready.shape[1] != self.tiles.tile:
-            ready = None  # a tile that can be halved more often
-        finest = ready[part] if ready is not None else how.pack(tiled(light, self.tiles.tile))
+        ready = field.blocks if self.in_blocks else None
+        finest = ready[part] if ready is not None else how.pack(tiled(light, self.tiles.tiles[0]))
         if self._sky is not None and field.cover is not None:
             light = whole_texels(light, field.cover[part], self._sky)
-        coarser = zip(range(self.levels), self.tiles.chain(light), strict=False)
-        levels = (finest, *(how.pack(tiles) for level, tiles in coarser if level))
+        coarser = [how.pack(tiles) for level, tiles in enumerate(self.tiles.chain(light)) if level]
+        return Packed((finest, *coarser), self._distances(part))
+
+    def _distances(self, part: slice | Sequence[int]) -> NDArray[Any]:
+        """(P, h, w, 1 or 2) of some maps."""
+        field, tile = self._field, self.tiles.tiles[0]
+        if self.in_blocks and field.distances is not None:
+            return np.asarray(field.distances[part])
         inverse = np.asarray(field.inverse_distance[part])
-        inverse = np.where(np.isfinite(inverse) & (inverse > 0), inverse, np.float16(0))
-        if field.cover is not None:
-            inverse = with_quarters(inverse, field.cover[part])
-        return Packed(levels, tiled(inverse[..., None], self.tiles.tile))
+        inverse = tiled(np.where(np.isfinite(inverse) & (inverse > 0), inverse, np.float16(0))[..., None], tile)
+        cover = None if field.cover is None else tiled(field.cover[part][..., None], tile)
+        if self.in_blocks:
+            from lambent.core.distance_blocks import encoded  # which imports numba
+
+            return encoded(inverse[..., 0], None if cover is None else cover[..., 0])
+        return inverse.view(np.uint16) if cover is None else with_quarters(inverse, cover)
 
     def fill(self) -> None:
         """Write the first maps into all places, row by row."""
-        for first in range(0, self.places, self.grid.columns):
-            self.write(self.packed(slice(first, min(first + self.grid.columns, self.places))), first)
+        step = self.layout.columns
+        for first in range(0, self.places, step):
+            self.write(self.packed(slice(first, min(first + step, self.places))), first)
 
     def write(self, maps: Packed, place: int) -> None:
-        """Write maps into places from `place` on, all of one row."""
+        """Write maps into places from `place` on."""
         for level, tiles in enumerate(maps.levels):
-            self._put(self.radiance, level, place, tiles, self._how.block)
-        self._put(self.inverse_distance, 0, place, maps.inverse, 1)
+            for run, column, row, layer in self.layout.runs(place, len(maps), level):
+                tile = self.tiles.tiles[level]
+                corner = column * tile, self.layout.first_row(level) + row * tile, layer
+                self._put(self.radiance, corner, tiles[run], self._how.block)
+        for run, column, row, layer in self.layout.runs(place, len(maps), 0):
+            corner = column * self.cell[0], row * self.cell[1], layer
+            self._put(self.distances, corner, maps.distances[run], 1)
 
-    def _put(self, texture: Any, level: int, place: int, tiles: NDArray[Any], block: int) -> None:
-        row, column = divmod(place, self.grid.columns)
-        layer, row = divmod(row, self.grid.rows)
-        tile = self.tiles.tile >> level
-        texels = np.ascontiguousarray(self.grid.placed(tiles))
+    def _put(self, texture: Any, corner: tuple[int, int, int], tiles: NDArray[Any], block: int) -> None:
+        texels = beside(tiles)
         rows, columns = texels.shape[:2]
         self._device.queue.write_texture(
-            {"texture": texture, "mip_level": level, "origin": (column * tile, row * tile, layer)},
-            texels,
+            {"texture": texture, "origin": corner}, texels,
             {"bytes_per_row": columns * texels.shape[2] * texels.itemsize, "rows_per_image": rows},
             (columns * block, rows * block, 1),
-        )
+        )  # fmt: skip

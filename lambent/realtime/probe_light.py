@@ -65,6 +65,10 @@ class ProbeLight:
             self._resources[look_up.__file__] = look_up.resources(self._layouts.device, self.probe, self.streams)
         return self._resources[look_up.__file__]
 
+    @property
+    def device(self) -> Any:
+        return self._layouts.device
+
     def view(self, cube: Cube) -> Any:
         """View of a cube map of the probe's radiance."""
         return self._texture(cube).create_view(dimension="cube-array" if cube == "cleaned" else "cube")

@@ -119,7 +119,7 @@ class ResidentMaps:
             if point not in held or not dropped:
                 continue  # another view was asked for since
             place = self._place.pop(dropped.pop())
-            self.atlas.write(Packed(tuple(level[i : i + 1] for level in maps.levels), maps.inverse[i : i + 1]), place)
+            self.atlas.write(maps.of(i), place)
             self._place[point] = place
             self.loaded += 1
         table = self._table()

@@ -34,7 +34,8 @@ _ARRAYS: tuple[tuple[str, tuple[int | None, ...], str], ...] = (  # name, shape,
     ("probe/*/radiance", (*CUBE, 3), "f"), ("probe/*/distance", CUBE, "f"), ("probe/*/planes", (ANY, 4), "f"),
     ("light_field/*/points", (ANY, 3), "f"), ("light_field/*/normals", (ANY, 3), "f"),
     ("light_field/*/radiance", (ANY, ANY, ANY, 3), "f"), ("light_field/*/inverse_distance", (ANY, ANY, ANY), "f"),
-    ("light_field/*/blocks", (ANY, ANY, ANY, 4), "u"), ("light_field/*/sample_map", (ANY, ANY, 4), "u"),
+    ("light_field/*/blocks", (ANY, ANY, ANY, 4), "u"), ("light_field/*/distances", (ANY, ANY, ANY, 2), "u"),
+    ("light_field/*/sample_map", (ANY, ANY, 4), "u"),
     ("texture/*", (ANY, ANY, ANY), "f"),
 )  # fmt: skip
 _PER_VERTEX = ("positions", "normals", "tangents", "uv", "uv2")

@@ -34,15 +34,15 @@
     light_field/OBJECT/radiance            (P, E, E, 3) float16, octahedral maps (core.octahedral), units as above,
                                            without the disc of meta["sun"] of light_map/irradiance
     light_field/OBJECT/blocks              in its place, (P, B, B, 4) uint32, blocks of BC6H: core.light_field_blocks
-    light_field/OBJECT/inverse_distance    (P, E, E) float16, 1/m, 0 where nothing is hit; cover, uint8, see there
+    light_field/OBJECT/inverse_distance    (P, E, E) float16, 1/m, 0 where nothing is hit; cover, uint8, see there. Or
+    light_field/OBJECT/distances           both, (P, R, B, 2) uint32, core.distance_blocks. meta["texels"]: [E]
     light_field/OBJECT/sample_map          (h, w, 4) uint16; written last. meta["corner"] and meta["grid"] place it on
                                            the light map's uv2, meta["offset_m"] is how far off the surface points are.
                                            meta["volume"]: points fill the box of OBJECT, maps are without it
     light_field/OBJECT/exits               (h, w, 4) float16, of glass, may be absent: the faces behind the sample map's
                                            texels, core.light_field.Glass; written before it. meta["glass"]: index of
                                            refraction, RGB share of light that a face passes, its power of the cosine
-    texture/MATERIAL/PART                  (H, W, C) float16, PART a field of scenes.scene.MaterialTextures;
-                                           row 0 is the top; the record has its transform of uv
+    texture/MATERIAL/PART                  (H, W, C) float16, of MaterialTextures; row 0 is the top
     view/KEY/KIND/PART                     what depends on one camera, for instance transport vectors per pixel. KEY is
                                            `view_key` of the camera's values and, where the array depends on it, of the
                                            image's size: a camera that is renamed keeps its arrays, one that moves has

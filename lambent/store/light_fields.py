@@ -14,6 +14,7 @@ from lambent.store.store import Store
 
 PARTS = ("points", "normals", "radiance", "inverse_distance", "sample_map")
 BLOCKS = "blocks"  # in place of radiance
+DISTANCES = "distances"  # in blocks, in place of inverse_distance and cover
 EXITS = "exits"  # of glass
 COVER = "cover"  # of texels' quarters; stores of earlier versions have none
 
@@ -26,9 +27,12 @@ def has_light_field(store: Store, object_name: str) -> bool:
 
 def read_light_field(store: Store, object_name: str) -> LightField:
     """The light field of an object; `UserError` where its arrays do not fit together."""
-    points, normals, inverse_distance, sample_map = (
-        store.read(light_field_name(object_name, part)) for part in PARTS if part != "radiance"
+    points, normals, sample_map = (
+        store.read(light_field_name(object_name, part))
+        for part in PARTS
+        if part not in ("radiance", "inverse_distance")
     )
+    inverse_distance, cover, distances = _distances(store, object_name)
     radiance, blocks = _radiance(store, object_name, inverse_distance.shape[-1])
     name = light_field_name(object_name, PARTS[-1])
     corner, grid = (numbers_of(store, name, key, 2) for key in ("corner", "grid"))
@@ -57,8 +61,27 @@ def read_light_field(store: Store, object_name: str) -> LightField:
         points, normals, radiance, inverse_distance, sample_map,
         (int(corner[0]), int(corner[1])), (int(grid[0]), int(grid[1])), offset_m, blocks,
         store.artefact(name).meta.get("levels") == 1, store.artefact(name).meta.get("volume") is True,
-        _glass(store, object_name, sample_map.shape), _cover(store, object_name, inverse_distance.shape),
+        _glass(store, object_name, sample_map.shape), cover, distances,
     )  # fmt: skip
+
+
+def _distances(
+    store: Store, object_name: str
+) -> tuple[NDArray[np.float16], NDArray[np.uint8] | None, NDArray[np.uint32] | None]:
+    """Inverse distances and cover, and their blocks where the store has those."""
+    name = light_field_name(object_name, DISTANCES)
+    if name not in store:
+        inverse = store.read(light_field_name(object_name, "inverse_distance"))
+        return inverse, _cover(store, object_name, inverse.shape), None
+    from lambent.core.light_field_blocks import distances_of  # which imports numba
+
+    blocks, (side,) = store.read(name), numbers_of(store, name, "texels", 1)
+    volume = store.artefact(light_field_name(object_name, PARTS[-1])).meta.get("volume") is True
+    try:
+        inverse, cover = distances_of(blocks, int(side))
+    except ValueError as error:
+        raise UserError("broken store", file=store.folder, field=name, got=str(error)) from error
+    return inverse, None if volume else cover, blocks
 
 
 def _cover(store: Store, object_name: str, shape: tuple[int, ...]) -> NDArray[np.uint8] | None:

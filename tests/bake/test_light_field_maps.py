@@ -159,7 +159,9 @@ def test_only_what_is_asked_is_baked_and_what_is_no_longer_asked_goes(tmp_path: 
 
 def test_blocks_hold_the_same_light(tmp_path: Path) -> None:
     scene = with_field(coloured_room(), texels=30)
-    plain = read(bake(scene, tmp_path / "s", quality=SMALL), "radiance").astype(float)
+    store = bake(scene, tmp_path / "s", quality=SMALL)
+    plain = read(store, "radiance").astype(float)
+    nearness, cover = read(store, "inverse_distance"), read(store, "cover")
     store = bake(scene, tmp_path / "s", quality=SMALL.changed(light_field={"blocks": True}))
     blocks = read(store, "blocks")
     assert blocks.shape == (24, 8, 8, 4) and light_field_name("ball", "radiance") not in store
@@ -167,7 +169,14 @@ def test_blocks_hold_the_same_light(tmp_path: Path) -> None:
     alike = np.ptp(sliding_window_view(plain, (7, 7), axis=(1, 2)), axis=(-2, -1)).max(axis=-1) == 0  # no edge near
     assert alike.mean() > 0.1
     np.testing.assert_allclose(field.radiance[:, 3:-3, 3:-3][alike], plain[:, 3:-3, 3:-3][alike], atol=1e-3)
-    assert np.array_equal(field.inverse_distance, read(store, "inverse_distance"))
+    assert light_field_name("ball", "inverse_distance") not in store and read(store, "distances").shape == (
+        24,
+        11,
+        8,
+        2,
+    )
+    np.testing.assert_allclose(np.median(field.inverse_distance / nearness), 1, atol=0.02)
+    assert field.cover is not None and (field.cover == cover).mean() > 0.98
 
 
 def test_traced_whole_it_is_the_same_within_noise(tmp_path: Path) -> None:
@@ -225,6 +234,32 @@ def test_quarters_of_texels_tell_where_a_square_ends(mi: Any) -> None:
     assert (light[bits.all(axis=-1)] == 0).all()
     np.testing.assert_allclose(light[inverse[0] == 0], 1, atol=1e-6)
     assert (light[mixed] == 0).mean() > 0.9, "where no part of two by two meets it, its sky"
+
+
+def test_lamps_smaller_than_texels_keep_their_light(mi: Any) -> None:
+    """A square lamp of .6 texels a side: most places see it through no middle of a texel."""
+    from lambent.bake.light_fields.acquisition import Around, radiance_maps
+    from lambent.bake.tracing.scene_builder import SceneBuilder
+
+    n, side_m = 32, 0.055
+    lamp = SceneObject(
+        "lamp", patch((-side_m / 2, 1, -side_m / 2), (side_m, 0, 0), (0, 0, side_m)), "black", (100.0,) * 3
+    )
+    ceiling = SceneObject("ceiling", patch((-50, 1.01, -50), (100, 0, 0), (0, 0, 100)), "black")
+    scene = Scene("s", (lamp, ceiling), {"black": BLACK})
+    points = np.random.default_rng(0).uniform(-0.3, 0.3, (400, 3)) * [1, 0, 1]
+    around = Around(SceneBuilder(scene, diffuse=False).build(), lambda si, active: mi.Color3f(0.0), 2)
+    distance = np.linalg.norm(points - [0, 1, 0], axis=1)
+    expected = (100 * side_m**2 / distance**3).sum()
+    omega, w = texel_solid_angles(n), texel_directions(n)
+    assert 0.6 < side_m / np.sqrt(omega[w[..., 1] > 0.95].mean()) < 0.7
+
+    def share(covers: bool) -> float:
+        light = radiance_maps(around, points, n, 4, 0, covers=covers)[..., 0]
+        return float((light * omega).sum() / expected)
+
+    without, found = share(covers=False), share(covers=True)
+    assert without < 0.85 and found == pytest.approx(1, abs=0.06), (without, found)
 
 
 def test_the_disc_of_the_sun_is_left_out(mi: Any) -> None:

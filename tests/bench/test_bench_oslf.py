@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from lambent.bench import oslf
+from lambent.bench.light_field_caches import partial_misses
 from lambent.bench.light_field_view import Compared, LightFieldView
 from lambent.core.light_field_lookup import surface
 from lambent.scenes import load_scene
@@ -69,11 +70,21 @@ def test_errors_are_those_of_the_object_alone() -> None:
     assert off["flip"] > 0.01 and min(off["rmse_rgb"]) > 0.01
 
 
+def test_reads_on_demand_miss_what_was_not_read_of_an_item() -> None:
+    reads = [(1, 3), (1, 2), (1, 4), (2, 0), (3, 0), (2, 0), (1, 0)]
+    assert partial_misses(reads, 2) == 5 and partial_misses(reads, 3) == 4
+
+
 def test_the_whole_run_is_json(mi: Any) -> None:
     report = oslf.run(replace(oslf.QUICK, size=(48, 48), paths=1))
     assert json.loads(json.dumps(report))["summary"]["64 x 32"]["march 4"][0] < 1
+    by = {row["method"]: row for row in report["rows"] if "method" in row}
+    assert by["march 4, in blocks"]["psnr"] > by["march 4"]["psnr"] - 0.5 and by["march 4, in blocks"]["light_mb"] > 0
     cached = [row for row in report["rows"] if "reads" in row]
-    assert len(cached) == 4 * 2 * len(oslf.QUICK.capacities)  # of four kinds of reads, in two orders
+    assert len(cached) == 5 * 2 * len(oslf.QUICK.capacities)  # of five kinds of reads, in two orders
     for row in cached:
         missed = row["miss_percent"]
+        assert 100 * row["first"] / row["count"] <= missed["least-recent"] + 1e-3, "each map is read once, at least"
+        if "known future" not in missed:
+            continue  # of maps that are read in part
         assert 0 < missed["known future"] <= min(missed["least-recent"], missed["adaptive"]) <= 100

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lambent.core.camera import Camera, image_plane
 from lambent.core.directions import normalize, reflect
 from lambent.core.light_field import CANDIDATES, NO_POINT, LightField
-from lambent.core.light_field_blocks import blocks_of
+from lambent.core.light_field_blocks import blocks_of, distance_blocks_of
 from lambent.core.octahedral import texel_directions
 from lambent.core.sequences import hammersley
 from lambent.materials.document import Lobe, Material
@@ -19,7 +19,7 @@ from lambent.realtime.baked import BakedScene
 from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import sphere
 from lambent.store.contract import light_field_name, write_scene_record
-from lambent.store.light_fields import BLOCKS, PARTS
+from lambent.store.light_fields import BLOCKS, DISTANCES, PARTS
 from lambent.store.store import Store
 from tests.realtime.lit_wall import cube_of
 
@@ -114,10 +114,17 @@ def put_ball(folder: Path, field: LightField, *, in_blocks: bool = False) -> Sto
     )
     halves = replace(field, radiance=field.radiance / np.float16(2))
     if in_blocks:
-        halves = replace(halves, blocks=blocks_of(halves.radiance))
-    for part in (BLOCKS if in_blocks and part == "radiance" else part for part in PARTS):
+        distances = distance_blocks_of(halves.inverse_distance, halves.cover)
+        halves = replace(halves, blocks=blocks_of(halves.radiance), distances=distances)
+    instead = {"radiance": BLOCKS, "inverse_distance": DISTANCES} if in_blocks else {}
+    for part in (instead.get(part, part) for part in PARTS):
         places = {"corner": list(field.corner), "grid": list(field.grid), "offset_m": field.offset_m}
-        meta = {"radiance": {"unit": 2.0}, BLOCKS: {"unit": 2.0}, "sample_map": places}.get(part, {})
+        meta = {
+            "radiance": {"unit": 2.0},
+            BLOCKS: {"unit": 2.0},
+            "sample_map": places,
+            DISTANCES: {"texels": [field.radiance.shape[1]]},
+        }.get(part, {})
         store.put(light_field_name("ball", part), "light_field", getattr(halves, part), key="k", meta=meta)
     write_scene_record(store, scene.record.model_copy(update={"cameras": (CAMERA,)}))
     return store

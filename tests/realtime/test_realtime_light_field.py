@@ -19,7 +19,7 @@ from lambent.realtime import light_field_atlas
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import BLOCKS
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.light_field_atlas import MOST_TEXELS, Grid, coding
+from lambent.realtime.light_field_atlas import MOST_TEXELS, Layout, coding
 from lambent.realtime.renderer import Renderer
 from lambent.render import Settings, still
 from lambent.store.light_fields import read_light_field
@@ -132,14 +132,14 @@ def test_blocks_in_a_store_and_on_the_adapter(
     """A store in blocks is drawn as one in half floats, by an adapter that reads blocks and by one that does not."""
     store = put_ball(tmp_path / "ball.store", field, in_blocks=True)
     read = read_light_field(store, "ball")
-    assert read.blocks is not None and read.radiance.shape == field.radiance.shape
+    assert read.blocks is not None and read.distances is not None and read.radiance.shape == field.radiance.shape
     exact, scene = renderer.image(STATE), read_baked(store)
     image = Renderer(device, scene).image(STATE)
     assert psnr_db(image, exact) > 38
     if BLOCKS not in device.features:
         pytest.skip("the adapter has no textures in blocks")
     monkeypatch.setattr(light_field_atlas, "is_software", lambda device: False)
-    assert coding(device, Tiles.of(126)).format == "bc6h-rgb-ufloat"
+    assert coding(device).format == "bc6h-rgb-ufloat"
     assert psnr_db(Renderer(device, scene).image(STATE), image) > 50
 
 
@@ -159,14 +159,31 @@ def test_a_light_field_that_contradicts_itself_is_refused(tmp_path: Path, field:
 
 
 def test_thousands_of_maps_fit_few_layers() -> None:
-    """The thesis's 1156 in one layer without an empty place, and the most there can be within WebGPU's 256 layers."""
-    tiles = Tiles.of(222)
-    assert (tiles.tile, tiles.levels) == (224, 6) and Grid.of(1156, 224) == Grid(34, 34, 1)
+    """The thesis's 1156 at as many texels with hardly an empty place, and the most there can be within 256 layers."""
+    tiles = Tiles.of(310)
+    assert tiles.tiles == (312, 80, 24, 8) and 310**2 <= 6 * 128**2
+    columns, rows, layers = Layout.of(1156, tiles.tiles).size
+    assert columns * rows * layers < 1.03 * 1156 * tiles.texels and tiles.texels < 1.08 * 312**2
     for count, side in ((1, 6), (7, 30), (4000, 94), (65535, 222), (3, 1022)):
-        tile = Tiles.of(side).tile
-        grid = Grid.of(count, tile)
-        assert grid.columns * grid.rows * grid.layers >= count and max(grid.columns, grid.rows) * tile <= MOST_TEXELS
-        assert grid.layers <= 256 and tile <= 1.06 * (side + 2)
+        tiles = Tiles.of(side)
+        layout = Layout.of(count, tiles.tiles)
+        assert layout.places * layout.layers >= count and max(layout.size[:2]) <= MOST_TEXELS
+        assert layout.layers <= 256 and tiles.tiles[0] <= side + 5
+
+
+def test_tiles_of_all_levels_lie_apart() -> None:
+    tiles = Tiles.of(46)
+    layout = Layout.of(61, tiles.tiles)
+    taken = np.zeros(layout.size[::-1], int)
+    for level, tile in enumerate(tiles.tiles):
+        placed = list[int]()
+        for start, count in ((0, 40), (40, 21)):
+            for run, column, row, layer in layout.runs(start, count, level):
+                placed += range(start + run.start, start + run.stop)
+                first = layout.first_row(level) + row * tile
+                taken[layer, first : first + tile, column * tile : (column + run.stop - run.start) * tile] += 1
+        assert placed == list(range(61))
+    assert taken.max() == 1 and taken.sum() == 61 * tiles.texels
 
 
 def test_levels_keep_the_light_and_see_over_edges(field: LightField) -> None:
@@ -174,8 +191,8 @@ def test_levels_keep_the_light_and_see_over_edges(field: LightField) -> None:
     maps = field.radiance[:3].astype(np.float32)
     whole = (maps * texel_solid_angles(126)[..., None]).sum(axis=(1, 2))
     for k, level in enumerate(tiles.chain(maps)):
-        n = tiles.inner(k)
+        n = tiles.sides[k]
         inner = level[:, 1 : n + 1, 1 : n + 1]
-        assert level.shape == (3, tiles.tile >> k, tiles.tile >> k, 3)
+        assert level.shape == (3, tiles.tiles[k], tiles.tiles[k], 3)
         np.testing.assert_allclose((inner * texel_solid_angles(n)[..., None]).sum(axis=(1, 2)), whole, rtol=0.02)
         np.testing.assert_array_equal(level[:, 0, 1 : n + 1], inner[:, 0, ::-1])  # an edge, mirrored about its middle

@@ -11,7 +11,10 @@ import pytest
 from lambent.core import light_field_lookup as numpy_twin
 from lambent.core.cubemap import sample
 from lambent.core.light_field import NO_POINT, LightField
+from lambent.core.light_field_blocks import in_blocks
 from lambent.materials.document import Lobe, Material
+from lambent.realtime import light_field_atlas
+from lambent.realtime.device import BLOCKS
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.incident.light_field import CHOSEN, LOOK_UPS, MARCHED, filled
 from lambent.realtime.renderer import Renderer
@@ -65,6 +68,29 @@ def test_shader_and_numpy_agree_on_quarters_of_texels(device: Any, field: LightF
     assert (march.sky & ~whole.sky)[inside].mean() > 0.02, "quarters matter"
     got = Renderer(device, plate_scene(covered)).image(replace(STATE, lookup="light_field")).reshape(-1, 3)
     error = np.abs(got - march.radiance)[inside].max(axis=1)
+    assert np.quantile(error, 0.5) < 0.01 and np.quantile(error, 0.9) < 0.05, np.quantile(error, [0.5, 0.9, 0.98, 1])
+
+
+@pytest.mark.parametrize("look_up", ["light_field", "light_field-bn"])
+def test_shader_and_numpy_agree_on_blocks(
+    device: Any, field: LightField, monkeypatch: pytest.MonkeyPatch, look_up: str
+) -> None:
+    """Quarters in patches, as at edges, and everywhere, so that the pool is too small for all mixed blocks."""
+    if BLOCKS not in device.features:
+        pytest.skip("the adapter has no textures in blocks")
+    monkeypatch.setattr(light_field_atlas, "is_software", lambda device: False)
+    side, (rows, columns) = field.inverse_distance.shape[1], np.indices(field.inverse_distance.shape[1:])
+    patches = np.where(((rows // 12 + columns // 12) % 4 == 0) | (rows < side // 4), rows * columns % 16, 15)
+    cover = np.where(field.inverse_distance > 0, patches, 0).astype(np.uint8)
+    stored = in_blocks(replace(field, cover=cover))
+    place, w, inside = mirrored(stored, SIZE)
+    cube = cube_of(smooth_light)
+    if look_up == "light_field":
+        expected = numpy_twin.marched(stored, place, w, sky=lambda w: sample(cube, w)).radiance
+    else:
+        expected = numpy_twin.blended(stored, place, w, "normal", sky=lambda w: sample(cube, w))
+    got = Renderer(device, plate_scene(stored)).image(replace(STATE, lookup=look_up)).reshape(-1, 3)
+    error = np.abs(got - expected)[inside].max(axis=1)
     assert np.quantile(error, 0.5) < 0.01 and np.quantile(error, 0.9) < 0.05, np.quantile(error, [0.5, 0.9, 0.98, 1])
 
 

@@ -22,6 +22,7 @@ from tests.realtime.lit_ball import CAMERA, ball_scene, light_field, put_ball
 
 SIZE = 64
 STATE = FrameState(CAMERA, SIZE, SIZE, n=1, antialias=False, show="specular")
+ROUNDED = {"rtol": 1e-3, "atol": 1e-4}  # filters round places in a texture by its size
 BEHIND = replace(CAMERA, position=(-0.25, -0.3, -0.65))
 
 
@@ -52,7 +53,7 @@ def test_all_maps_within_the_budget_change_nothing(device: Any, scene: BakedScen
 def test_a_view_gets_the_maps_that_it_needs(device: Any, scene: BakedScene) -> None:
     """Of half of the maps, those of the side that is seen: the picture is that of all maps."""
     exact, half = Renderer(device, scene), budgeted(device, scene, 44.5)
-    np.testing.assert_allclose(half.image(STATE), exact.image(STATE), atol=1e-4)
+    np.testing.assert_allclose(half.image(STATE), exact.image(STATE), **ROUNDED)
     found = half.streaming.statistics
     assert (found["maps"], found["resident"]) == (64, 44) and found["misses"] > 0
     assert 0 < found["resident_mb"] <= megabytes(device, scene.light_fields["ball"], 44.5)
@@ -60,7 +61,7 @@ def test_a_view_gets_the_maps_that_it_needs(device: Any, scene: BakedScene) -> N
     again = half.streaming.statistics
     assert again["misses"] == found["misses"] and again["hits"] > found["hits"], "what was loaded stays"
     turned = replace(STATE, camera=BEHIND)
-    np.testing.assert_allclose(half.image(turned), exact.image(turned), atol=1e-4)
+    np.testing.assert_allclose(half.image(turned), exact.image(turned), **ROUNDED)
 
 
 def test_fewer_maps_are_a_farther_picture_of_the_same_light(device: Any, scene: BakedScene) -> None:
@@ -82,7 +83,7 @@ def test_a_frame_that_does_not_wait_is_drawn_from_what_is_there(device: Any, sce
     while renderer.streaming.busy and time.monotonic() < end:
         time.sleep(0.01)
         last = renderer.image(STATE)
-    np.testing.assert_allclose(last, exact, atol=1e-4)
+    np.testing.assert_allclose(last, exact, **ROUNDED)
     assert renderer.streaming.version > version
 
 

@@ -25,7 +25,7 @@ from lambent.core.geometry import triangle_areas
 from lambent.core.progress import Progress, part_of
 from lambent.scenes.scene import LightFieldWish
 from lambent.store.contract import LIGHT_FIELD_CHOICE, light_field_name, needs_probe
-from lambent.store.light_fields import COVER, EXITS
+from lambent.store.light_fields import BLOCKS, COVER, DISTANCES, EXITS
 from lambent.store.store import Array
 
 if TYPE_CHECKING:
@@ -36,11 +36,11 @@ if TYPE_CHECKING:
 
 KIND = "light_field"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 6
+REVISION = 7
 MATTE = "%s: light_field is ignored: its material is purely diffuse"
 PATHS_OF_A_CHUNK = 1 << 21
 MIRROR_DEPTH = 6  # glossy surfaces in a row on paths of level 1, of objects without light fields
-BYTES_PER_TEXEL = {False: 8.0, True: 3.0}  # of radiance, in blocks or not, and of inverse distance
+BYTES_PER_TEXEL = {False: 9.0, True: 1.76}  # of light and distances, in blocks or not
 log = logging.getLogger(__name__)
 
 
@@ -49,7 +49,7 @@ class Settings:
     """`points` on each object, with maps of `texels` a side; `strata` x `strata` rays go through each texel.
 
     `onward` paths go on from each glossy surface that a ray meets: only there is there noise to speak of.
-    With `blocks`, radiance is stored in blocks of BC6H, which hold maps of 4 k - 2 texels best. Paths meet `levels`
+    With `blocks`, light and distances are stored in blocks, which hold maps of 4 k - 2 texels best. Paths meet `levels`
     glossy surfaces in a row. At 1, the objects that the scene gives light fields show each other and themselves their
     diffuse light alone.
     """
@@ -62,15 +62,15 @@ class Settings:
     blocks: bool = True
 
     @property
-    def parts(self) -> tuple[str, ...]:
-        """The arrays of a light field, in the order in which they are written."""
-        return "points", "normals", "blocks" if self.blocks else "radiance", "inverse_distance", "sample_map"
+    def maps(self) -> tuple[str, ...]:
+        """The arrays of what points see, in the order in which they are written."""
+        return (BLOCKS, DISTANCES) if self.blocks else ("radiance", "inverse_distance", COVER)
 
 
 SETTINGS = {
     QualityName.preview: Settings(196, 94),
     QualityName.normal: Settings(576, 158, onward=2),
-    QualityName.final: Settings(1156, 222, onward=4),
+    QualityName.final: Settings(1156, 310, onward=4),
 }
 
 
@@ -143,10 +143,9 @@ def wished(context: BakeContext) -> dict[str, LightFieldWish]:
 
 def parts_of(how: Settings, wish: LightFieldWish) -> tuple[str, ...]:
     """The arrays of an object's light field, in the order in which they are written."""
-    more = (EXITS,) if wish.refracts else ()
-    if not wish.volume:  # whose maps give irradiance, too, and have what texels show altogether
-        more = (COVER, *more)
-    return (*how.parts[:-1], *more, how.parts[-1])
+    # maps of volumes give irradiance, too, and have what texels show altogether
+    maps = [part for part in how.maps if part != COVER or not wish.volume]
+    return "points", "normals", *maps, *((EXITS,) if wish.refracts else ()), "sample_map"
 
 
 def settings_of(context: BakeContext, wish: LightFieldWish) -> Settings:
@@ -221,7 +220,7 @@ def _chooser(context: BakeContext, traced: Traced) -> Chooser:
 
 def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced, progress: Progress) -> None:
     from lambent.bake.light_fields.acquisition import covered_distances, inverse_distances, radiance_maps
-    from lambent.core.light_field_blocks import blocks_of, blocks_shape
+    from lambent.core.light_field_blocks import blocks_of, blocks_shape, distance_blocks_of, distance_blocks_shape
 
     start, how = time.perf_counter(), settings_of(context, wish)
     seen = traced.seen(name, how, wish)
@@ -247,17 +246,31 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
     def cover(region: tuple[slice, ...], seed: int) -> Array:
         return covered_distances(seen.scene, points[region[0]], how.texels)[1]
 
+    def distances(region: tuple[slice, ...], seed: int) -> Array:
+        some = points[region[0]]
+        if wish.volume:
+            return distance_blocks_of(inverse_distances(seen.scene, some, how.texels), None)
+        return distance_blocks_of(*covered_distances(seen.scene, some, how.texels))
+
     at_once = max(1, min(PATHS_OF_A_CHUNK // (how.texels * how.strata) ** 2, len(points)))
-    of_light = blocks_shape(how.texels) if how.blocks else (how.texels, how.texels, 3)
-    light, distance, quarters = (light_field_name(name, part) for part in (*how.parts[2:4], COVER))
-    kind = "uint32" if how.blocks else "float16"
-    arrays = (
-        (light, (len(points), *of_light), kind, radiance, 0.0, 0.9),
-        (distance, (len(points), how.texels, how.texels), "float16", inverse_distance, 0.9, 0.95),
-        (quarters, (len(points), how.texels, how.texels), "uint8", cover, 0.95, 1.0),
-    )
-    for at, shape, dtype, tile, begin, end in arrays[: 2 if wish.volume else 3]:
-        key, note = context.keys(KIND)[at], context.provenance(**({"unit": traced.unit} if at == light else {}))
+    count, square = len(points), (how.texels, how.texels)
+    arrays: dict[str, tuple[tuple[int, ...], str, Callable[[tuple[slice, ...], int], Array], float, float]] = {
+        "radiance": ((count, *square, 3), "float16", radiance, 0.0, 0.9),
+        "inverse_distance": ((count, *square), "float16", inverse_distance, 0.9, 0.95),
+        COVER: ((count, *square), "uint8", cover, 0.95, 1.0),
+        BLOCKS: ((count, *blocks_shape(how.texels)), "uint32", radiance, 0.0, 0.9),
+        DISTANCES: ((count, *distance_blocks_shape(how.texels)), "uint32", distances, 0.9, 1.0),
+    }
+    notes: dict[str, dict[str, Any]] = {
+        "radiance": {"unit": traced.unit},
+        BLOCKS: {"unit": traced.unit},
+        DISTANCES: {"texels": [how.texels]},
+    }
+    for part in parts_of(how, wish):
+        if part not in arrays:
+            continue
+        at, (shape, dtype, tile, begin, end) = light_field_name(name, part), arrays[part]
+        key, note = context.keys(KIND)[at], context.provenance(**notes.get(part, {}))
         chunks = (at_once, *shape[1:])  # an interrupted bake continues with the next points
         writer = context.store.begin(at, KIND, shape, chunks, dtype, key=key, meta=note)
         run_tiles(writer, tile, seed=context.seed, progress=part_of(progress, begin, end, at), what=at)

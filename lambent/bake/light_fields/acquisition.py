@@ -63,11 +63,13 @@ def radiance_maps(
     """Maps (P, texels, texels, 3) of the radiance that arrives at points (P, 3).
 
     Where the ray through a texel's middle meets no glossy surface, and its neighbours show nearly the same, its light
-    is the texel's (Whitted 1980). In other texels, rays go through strata x strata parts, and `onward` paths go on from
-    each glossy surface that these meet first. Beneath points whose surface has `normals` (P, 3), where next to no
-    reflection looks, glossy surfaces are met through the middle alone. A path that is not finite counts as black. A
-    texel holds the light of surfaces or of the sky, as its middle does: as `inverse_distances` has it, and look-ups
-    tell them apart. With `covers`, it has that of surfaces where any of its quarters meets one: as `covered_distances`.
+    is the texel's (Whitted 1980), unless, with `covers`, a lamp is seen through the middle of one of its quarters or
+    beside it: lamps smaller than texels would be lost. In other texels, rays go through strata x strata parts, and
+    `onward` paths go on from each glossy surface that these meet first. Beneath points whose surface has `normals`
+    (P, 3), where next to no reflection looks, glossy surfaces are met through the middle alone. A path that is not
+    finite counts as black. A texel holds the light of surfaces or of the sky, as its middle does: as
+    `inverse_distances` has it, and look-ups tell them apart. With `covers`, it has that of surfaces where any of its
+    quarters meets one: as `covered_distances`.
     """
     found = np.empty((len(points), texels, texels, 3), np.float32)
     for mine in slices(len(points), max(1, PATHS_AT_ONCE // texels**2)):
@@ -76,10 +78,15 @@ def radiance_maps(
         first = _first(around, _rays(some, every, texels, mi.Point2f(0.5)))
         dr.eval(first.light, first.mirrors, first.met)
         light, solid, mirrors = array_of(first.light), np.array(first.met), np.array(first.mirrors)
+        lamps: Flags = np.full(shape[:3], False)
         if covers:
-            mixed = ~solid & (_quarters(around.scene, some, texels) > 0).any(axis=(3, 4)).ravel()
+            quarters, glow = _quarters(around.scene, some, texels)
+            lamps = np.asarray(glow.any(axis=(3, 4)))
+            mixed = ~solid & (quarters > 0).any(axis=(3, 4)).ravel()
             light[mixed] = _parted(around, some, texels, np.flatnonzero(mixed), mixed[mixed], 2, onward, ~seed)
-        parted = unlike(light.reshape(shape), solid.reshape(shape[:3])).ravel() & (strata > 1)
+        edges = unlike(np.zeros(shape), lamps)
+        parted = unlike(light.reshape(shape), solid.reshape(shape[:3])) | edges | unlike(np.zeros(shape), edges)
+        parted = parted.ravel() & (strata > 1)
         beneath = np.zeros(len(light), bool) if normals is None else _beneath(normals[mine], texels).ravel()
         single = mirrors & beneath
         if covers:
@@ -163,20 +170,28 @@ def _radiance(around: Around, ray: Any, onward: int, seed: int) -> tuple[Any, An
 
 def inverse_distances(scene: Any, points: Floats, texels: int) -> NDArray[np.float16]:
     """Maps (P, texels, texels), 1/m, of what points (P, 3) see through the texels' centres; 0 for nothing."""
-    found = np.zeros(len(points) * texels * texels, np.float16)
+    return _met(scene, points, texels)[0]
+
+
+def _met(scene: Any, points: Floats, texels: int) -> tuple[NDArray[np.float16], Flags]:
+    """As `inverse_distances`, and which rays meet a surface that emits light, (P, texels, texels) each."""
+    found, glow = np.zeros(len(points) * texels * texels, np.float16), np.zeros(len(points) * texels * texels, bool)
     holes = rays.has_holes(scene)
     for mine in slices(len(found), PATHS_AT_ONCE):
         place = dr.opaque(mi.UInt32, mine.start) + dr.arange(mi.UInt32, mine.stop - mine.start)
         ray = _rays(points, place, texels, mi.Point2f(0.5))
         si = rays.intersect(scene, ray, mi.Bool(True), holes)
         inverse = dr.select(si.is_valid(), dr.rcp(dr.maximum(dr.norm(si.p - ray.o), 1 / HALF_MAX)), 0.0)
-        found[mine] = np.array(inverse).astype(np.float16)
-    return found.reshape(len(points), texels, texels)
+        lit = si.is_valid() & dr.any(si.emitter(scene).eval(si) > 0)
+        dr.eval(inverse, lit)
+        found[mine], glow[mine] = np.array(inverse).astype(np.float16), np.array(lit)
+    shape = len(points), texels, texels
+    return found.reshape(shape), glow.reshape(shape)
 
 
 def covered_distances(scene: Any, points: Floats, texels: int) -> tuple[NDArray[np.float16], NDArray[np.uint8]]:
     """As `inverse_distances`, of quarters where a texel's middle shows the sky; and `cover` of a light field."""
-    quarters = _quarters(scene, points, texels).astype(float)
+    quarters = _quarters(scene, points, texels)[0].astype(float)
     solid = quarters > 0
     mean = quarters.sum(axis=(3, 4)) / np.maximum(solid.sum(axis=(3, 4)), 1)
     middle = inverse_distances(scene, points, texels)
@@ -184,10 +199,11 @@ def covered_distances(scene: Any, points: Floats, texels: int) -> tuple[NDArray[
     return np.where(middle > 0, middle, mean).astype(np.float16), bits.sum(axis=3).astype(np.uint8)
 
 
-def _quarters(scene: Any, points: Floats, texels: int) -> NDArray[np.float16]:
-    """(P, texels, texels, 2, 2) inverse distances through the middles of texels' quarters."""
-    fine = inverse_distances(scene, points, 2 * texels)
-    return fine.reshape(len(points), texels, 2, texels, 2).transpose(0, 1, 3, 2, 4)
+def _quarters(scene: Any, points: Floats, texels: int) -> tuple[NDArray[np.float16], Flags]:
+    """(P, texels, texels, 2, 2) inverse distances through the middles of texels' quarters, and where a lamp is met."""
+    inverse, glow = _met(scene, points, 2 * texels)
+    shape, order = (len(points), texels, 2, texels, 2), (0, 1, 3, 2, 4)
+    return inverse.reshape(shape).transpose(order), glow.reshape(shape).transpose(order)
 
 
 def _rays(points: Floats, place: Any, texels: int, within: Any) -> Any:

@@ -44,7 +44,7 @@ class LookUp(Protocol):
     def distances(self, probe: Probe, w: Floats) -> Floats:
         """(M,) metres from the probe's centre to what is known along unit directions w (M, 3); inf for nothing."""
 
-    def constants(self, probe: Probe) -> dict[str, int]:
+    def constants(self, device: Any, probe: Probe) -> dict[str, int]:
         """Values of the shader's `override` constants."""
 
     def resources(self, device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:

@@ -27,7 +27,7 @@ def distances(probe: Probe, w: Floats) -> Floats:
     return np.where(np.isfinite(found) & (found < HALF_MAX), found, np.inf)
 
 
-def constants(probe: Probe) -> dict[str, int]:
+def constants(device: Any, probe: Probe) -> dict[str, int]:
     return {}
 
 

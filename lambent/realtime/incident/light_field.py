@@ -18,8 +18,9 @@ from lambent.core.light_field import NO_POINT
 from lambent.core.light_field_lookup import POWER, March
 from lambent.realtime.baked import DARK, BakedScene, Probe
 from lambent.realtime.cube_mips import finite, mip_chain
+from lambent.realtime.light_field_atlas import Atlas, coding
 from lambent.realtime.resident_maps import ResidentMaps, filled
-from lambent.realtime.structs import LIGHT_FIELD_DTYPE
+from lambent.realtime.structs import LIGHT_FIELD_DTYPE, Record
 from lambent.realtime.uploads import cube_texture, upload
 
 # by the shader's numbers; how the light of the points is blended, or found
@@ -38,7 +39,7 @@ class LightFieldLookUp:
     POWER: int = POWER  # of the cosines that weight points
     SURFACE: bool = False  # whether points show the object itself, too, in place of its light map
     AIMS: bool = False
-    BINDINGS: tuple[str, ...] = ("uniform", "exact", "layers", "exact layers", "numbers", "cube")
+    BINDINGS: tuple[str, ...] = ("uniform", "exact", "layers", "number layers", "numbers", "cube")
     __file__: str = __file__
 
     def serves(self, probe: Probe) -> bool:
@@ -50,19 +51,21 @@ class LightFieldLookUp:
     def distances(self, probe: Probe, w: Floats) -> Floats:
         return np.full(len(w), np.inf)
 
-    def constants(self, probe: Probe) -> dict[str, float]:
+    def constants(self, device: Any, probe: Probe) -> dict[str, float]:
         light_field = probe.light_field
-        glass = {"GLASS": light_field is not None and light_field.glass is not None}
-        quarters = light_field is not None and light_field.cover is not None
+        maps = {
+            "GLASS": light_field is not None and light_field.glass is not None,
+            "QUARTERS": light_field is not None and light_field.cover is not None,
+            "BLOCKS": coding(device).block > 1,
+        }
         if self.METHOD < MARCHED:
-            return {"METHOD": self.METHOD, "POWER": self.POWER, "QUARTERS": quarters, **glass}
+            return {"METHOD": self.METHOD, "POWER": self.POWER, **maps}
         rule = self.RULE
         return {
             "METHOD": self.METHOD, "POWER": self.POWER, "MARCHES": rule.candidates, "STEPS": rule.steps,
             "SECANTS": rule.secants, "FIRST": rule.first, "LAST": rule.last, "TOLERANCE": rule.tolerance,
             "ALIKE": rule.alike, "HAS_SKY": probe.sky is not None, "SURFACE": self.SURFACE,
-            "QUARTERS": quarters,
-            **glass,
+            **maps,
         }  # fmt: skip
 
     def resources(self, device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
@@ -74,8 +77,7 @@ class LightFieldLookUp:
             streams.append(maps)
         atlas = maps.atlas
         record = np.zeros((), LIGHT_FIELD_DTYPE)
-        record["side"], record["tile"], record["levels"] = atlas.tiles.side, atlas.tiles.tile, atlas.levels
-        record["columns"], record["rows"] = atlas.grid.columns, atlas.grid.rows
+        _put_layout(record, atlas)
         record["corner"], record["grid"] = light_field.corner[::-1], light_field.grid[::-1]
         record["sky_texels"] = np.log2(sky.shape[1] / 2)
         texels = filled(light_field.sample_map)
@@ -87,10 +89,20 @@ class LightFieldLookUp:
             device.create_buffer_with_data(data=record.tobytes(), usage=wgpu.BufferUsage.UNIFORM),
             maps.points.create_view(),
             atlas.radiance.create_view(dimension="2d-array"),
-            atlas.inverse_distance.create_view(dimension="2d-array"),
+            atlas.distances.create_view(dimension="2d-array"),
             numbers.create_view(),
             cube_texture(device, mip_chain(sky)).create_view(dimension="cube"),
         )
+
+
+def _put_layout(record: Record, atlas: Atlas) -> None:
+    """Write where maps lie."""
+    tiles, layout = atlas.tiles, atlas.layout
+    levels = range(1, len(tiles.sides))
+    record["side"], record["tile"], record["levels"] = tiles.sides[0], tiles.tiles[0], len(tiles.sides)
+    record["places"], record["size"], record["cell"] = layout.places, layout.size[:2], atlas.cell
+    record["coarse"][: len(levels)] = tiles.tiles[1:]
+    record["coarse_row"][: len(levels)] = [layout.first_row(level) for level in levels]
 
 
 LOOK_UPS = (

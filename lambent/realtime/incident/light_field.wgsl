@@ -4,11 +4,12 @@
 #include "frame.wgsl"
 #include "light_field_record.wgsl"
 #include "thin_glass.wgsl"
+#include "light_field_maps.wgsl"
 
 @group(2) @binding(3) var<uniform> field: LightFieldRecord;
 @group(2) @binding(4) var points: texture_2d<f32>; // places, and where the map is in the atlas; adapters in software read textures faster than buffers
 @group(2) @binding(5) var atlas: texture_2d_array<f32>;
-@group(2) @binding(6) var inverse_atlas: texture_2d_array<f32>;
+@group(2) @binding(6) var distances: texture_2d_array<u32>;
 @group(2) @binding(7) var sample_map: texture_2d<u32>;
 @group(2) @binding(8) var sky_cube: texture_cube<f32>;
 
@@ -24,7 +25,6 @@ override ALIKE: f32 = 0.15;
 override SURFACE: bool = false; // points show the surface itself, too
 override HAS_SKY: bool = true; // or the maps answer for it
 
-override QUARTERS: bool = false; // texels say which of their quarters show a surface
 override RELIT: bool = false; // the cube map says how many times brighter light is than in the maps
 override GLASS: bool = false; // what is transmitted is refracted; the lower half of the sample map then has the exits
 
@@ -73,80 +73,6 @@ fn exit_near(uv2: vec2f, front: bool) -> vec4f {
 
 fn place_of_point(point: u32) -> vec3f {
     return textureLoad(points, vec2u(point & 255u, point >> 8u), 0).xyz;
-}
-
-// a/b rounded down, exact for a < 2^16: in whole numbers, adapters in software divide one after the other.
-fn whole_share(a: u32, b: u32) -> u32 {
-    return u32((f32(a) + 0.5) / f32(b));
-}
-
-// First texel of a map's tile, and its layer.
-fn tile_of(point: u32) -> vec3u {
-    let place = u32(textureLoad(points, vec2u(point & 255u, point >> 8u), 0).w);
-    let row = whole_share(place, field.columns);
-    let layer = whole_share(row, field.rows);
-    return vec3u(vec2u(place - row * field.columns, row - layer * field.rows) * field.tile, layer);
-}
-
-fn map_place(w: vec3f) -> vec2f {
-    return 0.5 * octahedral(w) + 0.5;
-}
-
-fn light_on_level(tile: vec3u, place: vec2f, level: u32) -> vec3f {
-    let inner = select((field.tile >> level) - 2u, field.side, level == 0u);
-    let texel = vec2f(tile.xy >> vec2u(level)) + 1.0 + place * f32(inner);
-    let size = vec2f((vec2u(field.columns, field.rows) * field.tile) >> vec2u(level));
-    return textureSampleLevel(atlas, linear_sampler, texel / size, tile.z, f32(level)).rgb;
-}
-
-// Light of a point's map from direction w, averaged over a solid angle there: of a texel, 4 (|x| + |y| + |z|)^3/side^2 sr.
-fn light_of(point: u32, w: vec3f, half_log2_omega: f32) -> vec3f {
-    let spread = dot(abs(w), vec3f(1.0)) * inverseSqrt(dot(w, w));
-    let level = clamp(half_log2_omega + log2(0.5 * f32(field.side)) - 1.5 * log2(spread), 0.0, field.levels - 1.0);
-    let tile = tile_of(point);
-    let place = map_place(w);
-    let finer = u32(level);
-    var light = light_on_level(tile, place, finer);
-    if (QUARTERS && METHOD < MARCHED && finer == 0u) { light += edge_sky(tile, place, w); }
-    let share = level - f32(finer);
-    if (share > 0.0) { light = mix(light, light_on_level(tile, place, finer + 1u), share); }
-    return light;
-}
-
-// What is added to the light of the finest level, which is that of surfaces in texels that show the sky as well, so that it
-// has the light of both. Coarser levels are of both, and a march that meets a surface wants its light alone.
-fn edge_sky(tile: vec3u, place: vec2f, w: vec3f) -> vec3f {
-    let at = place * f32(field.side) - 0.5;
-    let low = floor(at);
-    var found = vec3f(0.0);
-    for (var k = 0u; k < 4u; k++) {
-        let beside = vec2f(f32(k & 1u), f32(k >> 1u));
-        let weights = abs(1.0 - beside - (at - low));
-        let texel = tile.xy + vec2u(vec2i(low + beside) + 1);
-        let quarters = countOneBits(cover_bits(textureLoad(inverse_atlas, texel, tile.z, 0).r) & 0x8007u);
-        if (quarters == 0u || quarters == 4u) { continue; }
-        let share = weights.x * weights.y * (1.0 - 0.25 * f32(quarters));
-        found += share * (light_of_sky(w, SHARP) - textureLoad(atlas, texel, tile.z, 0).rgb);
-    }
-    return found;
-}
-
-// The quarters of a texel that show a surface are the lowest bits of its inverse distance, and its sign: light_field_atlas.py.
-fn cover_bits(inverse: f32) -> u32 {
-    return pack2x16float(vec2f(inverse, 0.0));
-}
-
-// 1/m, of the quarter of a texel that a direction from a point lies in; 0 for the sky.
-fn inverse_distance(tile: vec3u, w: vec3f) -> f32 {
-    let at = map_place(w) * f32(field.side);
-    let texel = min(vec2u(at), vec2u(field.side - 1u));
-    let found = textureLoad(inverse_atlas, tile.xy + 1u + texel, tile.z, 0).r;
-    if (!QUARTERS) { return found; }
-    let bits = cover_bits(found);
-    let beyond = select(vec2u(0u), vec2u(1u), at - vec2f(texel) >= vec2f(0.5));
-    let quarter = 2u * beyond.y + beyond.x;
-    let shows = ((bits >> select(quarter, 15u, quarter == 3u)) & 1u) == 1u;
-    return select(0.0, unpack2x16float(bits & 0x7ff8u).x, shows);
 }
 
 fn light_of_sky(w: vec3f, half_log2_omega: f32) -> vec3f {
@@ -251,19 +177,19 @@ const MISSED = -1.0;
 
 // How far behind what a map sees a ray from o about its point along r is at the distance 1/u: 1/m, < 0 in front. Linear
 // in u for planes, and finite at infinity.
-fn behind(tile: vec3u, o: vec3f, r: vec3f, u: f32) -> f32 {
+fn behind(map: Map, o: vec3f, r: vec3f, u: f32) -> f32 {
     let q = r + u * o;
-    return inverse_distance(tile, q) - u * inverseSqrt(dot(q, q));
+    return inverse_distance(map, q) - u * inverseSqrt(dot(q, q));
 }
 
 // 1/m, of where the ray meets what the map sees; SKY or MISSED. Steps grow from FIRST times the distance of the point to
 // where the parallax is LAST texels, about 4/side rad each, and end at infinity.
 fn marched(point: u32, o: vec3f, r: vec3f) -> f32 {
-    let tile = tile_of(point);
+    let map = map_of(point);
     let texel = 4.0 / f32(field.side);
     let growth = pow(FIRST * texel / LAST, 1.0 / f32(STEPS - 1u));
     var near = 1.0 / (max(length(o), 1e-9) * FIRST);
-    var g_near = behind(tile, o, r, near);
+    var g_near = behind(map, o, r, near);
     var far = near;
     var g_far = g_near;
     var crossed = false;
@@ -271,14 +197,14 @@ fn marched(point: u32, o: vec3f, r: vec3f) -> f32 {
         near = far;
         g_near = g_far;
         far = select(near * growth, 0.0, i == STEPS);
-        g_far = behind(tile, o, r, far);
+        g_far = behind(map, o, r, far);
         crossed = g_near < 0.0 && (g_far > 0.0 || (g_far == 0.0 && i < STEPS));
     }
     if (!crossed) { return select(MISSED, SKY, g_far <= 0.0); }
     var u = far;
     for (var i = 0u; i < SECANTS; i++) {
         u = mix(near, far, clamp(g_near / min(g_near - g_far, -1e-30), 0.05, 0.95));
-        let g = behind(tile, o, r, u);
+        let g = behind(map, o, r, u);
         if (g < 0.0) { near = u; g_near = g; } else { far = u; g_far = g; }
     }
     // the last crossing is `near` or `far`: |q|/d - 1 is g |r + u o|/u there, and |q|/t is |r + u o|
@@ -348,7 +274,7 @@ fn rank_of(point: u32, x: vec3f, n: vec3f) -> f32 {
     let q = x - place_of_point(point);
     let away = length(q);
     let cosine = -dot(q, n) / max(away, 1e-12);
-    let sees = abs(away * inverse_distance(tile_of(point), select(-n, q, away > 0.0)) - 1.0) < SURFACE_TOLERANCE;
+    let sees = abs(away * inverse_distance(map_of(point), select(-n, q, away > 0.0)) - 1.0) < SURFACE_TOLERANCE;
     return select(UNSEEN, dot(select(vec2f(0.0), vec2f(1.0), vec2f(cosine) < CONES), vec2f(1.0)), sees);
 }
 

@@ -21,7 +21,7 @@ def distances(probe: Probe, w: Floats) -> Floats:
     return np.full(len(w), np.inf)
 
 
-def constants(probe: Probe) -> dict[str, int]:
+def constants(device: Any, probe: Probe) -> dict[str, int]:
     return {}
 
 

@@ -26,7 +26,7 @@ def distances(probe: Probe, w: Floats) -> Floats:
     return distances_to_planes(w, planes)
 
 
-def constants(probe: Probe) -> dict[str, int]:
+def constants(device: Any, probe: Probe) -> dict[str, int]:
     return {"PLANES": padded_count(probe)}
 
 
