@@ -17,6 +17,7 @@ from lambent.bake.keys import key_of
 from lambent.bake.methods import sorts_light
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles
+from lambent.core.delta_bytes import delta_bytes
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.store.answer import DIRECT, NO_PATCH, answer_name, probe_spots_name
 from lambent.store.contract import SIDES, probe_name, shared_probes
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
 KIND = "answer"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 8
+REVISION = 9
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
@@ -80,7 +81,7 @@ def keys(context: BakeContext) -> dict[str, str]:
     key = key_of(KIND, REVISION, light, effort, context.seed)
     sampled = () if ready else TRACED[:count]
     by_group = map(_by_group, sampled) if sorts_light(context.methods) else ()
-    found = dict.fromkeys((*sampled, *by_group, *MAPS[:count]), key)
+    found = dict.fromkeys((*sampled, *by_group, *(() if ready else MAPS[:count])), key)
     worn = [(o.name, o.material) for o in context.scene.objects]  # patches are of one material, by its name
     found |= dict.fromkeys(map(answer_name, (*PATCH, *BETWEEN)), key_of(KIND, REVISION, key, worn))
     of_probes = context.keys("probe")
@@ -114,15 +115,19 @@ def _direct(context: BakeContext, side: int) -> Floats:
 
     What lobes alone have sent on counts as direct.
     """
+    if keeps_direct(context):
+        return np.asarray(context.store.read(_direct_name(context, side)))
     if MAPS[side] not in context.stale(KIND):
         return np.asarray(context.store.read(MAPS[side]))
     lit = _lit(context)[side]
-    if keeps_direct(context):
-        direct = context.store.read(group_name(SIDES[side], direct=True))
-    else:
-        direct = np.minimum(_sampled_direct(context, side, lit), np.asarray(lit, np.float16))
+    direct = np.minimum(_sampled_direct(context, side, lit), np.asarray(lit, np.float16))
     context.put(KIND, MAPS[side], direct, context.provenance())
     return np.asarray(direct)
+
+
+def _direct_name(context: BakeContext, side: int) -> str:
+    """Name of the array of a side's direct light: the light map's, where it keeps all."""
+    return group_name(SIDES[side], direct=True) if keeps_direct(context) else MAPS[side]
 
 
 def _sampled_direct(context: BakeContext, side: int, lit: Floats) -> Floats:
@@ -221,7 +226,8 @@ def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
         context.put(KIND, answer_name(part), values.astype(np.uint16), context.provenance())
     direct = np.stack([patch_means(spots, found, of_group) for of_group in spots.direct]).astype(np.float32)
     context.put(KIND, answer_name("patch_direct"), direct, context.provenance())
-    note = context.provenance(materials=list(context.scene.materials))
+    directs = [_direct_name(context, side) for side in range(len(sides))]
+    note = context.provenance(materials=list(context.scene.materials), direct=directs)
     context.put(KIND, answer_name("patch"), patch.reshape(2, texels.height, texels.width), note)
     return found
 
@@ -276,9 +282,10 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
         writer = context.store.begin(answer_name(part), KIND, shape, chunk, dtype, key=key, meta=context.provenance())
         run_tiles(writer, tile, seed=context.seed, progress=context.progress, what=what)
         writer.finish()
-    numbers = (spots.index[everyone.texel] * 2 + everyone.side).astype(np.uint32)
     own_sun = spots.sun[everyone.side, everyone.texel]
-    values = (numbers, own_sun, other.astype(np.uint32), codes, near.points, near.shares)
+    numbers = spots.index[everyone.texel] * 2 + everyone.side, other, codes, near.points
+    of_points, of_other, of_texels, of_near = map(delta_bytes, numbers)
+    values = (of_points, own_sun, of_other, of_texels, of_near, near.shares)
     for part, array in zip(BETWEEN[3:], values, strict=True):
         context.put(KIND, answer_name(part), array, context.provenance())
 
@@ -301,5 +308,6 @@ def _seen_by_probes(context: BakeContext, stale: set[str]) -> None:
             own = set().union(*(family(scene.parts, one) for one in (name, *sharing(owners, name))))
         found = eyes.look(np.array(radiance.meta["centre"]), radiance.shape[1], frozenset(own))
         for part in SEEN:
-            context.put(KIND, probe_spots_name(name, part), getattr(found, part), context.provenance())
+            values = delta_bytes(found.spots) if part == "spots" else getattr(found, part)
+            context.put(KIND, probe_spots_name(name, part), values, context.provenance())
     context.progress(len(names), len(names), "what probes see")
