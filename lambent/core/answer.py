@@ -13,8 +13,9 @@ E and I have a leading axis of light groups, and so has F: each group's light li
 and not a difference, is applied to the baked light, so that it keeps its detail and the error is relative; with albedos
 as baked the ratio is 1 and nothing changes.
 
-Rays that lobes have sent on, and textures, are in the weights. Weights also follow the light around a point: a ray that
-ends where it is twice as bright as at the point counts twice.
+Rays that lobes have sent on, and textures, are in the weights. Those of F also follow the light within a patch by
+group: a ray that ends where it is twice as bright as in the mean counts twice. Points send the mean light around
+them: with its shape in the weights of rays, the indirect light of a sunlit spot grew as much as if it were the sun's.
 
 Light that rays read is (K, G, 4): `side_by_side`.
 """
@@ -149,7 +150,8 @@ class Points:
     other : (K,) integers
         The point on the other side of the surface; its own number where no light crosses it.
     direct, light : (G, K, 3) float32
-        Direct and all baked irradiance by group of lights, W/m^2, the sun's included.
+        Direct and all baked irradiance by group of lights, W/m^2, the sun's included: means over the texels for which
+        a point sends.
     """
 
     patch: NDArray[np.integer]
@@ -179,15 +181,15 @@ def side_by_side(light: Floats) -> NDArray[np.float32]:
 
 
 def packed_rays(point: NDArray[np.integer], weight: Floats) -> NDArray[np.uint8]:
-    """Rays (K, R, 2 + G) bytes: the point near which each ends, and its weights (G, K, R) by light group.
+    """Rays (K, R, 3) bytes: the point near which each ends, and its weight (K, R).
 
     Rays that end near the same point are one, in the order of points, each of which is the step from the one before,
-    low byte first. Weights are 0 or powers of two by WEIGHT_STEPS. Rows are filled up with 0. Points are below MOST_POINTS.
+    low byte first. Weights are 0 or powers of two by WEIGHT_STEPS. Rows are filled up with 0. Points are less than
+    MOST_POINTS.
     """
-    rays = np.zeros((*point.shape, 2 + len(weight)), np.uint8)
-    numbers = np.ascontiguousarray(point, np.int64)
-    given = np.ascontiguousarray(weight, np.float32)
-    loops.pack(numbers, given, np.float32(WEIGHT_STEPS), np.float32(WEIGHT_ONE), rays)
+    rays = np.zeros((*point.shape, 3), np.uint8)
+    numbers, weights = np.ascontiguousarray(point, np.int64), np.ascontiguousarray(weight, np.float32)
+    loops.pack(numbers, weights, np.float32(WEIGHT_STEPS), np.float32(WEIGHT_ONE), rays)
     return rays
 
 
@@ -213,8 +215,8 @@ class Rays:
         The rays of point k go from starts[k] on to starts[k + 1].
     points : (N,) uint16
         The point near which each ends.
-    weights : (N, G) uint8
-        By light group: `weights_of_bytes`.
+    weights : (N,) uint8
+        `weights_of_bytes`.
     scale : (K,) float32
         One over the number of each point's rays, those included that end nowhere.
     """
@@ -226,11 +228,10 @@ class Rays:
 
     @classmethod
     def of(cls, packed: NDArray[np.uint8]) -> Rays:
-        """Of `packed_rays` (K, R, 2 + G)."""
-        size, count, groups = packed.shape[0], packed.shape[1], packed.shape[2] - 2
-        used = packed[..., 2:].any(axis=2).sum(axis=1)
-        starts = np.append(0, np.cumsum(used)).astype(np.int64)
-        points, weights = np.zeros(starts[-1], np.uint16), np.zeros((starts[-1], groups), np.uint8)
+        """Of `packed_rays` (K, R, 3)."""
+        size, count = packed.shape[:2]
+        starts = np.append(0, np.cumsum(np.count_nonzero(packed[..., 2], axis=1))).astype(np.int64)
+        points, weights = np.zeros(starts[-1], np.uint16), np.zeros(starts[-1], np.uint8)
         loops.unpack(np.ascontiguousarray(packed), starts, points, weights)
         return cls(starts, points, weights, np.full(size, 1 / max(count, 1), np.float32))
 

@@ -1,7 +1,7 @@
 """Compiled loops of `answer`: light between patches, exitance of points, gathering, and the light of texels.
 
-Light of points is (K, G, 4) float32, groups side by side, so that a ray reads the light of all groups from one place; the
-fourth channel is padding, with which a processor adds the channels of a group at once (`by_lanes`).
+Light of points is (K, G, 4) float32, groups side by side, so that a ray reads the light of all groups from one place.
+The fourth channel is padding, with which a processor adds the channels of a group at once (`by_lanes`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _COMPILING = Lock()
 
 
 def by_lanes(loop: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a loop whose sums over neighbouring channels are vectors: Numba leaves this pass of LLVM out by default."""
+    """Compile a loop whose sums over neighbouring channels are vectors: a pass of LLVM that Numba leaves out."""
     compiled = numba.njit(parallel=True, cache=True, nogil=True)(loop)
 
     @wraps(loop)
@@ -109,54 +109,41 @@ def ratios(now, baked, least, most_ratio):  # type: ignore[no-untyped-def]
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
-    """`answer.packed_rays` (K, R, 2 + G), all 0 before, of rays to `numbers` (K, R) that weigh (G, K, R)."""
-    groups, last_code = weights.shape[0], np.float32(255)
+    """`answer.packed_rays` (K, R, 3), all 0 before, of rays to `numbers` (K, R) that weigh (K, R)."""
     for k in numba.prange(len(numbers)):
         order = np.argsort(numbers[k])
-        sums = np.zeros((numbers.shape[1], groups), np.float32)
-        ends = np.zeros(numbers.shape[1], np.int64)
+        sums = np.zeros(len(order), np.float32)
+        ends = np.zeros(len(order), np.int64)
         count, last = 0, np.int64(-1)
         for r in order:
-            lit = False
-            for group in range(groups):
-                lit |= weights[group, k, r] > 0
-            if not lit:
-                continue
-            if numbers[k, r] != last:
-                last = numbers[k, r]
-                ends[count] = last
-                count += 1
-            for group in range(groups):
-                sums[count - 1, group] += weights[group, k, r]
+            if weights[k, r] > 0:
+                if numbers[k, r] != last:
+                    last = numbers[k, r]
+                    ends[count] = last
+                    count += 1
+                sums[count - 1] += weights[k, r]
         place, last = 0, np.int64(0)
         for n in range(count):
-            # Steps are wide, so that codes are the one below or above as chance has it: sums of many stay right.
+            # Steps are wide, so that a byte is the one below or above as chance has it: sums of many stay right.
             dither = np.float32((n * 0.6180339887 + ends[n] * 0.7548776662) % 1)
-            any_code = False
-            for group in range(groups):
-                code = np.float32(0)
-                if sums[n, group] > 0:
-                    code = np.floor(np.log2(sums[n, group]) * steps + dither) + one
-                code = min(max(code, np.float32(0)), last_code)
-                rays[k, place, 2 + group] = np.uint8(code)
-                any_code |= code > 0
-            if any_code:
+            code = np.floor(np.log2(sums[n]) * steps + dither) + one
+            if code >= 1:
                 step = ends[n] - last
                 rays[k, place, 0], rays[k, place, 1] = np.uint8(step & 255), np.uint8(step >> 8)
+                rays[k, place, 2] = np.uint8(min(code, np.float32(255)))
                 last = ends[n]
                 place += 1
 
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def unpack(rays, starts, points, weights):  # type: ignore[no-untyped-def]
-    """Points (N,) and weights (N, G) of packed rays (K, R, 2 + G), those of each k from `starts` (K + 1,) on."""
+    """Points and weights (N,) of packed rays (K, R, 3), those of each k from `starts` (K + 1,) on."""
     for k in numba.prange(len(rays)):
         last = np.int64(0)
         for n in range(starts[k + 1] - starts[k]):
             last += np.int64(rays[k, n, 0]) | (np.int64(rays[k, n, 1]) << 8)
             points[starts[k] + n] = last
-            for group in range(weights.shape[1]):
-                weights[starts[k] + n, group] = rays[k, n, 2 + group]
+            weights[starts[k] + n] = rays[k, n, 2]
 
 
 @by_lanes
@@ -169,11 +156,11 @@ def gather_one(starts, points, weights, table, scale, sent):  # type: ignore[no-
     for k in numba.prange(len(scale)):
         a0 = a1 = a2 = a3 = np.float32(0)
         for r in range(starts[k], starts[k + 1]):
-            point, a = points[r], table[weights[r, 0]]
-            a0 += a * sent[point, 0, 0]
-            a1 += a * sent[point, 0, 1]
-            a2 += a * sent[point, 0, 2]
-            a3 += a * sent[point, 0, 3]
+            point, weight = points[r], table[weights[r]]
+            a0 += weight * sent[point, 0, 0]
+            a1 += weight * sent[point, 0, 1]
+            a2 += weight * sent[point, 0, 2]
+            a3 += weight * sent[point, 0, 3]
         by = scale[k]
         found[k, 0, 0], found[k, 0, 1], found[k, 0, 2], found[k, 0, 3] = a0 * by, a1 * by, a2 * by, a3 * by
     return found
@@ -181,32 +168,30 @@ def gather_one(starts, points, weights, table, scale, sent):  # type: ignore[no-
 
 @by_lanes
 def gather_four(starts, points, weights, table, scale, sent, first, found):  # type: ignore[no-untyped-def]
-    """The same for four groups from `first` on, into found (K, G, 4). Where there are fewer, the last is summed again."""
+    """The same for four groups from `first` on, into found (K, G, 4); where there are fewer, the last once more."""
     last = sent.shape[1] - 1
     two, three, four = min(first + 1, last), min(first + 2, last), min(first + 3, last)
     for k in numba.prange(len(scale)):
         a0 = a1 = a2 = a3 = b0 = b1 = b2 = b3 = np.float32(0)
         c0 = c1 = c2 = c3 = d0 = d1 = d2 = d3 = np.float32(0)
         for r in range(starts[k], starts[k + 1]):
-            point = points[r]
-            a, b = table[weights[r, first]], table[weights[r, two]]
-            c, d = table[weights[r, three]], table[weights[r, four]]
-            a0 += a * sent[point, first, 0]
-            a1 += a * sent[point, first, 1]
-            a2 += a * sent[point, first, 2]
-            a3 += a * sent[point, first, 3]
-            b0 += b * sent[point, two, 0]
-            b1 += b * sent[point, two, 1]
-            b2 += b * sent[point, two, 2]
-            b3 += b * sent[point, two, 3]
-            c0 += c * sent[point, three, 0]
-            c1 += c * sent[point, three, 1]
-            c2 += c * sent[point, three, 2]
-            c3 += c * sent[point, three, 3]
-            d0 += d * sent[point, four, 0]
-            d1 += d * sent[point, four, 1]
-            d2 += d * sent[point, four, 2]
-            d3 += d * sent[point, four, 3]
+            point, weight = points[r], table[weights[r]]
+            a0 += weight * sent[point, first, 0]
+            a1 += weight * sent[point, first, 1]
+            a2 += weight * sent[point, first, 2]
+            a3 += weight * sent[point, first, 3]
+            b0 += weight * sent[point, two, 0]
+            b1 += weight * sent[point, two, 1]
+            b2 += weight * sent[point, two, 2]
+            b3 += weight * sent[point, two, 3]
+            c0 += weight * sent[point, three, 0]
+            c1 += weight * sent[point, three, 1]
+            c2 += weight * sent[point, three, 2]
+            c3 += weight * sent[point, three, 3]
+            d0 += weight * sent[point, four, 0]
+            d1 += weight * sent[point, four, 1]
+            d2 += weight * sent[point, four, 2]
+            d3 += weight * sent[point, four, 3]
         by = scale[k]
         found[k, four, 0], found[k, four, 1], found[k, four, 2], found[k, four, 3] = d0 * by, d1 * by, d2 * by, d3 * by
         found[k, three, 0], found[k, three, 1] = c0 * by, c1 * by

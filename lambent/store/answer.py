@@ -9,10 +9,13 @@ answer/direct, direct_back (G, H, W, 3) float16, direct irradiance of texels wit
                            light map; light that only lobes have sent on counts as direct. Absent where the light map
                            keeps it as light_map/direct, direct_back; meta["direct"] of answer/patch names the arrays
 answer/transfer            (P, G P) float16, share of a patch's light by the patches that send it, group after group
-answer/rays                (2 + G, K, R) uint8, `core.answer.packed_rays` of the points that send and gather light
-answer/receiver_rays       (2 + G, F, S) uint8, of points beside contacts, which gather and do not send
+answer/rays                (3, K, R) uint8, `core.answer.packed_rays` of the points that send and gather light
+answer/receiver_rays       (3, F, S) uint8, of points beside contacts, which gather and do not send
 answer/points              (K + F,) numbers, the texel and side of each, as below; those that do not send are last
 answer/point_sun           (K + F, 3) float32, direct irradiance of the sun there, W/m^2
+answer/point_direct        (G, K, 3) float32, mean direct irradiance, W/m^2, by group, of the texels for which a point
+                           sends, with the sun's; and of all light as baked:
+answer/point_light         (G, K, 3) float32
 answer/point_other         (K,) numbers, the point on the other side of the surface; its own where light does not cross
 answer/texels              (T,) numbers, texels that answer: twice (row * W + column), plus 1 on the other side
 answer/near                (T, 8) numbers, points near each, and
@@ -23,7 +26,8 @@ answer/probe/OBJECT/sun    (6, N, N) float16, direct sun there over that on what
 answer/traced, traced_back (2, H, W, 4) float32, samples of direct light, from which a bake continues; by group too,
                            traced_by_group, traced_back_by_group (1, H, W, 6 G), where light is sorted
 
-Numbers are `core.delta_bytes` (4, ...) uint8. G is the number of light groups, in the order of `store.light_groups`; 1 where light was baked as one.
+Numbers are `core.delta_bytes` (4, ...) uint8. G is the number of light groups, in the order of `store.light_groups`; 1
+where light was baked as one.
 """
 
 from __future__ import annotations
@@ -70,6 +74,8 @@ def has_answer(store: Store) -> bool:
         "points",
         "point_other",
         "point_sun",
+        "point_direct",
+        "point_light",
         "near",
         "texels",
         "patch_direct",
@@ -134,13 +140,14 @@ def read_answer(store: Store) -> StoredAnswer:
         hint = "bake the scene again with `lambent bake --only answer`"
         raise UserError("store has no light that answers other colours", file=store.folder, field="answer", hint=hint)
     record = scene_record(store)
-    material, paired, direct, transfer, rays, more_rays, points, point_sun, across, texels, near, shares, patch = (
-        store.read(answer_name(part))
-        for part in (
-            "patch_material", "patch_paired", "patch_direct", "transfer", "rays", "receiver_rays", "points",
-            "point_sun", "point_other", "texels", "near", "shares", "patch",
-        )
+    parts = (
+        "patch_material", "patch_paired", "patch_direct", "transfer", "rays", "receiver_rays", "points", "point_sun",
+        "point_direct", "point_light", "point_other", "texels", "near", "shares", "patch",
     )  # fmt: skip
+    material, paired, direct, transfer, rays, more_rays, points, point_sun, *rest = map(
+        store.read, map(answer_name, parts)
+    )
+    point_direct, point_light, across, texels, near, shares, patch = rest
     names = tuple(map(str, store.artefact(answer_name("patch")).meta.get("materials", ())))
     count, height, width = len(material), *patch.shape[1:]
     points, across, texels, near = map(from_delta_bytes, (points, across, texels, near))
@@ -153,7 +160,7 @@ def read_answer(store: Store) -> StoredAnswer:
         and (not count or int(paired.max()) < count)
         and direct.shape[1:] == (count, 3)
         and transfer.shape == (count, len(direct) * count)
-        and rays.shape[2] == more_rays.shape[2] == 2 + len(direct)
+        and rays.shape[2] == more_rays.shape[2] == 3
         and near.shape == shares.shape
         and near.shape[0] == len(texels)
         and (not near.size or int(near.max()) < len(points))
@@ -163,6 +170,7 @@ def read_answer(store: Store) -> StoredAnswer:
         and across.shape == (senders,)
         and (not senders or int(across.max()) < senders)
         and point_sun.shape == (len(points), 3)
+        and point_direct.shape == point_light.shape == (len(direct), senders, 3)
         and bool(np.isin(points, texels).all())
         and all(not one.size or int(last_points(one).max()) < max(senders, 1) for one in (rays, more_rays))
     )
@@ -190,12 +198,10 @@ def read_answer(store: Store) -> StoredAnswer:
     sun = sun_beside(store)
     of_sun = next((n for n, group in enumerate(light_groups(store)) if SUN in group.members), 0)
     directs, at = np.minimum(directs, baked), number[points[:senders]]
-    with_sun = np.zeros((groups, senders, 3), np.float32)
-    with_sun[of_sun] = point_sun[:senders]
     nearest = Neighbours(near, shares)
     sending = Points(
         of_patch[at], material.astype(np.int64)[of_patch[at]], across.astype(np.int64),
-        directs[:, at] + with_sun, baked[:, at] + with_sun,
+        np.minimum(point_direct, point_light), point_light,
     )  # fmt: skip
     all_rays = Rays.of(rays).followed_by(Rays.of(more_rays))
     answer = Answer(patches, sending, all_rays, nearest, directs, baked, albedos)

@@ -30,8 +30,10 @@ class Between:
         self._ends, self._spots, self._sides, self._clusters = ends, spots, sides, clusters
         means = patch_means(spots, clusters, np.moveaxis(exitance, 0, -1)).T
         self._patches = senders_of(spots, clusters.of, means, exitance, size)
-        self._sent = exitance[:, points.side, points.texel]
-        self._near = senders_of(spots, near, self._sent, exitance, size)
+        self._near = np.full(2 * size, -1)
+        for side in range(2):
+            self._near[spots.index * 2 + side] = near[side]
+        self._sent = sender_means(spots, near, exitance[..., None].sum(axis=0), len(points.texel))[:, 0]
 
     def transfer_rows(self, first: int, last: int, rays: int, seed: int) -> NDArray[np.float32]:
         """Rows [first, last) of F (., G, P): means over `rays` from each patch, spread over its texels by area."""
@@ -67,20 +69,21 @@ class Between:
         return np.concatenate([nothing, *texels]), np.concatenate([nothing, *patches])
 
     def gathered_rays(self, points: GatherPoints, part: slice, count: int, kept: int, seed: int) -> NDArray[np.uint8]:
-        """`packed_rays` (n, kept, 2 + G), chosen of `count` from some of the points, which send light or do not."""
+        """`packed_rays` (n, kept, 3), chosen of `count` from some of the points, which send light or do not."""
         side, texel = points.side[part], points.texel[part]
-        found = np.zeros((len(texel), kept, 2 + len(self._near.relative)), np.uint8)
+        found = np.zeros((len(texel), kept, 3), np.uint8)
         for one in range(2):
             mine = np.flatnonzero(side == one)
             if len(mine):
                 ends = self._ends.from_texels(self._sides[one], texel[mine], count, seed_of(seed, "gather", one))
-                met, weight = self._near.met(*ends)
+                met = np.where(ends[0] == NOWHERE, -1, self._near[np.where(ends[0] == NOWHERE, 0, ends[0])])
+                weight = np.where(met >= 0, ends[1], 0.0)
                 if kept < count:
-                    light = np.einsum("gnr,gnr->nr", weight, self._sent[:, np.maximum(met, 0)])
                     shift = np.random.default_rng((seed, one)).random(len(mine))
-                    chosen, scale = chosen_rays(met, weight.sum(axis=0), light, kept, shift)
+                    light = weight * self._sent[np.maximum(met, 0)]
+                    chosen, scale = chosen_rays(met, weight, light, kept, shift)
                     met = np.take_along_axis(met, chosen, axis=1)
-                    weight = np.take_along_axis(weight, chosen[None], axis=2) * scale
+                    weight = np.take_along_axis(weight, chosen, axis=1) * scale
                 found[mine] = packed_rays(met, weight)
         return found
 
@@ -134,6 +137,18 @@ def patch_means(spots: Spots, clusters: Clusters, values: Floats) -> Floats:
     means = total / np.maximum(area, 1e-30)[:, None]
     lit = lit_total / np.maximum(lit_area, 1e-30)[:, None]
     return np.where((lit_area > 0)[:, None], lit, means)
+
+
+def sender_means(spots: Spots, senders: Indices, values: Floats, count: int) -> Floats:
+    """(count, C) means over area of values (2, K, C) of the lit texels for which each of `senders` (2, K) sends."""
+    total, area = np.zeros((count, values.shape[-1])), np.zeros(count)
+    for side in range(2):
+        mine = np.flatnonzero(spots.lit[side] & (senders[side] >= 0))
+        of, weight = senders[side][mine], spots.area[mine]
+        area += np.bincount(of, weight, count)
+        for channel in range(values.shape[-1]):
+            total[:, channel] += np.bincount(of, weight * values[side, mine, channel], count)
+    return np.asarray(total / np.maximum(area, 1e-30)[:, None])
 
 
 def light_seen(

@@ -17,8 +17,8 @@ from lambent.bake.keys import key_of
 from lambent.bake.methods import sorts_light
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles
-from lambent.core.delta_bytes import delta_bytes
 from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.delta_bytes import delta_bytes
 from lambent.store.answer import DIRECT, NO_PATCH, answer_name, probe_spots_name
 from lambent.store.contract import SIDES, probe_name, shared_probes
 from lambent.store.light_groups import group_name
@@ -36,7 +36,19 @@ REVISION = 9
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
-BETWEEN = ("transfer", "rays", "receiver_rays", "points", "point_sun", "point_other", "texels", "near", "shares")
+BETWEEN = (
+    "transfer",
+    "rays",
+    "receiver_rays",
+    "points",
+    "point_sun",
+    "point_direct",
+    "point_light",
+    "point_other",
+    "texels",
+    "near",
+    "shares",
+)
 SEEN = ("spots", "tint", "sun")
 TILES = 16  # of transfer and of rays
 
@@ -236,7 +248,7 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     """Transfer between patches, and rays between points."""
     from lambent.bake.answering.points import bounded_points, neighbours, receiving_points, refined_points, seeing
     from lambent.bake.answering.senders import points_near
-    from lambent.bake.answering.transfer import Between, light_seen
+    from lambent.bake.answering.transfer import Between, light_seen, sender_means
 
     how: Settings = context.settings(KIND)
     width, count = context.traced.texels.width, clusters.count
@@ -271,10 +283,9 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
         return tile
 
     key = context.keys(KIND)[answer_name("transfer")]
-    groups = len(spots.irradiance)
     sizes = (points, how.gather_rays), (receivers, how.receiver_rays)
-    of_points, of_receivers = ((2 + groups, len(of.texel), count) for of, count in sizes)
-    arrays = (("transfer", (count, groups * count), 0, "float16", rows, "light between patches"),
+    of_points, of_receivers = ((3, len(of.texel), count) for of, count in sizes)
+    arrays = (("transfer", (count, len(spots.irradiance) * count), 0, "float16", rows, "light between patches"),
               ("rays", of_points, 1, "uint8", rays(*sizes[0]), "gathering"),
               ("receiver_rays", of_receivers, 1, "uint8", rays(*sizes[1]), "gathering beside contacts"))  # fmt: skip
     for part, shape, axis, dtype, tile, what in arrays:
@@ -285,7 +296,9 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     own_sun = spots.sun[everyone.side, everyone.texel]
     numbers = spots.index[everyone.texel] * 2 + everyone.side, other, codes, near.points
     of_points, of_other, of_texels, of_near = map(delta_bytes, numbers)
-    values = (of_points, own_sun, of_other, of_texels, of_near, near.shares)
+    of_group = (spots.direct, spots.irradiance)
+    sent = (np.stack([sender_means(spots, closest, one, len(points.texel)) for one in light]) for light in of_group)
+    values = (of_points, own_sun, *(one.astype(np.float32) for one in sent), of_other, of_texels, of_near, near.shares)
     for part, array in zip(BETWEEN[3:], values, strict=True):
         context.put(KIND, answer_name(part), array, context.provenance())
 

@@ -133,7 +133,7 @@ class _Shared:
         about = [points.patch, points.material, points.other, np.zeros(len(points.patch))]
         self.points = stages.buffer(np.stack(about, axis=1).astype(np.uint32))
         self.ray_starts, self.ray_ends = stages.buffer(rays.starts.astype(np.uint32)), stages.buffer(rays.points)
-        self.ray_scale = stages.buffer(rays.scale)
+        self.ray_weights, self.ray_scale = stages.buffer(rays.weights), stages.buffer(rays.scale)
         self.near = stages.buffer(packed_near(answer.near))
 
     def colour(self, albedos: Albedos) -> None:
@@ -198,8 +198,7 @@ class _Group:
         lights = stages.buffer(np.concatenate([points.direct[group], points.light[group]], axis=1).astype(np.float32))
         self._first = self._exitance(lights, True, solver.indirect, solver.light())
         self._next = self._exitance(lights, False, self._found, gathered[: self._points])
-        weights = stages.buffer(rays.weights[:, group])
-        given = shared.ray_starts, shared.ray_ends, weights, shared.ray_scale, self._sent, self._found
+        given = (shared.ray_starts, shared.ray_ends, shared.ray_weights, shared.ray_scale, self._sent, self._found)
         self._gathers, self._gathers_last = (
             stages.call("gather", (count,), *given, threads=count) for count in (self._points, self._gathering)
         )
