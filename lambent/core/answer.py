@@ -9,13 +9,11 @@ B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, a and t 
 transmission, F (P, P) the share of what a patch receives that comes from each other one. Patches have most bounces; the
 last PASSES are gathered among some thirty times as many points, each with its own direct light. Beside contacts, where
 light changes from texel to texel, more points gather in the last pass, and send nothing. Light is linear, so D,
-E and I have a leading axis of light groups, and so has F: each group's light lies elsewhere within a patch. A ratio,
-and not a difference, is applied to the baked light, so that it keeps its detail and the error is relative; with albedos
-as baked the ratio is 1 and nothing changes.
+E and I have a leading axis of light groups; F may have one. A ratio, and not a difference, is applied to the baked
+light, so that it keeps its detail and the error is relative; with albedos as baked the ratio is 1 and nothing changes.
 
-Rays that lobes have sent on, and textures, are in the weights. Those of F also follow the light within a patch by
-group: a ray that ends where it is twice as bright as in the mean counts twice. Points send the mean light around
-them: with its shape in the weights of rays, the indirect light of a sunlit spot grew as much as if it were the sun's.
+Rays that lobes have sent on, and textures, are in the weights of rays. Points send the mean light around them. With the
+shape of baked light in the weights, a sunlit spot's indirect light grew as if it were the sun's.
 
 Light that rays read is (K, G, 4): `side_by_side`.
 """
@@ -59,8 +57,8 @@ class Patches:
         The patch on the other side; its own number on surfaces that no light crosses.
     direct : (G, P, 3) float32
         Direct irradiance by group of lights, W/m^2, the sun's included.
-    transfer : (G, P, P) float32
-        F by group, rows by the patch that receives; (P, P) is that of all groups.
+    transfer : (P, P) or (G, P, P) float32
+        F, rows by the patch that receives, of all groups alike or of each.
     """
 
     material: NDArray[np.integer]
@@ -238,9 +236,8 @@ class Rays:
     def followed_by(self, other: Rays) -> Rays:
         """These rays, and those of other points after them."""
         starts = np.concatenate([self.starts, other.starts[1:] + self.starts[-1]])
-        pairs = zip((self.points, self.weights, self.scale), (other.points, other.weights, other.scale), strict=True)
-        points, weights, scale = (np.concatenate(pair) for pair in pairs)
-        return Rays(starts, points, weights, scale)
+        points, weights = (np.concatenate([self.points, other.points]), np.concatenate([self.weights, other.weights]))
+        return Rays(starts, points, weights, np.concatenate([self.scale, other.scale]))
 
     def of_first(self, count: int) -> Rays:
         """The rays of the first `count` points."""

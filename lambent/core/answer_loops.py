@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import wraps
 from threading import Lock
-from typing import Any
+from typing import Any, cast
 
 import numba
 import numpy as np
 
 NO_LIGHT = np.float32(1e-30)
-_COMPILING = Lock()
+_COMPILING, _NUMBA = Lock(), cast(Any, numba.config)
 
 
 def by_lanes(loop: Callable[..., Any]) -> Callable[..., Any]:
@@ -27,11 +27,11 @@ def by_lanes(loop: Callable[..., Any]) -> Callable[..., Any]:
         if compiled.signatures:
             return compiled(*arguments)
         with _COMPILING:
-            before, numba.config.SLP_VECTORIZE = numba.config.SLP_VECTORIZE, 1
+            before, _NUMBA.SLP_VECTORIZE = _NUMBA.SLP_VECTORIZE, 1
             try:
                 return compiled(*arguments)
             finally:
-                numba.config.SLP_VECTORIZE = before
+                _NUMBA.SLP_VECTORIZE = before
 
     return called
 

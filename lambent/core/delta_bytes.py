@@ -9,7 +9,7 @@ PLACES = 4
 
 
 def delta_bytes(numbers: NDArray[np.integer]) -> NDArray[np.uint8]:
-    """(4, ...) bytes of numbers (...) below 2^32, lowest first: those of the steps from each to the next, row by row."""
+    """(4, ...) bytes of numbers (...) below 2^32, lowest first: of the steps from each to the next, row by row."""
     steps = np.diff(numbers.astype(np.uint32).reshape(-1), prepend=np.uint32(0))
     places = steps.astype("<u4").view(np.uint8).reshape(-1, PLACES)
     return np.ascontiguousarray(places.T).reshape(PLACES, *numbers.shape)

@@ -8,7 +8,7 @@ answer/patch_direct        (G, P, 3) float32, direct irradiance with the sun's, 
 answer/direct, direct_back (G, H, W, 3) float16, direct irradiance of texels without the sun's, at most that of the
                            light map; light that only lobes have sent on counts as direct. Absent where the light map
                            keeps it as light_map/direct, direct_back; meta["direct"] of answer/patch names the arrays
-answer/transfer            (P, G P) float16, share of a patch's light by the patches that send it, group after group
+answer/transfer            (P, P) float16, share of the light of patches that reaches each: rows receive
 answer/rays                (3, K, R) uint8, `core.answer.packed_rays` of the points that send and gather light
 answer/receiver_rays       (3, F, S) uint8, of points beside contacts, which gather and do not send
 answer/points              (K + F,) numbers, the texel and side of each, as below; those that do not send are last
@@ -159,7 +159,7 @@ def read_answer(store: Store) -> StoredAnswer:
         and paired.shape == material.shape
         and (not count or int(paired.max()) < count)
         and direct.shape[1:] == (count, 3)
-        and transfer.shape == (count, len(direct) * count)
+        and transfer.shape == (count, count)
         and rays.shape[2] == more_rays.shape[2] == 3
         and near.shape == shares.shape
         and near.shape[0] == len(texels)
@@ -188,8 +188,7 @@ def read_answer(store: Store) -> StoredAnswer:
         )
         raise UserError("does not fit the light map", file=store.folder, field="answer", got=got, expected=groups,
                         hint=hint)  # fmt: skip
-    by_group = np.ascontiguousarray(transfer.reshape(count, groups, count).transpose(1, 0, 2), np.float32)
-    patches = Patches(material.astype(np.int64), paired.astype(np.int64), direct, by_group)
+    patches = Patches(material.astype(np.int64), paired.astype(np.int64), direct, transfer.astype(np.float32))
     albedos = albedos_of([record.materials[name] for name in names])
     number = _numbers(texels, height * width)
     flat = patch.reshape(2, -1)

@@ -195,6 +195,13 @@ def neighbours(spots: Spots, points: GatherPoints) -> tuple[NDArray[np.uint32], 
     return code[order].astype(np.uint32), packed
 
 
+def points_near(spots: Spots, codes: NDArray[np.uint32], near: Neighbours) -> Indices:
+    """(2, K) the point that counts most for each spot that answers, -1 for others."""
+    found = np.full((2, len(spots.index)), -1)
+    found[codes % 2, np.searchsorted(spots.index, codes // 2)] = near.closest
+    return found
+
+
 def _shares(spots: Spots, mine: Indices, points: GatherPoints, at: Indices) -> Floats:
     """(n, count) bytes of the points `at` (n, count), nearest first; the largest of each row is BYTE."""
     texel = points.texel[at]

@@ -17,6 +17,7 @@ from lambent.bake.keys import key_of
 from lambent.bake.methods import sorts_light
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles
+from lambent.core.answer import Rays
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.delta_bytes import delta_bytes
 from lambent.store.answer import DIRECT, NO_PATCH, answer_name, probe_spots_name
@@ -55,15 +56,14 @@ TILES = 16  # of transfer and of rays
 
 @dataclass(frozen=True)
 class Settings:
-    """Patches, rays from each, and what light is gathered with.
+    """Patches, and what light is gathered with.
 
     Where the light map keeps no direct light, texels get `direct_samples` of it; where that is sorted, what lobes have
     sent on takes `lobe_samples`. One texel of each block of `block` x `block` texels gathers by `gather_rays`; those
-    beside contacts that do not send keep `receiver_rays` of these.
+    beside contacts that do not send trace half as many and keep `receiver_rays` of these.
     """
 
     patches: int = 1000
-    patch_rays: int = 4096
     gather_rays: int = 256
     receiver_rays: int = 64
     block: int = 4
@@ -74,10 +74,8 @@ class Settings:
 
 SETTINGS = {
     QualityName.preview: Settings(),
-    QualityName.normal: Settings(patch_rays=8192, block=8, direct_samples=64, lobe_samples=16),
-    QualityName.final: Settings(
-        patch_rays=16384, gather_rays=512, receiver_rays=128, block=12, direct_samples=256, lobe_samples=64
-    ),
+    QualityName.normal: Settings(block=8, direct_samples=64, lobe_samples=16),
+    QualityName.final: Settings(gather_rays=512, receiver_rays=128, block=12, direct_samples=256, lobe_samples=64),
 }
 
 
@@ -88,7 +86,7 @@ def keys(context: BakeContext) -> dict[str, str]:
     count = 2 if any(context.two_sided) else 1
     samples = 0 if ready else how.lobe_samples if sorts_light(context.methods) else how.direct_samples
     effort = [
-        how.patches, how.patch_rays, how.gather_rays, how.receiver_rays, how.block, samples, how.importance_rays,
+        how.patches, how.gather_rays, how.receiver_rays, how.block, samples, how.importance_rays,
     ]  # fmt: skip
     key = key_of(KIND, REVISION, light, effort, context.seed)
     sampled = () if ready else TRACED[:count]
@@ -246,12 +244,18 @@ def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
 
 def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Clusters) -> None:
     """Transfer between patches, and rays between points."""
-    from lambent.bake.answering.points import bounded_points, neighbours, receiving_points, refined_points, seeing
-    from lambent.bake.answering.senders import points_near
-    from lambent.bake.answering.transfer import Between, light_seen, sender_means
+    from lambent.bake.answering.points import (
+        bounded_points,
+        neighbours,
+        points_near,
+        receiving_points,
+        refined_points,
+        seeing,
+    )
+    from lambent.bake.answering.transfer import Between, light_seen, sender_means, transfer_of
 
     how: Settings = context.settings(KIND)
-    width, count = context.traced.texels.width, clusters.count
+    width = context.traced.texels.width
     sides = [context.traced.in_view(sign)[0] for sign in SIGNS[: 2 if any(context.two_sided) else 1]]
     coarse = bounded_points(spots, width, how.block, clusters.count)
     distance = np.zeros(len(coarse.texel))
@@ -270,29 +274,29 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     codes, near = neighbours(spots, everyone)
     across = closest[1 - points.side, points.texel]
     other = np.where(across >= 0, across, np.arange(len(across)))
-    between = Between(ends, spots, sides, clusters, closest, points, exitance)
+    between = Between(ends, spots, sides, closest, exitance, len(points.texel))
 
-    def rows(region: tuple[slice, ...], seed: int) -> Floats:
-        found = between.transfer_rows(region[0].start, region[0].stop, how.patch_rays, seed)
-        return found.astype(np.float16).reshape(len(found), -1)
-
-    def rays(of: GatherPoints, kept: int) -> Callable[[tuple[slice, ...], int], NDArray[np.uint8]]:
+    def rays(of: GatherPoints, traced: int, kept: int) -> Callable[[tuple[slice, ...], int], NDArray[np.uint8]]:
         def tile(region: tuple[slice, ...], seed: int) -> NDArray[np.uint8]:
-            return np.moveaxis(between.gathered_rays(of, region[1], how.gather_rays, kept, seed), -1, 0)
+            return np.moveaxis(between.gathered_rays(of, region[1], traced, kept, seed), -1, 0)
 
         return tile
 
-    key = context.keys(KIND)[answer_name("transfer")]
-    sizes = (points, how.gather_rays), (receivers, how.receiver_rays)
-    of_points, of_receivers = ((3, len(of.texel), count) for of, count in sizes)
-    arrays = (("transfer", (count, len(spots.irradiance) * count), 0, "float16", rows, "light between patches"),
-              ("rays", of_points, 1, "uint8", rays(*sizes[0]), "gathering"),
-              ("receiver_rays", of_receivers, 1, "uint8", rays(*sizes[1]), "gathering beside contacts"))  # fmt: skip
-    for part, shape, axis, dtype, tile, what in arrays:
-        chunk = tuple(max(1, -(-size // TILES)) if at == axis else max(1, size) for at, size in enumerate(shape))
-        writer = context.store.begin(answer_name(part), KIND, shape, chunk, dtype, key=key, meta=context.provenance())
-        run_tiles(writer, tile, seed=context.seed, progress=context.progress, what=what)
+    of_contacts = max(how.gather_rays // 2, how.receiver_rays)
+    arrays = (("rays", points, how.gather_rays, how.gather_rays, "gathering"),
+              ("receiver_rays", receivers, of_contacts, how.receiver_rays, "gathering beside contacts"))  # fmt: skip
+    for part, of, count, kept, what in arrays:
+        shape, chunk = (3, len(of.texel), kept), (3, max(1, -(-len(of.texel) // TILES)), kept)
+        key = context.keys(KIND)[answer_name(part)]
+        writer = context.store.begin(answer_name(part), KIND, shape, chunk, "uint8", key=key, meta=context.provenance())
+        run_tiles(writer, rays(of, count, kept), seed=context.seed, progress=context.progress, what=what)
         writer.finish()
+    sending = Rays.of(np.moveaxis(context.store.read(answer_name("rays")), 0, -1))
+    of_senders = np.bincount(
+        closest[closest >= 0], np.broadcast_to(spots.area, closest.shape)[closest >= 0], len(across)
+    )
+    transfer = transfer_of(sending, clusters.of[points.side, points.texel], of_senders, clusters.count)
+    context.put(KIND, answer_name("transfer"), transfer.astype(np.float16), context.provenance())
     own_sun = spots.sun[everyone.side, everyone.texel]
     numbers = spots.index[everyone.texel] * 2 + everyone.side, other, codes, near.points
     of_points, of_other, of_texels, of_near = map(delta_bytes, numbers)
