@@ -1,8 +1,9 @@
 """`answer`: how exactly and how fast baked light answers other colours, against path tracing with those colours.
 
 Rows are scene x edit. Errors are those at texels that viewers see, drawn at random, all channels alike, in percent:
-`rms` and `mean_error` over the mean of the truth, the others texel by texel (over at least LEAST of that mean). The truth has the direct sun, which texels show beside the light map and no edit changes. The light
-that is answered from is path traced, too, with the same random numbers, so that errors are those of the answer alone;
+`rms` and `mean_error` over the mean of the truth, the others texel by texel (over at least LEAST of that mean). The
+truth has the direct sun, which texels show beside the light map and no edit changes. The light that is answered from is
+path traced, too, with the same random numbers, so that errors are those of the answer alone;
 of it, as much is direct as of the light map, which may lie a texel beside it at edges of light.
 `shown_rms` has those of the light map besides, of which `baked_rms` is there before any edit. Where light is sorted by
 group, `shown_rms` is of the sum of the groups' own answers. `rms` and `relative_rms` are roots of mean products of the

@@ -51,7 +51,7 @@ BETWEEN = (
     "shares",
 )
 SEEN = ("spots", "tint", "sun")
-TILES = 16  # of transfer and of rays
+TILES = 16  # of rays
 
 
 @dataclass(frozen=True)
@@ -292,10 +292,9 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
         run_tiles(writer, rays(of, count, kept), seed=context.seed, progress=context.progress, what=what)
         writer.finish()
     sending = Rays.of(np.moveaxis(context.store.read(answer_name("rays")), 0, -1))
-    of_senders = np.bincount(
-        closest[closest >= 0], np.broadcast_to(spots.area, closest.shape)[closest >= 0], len(across)
-    )
-    transfer = transfer_of(sending, clusters.of[points.side, points.texel], of_senders, clusters.count)
+    sends = closest >= 0
+    area = np.bincount(closest[sends], np.broadcast_to(spots.area, closest.shape)[sends], len(across)).astype(float)
+    transfer = transfer_of(sending, clusters.of[points.side, points.texel], area, clusters.count)
     context.put(KIND, answer_name("transfer"), transfer.astype(np.float16), context.provenance())
     own_sun = spots.sun[everyone.side, everyone.texel]
     numbers = spots.index[everyone.texel] * 2 + everyone.side, other, codes, near.points
