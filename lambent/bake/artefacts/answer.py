@@ -293,7 +293,8 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
         writer.finish()
     sending = Rays.of(np.moveaxis(context.store.read(answer_name("rays")), 0, -1))
     sends = closest >= 0
-    area = np.bincount(closest[sends], np.broadcast_to(spots.area, closest.shape)[sends], len(across)).astype(float)
+    areas: Floats = np.broadcast_to(spots.area, closest.shape)[sends]
+    area = np.asarray(np.bincount(closest[sends], areas, len(across)), float)
     transfer = transfer_of(sending, clusters.of[points.side, points.texel], area, clusters.count)
     context.put(KIND, answer_name("transfer"), transfer.astype(np.float16), context.provenance())
     own_sun = spots.sun[everyone.side, everyone.texel]
