@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from lambent.bake.answering.points import (
     MORE,
@@ -17,7 +16,7 @@ from lambent.bake.answering.points import (
     seeing,
 )
 from lambent.bake.answering.spots import Spots
-from lambent.bake.answering.transfer import MOST_SHAPE, chosen_rays, indirect_shape, sender_means, transfer_of
+from lambent.bake.answering.transfer import chosen_rays, sender_means, transfer_of
 from lambent.core.answer import BYTE, Rays, packed_rays
 
 SIZE = 32
@@ -135,25 +134,3 @@ def test_transfer_between_patches_is_that_of_their_points() -> None:
     weight = np.array([[1.0, 1, 1, 0], [1, 1, 2, 2], [1, 1, 1, 1]])
     found = transfer_of(Rays.of(packed_rays(point, weight)), np.array([0, 0, 1]), np.array([1.0, 3.0, 9.0]), 3)
     assert np.allclose(found, [[(1 + 3 * 2) / 16, (2 + 3 * 4) / 16, 0], [1, 0, 0], [0, 0, 0]])
-
-
-def test_shape_of_indirect_light_keeps_what_points_send() -> None:
-    """Direct light and unlit texels are not in it, and its mean over the texels of a sender is 1."""
-    spots = plane()
-    column, row = spots.position[:, 0].astype(int), spots.position[:, 2]
-    direct = np.zeros((2, 2, len(column), 3), np.float32)
-    direct[0, 0, row < 3] = 50.0
-    indirect = np.zeros_like(direct)
-    indirect[:, 0] = (0.5 + row / SIZE)[:, None]
-    unlit = spots.lit.copy()
-    unlit[0, 5], indirect[0, 0, 5] = False, 1e6
-    spots = replace(spots, lit=unlit, direct=direct, irradiance=direct + indirect)
-    senders = np.stack([np.minimum(column, 3), np.full(len(column), -1)])
-    found = indirect_shape(spots, senders, 4)
-    assert found.shape == (2, len(column)) and (found[1] == 1).all() and found[0, 5] == 1
-    for one in range(4):
-        assert found[0][(senders[0] == one) & unlit[0]].mean() == pytest.approx(1, rel=1e-4)
-    assert found[0, -1] / found[0, 3] == pytest.approx((0.5 + 31 / 32) / 0.5, rel=1e-4)
-    dark = np.where(row[:, None] < 1, 1.0, 1e-3) * np.ones(3)
-    spots = replace(spots, direct=0 * direct, irradiance=np.stack([np.stack([dark, 0 * dark])] * 2).astype(np.float32))
-    assert indirect_shape(spots, senders, 4).max() == MOST_SHAPE

@@ -14,10 +14,7 @@ from lambent.bake.surfaces.texels import Sides
 from lambent.bake.tiles import seed_of
 from lambent.core.answer import Rays, packed_rays, weights_of_bytes
 from lambent.core.arrays import Floats, Indices
-from lambent.core.colour import luminance
 
-MOST_SHAPE = 4.0  # of a texel's indirect light over its sender's
-LEAST_SENT = 1e-6  # of the brightest sender: darker ones send as if they were even
 STRIDE = 8  # of the texels that viewers see, whose rays count for how important others are
 
 
@@ -29,11 +26,9 @@ class Between:
     ) -> None:
         size = sides[0].texels.width * sides[0].texels.height
         self._ends, self._sides = ends, sides
-        self._sender, self._shape = np.full(2 * size, -1), np.ones(2 * size, np.float32)
-        shape = indirect_shape(spots, senders, count)
+        self._sender = np.full(2 * size, -1)
         for side in range(2):
             self._sender[spots.index * 2 + side] = senders[side]
-            self._shape[spots.index * 2 + side] = shape[side]
         self._sent = sender_means(spots, senders, exitance.sum(axis=0)[..., None], count)[:, 0]
 
     def gathered_rays(self, points: GatherPoints, part: slice, count: int, kept: int, seed: int) -> NDArray[np.uint8]:
@@ -47,7 +42,7 @@ class Between:
                 there = ends[0] != NOWHERE
                 at = np.where(there, ends[0], 0)
                 met = np.where(there, self._sender[at], -1)
-                weight = np.where(met >= 0, ends[1] * self._shape[at], 0.0)
+                weight = np.where(met >= 0, ends[1], 0.0)
                 if kept < count:
                     shift = np.random.default_rng((seed, one)).random(len(mine))
                     light = weight * self._sent[np.maximum(met, 0)]
@@ -115,19 +110,6 @@ def patch_means(spots: Spots, clusters: Clusters, values: Floats) -> Floats:
     means = total / np.maximum(area, 1e-30)[:, None]
     lit = lit_total / np.maximum(lit_area, 1e-30)[:, None]
     return np.where((lit_area > 0)[:, None], lit, means)
-
-
-def indirect_shape(spots: Spots, senders: Indices, count: int) -> NDArray[np.float32]:
-    """(2, K) indirect light of each texel over the mean that its sender (2, K) sends, at most MOST_SHAPE.
-
-    It is that of all groups. Where no light was sampled, or next to none, it is 1.
-    """
-    indirect = luminance((spots.irradiance - spots.direct).sum(axis=0))
-    mean = sender_means(spots, senders, indirect[..., None], count)[:, 0]
-    of_sender = mean[senders]
-    known = spots.lit & (senders >= 0) & (of_sender > LEAST_SENT * mean.max(initial=0.0))
-    shape = np.divide(indirect, of_sender, out=np.ones_like(indirect, float), where=known)
-    return np.clip(shape, 0, MOST_SHAPE).astype(np.float32)
 
 
 def sender_means(spots: Spots, senders: Indices, values: Floats, count: int) -> Floats:
