@@ -93,7 +93,8 @@ def transfer_of(rays: Rays, patch: Indices, area: Floats, count: int) -> NDArray
     weight = weights_of_bytes()[rays.weights] * np.repeat(rays.scale * area, each)
     sums = csr_matrix((weight, (np.repeat(patch, each), patch[rays.points])), shape=(count, count))
     areas = np.bincount(patch, area, count)
-    return np.asarray(sums.toarray() / np.maximum(areas, 1e-30)[:, None], np.float32)
+    shares: Floats = sums.toarray() / np.maximum(areas, 1e-30)[:, None]
+    return shares.astype(np.float32)
 
 
 def patch_means(spots: Spots, clusters: Clusters, values: Floats) -> Floats:
