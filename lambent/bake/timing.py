@@ -1,4 +1,4 @@
-"""What the steps of a bake take, in seconds of wall clock."""
+"""What the steps of a bake take, in seconds of wall clock, and of processor time in this process."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Protocol
 
-from lambent.store.contract import LAST_RUN, TIMINGS
+from lambent.store.contract import LAST_RUN, PROCESSOR_TIMINGS, TIMINGS
 from lambent.store.store import Store
 
 
@@ -22,10 +22,11 @@ def untimed(step: str, *, continued: bool = False) -> AbstractContextManager[Non
 
 
 class Stopwatch:
-    """Notes seconds in two documents of a store.
+    """Notes seconds in documents of a store.
 
     "timings" has them by step; a step that continues an interrupted bake adds to those that are there. "last_run" has
-    those of one run alone, with "other" for what is no step, so that they add up to the whole.
+    those of one run alone, with "other" for what is no step, so that they add up to the whole. "processor_timings" has
+    seconds of all cores by step, which other work on the machine does not lengthen as much.
     """
 
     def __init__(self, store: Store) -> None:
@@ -34,14 +35,16 @@ class Stopwatch:
 
     @contextmanager
     def __call__(self, step: str, *, continued: bool = False) -> Iterator[None]:
-        start = time.perf_counter()
-        before = self._store.documents.get(TIMINGS, {}).get(step, 0.0) if continued else 0.0
+        start, of_cores = time.perf_counter(), time.process_time()
         try:
             yield
         finally:
             self._steps[step] = time.perf_counter() - start
-            after = {**self._store.documents.get(TIMINGS, {}), step: round(before + self._steps[step], 3)}
-            self._store.set_document(TIMINGS, after)
+            took = {TIMINGS: self._steps[step], PROCESSOR_TIMINGS: time.process_time() - of_cores}
+            for document, seconds in took.items():
+                noted = self._store.documents.get(document, {})
+                before = noted.get(step, 0.0) if continued else 0.0
+                self._store.set_document(document, {**noted, step: round(before + seconds, 3)})
 
     def finish(self, start: float) -> None:
         """Write "last_run"; the run began at `start` of `time.perf_counter`."""

@@ -1,13 +1,15 @@
 """`answer`: how exactly and how fast baked light answers other colours, against path tracing with those colours.
 
 Rows are scene x edit. Errors are those at texels that viewers see, drawn at random, all channels alike, in percent:
-`rms` and `mean_error` over the mean of the truth, `relative_rms` and `p95_contacts` texel by texel (over at least
-LEAST of that mean). The truth has the direct sun, which texels show beside the light map and no edit changes. The light
-that is answered from is path traced, too, with the same random numbers, so that errors are those of the answer alone;
+`rms` and `mean_error` over the mean of the truth, the others texel by texel (over at least LEAST of that mean). The
+truth has the direct sun, which texels show beside the light map and no edit changes. The light that is answered from is
+path traced, too, with the same random numbers, so that errors are those of the answer alone;
 of it, as much is direct as of the light map, which may lie a texel beside it at edges of light.
 `shown_rms` has those of the light map besides, of which `baked_rms` is there before any edit. Where light is sorted by
 group, `shown_rms` is of the sum of the groups' own answers. `rms` and `relative_rms` are roots of mean products of the
-errors in two independent halves of the paths, which noise (`noise`, of one whole) does not enter. `naive` is the light
+errors in two independent halves of the paths, which noise (`noise`, of one whole) does not enter; so is
+`relative_rms_contacts`. 95 % of contacts err less than `p95_contacts`, by `contact_paths` from each: noise is in this
+figure, `p95_contacts_noise` is that of noise alone. `naive` is the light
 as it was baked. `likely_error` is the bound on `rms` that the window shows.
 
 Contacts are texels from which a quarter of cosine distributed rays meet something within CONTACT_M.
@@ -40,7 +42,7 @@ from lambent.realtime.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.scene import Scene
 from lambent.store.answer import StoredAnswer, answer_name, read_answer
-from lambent.store.contract import TIMINGS
+from lambent.store.contract import PROCESSOR_TIMINGS, TIMINGS
 from lambent.store.store import Store
 
 if TYPE_CHECKING:
@@ -55,16 +57,20 @@ Edit = Mapping[str, Triple]  # diffuse colours, linear RGB, by material
 
 @dataclass(frozen=True)
 class Effort:
-    """Texels that are compared, paths from each, edits at most, turns of timing, and the scene baked without inputs."""
+    """Texels that are compared, paths from each, edits at most, turns of timing, and the scene baked without inputs.
+
+    Contacts among the texels get `contact_paths` besides.
+    """
 
     texels: int = 5000
     paths: int = 2048
     edits: int = 6
     turns: int = 5
     scene: str = "builtin:room"
+    contact_paths: int = 8192
 
 
-FULL, QUICK = Effort(), Effort(300, 256, 2, 5, "builtin:box")
+FULL, QUICK = Effort(), Effort(300, 256, 2, 5, "builtin:box", 1024)
 
 
 def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
@@ -111,10 +117,12 @@ def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[d
     truth = Truth(store, stored, effort, progress)
     edits = edits_of(truth.scene, effort.edits)
     times = timed(store, stored, truth.scene.materials, edits, effort.turns)
-    arrays = [a for a in store.artefacts() if a.name.startswith(answer_name("")) and a.kind != "raw"]
+    seconds = {name: store.documents.get(name, {}) for name in (TIMINGS, PROCESSOR_TIMINGS)}
     cost = {
-        "precompute_s": float(store.documents.get(TIMINGS, {}).get("answer", np.nan)),
-        "bytes": sum(int(np.prod(a.shape)) * np.dtype(a.dtype).itemsize for a in arrays),
+        "precompute_s": seconds[TIMINGS].get("answer"),
+        "precompute_cpu_s": seconds[PROCESSOR_TIMINGS].get("answer"),
+        "light_map_cpu_s": seconds[PROCESSOR_TIMINGS].get("light_map"),
+        "bytes": sum(path.stat().st_size for path in (store.folder / answer_name("")).rglob("*") if path.is_file()),
         "patches": len(stored.answer.patches.material),
         "texels": len(truth.at),
         "groups": len(stored.answer.baked),
@@ -146,7 +154,7 @@ class Truth:
         self.at = np.searchsorted(stored.texels, sides.texels.index[self._chosen] * 2)
         self._contact = self._contacts()
         self._sun = self._direct_sun()
-        self._before = self._traced({})
+        self._before, self._before_contacts = self._traced({}), self._traced_contacts({})
         answer = stored.answer
         self._reference = answer.reference()
         direct, light = (of[:, self.at].sum(axis=0) for of in (answer.direct, answer.baked))
@@ -154,11 +162,19 @@ class Truth:
 
     def _traced(self, edited: dict[str, Material]) -> Floats:
         """Halves (2, n, 3) of path traced irradiance."""
+        return self._halves(self._chosen, edited, self._effort.paths, SEED)
+
+    def _traced_contacts(self, edited: dict[str, Material]) -> Floats:
+        """The same of contacts, by more paths."""
+        return self._halves(self._chosen[self._contact], edited, self._effort.contact_paths, SEED + 1)
+
+    def _halves(self, texels: Indices, edited: dict[str, Material], paths: int, seed: int) -> Floats:
         from lambent.bake.reference.at_texels import retraced
 
-        how = self._effort
-        found = retraced(self._context.traced, self._sides, self._chosen, edited, how.paths, SEED, self._progress)
-        return found.halves.astype(float)
+        if not len(texels):
+            return np.zeros((2, 0, 3))
+        traced = retraced(self._context.traced, self._sides, texels, edited, paths, seed, self._progress)
+        return traced.halves.astype(float)
 
     def _direct_sun(self) -> Floats:
         """(n, 3) W/m^2."""
@@ -188,24 +204,33 @@ class Truth:
         after, before = self._traced(edited), self._before
         by_group = [light[:, self.at] for light in (answer.direct, answer.baked, computed, self._reference)]
         map_before, map_after = by_group[1].sum(axis=0), answered(*by_group).sum(axis=0)
-        gathered_light = [light.sum(axis=0)[None] for light in by_group[2:]]
-        ours = (
-            answered((self._share * half)[None], half[None], *gathered_light)[0] - true
-            for half, true in zip(before, after, strict=True)
-        )
+        now, then = (light.sum(axis=0) for light in by_group[2:])
+
+        def answer_errors(lit: Floats, true: Floats, some: Flags | slice) -> list[Floats]:
+            """Errors (n, 3) by halves, of some texels whose light was `lit` (2, n, 3) and is `true`."""
+            given = now[some][None], then[some][None]
+            found = (answered((self._share[some] * half)[None], half[None], *given)[0] for half in lit)
+            return [light - half for light, half in zip(found, true, strict=True)]
+
+        one, other = answer_errors(before, after, slice(None))
         naive = [half - true for half, true in zip(before, after, strict=True)]
         shown, as_baked = [map_after - half for half in after], [map_before - half for half in before]
         all_light = after.mean(axis=0) + self._sun
         mean, local = all_light.mean(), np.maximum(all_light, LEAST * all_light.mean())
-        one, other = ours
-        whole = (one + other) / 2
+        whole, contact = (one + other) / 2, self._contact
+        true = self._traced_contacts(edited)
+        first, second = answer_errors(self._before_contacts, true, contact)
+        there = np.maximum(true.mean(axis=0) + self._sun[contact], LEAST * mean)
+        halves = np.stack([first + second, first - second]) / 2 / there
+        off, noise = np.quantile(np.abs(halves), 0.95, axis=(1, 2)) if halves.size else (None, None)
         own, left = figures(one, other, mean, local), figures(naive[0], naive[1], mean, local)
-        contacts = np.abs(whole / local)[self._contact]
         return {
             "rms": own["rms"],
             "relative_rms": own["relative_rms"],
             "mean_error": percent(whole.mean() / mean),
-            "p95_contacts": percent(np.quantile(contacts, 0.95)) if len(contacts) else None,
+            "relative_rms_contacts": figures(first, second, mean, there)["relative_rms"] if halves.size else None,
+            "p95_contacts": None if off is None else percent(off),
+            "p95_contacts_noise": None if noise is None else percent(noise),
             "naive_rms": left["rms"],
             "naive_relative_rms": left["relative_rms"],
             "shown_rms": figures(shown[0], shown[1], mean, local)["rms"],

@@ -9,12 +9,13 @@ B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, a and t 
 transmission, F (P, P) the share of what a patch receives that comes from each other one. Patches have most bounces; the
 last PASSES are gathered among some thirty times as many points, each with its own direct light. Beside contacts, where
 light changes from texel to texel, more points gather in the last pass, and send nothing. Light is linear, so D,
-E and I have a leading axis of light groups, and so has F: each group's light lies elsewhere within a patch. A ratio,
-and not a difference, is applied to the baked light, so that it keeps its detail and the error is relative; with albedos
-as baked the ratio is 1 and nothing changes.
+E and I have a leading axis of light groups; F may have one. A ratio, and not a difference, is applied to the baked
+light, so that it keeps its detail and the error is relative; with albedos as baked the ratio is 1 and nothing changes.
 
-Rays that lobes have sent on, and textures, are in the weights. Weights also follow the light around a point: a ray that
-ends where it is twice as bright as at the point counts twice.
+Rays that lobes have sent on, and textures, are in the weights of rays. Points send the mean light around them. With the
+shape of baked light in the weights, a sunlit spot's indirect light grew as if it were the sun's.
+
+Light that rays read is (K, G, 4): `side_by_side`.
 """
 
 from __future__ import annotations
@@ -23,7 +24,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
@@ -34,7 +34,8 @@ from lambent.core.arrays import Floats
 BYTE = 255
 MOST_POINTS = 1 << 16
 PASSES = 2
-MOST_WEIGHT = 16.0  # of a ray
+WEIGHT_STEPS = 4  # of weights in an octave: each byte stands for one
+WEIGHT_ONE = 128  # the byte of weight 1
 TOLERANCE = 1e-3  # relative change of every patch in a sweep, below which a solution stands
 SWEEPS = 400  # at most: with albedos up to MOST_ALBEDO even a closed box is done before
 MOST_ALBEDO = 0.97  # of an edited surface
@@ -56,8 +57,8 @@ class Patches:
         The patch on the other side; its own number on surfaces that no light crosses.
     direct : (G, P, 3) float32
         Direct irradiance by group of lights, W/m^2, the sun's included.
-    transfer : (G, P, P) float32
-        F by group, rows by the patch that receives; (P, P) is that of all groups.
+    transfer : (P, P) or (G, P, P) float32
+        F, rows by the patch that receives, of all groups alike or of each.
     """
 
     material: NDArray[np.integer]
@@ -147,7 +148,8 @@ class Points:
     other : (K,) integers
         The point on the other side of the surface; its own number where no light crosses it.
     direct, light : (G, K, 3) float32
-        Direct and all baked irradiance by group of lights, W/m^2, the sun's included.
+        Direct and all baked irradiance by group of lights, W/m^2, the sun's included: means over the texels for which
+        a point sends.
     """
 
     patch: NDArray[np.integer]
@@ -157,7 +159,7 @@ class Points:
     light: NDArray[np.float32]
 
     def exitance(self, albedos: Albedos, ratio: Floats, of: NDArray[np.integer] | None = None) -> NDArray[np.float32]:
-        """Exitance (K, G, 3), W/m^2, where indirect light is `ratio` (G, n, 3) times as baked.
+        """Exitance (K, G, 4), W/m^2, where indirect light is `ratio` (n, G, 4) times as baked.
 
         The ratio of point k is number `of` (K,) of these, by default number k.
         """
@@ -165,37 +167,40 @@ class Points:
         reflected, transmitted = (
             np.asarray(one, np.float32)[self.material] for one in (albedos.reflected, albedos.transmitted)
         )
-        lights = (np.ascontiguousarray(one, np.float32) for one in (self.direct, self.light, ratio))
-        direct, light, now = lights
-        return np.asarray(loops.exitance(direct, light, now, number, self.other, reflected, transmitted))
+        direct, light = (np.ascontiguousarray(one, np.float32) for one in (self.direct, self.light))
+        return np.asarray(loops.exitance(direct, light, ratio, number, self.other, reflected, transmitted))
 
 
-def packed_weights(weights: Floats) -> NDArray[np.uint8]:
-    """Weights of rays as bytes, by their roots: steps are fine where weights are small."""
-    root = np.sqrt(np.clip(weights, 0, MOST_WEIGHT) / MOST_WEIGHT)
-    return np.asarray(root * BYTE + 0.5, np.uint8)
-
-
-def unpacked_weights(packed: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """The weights that bytes stand for."""
-    return np.asarray((packed.astype(np.float32) / BYTE) ** 2 * MOST_WEIGHT, np.float32)
+def side_by_side(light: Floats) -> NDArray[np.float32]:
+    """Light (K, G, 4) of points from (G, K, 3): groups beside each other, and a channel of padding."""
+    found = np.zeros((light.shape[1], light.shape[0], 4), np.float32)
+    found[..., :3] = np.moveaxis(light, 0, 1)
+    return found
 
 
 def packed_rays(point: NDArray[np.integer], weight: Floats) -> NDArray[np.uint8]:
-    """Rays (..., 2 + G) bytes: the point near which each ends, low byte first, and its weights (G, ...) by group.
+    """Rays (K, R, 3) bytes: the point near which each ends, and its weight (K, R).
 
-    Weights are 0 where it met none. Points are below MOST_POINTS. Rays are sorted by these, which files pack well.
+    Rays that end near the same point are one, in the order of points, each of which is the step from the one before,
+    low byte first. Weights are 0 or powers of two by WEIGHT_STEPS. Rows are filled up with 0. Points are less than
+    MOST_POINTS.
     """
-    number = np.where((weight > 0).any(axis=0), point, 0).astype(np.uint16)
-    weights = (packed_weights(of_group) for of_group in weight)
-    rays = np.stack([(number & BYTE).astype(np.uint8), (number >> 8).astype(np.uint8), *weights], axis=-1)
-    order = np.argsort(number, axis=-1, kind="stable")
-    return np.take_along_axis(rays, order[..., None], axis=-2)
+    rays = np.zeros((*point.shape, 3), np.uint8)
+    numbers, weights = np.ascontiguousarray(point, np.int64), np.ascontiguousarray(weight, np.float32)
+    loops.pack(numbers, weights, np.float32(WEIGHT_STEPS), np.float32(WEIGHT_ONE), rays)
+    return rays
 
 
-def points_of_rays(rays: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    """Numbers (...) of the points near which `packed_rays` end."""
-    return np.asarray(rays[..., 0] | rays[..., 1].astype(np.uint16) << 8, np.uint16)
+def weights_of_bytes() -> NDArray[np.float32]:
+    """(256,) the weights that bytes of `packed_rays` stand for."""
+    found = 2.0 ** ((np.arange(BYTE + 1) - WEIGHT_ONE) / WEIGHT_STEPS)
+    found[0] = 0
+    return np.asarray(found, np.float32)
+
+
+def last_points(rays: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """(K,) the largest number of a point near which the `packed_rays` of each end."""
+    return np.asarray((rays[..., 0] + 256 * rays[..., 1].astype(np.int64)).sum(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,55 +213,47 @@ class Rays:
         The rays of point k go from starts[k] on to starts[k + 1].
     points : (N,) uint16
         The point near which each ends.
-    weights : (N, G) uint8
-        By light group: roots over that of `most` (K, G) float32, the largest weight of a point's rays.
-    count : int
-        Rays of each point, those included that end nowhere.
+    weights : (N,) uint8
+        `weights_of_bytes`.
+    scale : (K,) float32
+        One over the number of each point's rays, those included that end nowhere.
     """
 
     starts: NDArray[np.int64]
     points: NDArray[np.uint16]
     weights: NDArray[np.uint8]
-    most: NDArray[np.float32]
-    count: int
+    scale: NDArray[np.float32]
 
     @classmethod
     def of(cls, packed: NDArray[np.uint8]) -> Rays:
-        """Of `packed_rays` (K, R, 2 + G)."""
-        size, count, groups = packed.shape[0], packed.shape[1], packed.shape[2] - 2
-        first = np.arange(size, dtype=np.int64) * count
-        ends, points = np.zeros_like(first), np.zeros(size * count, np.uint16)
-        weights, most = np.zeros((size * count, groups), np.uint8), np.zeros((size, groups), np.float32)
-        table = unpacked_weights(np.arange(BYTE + 1, dtype=np.uint8))
-        loops.merge(np.ascontiguousarray(packed), first, ends, points, weights, most, table)
-        kept = (np.arange(count) < (ends - first)[:, None]).reshape(-1)
-        starts = np.append(0, np.cumsum(ends - first)).astype(np.int64)
-        return cls(starts, points[kept], weights[kept], most, count)
+        """Of `packed_rays` (K, R, 3)."""
+        size, count = packed.shape[:2]
+        starts = np.append(0, np.cumsum(np.count_nonzero(packed[..., 2], axis=1))).astype(np.int64)
+        points, weights = np.zeros(starts[-1], np.uint16), np.zeros(starts[-1], np.uint8)
+        loops.unpack(np.ascontiguousarray(packed), starts, points, weights)
+        return cls(starts, points, weights, np.full(size, 1 / max(count, 1), np.float32))
 
     def followed_by(self, other: Rays) -> Rays:
         """These rays, and those of other points after them."""
         starts = np.concatenate([self.starts, other.starts[1:] + self.starts[-1]])
-        most = np.concatenate([self.most, other.most * np.float32(self.count / max(other.count, 1))])
-        points = np.concatenate([self.points, other.points])
-        weights = np.concatenate([self.weights, other.weights])
-        return Rays(starts, points, weights, most, self.count)
+        points, weights = (np.concatenate([self.points, other.points]), np.concatenate([self.weights, other.weights]))
+        return Rays(starts, points, weights, np.concatenate([self.scale, other.scale]))
 
     def of_first(self, count: int) -> Rays:
         """The rays of the first `count` points."""
-        return Rays(self.starts[: count + 1], self.points, self.weights, self.most[:count], self.count)
+        return Rays(self.starts[: count + 1], self.points, self.weights, self.scale[:count])
 
 
 def gathered(rays: Rays, exitance: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Indirect irradiance (G, K, 3) at points with such rays, from exitance (n, G, 3).
+    """Indirect irradiance (K, G, 4) at points with such rays, from exitance (n, G, 4).
 
     Rays are cosine distributed: it is pi times the mean of the radiance exitance/pi.
     """
-    table = ((np.arange(BYTE + 1) / BYTE) ** 2 / rays.count).astype(np.float32)
-    given = rays.starts, rays.points, rays.weights, rays.most, table, exitance
+    given = rays.starts, rays.points, rays.weights, weights_of_bytes(), rays.scale, exitance
     groups = exitance.shape[1]
     if groups == 1:
         return np.asarray(loops.gather_one(*given))
-    found = np.empty((groups, len(rays.most), 3), np.float32)
+    found = np.empty((len(rays.scale), groups, 4), np.float32)
     for first in range(0, groups, 4):
         loops.gather_four(*given, first, found)
     return found
@@ -279,33 +276,21 @@ class Neighbours:
         return np.take_along_axis(self.points, most, axis=1)[:, 0].astype(np.int64)
 
 
-def upsampled(light: Floats, near: Neighbours) -> NDArray[np.float32]:
-    """Means (G, T, 3) over the points near each texel of light (G, K, 3)."""
-    return np.stack([_upsampled(np.ascontiguousarray(of_group, np.float32), near.points, near.shares)
-                     for of_group in light])  # fmt: skip
-
-
-@numba.njit(parallel=True, cache=True, nogil=True)
-def _upsampled(light, points, shares):  # type: ignore[no-untyped-def]
-    found = np.zeros((points.shape[0], 3), np.float32)
-    for t in numba.prange(points.shape[0]):
-        total = np.float32(0)
-        red = green = blue = np.float32(0)
-        for n in range(points.shape[1]):
-            share = np.float32(shares[t, n])
-            at = points[t, n]
-            total += share
-            red += share * light[at, 0]
-            green += share * light[at, 1]
-            blue += share * light[at, 2]
-        found[t, 0], found[t, 1], found[t, 2] = red / total, green / total, blue / total
-    return found
+def upsampled(light: NDArray[np.float32], near: Neighbours) -> NDArray[np.float32]:
+    """Means (G, T, 3) over the points near each texel of light (K, G, 4)."""
+    return np.asarray(loops.upsampled(light, near.points, near.shares))
 
 
 def ratios(edited: Floats, reference: Floats) -> NDArray[np.float32]:
     """I(edited) / I(reference) of light (G, ..., 3), within [0, MOST_RATIO]; 1 where there was next to none."""
     ratio = np.divide(edited, reference, out=np.ones_like(reference), where=reference > least_light(reference))
     return np.clip(ratio, 0, MOST_RATIO)
+
+
+def point_ratios(now: NDArray[np.float32], baked: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The same of light of points (K, G, 4)."""
+    least = np.array([least_light(baked[None, :, group, :3])[0, 0, 0] for group in range(baked.shape[1])], np.float32)
+    return np.asarray(loops.ratios(now, baked, least, np.float32(MOST_RATIO)))
 
 
 def least_light(reference: Floats) -> Floats:
@@ -341,7 +326,7 @@ class Answer:
     albedos: Albedos
 
     def indirect(self, albedos: Albedos, solution: Solution | None = None) -> NDArray[np.float32]:
-        """Indirect irradiance (G, K + F, 3) at the points, as far as their rays see it.
+        """Indirect irradiance (K + F, G, 4) at the points, as far as their rays see it.
 
         `solution` is that of the patches, if there is one already.
         """
@@ -349,10 +334,10 @@ class Answer:
         if albedos.same_as(self.albedos):
             return found
         now = (solution or solved(self.patches, albedos)).irradiance - self.patches.direct
-        ratio, of = ratios(now, self._patches_as_baked), self.points.patch
+        ratio, of = point_ratios(side_by_side(now), self._patches_as_baked), self.points.patch
         for step in range(PASSES - 1):
             among = gathered(self._senders_rays, self.points.exitance(albedos, ratio, of if step == 0 else None))
-            ratio = ratios(among, self._gathered_as_baked[:, : among.shape[1]])
+            ratio = point_ratios(among, self._gathered_as_baked[: len(among)])
         return gathered(self.rays, self.points.exitance(albedos, ratio))
 
     @cached_property
@@ -360,12 +345,12 @@ class Answer:
         return self.rays.of_first(len(self.points.other))
 
     @cached_property
-    def _patches_as_baked(self) -> Floats:
-        return np.asarray(solved(self.patches, self.albedos).irradiance - self.patches.direct)
+    def _patches_as_baked(self) -> NDArray[np.float32]:
+        return side_by_side(solved(self.patches, self.albedos).irradiance - self.patches.direct)
 
     @cached_property
     def _gathered_as_baked(self) -> NDArray[np.float32]:
-        shape = len(self.points.direct), 1, 3
+        shape = 1, len(self.points.direct), 4
         none = np.zeros(len(self.points.other), np.int64)
         return gathered(self.rays, self.points.exitance(self.albedos, np.ones(shape, np.float32), none))
 
@@ -380,7 +365,7 @@ class Answer:
         return self.at_texels(self.indirect(albedos), reference)
 
     def at_texels(self, indirect: NDArray[np.float32], reference: Floats) -> NDArray[np.float32]:
-        """Irradiance (G, T, 3) of the texels, `answered` from indirect light (G, K + F, 3) of the points."""
+        """Irradiance (G, T, 3) of the texels, `answered` from indirect light (K + F, G, 4) of the points."""
         least = np.array([least_light(one[None])[0, 0, 0] for one in reference], np.float32)
         return np.asarray(loops.texel_light(
             self.near.points, self.near.shares, indirect, reference, self.direct, self.baked, least,

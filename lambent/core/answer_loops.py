@@ -1,14 +1,39 @@
 """Compiled loops of `answer`: light between patches, exitance of points, gathering, and the light of texels.
 
-Exitance is (K, G, 4) float32, so that a ray reads the light of all groups from one place; the fourth is padding.
+Light of points is (K, G, 4) float32, groups side by side, so that a ray reads the light of all groups from one place.
+The fourth channel is padding, with which a processor adds the channels of a group at once (`by_lanes`).
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from threading import Lock
+from typing import Any, cast
 
 import numba
 import numpy as np
 
 NO_LIGHT = np.float32(1e-30)
+_COMPILING, _NUMBA = Lock(), cast(Any, numba.config)
+
+
+def by_lanes(loop: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a loop whose sums over neighbouring channels are vectors: a pass of LLVM that Numba leaves out."""
+    compiled = numba.njit(parallel=True, cache=True, nogil=True)(loop)
+
+    @wraps(loop)
+    def called(*arguments: Any) -> Any:
+        if compiled.signatures:
+            return compiled(*arguments)
+        with _COMPILING:
+            before, _NUMBA.SLP_VECTORIZE = _NUMBA.SLP_VECTORIZE, 1
+            try:
+                return compiled(*arguments)
+            finally:
+                _NUMBA.SLP_VECTORIZE = before
+
+    return called
 
 
 @numba.njit(parallel=True, cache=True, nogil=True)
@@ -52,112 +77,154 @@ def solve(starts, ends, senders, shares, direct, reflected, transmitted, paired,
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def exitance(direct, light, ratio, of, other, reflected, transmitted):  # type: ignore[no-untyped-def]
-    """Exitance (K, G, 3) of points whose indirect light is ratio (G, n, 3) at `of` (K,) times as baked."""
+    """Exitance (K, G, 4) of points whose indirect light is ratio (n, G, 4) at `of` (K,) times as baked."""
     groups, points = direct.shape[:2]
-    found = np.empty((points, groups, 3), np.float32)
+    found = np.zeros((points, groups, 4), np.float32)
     for k in numba.prange(points):
         there = other[k]
         for group in range(groups):
             for c in range(3):
                 at = direct[group, k, c]
-                sent = reflected[k, c] * (at + (light[group, k, c] - at) * ratio[group, of[k], c])
+                sent = reflected[k, c] * (at + (light[group, k, c] - at) * ratio[of[k], group, c])
                 if there != k:
                     at = direct[group, there, c]
-                    now = at + (light[group, there, c] - at) * ratio[group, of[there], c]
+                    now = at + (light[group, there, c] - at) * ratio[of[there], group, c]
                     sent += transmitted[k, c] * now
                 found[k, group, c] = sent
     return found
 
 
 @numba.njit(parallel=True, cache=True, nogil=True)
-def merge(rays, starts, ends, points, weights, most, table):  # type: ignore[no-untyped-def]
-    """Add rays (K, R, 2 + G) of a row that end at one point: rows of `points` (K R,) from `starts` to `ends` (K,).
-
-    Weights (K R, G) are bytes: roots over that of the row's `most` (K, G). `table` has the weights of the rays' bytes.
-    """
-    count, groups = rays.shape[1], rays.shape[2] - 2
-    for k in numba.prange(rays.shape[0]):
-        number = rays[k, :, 0].astype(np.int64) | (rays[k, :, 1].astype(np.int64) << 8)
-        order = np.argsort(number)
-        sums = np.zeros((count, groups), np.float32)
-        place, last = np.int64(starts[k] - 1), np.int64(-1)
-        for r in order:
-            lit = False
-            for group in range(groups):
-                lit |= rays[k, r, 2 + group] != 0
-            if not lit:
-                continue
-            if number[r] != last:
-                place, last = place + 1, number[r]
-                points[place] = last
-            for group in range(groups):
-                sums[place - starts[k], group] += table[rays[k, r, 2 + group]]
-        ends[k] = place + 1
-        for group in range(groups):
-            largest = np.float32(0)
-            for n in range(ends[k] - starts[k]):
-                largest = max(largest, sums[n, group])
-            most[k, group] = largest
-            for n in range(ends[k] - starts[k] if largest > 0 else 0):
-                weights[starts[k] + n, group] = np.uint8(np.rint(np.sqrt(sums[n, group] / largest) * np.float32(255)))
-
-
-@numba.njit(parallel=True, cache=True, nogil=True)
-def gather_one(starts, points, weights, most, table, sent):  # type: ignore[no-untyped-def]
-    """Sums (1, K, 3) of exitance (n, 1, 3) at `points` (N,), those of each k from `starts` (K + 1,) on.
-
-    `table` has the weights that bytes stand for, over `most` (K, 1).
-    """
-    found = np.empty((1, len(most), 3), np.float32)
-    for k in numba.prange(len(most)):
-        red = green = blue = np.float32(0)
-        for r in range(starts[k], starts[k + 1]):
-            weight, point = table[weights[r, 0]], points[r]
-            red += weight * sent[point, 0, 0]
-            green += weight * sent[point, 0, 1]
-            blue += weight * sent[point, 0, 2]
-        found[0, k, 0], found[0, k, 1], found[0, k, 2] = red * most[k, 0], green * most[k, 0], blue * most[k, 0]
+def ratios(now, baked, least, most_ratio):  # type: ignore[no-untyped-def]
+    """`answer.ratios` of light of points (K, G, 4); a ratio is 1 where as baked there was `least` (G,) or less."""
+    found = np.ones(now.shape, np.float32)
+    for k in numba.prange(len(now)):
+        for group in range(now.shape[1]):
+            for c in range(3):
+                if baked[k, group, c] > least[group]:
+                    ratio = now[k, group, c] / baked[k, group, c]
+                    found[k, group, c] = min(max(ratio, np.float32(0)), most_ratio)
     return found
 
 
 @numba.njit(parallel=True, cache=True, nogil=True)
-def gather_four(starts, points, weights, most, table, sent, first, found):  # type: ignore[no-untyped-def]
-    """The same for four groups from `first` on, into found (G, K, 3): a ray finds their light side by side.
-
-    Where there are fewer, the last is summed again.
-    """
-    last = sent.shape[1] - 1
-    b, c, d = min(first + 1, last), min(first + 2, last), min(first + 3, last)
-    for k in numba.prange(len(most)):
-        a0 = a1 = a2 = b0 = b1 = b2 = c0 = c1 = c2 = d0 = d1 = d2 = np.float32(0)
-        for r in range(starts[k], starts[k + 1]):
-            point = points[r]
-            weight = table[weights[r, first]]
-            a0 += weight * sent[point, first, 0]
-            a1 += weight * sent[point, first, 1]
-            a2 += weight * sent[point, first, 2]
-            weight = table[weights[r, b]]
-            b0 += weight * sent[point, b, 0]
-            b1 += weight * sent[point, b, 1]
-            b2 += weight * sent[point, b, 2]
-            weight = table[weights[r, c]]
-            c0 += weight * sent[point, c, 0]
-            c1 += weight * sent[point, c, 1]
-            c2 += weight * sent[point, c, 2]
-            weight = table[weights[r, d]]
-            d0 += weight * sent[point, d, 0]
-            d1 += weight * sent[point, d, 1]
-            d2 += weight * sent[point, d, 2]
-        found[d, k, 0], found[d, k, 1], found[d, k, 2] = d0 * most[k, d], d1 * most[k, d], d2 * most[k, d]
-        found[c, k, 0], found[c, k, 1], found[c, k, 2] = c0 * most[k, c], c1 * most[k, c], c2 * most[k, c]
-        found[b, k, 0], found[b, k, 1], found[b, k, 2] = b0 * most[k, b], b1 * most[k, b], b2 * most[k, b]
-        found[first, k, 0], found[first, k, 1] = a0 * most[k, first], a1 * most[k, first]
-        found[first, k, 2] = a2 * most[k, first]
+def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
+    """`answer.packed_rays` (K, R, 3), all 0 before, of rays to `numbers` (K, R) that weigh (K, R)."""
+    for k in numba.prange(len(numbers)):
+        order = np.argsort(numbers[k])
+        sums = np.zeros(len(order), np.float32)
+        ends = np.zeros(len(order), np.int64)
+        count, last = 0, np.int64(-1)
+        for r in order:
+            if weights[k, r] > 0:
+                if numbers[k, r] != last:
+                    last = numbers[k, r]
+                    ends[count] = last
+                    count += 1
+                sums[count - 1] += weights[k, r]
+        place, last = 0, np.int64(0)
+        for n in range(count):
+            # Steps are wide, so that a byte is the one below or above as chance has it: sums of many stay right.
+            dither = np.float32((n * 0.6180339887 + ends[n] * 0.7548776662) % 1)
+            code = np.floor(np.log2(sums[n]) * steps + dither) + one
+            if code >= 1:
+                step = ends[n] - last
+                rays[k, place, 0], rays[k, place, 1] = np.uint8(step & 255), np.uint8(step >> 8)
+                rays[k, place, 2] = np.uint8(min(code, np.float32(255)))
+                last = ends[n]
+                place += 1
 
 
 @numba.njit(parallel=True, cache=True, nogil=True)
+def unpack(rays, starts, points, weights):  # type: ignore[no-untyped-def]
+    """Points and weights (N,) of packed rays (K, R, 3), those of each k from `starts` (K + 1,) on."""
+    for k in numba.prange(len(rays)):
+        last = np.int64(0)
+        for n in range(starts[k + 1] - starts[k]):
+            last += np.int64(rays[k, n, 0]) | (np.int64(rays[k, n, 1]) << 8)
+            points[starts[k] + n] = last
+            weights[starts[k] + n] = rays[k, n, 2]
+
+
+@by_lanes
+def gather_one(starts, points, weights, table, scale, sent):  # type: ignore[no-untyped-def]
+    """Sums (K, 1, 4) of exitance (n, 1, 4) at `points` (N,), those of each k from `starts` (K + 1,) on.
+
+    `table` has the weights that bytes stand for; the sums of each k are times `scale` (K,).
+    """
+    found = np.empty((len(scale), 1, 4), np.float32)
+    for k in numba.prange(len(scale)):
+        a0 = a1 = a2 = a3 = np.float32(0)
+        for r in range(starts[k], starts[k + 1]):
+            point, weight = points[r], table[weights[r]]
+            a0 += weight * sent[point, 0, 0]
+            a1 += weight * sent[point, 0, 1]
+            a2 += weight * sent[point, 0, 2]
+            a3 += weight * sent[point, 0, 3]
+        by = scale[k]
+        found[k, 0, 0], found[k, 0, 1], found[k, 0, 2], found[k, 0, 3] = a0 * by, a1 * by, a2 * by, a3 * by
+    return found
+
+
+@by_lanes
+def gather_four(starts, points, weights, table, scale, sent, first, found):  # type: ignore[no-untyped-def]
+    """The same for four groups from `first` on, into found (K, G, 4); where there are fewer, the last once more."""
+    last = sent.shape[1] - 1
+    two, three, four = min(first + 1, last), min(first + 2, last), min(first + 3, last)
+    for k in numba.prange(len(scale)):
+        a0 = a1 = a2 = a3 = b0 = b1 = b2 = b3 = np.float32(0)
+        c0 = c1 = c2 = c3 = d0 = d1 = d2 = d3 = np.float32(0)
+        for r in range(starts[k], starts[k + 1]):
+            point, weight = points[r], table[weights[r]]
+            a0 += weight * sent[point, first, 0]
+            a1 += weight * sent[point, first, 1]
+            a2 += weight * sent[point, first, 2]
+            a3 += weight * sent[point, first, 3]
+            b0 += weight * sent[point, two, 0]
+            b1 += weight * sent[point, two, 1]
+            b2 += weight * sent[point, two, 2]
+            b3 += weight * sent[point, two, 3]
+            c0 += weight * sent[point, three, 0]
+            c1 += weight * sent[point, three, 1]
+            c2 += weight * sent[point, three, 2]
+            c3 += weight * sent[point, three, 3]
+            d0 += weight * sent[point, four, 0]
+            d1 += weight * sent[point, four, 1]
+            d2 += weight * sent[point, four, 2]
+            d3 += weight * sent[point, four, 3]
+        by = scale[k]
+        found[k, four, 0], found[k, four, 1], found[k, four, 2], found[k, four, 3] = d0 * by, d1 * by, d2 * by, d3 * by
+        found[k, three, 0], found[k, three, 1] = c0 * by, c1 * by
+        found[k, three, 2], found[k, three, 3] = c2 * by, c3 * by
+        found[k, two, 0], found[k, two, 1], found[k, two, 2], found[k, two, 3] = b0 * by, b1 * by, b2 * by, b3 * by
+        found[k, first, 0], found[k, first, 1] = a0 * by, a1 * by
+        found[k, first, 2], found[k, first, 3] = a2 * by, a3 * by
+
+
+@by_lanes
+def upsampled(light, points, shares):  # type: ignore[no-untyped-def]
+    """Means (G, T, 3) over the points near each texel (T, 8) of light (K, G, 4)."""
+    groups = light.shape[1]
+    found = np.empty((groups, len(points), 3), np.float32)
+    for t in numba.prange(len(points)):
+        total = np.float32(0)
+        for n in range(points.shape[1]):
+            total += np.float32(shares[t, n])
+        for group in range(groups):
+            a0 = a1 = a2 = a3 = np.float32(0)
+            for n in range(points.shape[1]):
+                at, share = points[t, n], np.float32(shares[t, n])
+                a0 += share * light[at, group, 0]
+                a1 += share * light[at, group, 1]
+                a2 += share * light[at, group, 2]
+                a3 += share * light[at, group, 3]
+            found[group, t, 0], found[group, t, 1], found[group, t, 2] = a0 / total, a1 / total, a2 / total
+    return found
+
+
+@by_lanes
 def texel_light(points, shares, edited, reference, direct, baked, least, most_ratio, most_excess):  # type: ignore[no-untyped-def]
-    """`answer.answered` at texels (G, T, 3), of means over the points near each of `edited` (G, K, 3)."""
+    """`answer.answered` at texels (G, T, 3), of means over the points near each of `edited` (K, G, 4)."""
     found = np.empty(direct.shape, np.float32)
     groups, near = direct.shape[0], points.shape[1]
     for t in numba.prange(direct.shape[1]):
@@ -165,10 +232,14 @@ def texel_light(points, shares, edited, reference, direct, baked, least, most_ra
         for n in range(near):
             total += np.float32(shares[t, n])
         for group in range(groups):
-            for c in range(3):
-                now = np.float32(0)
-                for n in range(near):
-                    now += np.float32(shares[t, n]) * edited[group, points[t, n], c]
+            a0 = a1 = a2 = a3 = np.float32(0)
+            for n in range(near):
+                place, share = points[t, n], np.float32(shares[t, n])
+                a0 += share * edited[place, group, 0]
+                a1 += share * edited[place, group, 1]
+                a2 += share * edited[place, group, 2]
+                a3 += share * edited[place, group, 3]
+            for c, now in enumerate((a0, a1, a2)):
                 then, at = reference[group, t, c], direct[group, t, c]
                 ratio = np.float32(1)
                 if then > least[group]:

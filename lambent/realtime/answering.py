@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.answer import Albedos, upsampled
+from lambent.core.answer import Albedos, side_by_side, upsampled
 from lambent.core.arrays import Floats
 from lambent.core.irradiance import irradiance_of
 from lambent.materials.diffuse_albedos import albedos_of, edited_albedos
@@ -202,7 +202,9 @@ class AnsweredLight:
     @cached_property
     def _mean_sun(self) -> NDArray[np.float32]:
         """(3,) mean direct irradiance of the sun on the texels."""
-        return np.asarray(upsampled(self._stored.point_sun[None], self._stored.answer.near)[0].mean(axis=0))
+        return np.asarray(
+            upsampled(side_by_side(self._stored.point_sun[None]), self._stored.answer.near)[0].mean(axis=0)
+        )
 
     def groups(self, light: Lit) -> GroupArrays | None:
         """The light by group, to be mixed; as baked before an edit, and None where it is not sorted."""

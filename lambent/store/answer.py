@@ -6,23 +6,28 @@ answer/patch_material      (P,) uint16, number of each patch's material
 answer/patch_paired        (P,) uint16, the patch on the other side; its own where light does not cross
 answer/patch_direct        (G, P, 3) float32, direct irradiance with the sun's, W/m^2, by group of lights
 answer/direct, direct_back (G, H, W, 3) float16, direct irradiance of texels without the sun's, at most that of the
-                           light map; light that only lobes have sent on counts as direct
-answer/transfer            (P, G P) float16, share of a patch's light by the patches that send it, group after group
-answer/rays                (2 + G, K, R) uint8, `core.answer.packed_rays` of the points that send and gather light
-answer/receiver_rays       (2 + G, F, S) uint8, of points beside contacts, which gather and do not send
-answer/points              (K + F,) uint32, the texel and side of each, as below; those that do not send are last
+                           light map; light that only lobes have sent on counts as direct. Absent where the light map
+                           keeps it as light_map/direct, direct_back; meta["direct"] of answer/patch names the arrays
+answer/transfer            (P, P) float16, share of the light of patches that reaches each: rows receive
+answer/rays                (3, K, R) uint8, `core.answer.packed_rays` of the points that send and gather light
+answer/receiver_rays       (3, F, S) uint8, of points beside contacts, which gather and do not send
+answer/points              (K + F,) numbers, the texel and side of each, as below; those that do not send are last
 answer/point_sun           (K + F, 3) float32, direct irradiance of the sun there, W/m^2
-answer/point_other         (K,) uint32, the point on the other side of the surface; its own where light does not cross
-answer/texels              (T,) uint32, texels that answer: twice (row * W + column), plus 1 on the other side
-answer/near                (T, 8) uint32, points near each, and
+answer/point_direct        (G, K, 3) float32, mean direct irradiance, W/m^2, by group, of the texels for which a point
+                           sends, with the sun's; and of all light as baked:
+answer/point_light         (G, K, 3) float32
+answer/point_other         (K,) numbers, the point on the other side of the surface; its own where light does not cross
+answer/texels              (T,) numbers, texels that answer: twice (row * W + column), plus 1 on the other side
+answer/near                (T, 8) numbers, points near each, and
 answer/shares              (T, 8) uint8, what these count
-answer/probe/OBJECT/spots  (6, N, N) uint32, texel that each texel of a probe sees, as above; NO_SPOT for none
+answer/probe/OBJECT/spots  (6, N, N) numbers, texel that each texel of a probe sees, as above; NO_SPOT for none
 answer/probe/OBJECT/tint   (6, N, N, 3) float16, texture there, relative to the material's colour
 answer/probe/OBJECT/sun    (6, N, N) float16, direct sun there over that on what faces it; negative on the far side
 answer/traced, traced_back (2, H, W, 4) float32, samples of direct light, from which a bake continues; by group too,
                            traced_by_group, traced_back_by_group (1, H, W, 6 G), where light is sorted
 
-G is the number of light groups, in the order of `store.light_groups`; 1 where light was baked as one.
+Numbers are `core.delta_bytes` (4, ...) uint8. G is the number of light groups, in the order of `store.light_groups`; 1
+where light was baked as one.
 """
 
 from __future__ import annotations
@@ -32,8 +37,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.answer import Answer, Neighbours, Patches, Points, Rays, points_of_rays
+from lambent.core.answer import Answer, Neighbours, Patches, Points, Rays, last_points
 from lambent.core.arrays import Floats
+from lambent.core.delta_bytes import PLACES, from_delta_bytes
 from lambent.core.errors import UserError
 from lambent.materials.diffuse_albedos import albedos_of
 from lambent.scenes.light_groups import SUN
@@ -61,20 +67,29 @@ def probe_spots_name(object_name: str, part: str) -> str:
 def has_answer(store: Store) -> bool:
     """Whether a store's light can answer other colours of its materials, by group where it is sorted so."""
     needed = (
+        "patch",
         "transfer",
         "rays",
         "receiver_rays",
         "points",
         "point_other",
         "point_sun",
+        "point_direct",
+        "point_light",
         "near",
         "texels",
         "patch_direct",
-        *DIRECT[:1],
     )
     if LAST not in store or not all(answer_name(part) in store for part in needed):
         return False
+    if store.artefact(answer_name("near")).shape[0] != PLACES or not all(one in store for one in _directs(store)):
+        return False  # of an earlier version
     return store.artefact(answer_name("patch_direct")).shape[0] == max(1, len(light_groups(store)))
+
+
+def _directs(store: Store) -> list[str]:
+    """Names of the arrays of direct light, by side."""
+    return list(map(str, store.artefact(answer_name("patch")).meta.get("direct", ())))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,15 +140,17 @@ def read_answer(store: Store) -> StoredAnswer:
         hint = "run `lambent bake --only answer` for its scene"
         raise UserError("store has no answer data for changed materials", file=store.folder, field="answer", hint=hint)
     record = scene_record(store)
-    material, paired, direct, transfer, rays, more_rays, points, point_sun, across, texels, near, shares, patch = (
-        store.read(answer_name(part))
-        for part in (
-            "patch_material", "patch_paired", "patch_direct", "transfer", "rays", "receiver_rays", "points",
-            "point_sun", "point_other", "texels", "near", "shares", "patch",
-        )
+    parts = (
+        "patch_material", "patch_paired", "patch_direct", "transfer", "rays", "receiver_rays", "points", "point_sun",
+        "point_direct", "point_light", "point_other", "texels", "near", "shares", "patch",
     )  # fmt: skip
+    material, paired, direct, transfer, rays, more_rays, points, point_sun, *rest = map(
+        store.read, map(answer_name, parts)
+    )
+    point_direct, point_light, across, texels, near, shares, patch = rest
     names = tuple(map(str, store.artefact(answer_name("patch")).meta.get("materials", ())))
     count, height, width = len(material), *patch.shape[1:]
+    points, across, texels, near = map(from_delta_bytes, (points, across, texels, near))
     rays, more_rays = np.moveaxis(rays, 0, -1), np.moveaxis(more_rays, 0, -1)
     senders = len(rays)
     fits = (
@@ -142,8 +159,8 @@ def read_answer(store: Store) -> StoredAnswer:
         and paired.shape == material.shape
         and (not count or int(paired.max()) < count)
         and direct.shape[1:] == (count, 3)
-        and transfer.shape == (count, len(direct) * count)
-        and rays.shape[2] == more_rays.shape[2] == 2 + len(direct)
+        and transfer.shape == (count, count)
+        and rays.shape[2] == more_rays.shape[2] == 3
         and near.shape == shares.shape
         and near.shape[0] == len(texels)
         and (not near.size or int(near.max()) < len(points))
@@ -153,14 +170,15 @@ def read_answer(store: Store) -> StoredAnswer:
         and across.shape == (senders,)
         and (not senders or int(across.max()) < senders)
         and point_sun.shape == (len(points), 3)
+        and point_direct.shape == point_light.shape == (len(direct), senders, 3)
         and bool(np.isin(points, texels).all())
-        and all(not one.size or int(points_of_rays(one).max()) < max(senders, 1) for one in (rays, more_rays))
+        and all(not one.size or int(last_points(one).max()) < max(senders, 1) for one in (rays, more_rays))
     )
     if not fits:
         raise UserError("broken store", file=store.folder, field="answer", got="arrays that match")
     sorted_light = bool(light_groups(store))
     maps = [group_name(side) if sorted_light else f"light_map/{side}" for side in SIDES]
-    lights = maps, [answer_name(part) for part in DIRECT]
+    lights = maps, _directs(store)
     baked, directs = (_at_texels(store, of_sides, texels) for of_sides in lights)
     groups = baked.shape[0]
     if not directs.shape[0] == direct.shape[0] == groups:
@@ -170,8 +188,7 @@ def read_answer(store: Store) -> StoredAnswer:
         )
         raise UserError("does not fit the light map", file=store.folder, field="answer", got=got, expected=groups,
                         hint=hint)  # fmt: skip
-    by_group = np.ascontiguousarray(transfer.reshape(count, groups, count).transpose(1, 0, 2), np.float32)
-    patches = Patches(material.astype(np.int64), paired.astype(np.int64), direct, by_group)
+    patches = Patches(material.astype(np.int64), paired.astype(np.int64), direct, transfer.astype(np.float32))
     albedos = albedos_of([record.materials[name] for name in names])
     number = _numbers(texels, height * width)
     flat = patch.reshape(2, -1)
@@ -180,12 +197,10 @@ def read_answer(store: Store) -> StoredAnswer:
     sun = sun_beside(store)
     of_sun = next((n for n, group in enumerate(light_groups(store)) if SUN in group.members), 0)
     directs, at = np.minimum(directs, baked), number[points[:senders]]
-    with_sun = np.zeros((groups, senders, 3), np.float32)
-    with_sun[of_sun] = point_sun[:senders]
     nearest = Neighbours(near, shares)
     sending = Points(
         of_patch[at], material.astype(np.int64)[of_patch[at]], across.astype(np.int64),
-        directs[:, at] + with_sun, baked[:, at] + with_sun,
+        np.minimum(point_direct, point_light), point_light,
     )  # fmt: skip
     all_rays = Rays.of(rays).followed_by(Rays.of(more_rays))
     answer = Answer(patches, sending, all_rays, nearest, directs, baked, albedos)
@@ -224,7 +239,7 @@ def _seen(store: Store, record: SceneRecord, number: NDArray[np.int64]) -> dict[
         name = probe_spots_name(o.name, "spots")
         if name not in store:
             continue
-        spots = store.read(name)
+        spots = from_delta_bytes(store.read(name))
         there = spots < len(number)
         tint, sun = (store.read(probe_spots_name(o.name, part)) for part in ("tint", "sun"))
         found[o.name] = SeenSpots(np.where(there, number[np.where(there, spots, 0)], -1), tint, sun)

@@ -109,8 +109,8 @@ the band, and the factor of the tail. Coefficients of bands are `Curve.band_mean
 of a tail scattered as they did in the bake, over their albedos then.
 
 The scene record (cameras, materials, objects...) is the document "scene"; of a store of edited views alone it has no
-objects. Times are the documents "timings" and "last_run". Every array is absent, partial or complete
-(`Store.availability`); of a partial one, `Store.read_partial` gives what is there.
+objects. Times are the documents "timings", "processor_timings" and "last_run". Every array is absent, partial or
+complete (`Store.availability`); of a partial one, `Store.read_partial` gives what is there.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ from lambent.store.store import MANIFEST, Store
 FAR = 1.0e4  # metres: distance of what is not hit
 SCENE = "scene"
 CUTS = "cuts"  # document: the objects whose triangles the bake has cut, and for which viewers
-TIMINGS = "timings"  # of every step, in seconds
+TIMINGS, PROCESSOR_TIMINGS = "timings", "processor_timings"  # of every step, in seconds by the clock and of all cores
 LAST_RUN = "last_run"  # those of the last bake alone, and "other"
 SHARED_PROBES = "shared_probes"  # document: its key, and "owners", by object that shows the probe of another
 LIGHT_FIELD_CHOICE = (

@@ -16,8 +16,8 @@ from lambent.bake.answering.points import (
     seeing,
 )
 from lambent.bake.answering.spots import Spots
-from lambent.bake.answering.transfer import chosen_rays
-from lambent.core.answer import BYTE
+from lambent.bake.answering.transfer import chosen_rays, sender_means, transfer_of
+from lambent.core.answer import BYTE, Rays, packed_rays
 
 SIZE = 32
 
@@ -110,3 +110,27 @@ def test_chosen_rays_stand_for_all() -> None:
         whole, found = (weight * sent[np.maximum(met, 0)]).mean(axis=1), (kept * sent[at]).mean(axis=1)
         assert np.abs(found.mean() / whole.mean() - 1) < 0.01 and np.std(found / whole) < 0.06
     assert kept.max() <= 2.1 * weight.mean(axis=1).max()
+
+
+def test_points_send_the_mean_light_of_their_lit_texels() -> None:
+    """Half of a square is in the sun; its senders are columns, and one of their texels has no light."""
+    spots = plane()
+    column = spots.position[:, 0].astype(int)
+    senders = np.stack([np.minimum(column, 3), np.full(len(column), -1)])
+    light = np.zeros((2, len(column), 1))
+    light[0, :, 0] = np.where(spots.position[:, 2] < SIZE / 2, 8.0, 2.0)
+    unlit = spots.lit.copy()
+    unlit[0, 0], light[0, 0] = False, 1e6
+    spots = replace(spots, lit=unlit, area=np.where(spots.position[:, 2] < SIZE / 2, 3.0, 1.0))
+    found = sender_means(spots, senders, light, 5)[:, 0]
+    sunny, shady = 3.0 * SIZE / 2, 1.0 * SIZE / 2
+    first = (8.0 * (sunny - 3) + 2.0 * shady) / (sunny - 3 + shady)
+    assert np.allclose(found, [first, 6.5, 6.5, 6.5, 0.0])
+
+
+def test_transfer_between_patches_is_that_of_their_points() -> None:
+    """Two points of the first patch, one three times as large, and one of the second, which sees nothing of itself."""
+    point = np.array([[0, 2, 2, 2], [1, 1, 2, 2], [0, 0, 1, 1]])
+    weight = np.array([[1.0, 1, 1, 0], [1, 1, 2, 2], [1, 1, 1, 1]])
+    found = transfer_of(Rays.of(packed_rays(point, weight)), np.array([0, 0, 1]), np.array([1.0, 3.0, 9.0]), 3)
+    assert np.allclose(found, [[(1 + 3 * 2) / 16, (2 + 3 * 4) / 16, 0], [1, 0, 0], [0, 0, 0]])

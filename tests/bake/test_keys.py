@@ -257,7 +257,6 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
     },
     "answer": {
         "patches": (8, ANSWER),
-        "patch_rays": (64, ANSWER),
         "gather_rays": (32, ANSWER),
         "receiver_rays": (8, ANSWER),
         "block": (2, ANSWER),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -235,3 +236,14 @@ def test_groups_are_named_by_the_scene_and_change_with_it(tmp_path: Path) -> Non
 def test_photons_have_no_groups(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="photons cannot be stored by light group"):
         bake(room_with_step(), tmp_path / "s", quality=TINY, light_map="photons", light_groups="scene")
+
+
+def test_samples_by_group_are_rounded_evenly(mi: Any) -> None:
+    from lambent.bake.light.groups import rounded
+
+    means = np.random.default_rng(0).lognormal(0, 6, 100_000).astype(np.float32)
+    means[:3] = 0, -3.3, np.inf
+    found = rounded(means)
+    assert np.allclose(found, means, rtol=2**-13, atol=0)
+    assert np.mean(found[3:] / means[3:]) == pytest.approx(1, abs=2e-6)
+    assert len(zlib.compress(found.tobytes())) < 0.7 * len(zlib.compress(means.tobytes()))

@@ -20,9 +20,9 @@ SMALL = quality_named("preview").changed(
     light_map={"samples": (32, 32), "noise": 0.0, "gather_samples": 64},
     environment={"texels": 16},
     probe={"texels": 16, "samples": 8},
-    answer={"patches": 100, "patch_rays": 512, "gather_rays": 64},
+    answer={"patches": 100, "gather_rays": 64},
 )
-EFFORT = answer.Effort(texels=60, paths=128, edits=2, turns=1)
+EFFORT = answer.Effort(texels=60, paths=128, edits=2, turns=1, contact_paths=512)
 
 
 @pytest.mark.usefixtures("adapter", "mi")
@@ -42,6 +42,9 @@ def test_rows_of_a_store(tmp_path: Path, groups: str) -> None:
         assert min(parts) > 0 and row["edit_to_picture_ms"] > row["upload_ms"] and row["sweeps"] >= 1
         assert row["rms"] < row["likely_error"] < row["naive_rms"]
         assert row["bytes"] > 1000 and row["precompute_s"] > 0
+        assert row["precompute_cpu_s"] > 0 and row["light_map_cpu_s"] > 0
+        if row["p95_contacts"] is not None:
+            assert row["p95_contacts_noise"] > 0 and row["relative_rms_contacts"] <= 2 * row["p95_contacts"]
 
 
 def test_edits_of_a_scene_are_of_its_largest_materials() -> None:

@@ -9,7 +9,6 @@ from lambent.core.answer import (
     MOST_EXCESS,
     MOST_POINTS,
     MOST_SHARES,
-    MOST_WEIGHT,
     Albedos,
     Answer,
     Neighbours,
@@ -18,12 +17,12 @@ from lambent.core.answer import (
     Rays,
     answered,
     gathered,
+    last_points,
     packed_rays,
-    packed_weights,
-    points_of_rays,
+    point_ratios,
     ratios,
+    side_by_side,
     solved,
-    unpacked_weights,
     upsampled,
 )
 
@@ -84,46 +83,55 @@ def test_light_that_would_grow_without_end_is_bounded() -> None:
         assert found.converged and found.irradiance == pytest.approx(1 / (1 - share * albedo), rel=1e-4)
 
 
-def test_weights_keep_their_relative_size_in_a_byte() -> None:
-    weights = np.geomspace(0.1, MOST_WEIGHT, 200)
-    assert np.allclose(unpacked_weights(packed_weights(weights)), weights, rtol=0.06)
-    assert unpacked_weights(packed_weights(np.array([0.0, 99.0]))).tolist() == [0.0, MOST_WEIGHT]
+def rays_of_light(weight: np.ndarray, point: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """(K, G, 3) means over rays to `point` (K, R) that weigh (K, R), of light (n, G, 3)."""
+    return (weight[..., None, None] * light[point]).mean(axis=1)
+
+
+def padded(light: np.ndarray) -> np.ndarray:
+    return side_by_side(np.moveaxis(light, 0, 1))
 
 
 def test_gathering_sums_what_rays_end_on() -> None:
     rng = np.random.default_rng(0)
-    point, weight = rng.integers(0, MOST_POINTS, (5, 64)), rng.random((2, 5, 64)) * 2
-    weight[:, :, ::7] = 0
+    point, weight = rng.integers(0, MOST_POINTS, (5, 64)), rng.random((5, 64)) * 2
+    weight[:, ::7] = 0
     rays = packed_rays(point, weight)
-    assert np.array_equal(points_of_rays(rays), np.sort(np.where(weight[0] > 0, point, 0)))
-    light = rng.random((2, MOST_POINTS, 3)).astype(np.float32)
-    expected = (weight[..., None] * light[:, point]).mean(axis=2)
-    assert np.allclose(gathered(Rays.of(rays), light.transpose(1, 0, 2).copy()), expected, rtol=0.01)
+    assert np.array_equal(last_points(rays), np.where(weight > 0, point, 0).max(axis=1))
+    light = rng.random((MOST_POINTS, 2, 3)).astype(np.float32)
+    assert np.allclose(gathered(Rays.of(rays), padded(light))[..., :3], rays_of_light(weight, point, light), rtol=0.03)
+
+
+def test_steps_of_weights_add_no_light_and_take_none() -> None:
+    """Every weight alike: sums of many are right, whatever lies between two steps."""
+    point = np.tile(np.arange(256), (64, 1))
+    light = np.ones((256, 1, 4), np.float32)
+    for one in (1.0, 1.07, 1.3, 3.0, 0.011):
+        found = gathered(Rays.of(packed_rays(point, np.full((64, 256), one))), light)
+        assert found[:, 0, :3] == pytest.approx(one, rel=0.01)
 
 
 @pytest.mark.parametrize("groups", [1, 2, 4, 5, 7])
 def test_rays_that_end_at_one_point_are_one(groups: int) -> None:
     rng = np.random.default_rng(groups)
-    point, weight = rng.integers(0, 20, (6, 256)), rng.random((groups, 6, 256)) * 3
-    weight[:, :2, ::3] = 0
-    weight[:, 5] = 0  # a point that sees nothing
+    point, weight = rng.integers(0, 20, (6, 256)), rng.random((6, 256)) * 3
+    weight[:2, ::3] = 0
+    weight[5] = 0  # a point that sees nothing
     merged = Rays.of(packed_rays(point, weight))
     assert len(merged.points) == 5 * 20 and merged.starts[-1] == 100 and merged.starts[-2] == 100
     assert (np.diff(merged.points[:20].astype(int)) > 0).all()
     light = rng.random((20, groups, 3)).astype(np.float32)
-    expected = np.stack([(weight[g][..., None] * light[point, g]).mean(axis=1) for g in range(groups)])
-    assert np.allclose(gathered(merged, light), expected, rtol=0.01)
+    assert np.allclose(gathered(merged, padded(light))[..., :3], rays_of_light(weight, point, light), rtol=0.08)
 
 
 def test_points_that_gather_alone_follow_those_that_send() -> None:
     rng = np.random.default_rng(2)
-    point, weight = rng.integers(0, 5, (5, 64)), rng.random((2, 5, 64))
-    more, of_more = rng.integers(0, 5, (3, 16)), rng.random((2, 3, 16))
-    senders = Rays.of(packed_rays(point, weight))
-    both, light = senders.followed_by(Rays.of(packed_rays(more, of_more))), rng.random((5, 2, 3)).astype(np.float32)
-    expected = (of_more[..., None] * np.moveaxis(light, 1, 0)[np.arange(2)[:, None, None], more]).mean(axis=2)
-    assert np.allclose(gathered(both, light)[:, 5:], expected, rtol=0.01)
-    assert np.allclose(gathered(both, light)[:, :5], gathered(senders, light), rtol=1e-6)
+    point, weight = rng.integers(0, 5, (5, 64)), rng.random((5, 64))
+    more, of_more = rng.integers(0, 5, (3, 16)), rng.random((3, 16))
+    senders, given = Rays.of(packed_rays(point, weight)), rng.random((5, 2, 3)).astype(np.float32)
+    both, light = senders.followed_by(Rays.of(packed_rays(more, of_more))), padded(given)
+    assert np.allclose(gathered(both, light)[5:, :, :3], rays_of_light(of_more, more, given), rtol=0.1)
+    assert np.array_equal(gathered(both, light)[:5], gathered(senders, light))
     assert np.array_equal(gathered(both.of_first(5), light), gathered(senders, light))
 
 
@@ -131,15 +139,16 @@ def test_points_send_the_light_of_both_their_sides() -> None:
     light = np.array([[[10.0] * 3, [4.0] * 3]], np.float32)
     points = Points(np.zeros(2, int), np.zeros(2, int), np.array([1, 0]), np.float32(0.5) * light, light)
     sheet = Albedos(np.full((1, 3), 0.2), np.full((1, 3), 0.5))
-    as_baked = points.exitance(sheet, np.ones((1, 1, 3), np.float32), np.zeros(2, int))
+    as_baked = points.exitance(sheet, np.ones((1, 1, 4), np.float32), np.zeros(2, int))
+    assert as_baked.shape == (2, 1, 4) and not as_baked[..., 3].any()
     assert np.allclose(as_baked[:, 0, 0], [0.2 * 10 + 0.5 * 4, 0.2 * 4 + 0.5 * 10])
-    doubled = points.exitance(sheet, np.full((1, 2, 3), 2, np.float32))
+    doubled = points.exitance(sheet, np.full((2, 1, 4), 2, np.float32))
     assert np.allclose(doubled[:, 0, 0], 1.5 * as_baked[:, 0, 0]), "direct light stays"
 
 
 def test_two_points_in_a_furnace_have_the_light_of_its_series() -> None:
     """Direct light 1 everywhere, albedo a, every ray ends on a point: all light is 1 / (1 - a)."""
-    direct, rays = np.ones((1, 2, 3), np.float32), packed_rays(np.tile([0, 1], (2, 8)), np.ones((1, 2, 16)))
+    direct, rays = np.ones((1, 2, 3), np.float32), packed_rays(np.tile([0, 1], (2, 8)), np.ones((2, 16)))
     room = Patches(np.zeros(2, int), np.arange(2), direct, np.full((2, 2), 0.5, np.float32))
     points = Points(np.arange(2), np.zeros(2, int), np.arange(2), direct, 2 * direct)
     near = Neighbours(np.array([[0], [1]], np.uint32), np.full((2, 1), 255, np.uint8))
@@ -154,12 +163,14 @@ def test_two_points_in_a_furnace_have_the_light_of_its_series() -> None:
 def test_texels_show_means_of_their_points() -> None:
     near = Neighbours(np.array([[0, 1], [2, 2]], np.uint32), np.array([[255, 85], [10, 0]], np.uint8))
     light = np.arange(9, dtype=np.float32).reshape(1, 3, 3)
-    assert np.allclose(upsampled(light, near), [[[0.75, 1.75, 2.75], [6.0, 7.0, 8.0]]])
+    assert np.allclose(upsampled(side_by_side(light), near), [[[0.75, 1.75, 2.75], [6.0, 7.0, 8.0]]])
 
 
 def test_ratios_of_no_light_are_one_and_bounded() -> None:
     reference = np.array([[[1.0, 2.0, 0.0]]])
     assert ratios(np.array([[[0.5, 4e9, 5.0]]]), reference).tolist() == [[[0.5, 64.0, 1.0]]]
+    of_points = (side_by_side(np.array(one, np.float32)) for one in ([[[0.5, 4e9, 5.0]]], reference))
+    assert point_ratios(*of_points)[..., :3].tolist() == [[[0.5, 64.0, 1.0]]]
 
 
 def test_direct_light_stays_and_light_that_was_not_gathered_never_grows() -> None:
@@ -179,7 +190,7 @@ def test_texels_are_answered_as_arrays_are() -> None:
 
 def small_answer() -> Answer:
     rng, room = np.random.default_rng(1), patches(1)
-    rays = packed_rays(rng.integers(0, 9, (9, 32)), np.ones((1, 9, 32)))
+    rays = packed_rays(rng.integers(0, 9, (9, 32)), np.ones((9, 32)))
     light = (1 + rng.random((1, 9, 3))).astype(np.float32)
     points = Points(rng.integers(0, 30, 9), rng.integers(0, 4, 9), np.arange(9), 0.3 * light, light)
     near = Neighbours(rng.integers(0, 9, (50, 8)).astype(np.uint32), np.full((50, 8), 255, np.uint8))

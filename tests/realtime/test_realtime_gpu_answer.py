@@ -30,11 +30,11 @@ def room(groups: int, seed: int = 3) -> Answer:
     paired[:20], other[:50] = np.roll(paired[:20], 10), np.roll(other[:50], 25)
     direct = rng.random((groups, PATCHES, 3)) ** 4
     patches = Patches(rng.integers(0, MATERIALS, PATCHES), paired, *(x.astype(np.float32) for x in (direct, transfer)))
-    weight = rng.random((groups, POINTS, 33)) * 2
-    weight[:, :, ::5] = 0
-    weight[:, 7] = 0  # a point that sees nothing
+    weight = rng.random((POINTS, 33)) * 2
+    weight[:, ::5] = 0
+    weight[7] = 0  # a point that sees nothing
     rays = Rays.of(packed_rays(rng.integers(0, POINTS, (POINTS, 33)), weight))
-    more = rng.integers(0, POINTS, (RECEIVERS, 9)), rng.random((groups, RECEIVERS, 9))
+    more = rng.integers(0, POINTS, (RECEIVERS, 9)), rng.random((RECEIVERS, 9))
     rays = rays.followed_by(Rays.of(packed_rays(*more)))
     light = (0.2 + rng.random((groups, POINTS, 3))).astype(np.float32)
     of_patch = rng.integers(0, PATCHES, POINTS)
@@ -85,7 +85,7 @@ def test_light_that_grows_without_end_is_left_to_the_cores(device: Any) -> None:
 
 def test_the_gpu_finds_the_series_of_a_furnace(device: Any) -> None:
     """Direct light 1 everywhere, albedo a, every ray ends on a point: all light is 1 / (1 - a)."""
-    direct, rays = np.ones((1, 2, 3), np.float32), packed_rays(np.tile([0, 1], (2, 8)), np.ones((1, 2, 16)))
+    direct, rays = np.ones((1, 2, 3), np.float32), packed_rays(np.tile([0, 1], (2, 8)), np.ones((2, 16)))
     box = Patches(np.zeros(2, int), np.arange(2), direct, np.full((2, 2), 0.5, np.float32))
     points = Points(np.arange(2), np.zeros(2, int), np.arange(2), direct, 2 * direct)
     near = Neighbours(np.array([[0], [1]], np.uint32), np.full((2, 1), 255, np.uint8))

@@ -181,8 +181,8 @@ def neighbours(spots: Spots, points: GatherPoints) -> tuple[NDArray[np.uint32], 
             known = np.flatnonzero(point_owner == one)
             count = min(NEAR, len(known))
             found = KDTree(place[points.texel[known]]).query(place[mine], k=np.arange(1, count + 1))[1]
-            at = known[found]  # (n, count)
-            share = _shares(spots, mine, points, at)
+            share, order = _shares(spots, mine, points, known[found]), np.argsort(found, axis=1)  # files pack it well
+            at, share = known[np.take_along_axis(found, order, axis=1)], np.take_along_axis(share, order, axis=1)
             codes.append(spots.index[mine] * 2 + side)
             near.append(np.pad(at, ((0, 0), (0, NEAR - count))))
             shares.append(np.pad(share, ((0, 0), (0, NEAR - count))))
@@ -193,6 +193,13 @@ def neighbours(spots: Spots, points: GatherPoints) -> tuple[NDArray[np.uint32], 
     order = np.argsort(code)
     packed = Neighbours(nearest[order].astype(np.uint32), share[order].astype(np.uint8))
     return code[order].astype(np.uint32), packed
+
+
+def points_near(spots: Spots, codes: NDArray[np.uint32], near: Neighbours) -> Indices:
+    """(2, K) the point that counts most for each spot that answers, -1 for others."""
+    found = np.full((2, len(spots.index)), -1)
+    found[codes % 2, np.searchsorted(spots.index, codes // 2)] = near.closest
+    return found
 
 
 def _shares(spots: Spots, mine: Indices, points: GatherPoints, at: Indices) -> Floats:

@@ -1,86 +1,54 @@
-"""Light between patches, and light from patches to the points that gather it."""
+"""Light between points that send and gather it, and between the patches that they lie in."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from lambent.bake.answering.patches import Clusters
 from lambent.bake.answering.points import GatherPoints
 from lambent.bake.answering.rays import NOWHERE, RayEnds
-from lambent.bake.answering.senders import senders_of
 from lambent.bake.answering.spots import Spots
 from lambent.bake.surfaces.texels import Sides
 from lambent.bake.tiles import seed_of
-from lambent.core.answer import packed_rays
+from lambent.core.answer import Rays, packed_rays, weights_of_bytes
 from lambent.core.arrays import Floats, Indices
 
-RAYS_OF_TEXEL = 32
 STRIDE = 8  # of the texels that viewers see, whose rays count for how important others are
 
 
 class Between:
-    """Rays between the texels of a scene, as rays between its patches, and between its points."""
+    """Rays between points that send light, from these and from others."""
 
     def __init__(
-        self, ends: RayEnds, spots: Spots, sides: list[Sides], clusters: Clusters, near: Indices,
-        points: GatherPoints, exitance: Floats,
-    ) -> None:  # fmt: skip
+        self, ends: RayEnds, spots: Spots, sides: list[Sides], senders: Indices, exitance: Floats, count: int
+    ) -> None:
         size = sides[0].texels.width * sides[0].texels.height
-        self._ends, self._spots, self._sides, self._clusters = ends, spots, sides, clusters
-        means = patch_means(spots, clusters, np.moveaxis(exitance, 0, -1)).T
-        self._patches = senders_of(spots, clusters.of, means, exitance, size)
-        self._sent = exitance[:, points.side, points.texel]
-        self._near = senders_of(spots, near, self._sent, exitance, size)
-
-    def transfer_rows(self, first: int, last: int, rays: int, seed: int) -> NDArray[np.float32]:
-        """Rows [first, last) of F (., G, P): means over `rays` from each patch, spread over its texels by area."""
-        count = self._clusters.count
-        rows = np.zeros((last - first, len(self._patches.relative), count), np.float32)
+        self._ends, self._sides = ends, sides
+        self._sender = np.full(2 * size, -1)
         for side in range(2):
-            texel, patch = self._drawn(side, first, last, rays, seed)
-            if not len(texel):
-                continue
-            ends = self._ends.from_texels(self._sides[side], texel, RAYS_OF_TEXEL, seed_of(seed, "transfer", side))
-            drawn = np.bincount(patch - first, minlength=len(rows)) * RAYS_OF_TEXEL
-            met, weights = self._patches.met(*ends)
-            known = met >= 0
-            place = ((patch - first)[:, None] * count + met)[known]
-            for group, weight in enumerate(weights):
-                sums = np.bincount(place, weight[known], len(rows) * count).reshape(-1, count)
-                rows[:, group] += (sums / np.maximum(drawn, 1)[:, None]).astype(np.float32)
-        return rows
-
-    def _drawn(self, side: int, first: int, last: int, rays: int, seed: int) -> tuple[Indices, Indices]:
-        """Texels of a side by area, with replacement in patches of few, and the patch of each."""
-        of, rng = self._clusters.of[side], np.random.default_rng((seed, side))
-        mine = np.flatnonzero(self._spots.lit[side] & (of >= first) & (of < last))
-        mine = mine[np.argsort(of[mine], kind="stable")]
-        wanted = max(1, rays // RAYS_OF_TEXEL)
-        texels, patches = [], []
-        for patch, one in _runs(of[mine], mine):
-            sums = np.cumsum(self._spots.area[one])
-            at = (np.arange(wanted) + rng.random(wanted)) / wanted * sums[-1]
-            texels.append(one[np.searchsorted(sums, at, side="right").clip(0, len(one) - 1)])
-            patches.append(np.full(wanted, patch))
-        nothing: Indices = np.zeros(0, np.int64)
-        return np.concatenate([nothing, *texels]), np.concatenate([nothing, *patches])
+            self._sender[spots.index * 2 + side] = senders[side]
+        self._sent = sender_means(spots, senders, exitance.sum(axis=0)[..., None], count)[:, 0]
 
     def gathered_rays(self, points: GatherPoints, part: slice, count: int, kept: int, seed: int) -> NDArray[np.uint8]:
-        """`packed_rays` (n, kept, 2 + G), chosen of `count` from some of the points, which send light or do not."""
+        """`packed_rays` (n, kept, 3), chosen of `count` from some of the points, which send light or do not."""
         side, texel = points.side[part], points.texel[part]
-        found = np.zeros((len(texel), kept, 2 + len(self._near.relative)), np.uint8)
+        found = np.zeros((len(texel), kept, 3), np.uint8)
         for one in range(2):
             mine = np.flatnonzero(side == one)
             if len(mine):
                 ends = self._ends.from_texels(self._sides[one], texel[mine], count, seed_of(seed, "gather", one))
-                met, weight = self._near.met(*ends)
+                there = ends[0] != NOWHERE
+                at = np.where(there, ends[0], 0)
+                met = np.where(there, self._sender[at], -1)
+                weight = np.where(met >= 0, ends[1], 0.0)
                 if kept < count:
-                    light = np.einsum("gnr,gnr->nr", weight, self._sent[:, np.maximum(met, 0)])
                     shift = np.random.default_rng((seed, one)).random(len(mine))
-                    chosen, scale = chosen_rays(met, weight.sum(axis=0), light, kept, shift)
+                    light = weight * self._sent[np.maximum(met, 0)]
+                    chosen, scale = chosen_rays(met, weight, light, kept, shift)
                     met = np.take_along_axis(met, chosen, axis=1)
-                    weight = np.take_along_axis(weight, chosen[None], axis=2) * scale
+                    weight = np.take_along_axis(weight, chosen, axis=1) * scale
                 found[mine] = packed_rays(met, weight)
         return found
 
@@ -112,12 +80,21 @@ def chosen_rays(met: Indices, weight: Floats, light: Floats, kept: int, shift: F
     return chosen, np.where(of_chosen > 0, total / np.maximum(of_chosen, 1e-30) / met.shape[1], 0.0)
 
 
-def _runs(keys: Indices, values: Indices) -> list[tuple[int, Indices]]:
-    """Values by key; keys are sorted."""
-    if not len(keys):
-        return []
-    cuts = np.flatnonzero(np.diff(keys)) + 1
-    return [(int(k[0]), v) for k, v in zip(np.split(keys, cuts), np.split(values, cuts), strict=True)]
+def transfer_of(rays: Rays, patch: Indices, area: Floats, count: int) -> NDArray[np.float32]:
+    """F (count, count): means over the points of each patch, by `area` (K,), of their rays to points of each other.
+
+    Parameters
+    ----------
+    rays : Rays
+        Of K points, between these.
+    patch : (K,) integers
+    """
+    each = np.diff(rays.starts)
+    weight = weights_of_bytes()[rays.weights] * np.repeat(rays.scale * area, each)
+    sums = csr_matrix((weight, (np.repeat(patch, each), patch[rays.points])), shape=(count, count))
+    areas = np.bincount(patch, area, count)
+    shares: Floats = sums.toarray() / np.maximum(areas, 1e-30)[:, None]
+    return shares.astype(np.float32)
 
 
 def patch_means(spots: Spots, clusters: Clusters, values: Floats) -> Floats:
@@ -134,6 +111,18 @@ def patch_means(spots: Spots, clusters: Clusters, values: Floats) -> Floats:
     means = total / np.maximum(area, 1e-30)[:, None]
     lit = lit_total / np.maximum(lit_area, 1e-30)[:, None]
     return np.where((lit_area > 0)[:, None], lit, means)
+
+
+def sender_means(spots: Spots, senders: Indices, values: Floats, count: int) -> Floats:
+    """(count, C) means over area of values (2, K, C) of the lit texels for which each of `senders` (2, K) sends."""
+    total, area = np.zeros((count, values.shape[-1])), np.zeros(count)
+    for side in range(2):
+        mine = np.flatnonzero(spots.lit[side] & (senders[side] >= 0))
+        of, weight = senders[side][mine], spots.area[mine]
+        area += np.bincount(of, weight, count)
+        for channel in range(values.shape[-1]):
+            total[:, channel] += np.bincount(of, weight * values[side, mine, channel], count)
+    return np.asarray(total / np.maximum(area, 1e-30)[:, None])
 
 
 def light_seen(

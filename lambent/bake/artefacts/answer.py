@@ -17,7 +17,9 @@ from lambent.bake.keys import key_of
 from lambent.bake.methods import sorts_light
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles
+from lambent.core.answer import Rays
 from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.delta_bytes import delta_bytes
 from lambent.store.answer import DIRECT, NO_PATCH, answer_name, probe_spots_name
 from lambent.store.contract import SIDES, probe_name, shared_probes
 from lambent.store.light_groups import group_name
@@ -31,26 +33,37 @@ if TYPE_CHECKING:
 
 KIND = "answer"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 8
+REVISION = 9
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
-BETWEEN = ("transfer", "rays", "receiver_rays", "points", "point_sun", "point_other", "texels", "near", "shares")
+BETWEEN = (
+    "transfer",
+    "rays",
+    "receiver_rays",
+    "points",
+    "point_sun",
+    "point_direct",
+    "point_light",
+    "point_other",
+    "texels",
+    "near",
+    "shares",
+)
 SEEN = ("spots", "tint", "sun")
-TILES = 16  # of transfer and of rays
+TILES = 16  # of rays
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Patches, rays from each, and what light is gathered with.
+    """Patches, and what light is gathered with.
 
     Where the light map keeps no direct light, texels get `direct_samples` of it; where that is sorted, what lobes have
     sent on takes `lobe_samples`. One texel of each block of `block` x `block` texels gathers by `gather_rays`; those
-    beside contacts that do not send keep `receiver_rays` of these.
+    beside contacts that do not send trace half as many and keep `receiver_rays` of these.
     """
 
     patches: int = 1000
-    patch_rays: int = 4096
     gather_rays: int = 256
     receiver_rays: int = 64
     block: int = 4
@@ -61,10 +74,8 @@ class Settings:
 
 SETTINGS = {
     QualityName.preview: Settings(),
-    QualityName.normal: Settings(patch_rays=8192, block=8, direct_samples=64, lobe_samples=16),
-    QualityName.final: Settings(
-        patch_rays=16384, gather_rays=512, receiver_rays=128, block=12, direct_samples=256, lobe_samples=64
-    ),
+    QualityName.normal: Settings(block=8, direct_samples=64, lobe_samples=16),
+    QualityName.final: Settings(gather_rays=512, receiver_rays=128, block=12, direct_samples=256, lobe_samples=64),
 }
 
 
@@ -75,12 +86,12 @@ def keys(context: BakeContext) -> dict[str, str]:
     count = 2 if any(context.two_sided) else 1
     samples = 0 if ready else how.lobe_samples if sorts_light(context.methods) else how.direct_samples
     effort = [
-        how.patches, how.patch_rays, how.gather_rays, how.receiver_rays, how.block, samples, how.importance_rays,
+        how.patches, how.gather_rays, how.receiver_rays, how.block, samples, how.importance_rays,
     ]  # fmt: skip
     key = key_of(KIND, REVISION, light, effort, context.seed)
     sampled = () if ready else TRACED[:count]
     by_group = map(_by_group, sampled) if sorts_light(context.methods) else ()
-    found = dict.fromkeys((*sampled, *by_group, *MAPS[:count]), key)
+    found = dict.fromkeys((*sampled, *by_group, *(() if ready else MAPS[:count])), key)
     worn = [(o.name, o.material) for o in context.scene.objects]  # patches are of one material, by its name
     found |= dict.fromkeys(map(answer_name, (*PATCH, *BETWEEN)), key_of(KIND, REVISION, key, worn))
     of_probes = context.keys("probe")
@@ -114,15 +125,19 @@ def _direct(context: BakeContext, side: int) -> Floats:
 
     What lobes alone have sent on counts as direct.
     """
+    if keeps_direct(context):
+        return np.asarray(context.store.read(_direct_name(context, side)))
     if MAPS[side] not in context.stale(KIND):
         return np.asarray(context.store.read(MAPS[side]))
     lit = _lit(context)[side]
-    if keeps_direct(context):
-        direct = context.store.read(group_name(SIDES[side], direct=True))
-    else:
-        direct = np.minimum(_sampled_direct(context, side, lit), np.asarray(lit, np.float16))
+    direct = np.minimum(_sampled_direct(context, side, lit), np.asarray(lit, np.float16))
     context.put(KIND, MAPS[side], direct, context.provenance())
     return np.asarray(direct)
+
+
+def _direct_name(context: BakeContext, side: int) -> str:
+    """Name of the array of a side's direct light: the light map's, where it keeps all."""
+    return group_name(SIDES[side], direct=True) if keeps_direct(context) else MAPS[side]
 
 
 def _sampled_direct(context: BakeContext, side: int, lit: Floats) -> Floats:
@@ -221,19 +236,26 @@ def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
         context.put(KIND, answer_name(part), values.astype(np.uint16), context.provenance())
     direct = np.stack([patch_means(spots, found, of_group) for of_group in spots.direct]).astype(np.float32)
     context.put(KIND, answer_name("patch_direct"), direct, context.provenance())
-    note = context.provenance(materials=list(context.scene.materials))
+    directs = [_direct_name(context, side) for side in range(len(sides))]
+    note = context.provenance(materials=list(context.scene.materials), direct=directs)
     context.put(KIND, answer_name("patch"), patch.reshape(2, texels.height, texels.width), note)
     return found
 
 
 def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Clusters) -> None:
     """Transfer between patches, and rays between points."""
-    from lambent.bake.answering.points import bounded_points, neighbours, receiving_points, refined_points, seeing
-    from lambent.bake.answering.senders import points_near
-    from lambent.bake.answering.transfer import Between, light_seen
+    from lambent.bake.answering.points import (
+        bounded_points,
+        neighbours,
+        points_near,
+        receiving_points,
+        refined_points,
+        seeing,
+    )
+    from lambent.bake.answering.transfer import Between, light_seen, sender_means, transfer_of
 
     how: Settings = context.settings(KIND)
-    width, count = context.traced.texels.width, clusters.count
+    width = context.traced.texels.width
     sides = [context.traced.in_view(sign)[0] for sign in SIGNS[: 2 if any(context.two_sided) else 1]]
     coarse = bounded_points(spots, width, how.block, clusters.count)
     distance = np.zeros(len(coarse.texel))
@@ -252,33 +274,35 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     codes, near = neighbours(spots, everyone)
     across = closest[1 - points.side, points.texel]
     other = np.where(across >= 0, across, np.arange(len(across)))
-    between = Between(ends, spots, sides, clusters, closest, points, exitance)
+    between = Between(ends, spots, sides, closest, exitance, len(points.texel))
 
-    def rows(region: tuple[slice, ...], seed: int) -> Floats:
-        found = between.transfer_rows(region[0].start, region[0].stop, how.patch_rays, seed)
-        return found.astype(np.float16).reshape(len(found), -1)
-
-    def rays(of: GatherPoints, kept: int) -> Callable[[tuple[slice, ...], int], NDArray[np.uint8]]:
+    def rays(of: GatherPoints, traced: int, kept: int) -> Callable[[tuple[slice, ...], int], NDArray[np.uint8]]:
         def tile(region: tuple[slice, ...], seed: int) -> NDArray[np.uint8]:
-            return np.moveaxis(between.gathered_rays(of, region[1], how.gather_rays, kept, seed), -1, 0)
+            return np.moveaxis(between.gathered_rays(of, region[1], traced, kept, seed), -1, 0)
 
         return tile
 
-    key = context.keys(KIND)[answer_name("transfer")]
-    groups = len(spots.irradiance)
-    sizes = (points, how.gather_rays), (receivers, how.receiver_rays)
-    of_points, of_receivers = ((2 + groups, len(of.texel), count) for of, count in sizes)
-    arrays = (("transfer", (count, groups * count), 0, "float16", rows, "light between patches"),
-              ("rays", of_points, 1, "uint8", rays(*sizes[0]), "gathering"),
-              ("receiver_rays", of_receivers, 1, "uint8", rays(*sizes[1]), "gathering beside contacts"))  # fmt: skip
-    for part, shape, axis, dtype, tile, what in arrays:
-        chunk = tuple(max(1, -(-size // TILES)) if at == axis else max(1, size) for at, size in enumerate(shape))
-        writer = context.store.begin(answer_name(part), KIND, shape, chunk, dtype, key=key, meta=context.provenance())
-        run_tiles(writer, tile, seed=context.seed, progress=context.progress, what=what)
+    of_contacts = max(how.gather_rays // 2, how.receiver_rays)
+    arrays = (("rays", points, how.gather_rays, how.gather_rays, "gathering"),
+              ("receiver_rays", receivers, of_contacts, how.receiver_rays, "gathering beside contacts"))  # fmt: skip
+    for part, of, count, kept, what in arrays:
+        shape, chunk = (3, len(of.texel), kept), (3, max(1, -(-len(of.texel) // TILES)), kept)
+        key = context.keys(KIND)[answer_name(part)]
+        writer = context.store.begin(answer_name(part), KIND, shape, chunk, "uint8", key=key, meta=context.provenance())
+        run_tiles(writer, rays(of, count, kept), seed=context.seed, progress=context.progress, what=what)
         writer.finish()
-    numbers = (spots.index[everyone.texel] * 2 + everyone.side).astype(np.uint32)
+    sending = Rays.of(np.moveaxis(context.store.read(answer_name("rays")), 0, -1))
+    sends = closest >= 0
+    areas: Floats = np.broadcast_to(spots.area, closest.shape)[sends]
+    area = np.asarray(np.bincount(closest[sends], areas, len(across)), float)
+    transfer = transfer_of(sending, clusters.of[points.side, points.texel], area, clusters.count)
+    context.put(KIND, answer_name("transfer"), transfer.astype(np.float16), context.provenance())
     own_sun = spots.sun[everyone.side, everyone.texel]
-    values = (numbers, own_sun, other.astype(np.uint32), codes, near.points, near.shares)
+    numbers = spots.index[everyone.texel] * 2 + everyone.side, other, codes, near.points
+    of_points, of_other, of_texels, of_near = map(delta_bytes, numbers)
+    of_group = (spots.direct, spots.irradiance)
+    sent = (np.stack([sender_means(spots, closest, one, len(points.texel)) for one in light]) for light in of_group)
+    values = (of_points, own_sun, *(one.astype(np.float32) for one in sent), of_other, of_texels, of_near, near.shares)
     for part, array in zip(BETWEEN[3:], values, strict=True):
         context.put(KIND, answer_name(part), array, context.provenance())
 
@@ -301,5 +325,6 @@ def _seen_by_probes(context: BakeContext, stale: set[str]) -> None:
             own = set().union(*(family(scene.parts, one) for one in (name, *sharing(owners, name))))
         found = eyes.look(np.array(radiance.meta["centre"]), radiance.shape[1], frozenset(own))
         for part in SEEN:
-            context.put(KIND, probe_spots_name(name, part), getattr(found, part), context.provenance())
+            values = delta_bytes(found.spots) if part == "spots" else getattr(found, part)
+            context.put(KIND, probe_spots_name(name, part), values, context.provenance())
     context.progress(len(names), len(names), "answer of probes")

@@ -82,7 +82,15 @@ class GpuAnswer:
         _solve(self._stages, self._solvers)
         as_baked = answer.indirect(answer.albedos)
         self._groups = [
-            _Group(self._stages, self._shared, self._solvers[group], answer, group, as_baked[group], reference[group])
+            _Group(
+                self._stages,
+                self._shared,
+                self._solvers[group],
+                answer,
+                group,
+                as_baked[:, group, :3],
+                reference[group],
+            )
             for group in numbers
         ]
 
@@ -125,6 +133,7 @@ class _Shared:
         about = [points.patch, points.material, points.other, np.zeros(len(points.patch))]
         self.points = stages.buffer(np.stack(about, axis=1).astype(np.uint32))
         self.ray_starts, self.ray_ends = stages.buffer(rays.starts.astype(np.uint32)), stages.buffer(rays.points)
+        self.ray_weights, self.ray_scale = stages.buffer(rays.weights), stages.buffer(rays.scale)
         self.near = stages.buffer(packed_near(answer.near))
 
     def colour(self, albedos: Albedos) -> None:
@@ -183,17 +192,15 @@ class _Group:
     ) -> None:  # fmt: skip
         self._stages, self._shared = stages, shared
         points, rays = answer.points, answer.rays
-        self._points, self._gathering, self._texels = len(points.other), len(rays.most), len(reference)
+        self._points, self._gathering, self._texels = len(points.other), len(rays.scale), len(reference)
         self._sent = stages.empty(self._points * LIGHT_BYTES)
         self._found = stages.empty(self._gathering * LIGHT_BYTES)
         lights = stages.buffer(np.concatenate([points.direct[group], points.light[group]], axis=1).astype(np.float32))
         self._first = self._exitance(lights, True, solver.indirect, solver.light())
         self._next = self._exitance(lights, False, self._found, gathered[: self._points])
-        weights, most = stages.buffer(rays.weights[:, group]), stages.buffer(rays.most[:, group])
-        given = shared.ray_starts, shared.ray_ends, weights, most, self._sent, self._found
+        given = (shared.ray_starts, shared.ray_ends, shared.ray_weights, shared.ray_scale, self._sent, self._found)
         self._gathers, self._gathers_last = (
-            stages.call("gather", (count, rays.count), *given, threads=count)
-            for count in (self._points, self._gathering)
+            stages.call("gather", (count,), *given, threads=count) for count in (self._points, self._gathering)
         )
         arrays = reference, answer.direct[group], answer.baked[group]
         self._of_texels = [stages.buffer(np.asarray(one, np.float32)) for one in arrays]

@@ -10,7 +10,7 @@ import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
-from lambent.core.answer import MOST_EXCESS, MOST_RATIO
+from lambent.core.answer import MOST_EXCESS, MOST_RATIO, WEIGHT_ONE, WEIGHT_STEPS
 from lambent.core.answer_loops import NO_LIGHT
 from lambent.core.colour import HALF_MAX
 from lambent.realtime.device import adapter_info
@@ -30,6 +30,8 @@ BINDINGS = {
 CONSTANTS = f"""const MOST_RATIO = {MOST_RATIO:.9g}f;
 const MOST_EXCESS = {MOST_EXCESS:.9g}f;
 const NO_LIGHT = {float(NO_LIGHT):.9g}f;
+const WEIGHT_ONE = {WEIGHT_ONE:.9g}f;
+const WEIGHT_STEPS = {WEIGHT_STEPS:.9g}f;
 const HALF_MAX = {HALF_MAX:.9g}f;
 """
 

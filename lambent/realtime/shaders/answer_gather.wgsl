@@ -1,15 +1,16 @@
 // Indirect light at points: sums of exitance where their rays end (`lambent.core.answer.gathered`).
 
+#include "answer_constants.wgsl"
+
 struct Gather {
     points: u32,
-    rays: u32,  // of each point, those included that end nowhere
 }
 
 @group(0) @binding(0) var<uniform> gather: Gather;
 @group(0) @binding(1) var<storage, read> starts: array<u32>;  // of each point's rays, and the end of the last
 @group(0) @binding(2) var<storage, read> ends: array<u32>;  // points near which rays end, two in a word
-@group(0) @binding(3) var<storage, read> weights: array<u32>;  // roots over that of the largest, four in a word
-@group(0) @binding(4) var<storage, read> most: array<f32>;  // the largest weight of each point's rays
+@group(0) @binding(3) var<storage, read> weights: array<u32>;  // powers of two by WEIGHT_STEPS, four in a word; 0 for none
+@group(0) @binding(4) var<storage, read> scale: array<f32>;  // one over the rays of each point
 @group(0) @binding(5) var<storage, read> sent: array<f32>;
 @group(0) @binding(6) var<storage, read_write> found: array<f32>;
 
@@ -19,10 +20,11 @@ struct Gather {
     var sum = vec3f(0.0);
     for (var ray = starts[point]; ray < starts[point + 1u]; ray++) {
         let at = 3u * extractBits(ends[ray / 2u], 16u * (ray % 2u), 16u);
-        let root = f32(extractBits(weights[ray / 4u], 8u * (ray % 4u), 8u)) / 255.0;
-        sum += root * root * vec3f(sent[at], sent[at + 1u], sent[at + 2u]);
+        let code = extractBits(weights[ray / 4u], 8u * (ray % 4u), 8u);
+        let weight = select(exp2((f32(code) - WEIGHT_ONE) / WEIGHT_STEPS), 0.0, code == 0u);
+        sum += weight * vec3f(sent[at], sent[at + 1u], sent[at + 2u]);
     }
-    sum *= most[point] / f32(gather.rays);
+    sum *= scale[point];
     found[3u * point] = sum.r;
     found[3u * point + 1u] = sum.g;
     found[3u * point + 2u] = sum.b;
