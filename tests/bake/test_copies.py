@@ -34,7 +34,9 @@ def nodes_of_meshes(path: Path, meshes: list[Mesh], places: Floats) -> None:
 
     documents = [
         {"primitives": [{
-            "attributes": {"POSITION": accessor(m.positions, "VEC3", 5126), "NORMAL": accessor(m.normals, "VEC3", 5126)},
+            "attributes": {
+                "POSITION": accessor(m.positions, "VEC3", 5126), "NORMAL": accessor(m.normals, "VEC3", 5126),
+            },
             "indices": accessor(m.faces.astype(np.uint32).ravel(), "SCALAR", 5125),
         }]}
         for m in meshes

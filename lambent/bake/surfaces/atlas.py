@@ -102,8 +102,7 @@ def _seams(charts: list[Chart], corners: list[Floats]) -> tuple[Indices, NDArray
     for i, (chart, local) in enumerate(zip(charts, corners, strict=True)):
         number[chart.faces], place[chart.faces], chart_of[chart.faces] = chart.vertices, local, i
     _, first, faces = np.unique(number, return_index=True, return_inverse=True)
-    faces = faces.reshape(-1, 3).astype(np.uint32)
-    return first, faces, chart_of.reshape(-1)[first], place.reshape(-1, 2)[first]
+    return first, faces.reshape(-1, 3).astype(np.uint32), chart_of.reshape(-1)[first], place.reshape(-1, 2)[first]
 
 
 def _split(mesh: Mesh, corner: Indices, faces: NDArray[np.uint32]) -> Mesh:
