@@ -171,7 +171,7 @@ PINNED = {
 
 @pytest.mark.parametrize("case", PINNED, ids="-".join)
 def test_stores_of_older_bakes_are_up_to_date(tmp_path: Path, case: tuple[str, str, str]) -> None:
-    """Keys since no texel holds surfaces far apart, and probes keep flat objects in view: where one changes without need, everybody bakes again."""
+    """Keys since probes keep flat objects in view: where one changes without need, everybody bakes again."""
     quality, light_map, probes = case
     store = Store.create(tmp_path / "s", {})
     methods = chosen({}, light_map=light_map, probes=probes)

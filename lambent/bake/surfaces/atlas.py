@@ -75,8 +75,8 @@ def unwrap(
 
 def areas_of(scene: Scene, pieces: list[Piece]) -> Floats:
     """(N,) square metres of pieces."""
-    meshes = [scene.objects[piece.owner].mesh for piece in pieces]
-    return np.array([triangle_areas(mesh.corners_of(p.faces)).sum() for mesh, p in zip(meshes, pieces, strict=True)])
+    areas = [triangle_areas(o.mesh.corners) for o in scene.objects]
+    return np.array([areas[piece.owner][piece.faces].sum() for piece in pieces])
 
 
 def scales_of(scene: Scene, pieces: list[Piece]) -> Floats:
