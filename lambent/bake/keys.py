@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,11 +28,17 @@ def key_of(what: str, revision: int, *inputs: object) -> str:
     result = hashlib.sha256(f"{what} {revision}".encode())
     for one in inputs:
         if isinstance(one, np.ndarray):
-            result.update(f"{one.dtype} {one.shape}".encode())
+            result.update(f"{_name_of(one.dtype)} {one.shape}".encode())
             result.update(np.ascontiguousarray(one).tobytes())
         else:
-            result.update(json.dumps(one, sort_keys=True, default=_nested).encode())
+            result.update(_TEXT.encode(one).encode())
     return result.hexdigest()
+
+
+@lru_cache(maxsize=64)
+def _name_of(dtype: np.dtype[Any]) -> str:
+    """As str(dtype), which takes longer than to hash a small array."""
+    return str(dtype)
 
 
 def _nested(value: object) -> object:
@@ -45,6 +52,9 @@ def _nested(value: object) -> object:
     if isinstance(value, Path):
         return str(value)
     raise TypeError(f"no key of {type(value).__name__}: it has no text that is the same in every process")
+
+
+_TEXT = json.JSONEncoder(sort_keys=True, default=_nested)
 
 
 def geometry_inputs(scene: Scene) -> list[object]:

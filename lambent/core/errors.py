@@ -62,6 +62,10 @@ EXPECTED_TYPES = {
     "bool_type": "true or false",
     "float_type": NUMBER,
     "int_type": "a whole number",
+    "bool_parsing": "true or false",
+    "float_parsing": NUMBER,
+    "int_parsing": "a whole number",
+    "int_from_float": "a whole number",
 }  # by pydantic's types of errors: users write tables and lists, not dictionaries
 
 
@@ -74,10 +78,20 @@ def invalid(error: Any, file: str | Path, known: Iterable[str] = ()) -> UserErro
     if first["type"] == "missing":
         return UserError("is missing", file=file, field=field)
     got = None if isinstance(first["input"], dict) else first["input"]  # a table is too long to be shown
+    if first["type"] == "union_tag_invalid":  # a table of one of several kinds
+        tag, key = str(first["ctx"]["tag"]), first["ctx"]["discriminator"].strip("'")
+        kinds = [kind.strip("' ") for kind in first["ctx"]["expected_tags"].split(",")]
+        hint, expected = did_you_mean(tag, kinds), f"one of {', '.join(kinds)}"
+        return UserError("unknown kind", file=file, field=f"{field}.{key}", got=tag, expected=expected, hint=hint)
+    if first["type"] == "union_tag_not_found":
+        return UserError("is missing", file=file, field=f"{field}.{first['ctx']['discriminator'].strip(chr(39))}")
+    if first["type"] == "literal_error":
+        return UserError("unknown value", file=file, field=field, got=got, expected=first["ctx"]["expected"])
     if first["type"] in EXPECTED_TYPES:
         expected = EXPECTED_TYPES[first["type"]]
         return UserError("has the wrong type", file=file, field=field, got=got, expected=expected)
-    return UserError(first["msg"].removeprefix("Value error, "), file=file, field=field, got=got)
+    said = first["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+    return UserError(said, file=file, field=field, got=got)
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str | None:

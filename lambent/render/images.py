@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,7 +16,7 @@ from lambent.core.camera import Camera
 from lambent.core.colour import shown
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
-from lambent.core.exposure import metered
+from lambent.core.exposure import ev100_of, metered
 from lambent.core.false_colour import Range, false_colour, fitting_range, with_scale
 from lambent.core.images import to_bytes
 from lambent.core.light_mix import MixTrack
@@ -32,6 +33,8 @@ from lambent.scenes.scene import Variant
 PATH_TRACER = "path"
 FALSE_COLOUR, NOISE = "false-colour", "noise"
 ANYWHERE = Camera("anywhere", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
+log = logging.getLogger(__name__)
+DARK_EV100 = -2.5  # of a metered picture, below which light from outside that slips through may be all there is
 MOST_EV = 64  # largest exposure in stops, up or down; 2^64 fits into float32
 VIEWS = ("filmic", "neutral", "linear", FALSE_COLOUR)
 
@@ -184,5 +187,14 @@ class Images(ABC):
     def exposed(self, radiance: Floats) -> float:
         """The exposure of displayed images, that of `radiance` where none was there yet."""
         if self.exposure_ev is None:
-            self.exposure_ev = metered(radiance) or 0.0
+            found = metered(radiance)
+            if found is None:
+                log.warning("no light reaches this view: its picture is black")
+            elif ev100_of(found) < DARK_EV100:
+                log.warning(
+                    "hardly any light reaches this view (metered at EV100 %.1f, darker than by moonlight): what it "
+                    "shows may have slipped in along joints",
+                    ev100_of(found),
+                )
+            self.exposure_ev = found or 0.0
         return self.exposure_ev

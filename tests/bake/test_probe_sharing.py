@@ -12,12 +12,13 @@ from lambent.bake.bake import bake
 from lambent.bake.probes.sharing import MOST, _grouped, _largest
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
+from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import read_baked
-from lambent.scenes.geometry import placed, sphere
-from lambent.scenes.scene import Scene, SceneObject
+from lambent.scenes.geometry import box, patch, placed, sphere
+from lambent.scenes.scene import ConstantEnvironment, Scene, SceneObject
 from lambent.store.contract import probe_name, scene_record, shared_probes
 from lambent.store.store import Store
-from tests.bake.small_scenes import TINY, room_with_step
+from tests.bake.small_scenes import BLACK, TINY, room_with_step
 
 CAMERA = Camera("door", (-1.8, 1.5, 1.8), (0.0, 0.5, 0.0))
 
@@ -75,15 +76,41 @@ def test_a_lamp_is_not_left_out_of_its_neighbours_reflections(tmp_path: Path) ->
     assert "bead2" not in owners.values() and "bead2" not in owners
 
 
+def test_in_a_closed_room_no_probe_shows_the_sky(tmp_path: Path) -> None:
+    """Not even through the floor, ceiling or wall whose probe it is, or that another object shares."""
+    glossy = Material(kd=(0.5, 0.5, 0.5), lobes=(Lobe(mx=0.6, my=0.6, r0=(0.04,) * 3),))
+    sides = [(axis, sign) for axis in range(3) for sign in (-1, 1)]
+    slabs = [
+        SceneObject(f"slab{axis}{sign}", placed(box(np.where(np.arange(3) == axis, 0.3, 4.6)),
+                                                np.where(np.arange(3) == axis, 2.15 * sign, 0.0)), "glossy")
+        for axis, sign in sides
+    ]  # fmt: skip
+    ball = SceneObject("ball", placed(sphere(0.2, 12, 8), (0.5, 0.0, 0.3)), "glossy")
+    lamp = SceneObject("lamp", patch((-0.5, 1.9, -0.5), (1, 0, 0), (0, 0, 1)), "black", emission=(5, 5, 5))
+    scene = Scene(
+        "closed", (*slabs, ball, lamp), {"glossy": glossy, "black": BLACK},
+        environment=ConstantEnvironment((1e3,) * 3), cameras=(Camera("door", (-1.5, 0.0, 1.5), (0.5, 0.0, 0.3)),),
+    )  # fmt: skip
+    store = bake(scene, tmp_path / "s", quality=TINY)
+    own = probes_of(store)
+    assert own, "some have a probe"
+    for name in own:
+        array = store.artefact(probe_name(name, "radiance"))
+        brightest = float(store.read(array.name).astype(float).max()) * array.meta["unit"]
+        assert brightest < 20, f"the probe of {name} shows the sky"
+
+
 def test_groups_by_hand() -> None:
     """Of four in a row, the second serves its neighbours; the last sees the others too well to lose them."""
     pairs = np.array([(i, j) for i in range(4) for j in range(4) if i != j])
     wrong = np.where(np.abs(pairs[:, 0] - pairs[:, 1]) == 1, 0.1, 0.9)
-    none, limits = np.zeros((4, 4)), np.full(4, 0.2)
-    assert _grouped(np.arange(4), pairs, wrong, none, limits).tolist() == [1, 1, 1, 3]
+    none, bare, limits = np.zeros((4, 4)), np.zeros((4, 4)), np.full(4, 0.2)
+    assert _grouped(np.arange(4), pairs, wrong, none, none, limits).tolist() == [1, 1, 1, 3]
     lost = none.copy()
     lost[0, 2] = 0.15  # with .1 hidden, above its limit where the third is left out
-    assert _grouped(np.arange(4), pairs, wrong, lost, limits).tolist() == [0, 2, 2, 2]
+    assert _grouped(np.arange(4), pairs, wrong, lost, none, limits).tolist() == [0, 2, 2, 2]
+    bare[0, 1] = 0.05  # the first would see the sky through the second
+    assert _grouped(np.arange(4), pairs, wrong, none, bare, limits).tolist() == [0, 2, 2, 2]
 
 
 def test_a_damaged_list_of_owners_is_refused(tmp_path: Path) -> None:

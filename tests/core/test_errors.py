@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated, Literal
 
 import pytest
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from lambent.core.errors import UserError, invalid
 from lambent.core.inputs import foreign_bytes
@@ -44,6 +45,9 @@ def test_what_is_no_fault_of_the_bytes_passes() -> None:
         (list[int], 3, "has the wrong type; found 3; expected a list"),
         (dict[str, list[int]], {"a": {"b": 1}}, "a: has the wrong type; expected a list"),
         (dict[str, str], {"a": 3}, "a: has the wrong type; found 3; expected text"),
+        (dict[str, float], {"a": "bright"}, "a: has the wrong type; found bright; expected a number"),
+        (Annotated[int, Field(gt=0)], 0, "must be greater than 0; found 0"),
+        (Literal[1], 99, "unknown value; found 99; expected 1"),
     ],
 )
 def test_a_value_of_another_type_is_said_in_the_words_of_files(kind: type, value: object, words: str) -> None:

@@ -194,3 +194,13 @@ def test_a_scene_without_an_exposure_is_metered(tmp_path: Path) -> None:
     measured = still(opened, tmp_path / "a.png", FRONT, replace(SMALL, show="light-map", view="false-colour"))
     assert measured.exposure_ev is None and measured.scale is not None and measured.scale["unit"] == "lx"
     assert measured.scale["low"] < 128 * 179 <= measured.scale["high"]
+
+
+@pytest.mark.parametrize(
+    ("level", "said"), [(1e-6, "hardly any light reaches this view"), (0.0, "no light"), (0.1, "")]
+)
+def test_a_view_without_light_is_said(store: Path, level: float, said: str, caplog: pytest.LogCaptureFixture) -> None:
+    drawn = images(Store.open(store), SMALL)
+    drawn.exposure_ev = None
+    drawn.exposed(np.full((8, 8, 3), level))
+    assert said in caplog.text and bool(said) == bool(caplog.text)

@@ -192,7 +192,7 @@ def test_a_texture_multiplies_the_mean_that_the_document_holds(tmp_path: Path) -
     look = {"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 1, 1, 1], "metallicFactor": 0}
     content = _worn({"name": "cloth", "pbrMetallicRoughness": look}, ["half.png"])
     scene = loaded(tmp_path, content)
-    assert scene.materials["cloth"].kd == pytest.approx((0.24, 0, 0)) and scene.materials["cloth"].kd_coupled
+    assert scene.materials["cloth"].kd == pytest.approx((0.24, 0, 0)) and not scene.materials["cloth"].kd_coupled
     texture = scene.textures["cloth"].diffuse
     assert texture is not None and texture.texels.dtype == np.float16
     assert np.allclose(texture.texels, [[[2, 1, 1]], [[0, 1, 1]]]) and scene.warnings == ()

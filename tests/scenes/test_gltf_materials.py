@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lambent.core.sequences import cosine_hemisphere, hammersley
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.scenes.loaders.surfaces.made_materials import masking
@@ -31,6 +32,25 @@ def test_specular_has_a_weight_and_a_colour(tmp_path: Path) -> None:
     assert half.lobes[0].k == pytest.approx((0.5 * masking(0.09, 0.09, "ggx")[1],) * 3)
     tinted = seen(specularColorFactor=[5, 1, 1])
     assert tinted.lobes[0].r0 == pytest.approx((0.2, 0.04, 0.04)) and tinted.kd == pytest.approx((0.8,) * 3)
+
+
+@pytest.mark.parametrize("roughness", [0.5, 0.7, 1.0])
+def test_rough_surfaces_keep_their_colour_towards_grazing(tmp_path: Path, roughness: float) -> None:
+    """glTF's diffuse term is the colour times 1 - F at the half vector, whose mean falls by 2 % up to 88 degrees."""
+
+    def bsdf(colour: float) -> MaterialBSDF:
+        look = {"metallicFactor": 0, "roughnessFactor": roughness, "baseColorFactor": [colour] * 3 + [1]}
+        return MaterialBSDF(loaded(tmp_path, worn({"name": "m", "pbrMetallicRoughness": look}, [])).materials["m"])
+
+    wi = cosine_hemisphere(hammersley(4096))
+    for theta_deg in (0, 60, 80, 88):
+        wo = np.array([np.sin(np.radians(theta_deg)), 0, np.cos(np.radians(theta_deg))])
+        half = (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
+        theirs = 0.5 * np.mean(1 - (0.04 + 0.96 * (1 - half @ wo) ** 5))
+        ours = bsdf(0.5).albedo(wo).max() - bsdf(0.0).albedo(wo).max()
+        assert ours == pytest.approx(theirs, abs=0.015)
+    wo = np.array([np.sin(np.radians(85)), 0, np.cos(np.radians(85))])
+    assert bsdf(1.0).albedo(wo).max() <= 1.03, "white paint gives back no more than it gets"
 
 
 def test_coats_take_from_what_is_below(tmp_path: Path) -> None:

@@ -210,7 +210,9 @@ WRONG = {
     MATERIALS + "[assign]\nsphere = 'metall'": r"assign.sphere: unknown material; found metall; did you mean 'metal'",
     "variant = 'oak'": r"variant: unknown variant; found oak; the geometry has no variants",
     "[[paths]]\nname='a'\nkeys=[]": r"paths.0.keys.*at least 2",
-    "[[lights]]\nkind='laser'": r"lights.0.*laser",
+    "[[lights]]\nkind='laser'": r"lights.0.kind: unknown kind; found laser; expected one of point, spot",
+    "[[lights]]\nkind='piont'": r"lights.0.kind: unknown kind; found piont; .*did you mean 'point'\?",
+    "[environment]\nfile='sky.hdr'": r"environment.kind: is missing",
     "[[lights]]\nkind='point'\nposition=[0.0,0.0,0.0]": r"has no intensity: set one of intensity",
     "[[lights]]\nkind='point'\nposition=[0.0,0.0,0.0]\ncandela=1\nlumens=2": r"has two intensities",
     "[[lights]]\nkind='directional'\ndirection=[0.0,1.0,0.0]\nlux=1\ncolour=[0.0,0.0,0.0]": r"cannot be black",
@@ -308,6 +310,22 @@ def test_a_mitsuba_scene_as_geometry(tmp_path: Path) -> None:
     assert scene.environment == ConstantEnvironment((0.5,) * 3) and [c.name for c in scene.cameras] == ["eye"]
     own = load_scene(written(tmp_path, "[environment]\nkind = 'constant'\nradiance = [1.0, 2.0, 3.0]\n", head))
     assert own.environment == ConstantEnvironment((1, 2, 3))
+
+
+@pytest.mark.parametrize(
+    ("geometry", "said"),
+    [
+        ("3", r"geometry: names no file; found 3"),
+        ('{ file = "builtin:box", scale = 0.0 }', r"geometry.0.scale: has to be greater than 0; found 0.0"),
+        (
+            '["builtin:box", { file = "builtin:box", sclae = 2.0 }]',
+            r"geometry.1.sclae: unknown key; did you mean 'scale'",
+        ),
+    ],
+)
+def test_a_wrong_geometry_is_said_where_it_is_wrong(tmp_path: Path, geometry: str, said: str) -> None:
+    with pytest.raises(UserError, match=said):
+        load_scene(written(tmp_path, MATERIALS, HEAD.replace('"builtin:box"', geometry)))
 
 
 @pytest.mark.parametrize("geometry", ["../room.glb", "/etc/passwd", "a/../../b.glb"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,10 +20,15 @@ from lambent.bake.quality import QualityName
 from lambent.bake.tiles import seed_of
 from lambent.scenes.variants import documents_of
 from lambent.store.contract import SHARED_PROBES, needs_probe, probe_name, shared_probes
+from lambent.store.store import Store
+
+if TYPE_CHECKING:
+    from lambent.bake.probes.sharing import Sharing
 
 KIND = "probe"
 NEEDS = ("geometry", "light_map")
 REVISION = 6
+HELD = "held"  # in the document of shared probes: objects that no probe leaves out
 SHARING = "sharing"  # the step that finds whose probe each object shows
 PARTS = ("radiance", "distance", "planes")
 GROUPS = "groups"  # a further part, where light is sorted
@@ -61,6 +67,8 @@ def keys(context: BakeContext) -> dict[str, str]:
         inputs = [light, name, scene.probe_centres.get(name), how.texels, how.samples, how.noise, context.seed]
         if others := sharing(owners, name):
             inputs += [*others, "mirrored together"]
+        if staying := sorted({name, *others} & _held(context.store)):
+            inputs += [*staying, "not left out"]
         if name in backs:
             inputs.append("from both sides")
         if not _cached(context):
@@ -83,7 +91,7 @@ def bake(context: BakeContext) -> None:
     front, back = finished_maps(context)
     front_or_none = front if _cached(context) else None
     depth = context.settings("light_map").max_depth
-    probes = ProbeSet(context.traced, front_or_none, back, depth, backs_of(context.store))
+    probes = ProbeSet(context.traced, front_or_none, back, depth, backs_of(context.store), _held(context.store))
     if sorts_light(context.methods):
         probes.sort_light(*(finished_groups(context) if _cached(context) else (None, None)))
     for i, name in enumerate(missing):
@@ -113,22 +121,27 @@ def _owners(context: BakeContext) -> dict[str, str]:
     Nothing before the geometry is baked, which viewers are then looked for in.
     """
     scene, names, store = context.scene, _objects(context), context.store
-    if context.stale("geometry"):
+    if not names or context.stale("geometry"):
         return {}
     given = [sorted(scene.probe_centres), sorted(scene.probe_planes)]
     worn = [scene.materials[scene.object(name).material] for name in names]
     look = [(m.transmits, [(lobe.mx, lobe.my) for lobe in m.lobes]) for m in worn]
     lamps = [o.name for o in scene.objects if any(o.emission)]
-    key = key_of(SHARED_PROBES, 5, names, look, given, lamps, *geometry_inputs(scene))
+    key = key_of(SHARED_PROBES, 6, names, look, given, lamps, *geometry_inputs(scene))
     said = store.documents.get(SHARED_PROBES)
     if not isinstance(said, dict) or said.get("key") != key:
         with context.timed(SHARING):
-            owners = _shared(context, names) if len(names) > 1 else {}
-        store.set_document(SHARED_PROBES, {"key": key, "owners": owners})
+            found = _shared(context, names)
+        store.set_document(SHARED_PROBES, {"key": key, "owners": found.owners, HELD: sorted(found.held)})
     return shared_probes(store)
 
 
-def _shared(context: BakeContext, names: list[str]) -> dict[str, str]:
+def _held(store: Store) -> frozenset[str]:
+    """Names of the objects that no probe leaves out."""
+    return frozenset(store.documents.get(SHARED_PROBES, {}).get(HELD, []))
+
+
+def _shared(context: BakeContext, names: list[str]) -> Sharing:
     engine()  # before Mitsuba is imported
     from lambent.bake.probes.sharing import shared
 

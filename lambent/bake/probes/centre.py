@@ -25,7 +25,7 @@ from lambent.core.geometry import triangle_areas, triangle_normals
 from lambent.scenes.scene import EYE_HEIGHT_M, Mesh
 
 GRID = 5  # points along each side of a flat object that a probe may stand over
-FLAT_SHARE = 0.9  # of an object's area with normals along one axis
+FLAT_SHARE = 0.8  # of an object's area with normals along one axis: a slab an eighth as thick as it is long
 CONTACT_M = 1e-3  # over a flat object: things closer to it do not limit the height of its probe
 CLEARANCE_M = 0.02  # beyond the surface of the solid that a centre is moved out of
 MOVES = 4

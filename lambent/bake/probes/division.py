@@ -71,20 +71,16 @@ def cuts_of(scene: Scene, progress: Progress = silent) -> dict[str, Cut]:
     if not shiny:
         return {}
     engine()  # before Mitsuba is imported
-    from lambent.bake.probes.centre import flat_axis
     from lambent.bake.tracing.scene_builder import SceneBuilder, bare_scene
     from lambent.bake.tracing.solids import SolidTest
     from lambent.bake.tracing.visibility import viewing_places
 
-    curved = [o for o in shiny if flat_axis(o.mesh) is None]
-    if not curved:
-        return {}
     bare = bare_scene(scene.corners)
     places = viewing_places(scene, bare)
-    tried = _worth_trying(scene, curved, bare, places)
+    tried = _worth_trying(scene, shiny, bare, places)
     if not tried:
         return {}
-    builder = SceneBuilder(scene)
+    builder = SceneBuilder(scene, coarse_sky=True)
     whole, solids, cuts = builder.build(), SolidTest(builder, None), dict[str, Cut]()
     for i, o in enumerate(tried):
         progress(i, len(tried), "views of probes")
@@ -95,7 +91,8 @@ def cuts_of(scene: Scene, progress: Progress = silent) -> dict[str, Cut]:
 
 
 def _worth_trying(scene: Scene, objects: list[SceneObject], bare: Any, places: Floats) -> list[SceneObject]:
-    """Those that viewers see large and of which much seems hidden from one probe, the MOST largest, in their order."""
+    """Those not flat that look large and of which much seems hidden from one probe, the MOST largest, in order."""
+    from lambent.bake.probes.centre import flat_axis
     from lambent.bake.probes.screening import hidden_shares, median_distances, widths
 
     meshes = [o.mesh for o in objects]
@@ -104,6 +101,7 @@ def _worth_trying(scene: Scene, objects: list[SceneObject], bare: Any, places: F
     if len(places):
         size /= np.maximum(median_distances(meshes, places), size)
         large = np.flatnonzero(size > LEAST_RAD)
+    large = np.array([i for i in large if flat_axis(meshes[i]) is None], np.int64)
     numbers = {o.name: number for number, o in enumerate(scene.objects)}
     owner = np.repeat(np.arange(len(scene.objects)), [len(o.mesh.faces) for o in scene.objects])
     hidden = hidden_shares(bare, owner, [meshes[i] for i in large], [numbers[objects[i].name] for i in large])

@@ -41,17 +41,18 @@ class ProbeSet:
     """Bakes the probes of a scene from its light map (H, W, 3), or, where that is None, path traced whole.
 
     With the light map a path ends at the first diffuse surface; mirrors in mirrors are traced either way. Without it,
-    paths have at most `max_depth` vertices. `backs` are the opaque objects that are seen from behind, too.
+    paths have at most `max_depth` vertices. `backs` are the opaque objects that are seen from behind, too, and `held`
+    those that stay in every probe (`sharing`).
     """
 
     def __init__(
         self, traced: TracedScene, irradiance: Floats | None, irradiance_back: Floats | None, max_depth: int,
-        backs: frozenset[str] = frozenset(),
+        backs: frozenset[str] = frozenset(), held: frozenset[str] = frozenset(),
     ) -> None:  # fmt: skip
         whole_paths = irradiance is None
         self._traced, self._depth = traced, max_depth if whole_paths else MIRROR_DEPTH
         self._builder, self._whole = traced.builder(diffuse=whole_paths), traced.whole(diffuse=whole_paths)
-        self._scene, self._backs = self._builder.scene, backs
+        self._scene, self._backs, self._held = self._builder.scene, backs, held
         self._left_out: tuple[frozenset[str], Any] | None = None
         self._cache = None if irradiance is None else traced.cache(irradiance, irradiance_back)
         self._sorting: tuple[Tally, GroupedCache | None] | None = None
@@ -68,6 +69,8 @@ class ProbeSet:
 
     def _without(self, names: frozenset[str]) -> Any:
         """The scene without these objects, kept until others are left out: parts of one object share it."""
+        if not names:
+            return self._whole
         if self._left_out is None or self._left_out[0] != names:
             self._left_out = None
             self._left_out = names, self._builder.build(leave_out=names)
@@ -135,14 +138,14 @@ class ProbeSet:
         Planes that the scene gives are taken as they are; others are found from the probe itself.
         """
         names = (name, *sharing)
-        without = self._without(self._own(names))
+        without = self._without(self._own(tuple(one for one in names if one not in self._held)))
         rays = self._mirrored(names, seed)
         centre = self._centre(name, without, rays, seed)
-        left_out = not encloses(self._builder, name, centre, self._whole)
+        left_out = name not in self._held and not encloses(self._builder, name, centre, self._whole)
         if left_out and rays is not None and not self._transmits(name) and rays.own.mean() > OWN:
             alone, held = (self._error(rays, first, centre, seed) for first in (without, self._whole))
             left_out = held >= WORTH * alone
-        seen = without if left_out else self._whole
+        seen = without if left_out or name in self._held else self._whole
         around = Surroundings(seen, self._whole, self._cache, self._depth)
         if self._sorting is not None:
             tally, cache = self._sorting

@@ -2,14 +2,19 @@
 
 A probe serves another object as far as its centre sees what viewers see mirrored there. Rays from viewers are mirrored
 in points all over each object, and two shares of them are wrong in a neighbour's probe: those whose hits other things
-hide from its centre, and those that meet an object that the probe leaves out, as it does all that share it. An object
-is served where both together stay below a limit: HIDDEN at MEDIUM size, as the median viewer sees it, and with the
-inverse root of the size above and below. No object larger than SMALL and its lobe's roughness, which blurs as much,
-shares another's probe, nor one whose centre is further off than NEAR of what is mirrored, or less for narrow lobes:
-look-ups from far away are turned wrongly. Groups are found greedily, the largest first.
+hide from its centre, and those that meet an object that the probe leaves out. An object is served where both together
+stay below a limit: HIDDEN at MEDIUM size, as the median viewer sees it, and with the inverse root of the size above and
+below. Of what is left out, no more than OPEN may have nothing behind it: a small thing would mirror the sky. No object
+larger than SMALL and its lobe's roughness, which blurs as much, shares another's probe, nor one whose centre is further
+off than NEAR of what is mirrored, or less for narrow lobes: look-ups from far away are turned wrongly. Groups are found
+greedily, the largest first.
 
 Objects that fill a few pixels from nearby, or that nobody sees, have no probe: they show the nearest. So do the groups
 that fill least of the view where a scene has very many (leaves, say): there are MOST probes.
+
+A probe leaves out its objects but those that are `held`: flat ones that viewers see from one side, on which it stands,
+and those that have none because nobody sees them. Without its ceiling, a probe of it would see the sky, which wide
+lobes and all that share the probe would bring into the room.
 """
 
 from __future__ import annotations
@@ -23,7 +28,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.probes.centre import outside
+from lambent.bake.probes.centre import flat_axis, outside
 from lambent.bake.probes.division import HIDDEN
 from lambent.bake.probes.hidden import SHORT, spread
 from lambent.bake.probes.selection import viewers_of, widest_lobe
@@ -32,6 +37,7 @@ from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
 from lambent.core.directions import normalize, reflect
 from lambent.core.geometry import triangle_areas
+from lambent.scenes.scene import Mesh
 
 POINTS = 256  # on each object
 NEIGHBOURS = 12  # whose probes are tried for it
@@ -39,6 +45,9 @@ MOST = 64  # probes of a scene, some two CPU seconds each at `preview`; more onl
 MEDIUM, SMALL = 0.1, 0.06  # radians
 NEAR, REACH = 0.5, 0.75  # of the distance of what is mirrored, for wide lobes, and the quantile of that
 NEAR_MIRROR, PER_BLUR = 0.2, 2.0  # for mirrors, and how much more by a lobe's roughness: what it blurs may be turned
+OPEN = 0.04  # share of what an object mirrors that may be left out with nothing behind it
+CROSSINGS = 4  # of what is left out, after which something is behind it
+ONE_SIDE = 0.95  # share of a flat object's mirrored rays that leave on one side of it
 FEW = 0.006  # radians: six pixels of a picture of 60 degrees and 1080 rows
 SEEN = 4  # of the points, from anywhere: with fewer, nobody sees the object
 CLOSEST = 0.05  # quantile of the distances of viewers
@@ -50,28 +59,39 @@ NOTHING = -1
 class Looked:
     """What viewers see mirrored in N objects, at POINTS points of each.
 
-    `hits` (N, POINTS, 3) with the object met there, `met` (N, POINTS), NOTHING where there is none; `valid` (N, POINTS)
-    where a viewer sees the point; `size` and `largest` (N,) of the objects in radians, for the median viewer and for
-    close ones; `reach` (N,) metres to far hits.
+    `ways` (N, POINTS, 3) are unit directions, `hits` (N, POINTS, 3) what they lead to, with the object met there, `met`
+    (N, POINTS), NOTHING where there is none, and whether nothing is behind that object, `open` (N, POINTS); `valid`
+    (N, POINTS) where a viewer sees the point; `size` and `largest` (N,) of the objects in radians, for the median
+    viewer and for close ones; `reach` (N,) metres to far hits.
     """
 
+    ways: Floats
     hits: Floats
     met: NDArray[np.int64]
+    open: NDArray[np.bool_]
     valid: NDArray[np.bool_]
     size: Floats
     largest: Floats
     reach: Floats
 
 
-def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[str]) -> dict[str, str]:
-    """By each object of `names` that goes without a probe, the one whose probe it shows.
+@dataclass(frozen=True)
+class Sharing:
+    """By each object that goes without a probe, the one whose probe it shows, and objects that no probe leaves out."""
+
+    owners: dict[str, str]
+    held: frozenset[str]
+
+
+def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[str]) -> Sharing:
+    """Who of the objects `names` shares whose probe.
 
     `whole` is the Mitsuba scene of the builder, `places` (m, 3) are those of viewers; without any, none is shared.
     Objects whose probe the scene places keep theirs.
     """
     scene, names = builder.scene, list(names)
-    if len(names) < 2 or not len(places):
-        return {}
+    if not names or not len(places):
+        return Sharing({}, frozenset())
     meshes = [scene.object(name).mesh for name in names]
     middle = np.mean(scene.bounds, axis=0)
     centres = np.stack([outside(mesh, middle, whole) for mesh in meshes])
@@ -91,13 +111,26 @@ def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[
     near = np.minimum(NEAR_MIRROR + PER_BLUR * blur, NEAR)
     close = np.linalg.norm(centres[one] - centres[other], axis=1) < near[one] * looked.reach[one]
     pairs = pairs[(one != other) & close & (looked.size[one] < SMALL + blur[one])]
+    flat = np.array([_is_seen_from_one_side(*one) for one in zip(meshes, looked.ways, looked.valid, strict=True)])
+    held = ~shown | (flat & ~clear & ~given)
     limits = np.minimum(HIDDEN * np.sqrt(MEDIUM / np.maximum(looked.size, 1e-9)), 1)
-    lost = _lost(looked, len(names))
-    owner = _grouped(worth, pairs, _wrong(builder, whole, names, centres, looked, pairs), lost, limits)
+    lost, bare = (_lost(looked, rays, held) for rays in (looked.valid, looked.valid & looked.open))
+    wrong = _wrong(builder, whole, names, centres, looked, pairs, held)
+    owner = _grouped(worth, pairs, wrong, lost, bare, limits)
     own = _largest(owner, worth, looked.size, given)
     for i in np.flatnonzero(~np.isin(owner, own)):
         owner[i] = own[np.argmin(np.linalg.norm(centres[own] - centres[i], axis=1))]
-    return {name: names[owner[i]] for i, name in enumerate(names) if owner[i] != i}
+    owners = {name: names[owner[i]] for i, name in enumerate(names) if owner[i] != i}
+    return Sharing(owners, frozenset(names[i] for i in np.flatnonzero(held)))
+
+
+def _is_seen_from_one_side(mesh: Mesh, ways: Floats, valid: NDArray[np.bool_]) -> bool:
+    """Whether a mesh is flat, and mirrored rays `ways` (POINTS, 3), those that are `valid`, leave on one side of it."""
+    axis = flat_axis(mesh)
+    if axis is None or not valid.any():
+        return False
+    above = float((ways[valid] @ axis > 0).mean())
+    return max(above, 1 - above) >= ONE_SIDE
 
 
 def _largest(
@@ -122,7 +155,9 @@ def _looked(builder: SceneBuilder, whole: Any, places: Floats, names: list[str])
     view = normalize(np.where(found[:, None], eyes - points, normals))
     clear = np.repeat([scene.materials[scene.object(name).material].transmits for name in names], POINTS)
     directions = np.where(clear[:, None], -view, reflect(view, normals))
-    t, met = _first(whole, leaving(whole, points, normals, directions), _numbers(builder, names))
+    numbers = _numbers(builder, names)
+    t, met = _first(whole, leaving(whole, points, normals, directions), numbers)
+    open_ = _nothing_behind(whole, points, directions, t, met, numbers)
     far = SKY * float(np.linalg.norm(np.ptp(np.array(scene.bounds), axis=0)))
     t = np.where(np.isfinite(t), t, far)
     valid, distance = (a.reshape(count, POINTS) for a in (found, np.linalg.norm(eyes - points, axis=1)))
@@ -130,9 +165,27 @@ def _looked(builder: SceneBuilder, whole: Any, places: Floats, names: list[str])
         np.quantile(d[v], (CLOSEST, 0.5)) if v.any() else (np.inf,) * 2 for d, v in zip(distance, valid, strict=True)
     ]
     largest, size = width / np.array(seen).T
-    hits = (points + directions * t[:, None]).reshape(count, POINTS, 3)
+    ways, hits = (a.reshape(count, POINTS, 3) for a in (directions, points + directions * t[:, None]))
     reach = np.quantile(t.reshape(count, POINTS), REACH, axis=1)
-    return Looked(hits, met.reshape(count, POINTS), valid, size, largest, reach)
+    grid = count, POINTS
+    return Looked(ways, hits, met.reshape(grid), open_.reshape(grid), valid, size, largest, reach)
+
+
+def _nothing_behind(
+    whole: Any, points: Floats, ways: Floats, t: Floats, met: NDArray[np.int64], numbers: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Whether rays (n,) from points along `ways` (n, 3), which `met` an object after `t`, meet no other beyond it."""
+    found, at, left = np.zeros(len(points), bool), t.copy(), np.flatnonzero(met != NOTHING)
+    for _ in range(CROSSINGS):
+        if not len(left):
+            break
+        at[left] += SHORT * (1 + at[left])
+        ahead, other = _first(whole, rays_from(points[left] + ways[left] * at[left, None], ways[left]), numbers)
+        found[left[~np.isfinite(ahead)]] = True
+        again = np.isfinite(ahead) & (other == met[left])
+        left = left[again]
+        at[left] += ahead[again]
+    return found
 
 
 def _numbers(builder: SceneBuilder, names: list[str]) -> NDArray[np.int64]:
@@ -151,20 +204,27 @@ def _first(whole: Any, ray: Any, numbers: NDArray[np.int64]) -> tuple[Floats, ND
     return np.array(found.t).astype(float), np.where(known, numbers[np.where(known, shape, 0)], NOTHING)
 
 
-def _lost(looked: Looked, count: int) -> Floats:
-    """(N, N): share of an object's rays that meet another."""
+def _lost(looked: Looked, rays: NDArray[np.bool_], held: NDArray[np.bool_]) -> Floats:
+    """(N, N): share of an object's rays that are among `rays` (N, POINTS) and meet another that is not `held` (N,)."""
+    count = len(held)
     own = np.arange(count)[:, None]
-    seen = looked.valid & (looked.met != NOTHING) & (looked.met != own)
+    seen = rays & (looked.met != NOTHING) & (looked.met != own) & ~held[looked.met]
     flat = np.bincount((own * count + looked.met)[seen], minlength=count * count).reshape(count, count)
     return np.asarray(flat / np.maximum(looked.valid.sum(axis=1, keepdims=True), 1))
 
 
 def _wrong(
-    builder: SceneBuilder, whole: Any, names: list[str], centres: Floats, looked: Looked, pairs: NDArray[np.int64]
+    builder: SceneBuilder,
+    whole: Any,
+    names: list[str],
+    centres: Floats,
+    looked: Looked,
+    pairs: NDArray[np.int64],
+    held: NDArray[np.bool_],
 ) -> Floats:
     """(P,): share of what is mirrored in the first object of each pair that something hides from the other's centre.
 
-    Neither of the two hides anything, nor does what is met count that is one of them.
+    Neither of the two hides anything where it is not `held` (N,), nor does what is met count that is one of them.
     """
     if not len(pairs):
         return np.zeros(0)
@@ -175,16 +235,17 @@ def _wrong(
     w = offset / np.maximum(distance, 1e-9)[:, None]
     start = SHORT * (1 + distance)
     t, between = _first(whole, rays_from(hits + w * start[:, None], w), _numbers(builder, names))
-    blocked = (t < distance - 2 * start) & (between != one) & (between != other)
+    left_out = ((between == one) | (between == other)) & ~held[between]
+    blocked = (t < distance - 2 * start) & ~left_out
     blocked &= (met != one) & (met != other)
     valid = looked.valid[pairs[:, 0]]
     return np.asarray((blocked.reshape(-1, POINTS) & valid).sum(axis=1) / np.maximum(valid.sum(axis=1), 1))
 
 
 def _grouped(
-    worth: NDArray[np.int64], pairs: NDArray[np.int64], wrong: Floats, lost: Floats, limits: Floats
+    worth: NDArray[np.int64], pairs: NDArray[np.int64], wrong: Floats, lost: Floats, bare: Floats, limits: Floats
 ) -> NDArray[np.int64]:
-    """(N,): whose probe each object shows. `lost` (N, N) and `limits` (N,) are of objects, `wrong` of pairs."""
+    """(N,): whose probe each object shows. `lost`, `bare` (N, N) and `limits` (N,) are of objects, `wrong` of pairs."""
     owner = np.arange(len(limits))
     served: dict[int, list[tuple[float, int]]] = {int(i): [] for i in worth}
     for (one, other), share in zip(pairs, wrong, strict=True):
@@ -199,7 +260,7 @@ def _grouped(
                 continue
             tried = np.array([*members, j])
             totals = np.array([*shares, share]) + lost[np.ix_(tried, tried)].sum(axis=1)
-            if (totals <= limits[tried]).all():
+            if (totals <= limits[tried]).all() and (bare[np.ix_(tried, tried)].sum(axis=1) <= OPEN).all():
                 members, shares = [*members, j], [*shares, share]
         return members
 

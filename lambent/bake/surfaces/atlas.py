@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lambent.bake.surfaces.charts import Chart, Piece, charts_of, pieces_of
+from lambent.bake.surfaces.copies import copies_of
 from lambent.bake.surfaces.packing import packed, snapped
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Floats, Indices
 from lambent.core.geometry import triangle_areas
 from lambent.core.plain import triple
 from lambent.core.progress import Progress, silent
@@ -48,28 +50,33 @@ def unwrap(
     part of an object to the next, none of which is longer than `longest_m`. The result is deterministic.
     """
     progress(0, 1, "unwrapping")
-    pieces = pieces_of(scene.objects, longest_m)
-    sizes_m = (sizes or even)(scene, pieces, resolution**2)
-    charts = charts_of(scene.objects, pieces, sizes_m, progress)
-    local, measures = zip(*(snapped(chart.corners) for chart in charts), strict=True)
-    places, (width, height) = packed(list(local), list(measures))
-    placed = [(corners + place) / (width, height) for corners, place in zip(local, places, strict=True)]
-    of_each: list[list[tuple[Chart, Floats]]] = [[] for _ in scene.objects]
-    for chart, uv in zip(charts, placed, strict=True):
-        of_each[chart.owner].append((chart, uv))
+    copies = copies_of([o.mesh for o in scene.objects])
+    pieces = pieces_of(scene.objects, copies, longest_m)
+    owner = np.array([piece.owner for piece in pieces])
+    sizes_m = copies.stepped(owner, (sizes or even)(scene, pieces, resolution**2))
+    charts = charts_of(scene.objects, pieces, sizes_m, copies, progress)
+    once = {id(own): own for own in charts}
+    shapes = {key: [snapped(chart.corners) for chart in own] for key, own in once.items()}
+    seams = {key: _seams(own, [local for local, _ in shapes[key]]) for key, own in once.items()}
+    first = dict(zip(shapes, np.cumsum([0, *map(len, shapes.values())]).tolist(), strict=False))
+    which = np.concatenate([np.arange(len(own)) + first[id(own)] for own in charts])
+    places, (width, height) = packed([one for own in shapes.values() for one in own], which)
     uv2: dict[str, Floats] = {}
-    objects = []
-    for o, mine in zip(scene.objects, of_each, strict=True):
-        mesh, uv2[o.name] = _split(o.mesh, mine)
-        objects.append(replace(o, mesh=mesh))
+    objects, begins = [], 0
+    for o, own in zip(scene.objects, charts, strict=True):
+        source, faces, chart, local = seams[id(own)]
+        at = places[begins : begins + len(own)]
+        begins += len(own)
+        uv2[o.name] = ((local + at[chart]) / (width, height)).astype(np.float32)
+        objects.append(replace(o, mesh=_split(o.mesh, source, faces)))
     progress(1, 1, "unwrapping")
     return Atlas(replace(scene, objects=tuple(objects)), uv2, width, height)
 
 
 def areas_of(scene: Scene, pieces: list[Piece]) -> Floats:
     """(N,) square metres of pieces."""
-    meshes = [scene.objects[piece.owner].mesh for piece in pieces]
-    return np.array([triangle_areas(mesh.corners_of(p.faces)).sum() for mesh, p in zip(meshes, pieces, strict=True)])
+    areas = [triangle_areas(o.mesh.corners) for o in scene.objects]
+    return np.array([areas[piece.owner][piece.faces].sum() for piece in pieces])
 
 
 def scales_of(scene: Scene, pieces: list[Piece]) -> Floats:
@@ -83,21 +90,25 @@ def even(scene: Scene, pieces: list[Piece], texels: int) -> Floats:
     return np.asarray(np.sqrt((areas * scales**2).sum() / texels) / scales)
 
 
-def _split(mesh: Mesh, charts: list[tuple[Chart, Floats]]) -> tuple[Mesh, Floats]:
-    """The mesh with the vertices of its charts, faces in their old order, and the second coordinates."""
-    number, uv2 = np.zeros(mesh.faces.shape, np.int64), np.zeros((*mesh.faces.shape, 2), np.float32)
-    for chart, corners in charts:
-        number[chart.faces], uv2[chart.faces] = chart.vertices, corners
+def _seams(charts: list[Chart], corners: list[Floats]) -> tuple[Indices, NDArray[np.uint32], Indices, Floats]:
+    """Vertices of a mesh that is split along its charts, whose `corners` (K, 3, 2) are in texels.
+
+    The corner (V,) of the mesh's faces, counted through, that each vertex is; faces (F, 3) uint32 in their old order;
+    the chart of each vertex (V,), and its place there (V, 2).
+    """
+    count = sum(len(chart.faces) for chart in charts)
+    number, place = np.zeros((count, 3), np.int64), np.zeros((count, 3, 2))
+    chart_of = np.zeros((count, 3), np.int64)
+    for i, (chart, local) in enumerate(zip(charts, corners, strict=True)):
+        number[chart.faces], place[chart.faces], chart_of[chart.faces] = chart.vertices, local, i
     _, first, faces = np.unique(number, return_index=True, return_inverse=True)
-    source = mesh.faces.reshape(-1)[first]
-    split = Mesh(
-        mesh.positions[source],
-        mesh.normals[source],
-        mesh.tangents[source],
-        mesh.uv[source],
-        faces.reshape(-1, 3).astype(np.uint32),
-    )
-    return split, uv2.reshape(-1, 2)[first]
+    return first, faces.reshape(-1, 3).astype(np.uint32), chart_of.reshape(-1)[first], place.reshape(-1, 2)[first]
+
+
+def _split(mesh: Mesh, corner: Indices, faces: NDArray[np.uint32]) -> Mesh:
+    """The mesh with a vertex for each of these corners (V,) of its faces, counted through."""
+    source = mesh.faces.reshape(-1)[corner]
+    return Mesh(mesh.positions[source], mesh.normals[source], mesh.tangents[source], mesh.uv[source], faces)
 
 
 def merged(atlas: Atlas) -> dict[str, Floats]:

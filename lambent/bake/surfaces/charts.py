@@ -15,6 +15,7 @@ import numpy as np
 import xatlas
 
 from lambent.bake.surfaces.clusters import clusters_of
+from lambent.bake.surfaces.copies import Copies
 from lambent.bake.surfaces.layers import in_first_layer, layers_of, lie_flat
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import normalize
@@ -46,59 +47,93 @@ class Chart:
     Vertices are counted within the object's charts of one kind; no two charts share one.
     """
 
-    owner: int
     faces: Indices
     corners: Floats
     vertices: Indices
 
 
-def pieces_of(objects: tuple[SceneObject, ...], longest_m: float = np.inf) -> list[Piece]:
+def pieces_of(objects: tuple[SceneObject, ...], copies: Copies, longest_m: float = np.inf) -> list[Piece]:
     """All faces in spatially compact pieces of at most PIECE_FACES (halved at the median of the longest side).
 
-    The middles of a piece's faces are no further apart than `longest_m`.
+    The middles of a piece's faces are no further apart than `longest_m`. Copies have the pieces of their first, the
+    same arrays, where none is longer than that.
     """
-    pieces = []
+    pieces: list[Piece] = []
+    of_first: dict[int, list[Indices]] = {}
     for owner, o in enumerate(objects):
-        centres = o.mesh.positions[o.mesh.faces].mean(axis=1)
-        left: list[Indices] = [np.arange(len(o.mesh.faces))]
-        while left:
-            part = left.pop()
-            extent = np.ptp(centres[part], axis=0)
-            if len(part) <= PIECE_FACES and extent.max() <= longest_m:
-                pieces.append(Piece(owner, np.sort(part)))
-                continue
-            axis = np.argmax(extent)
-            order = part[np.argsort(centres[part, axis], kind="stable")]
-            left += [order[len(order) // 2 :], order[: len(order) // 2]]
+        first = int(copies.first[owner])
+        parts = of_first.get(first)
+        if parts is None or (longest_m < np.inf and max(_diagonal(o.mesh, part) for part in parts) > longest_m):
+            parts = _parts(o.mesh, longest_m)
+            of_first.setdefault(first, parts)
+        pieces += [Piece(owner, part) for part in parts]
     return pieces
 
 
+def _diagonal(mesh: Mesh, faces: Indices) -> float:
+    return float(np.linalg.norm(np.ptp(mesh.positions[mesh.faces[faces]].reshape(-1, 3), axis=0)))
+
+
+def _parts(mesh: Mesh, longest_m: float) -> list[Indices]:
+    centres = mesh.positions[mesh.faces].mean(axis=1)
+    left, parts = [np.arange(len(mesh.faces))], []
+    while left:
+        part = left.pop()
+        extent = np.ptp(centres[part], axis=0)
+        if len(part) <= PIECE_FACES and extent.max() <= longest_m:
+            parts.append(np.sort(part))
+            continue
+        axis = np.argmax(extent)
+        order = part[np.argsort(centres[part, axis], kind="stable")]
+        left += [order[len(order) // 2 :], order[: len(order) // 2]]
+    return parts
+
+
 def charts_of(
-    objects: tuple[SceneObject, ...], pieces: list[Piece], sizes_m: Floats, progress: Progress = silent
-) -> list[Chart]:
-    """Charts of all faces; `sizes_m` (N,) is the size of a texel on each piece, in metres."""
-    unwrapped = _unwrapped(objects, pieces)
-    charts = []
-    pieces_of_each: list[list[int]] = [[] for _ in objects]
+    objects: tuple[SceneObject, ...],
+    pieces: list[Piece],
+    sizes_m: Floats,
+    copies: Copies,
+    progress: Progress = silent,
+) -> list[list[Chart]]:
+    """Charts of all faces, by object; `sizes_m` (N,) is the size of a texel on each piece, in metres.
+
+    Copies with the same pieces, and texels that are as large beside them, have the same list.
+    """
+    unwrapped = _unwrapped(objects, pieces, copies)
+    of_object: list[list[int]] = [[] for _ in objects]
     for i, piece in enumerate(pieces):
-        pieces_of_each[piece.owner].append(i)
-    for owner, (o, mine) in enumerate(zip(objects, pieces_of_each, strict=True)):
+        of_object[piece.owner].append(i)
+    known: dict[tuple[object, ...], list[Chart]] = {}
+    charts = []
+    for owner, (o, mine) in enumerate(zip(objects, of_object, strict=True)):
         progress(owner, len(objects), "unwrapping")
-        size = np.zeros(len(o.mesh.faces))
-        for i in mine:
-            size[pieces[i].faces] = sizes_m[i]
-        faces = np.concatenate([np.zeros(0, np.int64), *(pieces[i].faces for i in mine)])
-        charts += _merged(o.mesh, owner, _charts(o.mesh, owner, faces, [unwrapped[i] for i in mine], size[faces]), size)
+        first, scale = int(copies.first[owner]), copies.scale[owner]
+        key = (first, *((id(pieces[i].faces), round(float(np.log(sizes_m[i] / scale)), 6)) for i in mine))
+        if key not in known:
+            size = np.zeros(len(o.mesh.faces))
+            for i in mine:
+                size[pieces[i].faces] = sizes_m[i]
+            faces = np.concatenate([np.zeros(0, np.int64), *(pieces[i].faces for i in mine)])
+            known[key] = _merged(o.mesh, _charts(o.mesh, faces, [unwrapped[i] for i in mine], size[faces]), size)
+        charts.append(known[key])
     return charts
 
 
-def _unwrapped(objects: tuple[SceneObject, ...], pieces: list[Piece]) -> list[tuple[Floats, Indices, Floats]]:
-    """By piece as xatlas has it: the vertex of each of its vertices, faces, and coordinates.
+def _unwrapped(
+    objects: tuple[SceneObject, ...], pieces: list[Piece], copies: Copies
+) -> list[tuple[Floats, Indices, Floats]]:
+    """By piece as xatlas has it: the vertex of each of its vertices, faces, and coordinates. Copies share them.
 
     Pieces are scaled to one size: xatlas ignores triangles below 1.2e-7 of its units squared.
     """
     atlas = xatlas.Atlas()
-    for piece in pieces:
+    keys = [(int(copies.first[piece.owner]), id(piece.faces)) for piece in pieces]
+    number: dict[tuple[int, int], int] = {}
+    for piece, key in zip(pieces, keys, strict=True):
+        if key in number:
+            continue
+        number[key] = len(number)
         o = objects[piece.owner]
         vertices, faces = np.unique(o.mesh.faces[piece.faces], return_inverse=True)
         at = o.mesh.positions[vertices].astype(np.float64)
@@ -109,14 +144,13 @@ def _unwrapped(objects: tuple[SceneObject, ...], pieces: list[Piece]) -> list[tu
         except (RuntimeError, ValueError) as error:
             raise UserError(f"object cannot be unwrapped ({error})", field=o.name) from error
     packing = xatlas.PackOptions()
-    packing.resolution, packing.padding, packing.bilinear = 16 * int(np.ceil(np.sqrt(len(pieces)))), 0, False
+    packing.resolution, packing.padding, packing.bilinear = 16 * int(np.ceil(np.sqrt(len(number)))), 0, False
     atlas.generate(xatlas.ChartOptions(), packing, False)
-    return [atlas[i] for i in range(len(pieces))]
+    found = [atlas[i] for i in range(len(number))]
+    return [found[number[key]] for key in keys]
 
 
-def _charts(
-    mesh: Mesh, owner: int, faces: Indices, pieces: list[tuple[Floats, Indices, Floats]], size_m: Floats
-) -> list[Chart]:
+def _charts(mesh: Mesh, faces: Indices, pieces: list[tuple[Floats, Indices, Floats]], size_m: Floats) -> list[Chart]:
     """The charts of an object's `pieces` as xatlas has them, of faces (K,) with texels of `size_m` (K,).
 
     Faces without area in the map, stretched ones, and those that pass others of their chart within a texel have no
@@ -146,8 +180,8 @@ def _charts(
             while not flat[label[mine[0]]] and not (inside := in_first_layer(corners[kept], world[kept])).all():
                 kept = kept[inside]  # a smaller chart lies anew
             lost[np.setdiff1d(mine, kept, assume_unique=True) if len(kept) < len(mine) else []] = True
-            charts.append(Chart(owner, faces[kept], corners[kept], indices[kept]))
-    charts.append(Chart(owner, faces[lost], np.zeros((lost.sum(), 0, 2)), indices[lost]))
+            charts.append(Chart(faces[kept], corners[kept], indices[kept]))
+    charts.append(Chart(faces[lost], np.zeros((lost.sum(), 0, 2)), indices[lost]))
     return charts
 
 
@@ -211,7 +245,7 @@ def _turns(angles: Floats) -> Floats:
     return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
 
 
-def _merged(mesh: Mesh, owner: int, charts: list[Chart], size_m: Floats) -> list[Chart]:
+def _merged(mesh: Mesh, charts: list[Chart], size_m: Floats) -> list[Chart]:
     """Charts of an object, small ones merged where that takes fewer texels."""
     lost = np.concatenate([chart.faces for chart in charts if not chart.corners.size])
     kept = [chart for chart in charts if chart.corners.size]
@@ -219,10 +253,10 @@ def _merged(mesh: Mesh, owner: int, charts: list[Chart], size_m: Floats) -> list
     small = [chart for chart, one in zip(kept, is_small, strict=True) if one]
     kept = [chart for chart, one in zip(kept, is_small, strict=True) if not one]
     if small:
-        merged = _by_direction(mesh, owner, np.concatenate([chart.faces for chart in small]), size_m, 1)
+        merged = _by_direction(mesh, np.concatenate([chart.faces for chart in small]), size_m, 1)
         extents = np.array([np.ptp(chart.corners.reshape(-1, 2), axis=0) for chart in merged])
         kept += merged if texels_taken(extents).sum() < taken else small
-    return kept + _by_direction(mesh, owner, lost, size_m, 1 + len(kept))
+    return kept + _by_direction(mesh, lost, size_m, 1 + len(kept))
 
 
 def _small(mesh: Mesh, charts: list[Chart]) -> tuple[Flags, float]:
@@ -246,7 +280,7 @@ def _small(mesh: Mesh, charts: list[Chart]) -> tuple[Flags, float]:
     return small, float(here[small].sum())
 
 
-def _by_direction(mesh: Mesh, owner: int, faces: Indices, size_m: Floats, first: int) -> list[Chart]:
+def _by_direction(mesh: Mesh, faces: Indices, size_m: Floats, first: int) -> list[Chart]:
     """Merged charts of some faces; vertices of different `first` differ. `size_m` (F,) is of all faces."""
     corners, size_m = mesh.corners_of(faces).astype(float), size_m[faces]
     normals, areas = triangle_normals(corners), triangle_areas(corners)
@@ -266,7 +300,7 @@ def _by_direction(mesh: Mesh, owner: int, faces: Indices, size_m: Floats, first:
                     left += [mine[layer] for layer in layers]
                     continue
                 number = mesh.faces[faces[mine]].astype(np.int64) + len(mesh.positions) * (first + len(charts))
-                charts.append(Chart(owner, faces[mine], flat, -number))  # negative: none of a chart by xatlas
+                charts.append(Chart(faces[mine], flat, -number))  # negative: none of a chart by xatlas
     return charts
 
 

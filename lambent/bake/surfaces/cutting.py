@@ -29,7 +29,11 @@ def lengths_of(corners: Floats) -> Floats:
 
 def is_too_long(mesh: Mesh, reach_m: float = 0.0) -> bool:
     """Whether triangles of a mesh are so long that they are cut where viewers see `reach_m` far."""
-    return bool(lengths_of(mesh.corners.astype(float)).max(initial=0) > max(LEAST_M, TIMES * reach_m))
+    longest = max(LEAST_M, TIMES * reach_m)
+    low, high = mesh.bounds
+    if np.linalg.norm(high.astype(float) - low) <= longest:
+        return False
+    return bool(lengths_of(mesh.corners).max(initial=0) > longest)
 
 
 def cut(mesh: Mesh, eyes: Floats, reach_m: float) -> Mesh:

@@ -26,6 +26,8 @@ def layers_of(corners: Floats, depths: Floats) -> list[Indices]:
     corners : (F, 3, 2) of triangles on the chart, in texels.
     depths : (F, 3) of the same corners along the projection, in texels.
     """
+    if np.ptp(depths) <= BEHIND:  # nothing lies far behind anything
+        return [np.arange(len(depths))]
     left = np.argsort(depths.min(axis=1), kind="stable")
     found = []
     while len(left):

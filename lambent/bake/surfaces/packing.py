@@ -33,18 +33,22 @@ def snapped(corners: Floats) -> tuple[Floats, tuple[int, int]]:
     return np.ascontiguousarray(local), (int(whole[0]) + 1, int(whole[1]) + 1)
 
 
-def packed(charts: list[Floats], sizes: list[tuple[int, int]]) -> tuple[Indices, tuple[int, int]]:
-    """Texel (column, row) at which each chart of `snapped` begins (N, 2), and the map's size (width, height)."""
-    columns, rows = np.array(sizes, np.int64).reshape(-1, 2).T
+def packed(shapes: list[tuple[Floats, tuple[int, int]]], shape: Indices) -> tuple[Indices, tuple[int, int]]:
+    """Texel (column, row) at which each chart begins (N, 2), and the map's size (width, height).
+
+    `shapes` are those of `snapped`, and `shape` (N,) is the number of each chart's.
+    """
+    columns, rows = np.array([size for _, size in shapes], np.int64).reshape(-1, 2).T
     starts = np.append(0, np.cumsum(columns * rows))
     taken = np.zeros(int(starts[-1]), np.uint8)
-    for chart, start, width, height in zip(charts, starts, columns, rows, strict=False):
+    for (chart, _), start, width, height in zip(shapes, starts, columns, rows, strict=False):
         _touched(chart, int(width), int(height), taken[start : start + width * height])
-    width = max(int(np.ceil(np.sqrt(taken.sum() / FULL))), int(columns.max()))
-    order = np.lexsort((np.arange(len(rows)), -columns, -rows))
+    filled = np.add.reduceat(taken, starts[:-1], dtype=np.int64)[shape].sum()
+    width = max(int(np.ceil(np.sqrt(filled / FULL))), int(columns.max()))
+    order = np.lexsort((np.arange(len(shape)), shape, -columns[shape], -rows[shape]))
     height = int(rows.max()) + 2 * width
     for _ in range(SEARCHES):
-        places, used = _placed(taken, starts, columns, rows, order, width, height)
+        places, used = _placed(taken, starts, columns, rows, shape, order, width, height)
         if used:
             return places, (width, int(used))
         height += height
@@ -92,6 +96,7 @@ def _placed(
     starts: Indices,
     columns: Indices,
     rows: Indices,
+    shape: Indices,
     order: Indices,
     width: int,
     height: int,
@@ -99,23 +104,27 @@ def _placed(
     """First fit from the top, row by row. 0 rows are used where the height does not suffice.
 
     `busy` is the first taken column at or after each, `free` the first that is not: a chart that does not fit jumps
-    past what is in its way.
+    past what is in its way. Where a chart did not fit, the next of the same texels does not either.
     """
-    places = np.zeros((len(rows), 2), np.int64)
+    places = np.zeros((len(order), 2), np.int64)
     busy = np.full((height, width + 1), width, np.int32)
     free = np.zeros((height, width + 1), np.int32)
     free[:] = np.arange(width + 1)
     left = np.full(height, width)
-    used = 0
+    used, top, side, before = 0, 0, 0, taken[:0]
     for chart in order:
-        w, h = columns[chart], rows[chart]
-        mask = taken[starts[chart] : starts[chart + 1]].reshape(h, w)
+        w, h = columns[shape[chart]], rows[shape[chart]]
+        cells = taken[starts[shape[chart]] : starts[shape[chart] + 1]]
+        if w != side or len(cells) != len(before) or not (cells == before).all():
+            top = 0
+        side, before = w, cells
+        mask = cells.reshape(h, w)
         runs = _runs(mask)
         count = np.zeros(h, np.int64)
         for row in range(h):
             count[row] = mask[row].sum()
         found = False
-        for y in range(height - h + 1):
+        for y in range(top, height - h + 1):
             possible = True
             for row in range(h):
                 if left[y + row] < count[row]:
@@ -132,6 +141,7 @@ def _placed(
                         break
             if found:
                 places[chart] = x, y
+                top = y
                 used = max(used, y + h)
                 left[y : y + h] -= count
                 _take(busy, free, runs, x, y)

@@ -37,6 +37,8 @@ from lambent.scenes.scene import (
 )
 
 UV2_ATTRIBUTE = "vertex_uv2"
+COARSE = 4  # pixels along each side of one of a coarse sky
+FEW_PIXELS = 128  # along the shorter side of a picture: with fewer left, it stays as it is
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,8 @@ class SceneBuilder:
         Terms and curves by material name, by which surfaces scatter instead of by their documents.
     sampling : EmitterSampling, optional
         Of another builder of the same scene, whose emitters are sampled alike.
+    coarse_sky : bool
+        Whether a picture of the environment has a sixteenth of its pixels, for trials that do not tell the difference.
     """
 
     def __init__(
@@ -78,6 +82,7 @@ class SceneBuilder:
         measured: Mapping[str, Lookup] | None = None,
         sampling: EmitterSampling | None = None,
         edited: Mapping[str, Editable] | None = None,
+        coarse_sky: bool = False,
     ) -> None:
         register_material_plugin()
         self.scene, self.measured, self.edited = scene, measured or {}, edited or {}
@@ -98,7 +103,7 @@ class SceneBuilder:
                 bsdf = bsdfs[look]
             self.meshes[o.name] = mesh_of(o, bsdf, (uv2 or {}).get(o.name))
         self.lights = [emitter_of(light) for light in scene.lights]
-        self.environment: Any = _emitter_of(scene.environment)
+        self.environment: Any = _emitter_of(scene.environment, COARSE if coarse_sky else 1)
         if sampling is not None:
             self.environment = sampling.environment
             self.weigh_emitters(sampling.weights)
@@ -219,16 +224,19 @@ def light_dict(light: PointLight | DirectionalLight) -> dict[str, Any]:
     return {"type": "spot", "to_world": frame, "intensity": _rgb(light.intensity), **angles}
 
 
-def _emitter_of(environment: Environment | None) -> Any:
-    """mi.Emitter; None where no light comes from it: Mitsuba's densities of a black picture are not finite."""
+def _emitter_of(environment: Environment | None, size: int = 1) -> Any:
+    """mi.Emitter, its picture in pixels of `size` x `size`.
+
+    None where no light comes from it: Mitsuba's densities of a black picture are not finite.
+    """
     if environment is None:
         return None
-    found = environment_dict(environment)
+    found = environment_dict(environment, size)
     return mi.load_dict(found) if found["scale"] > 0 and np.array(found["bitmap"]).any() else None
 
 
-def environment_dict(environment: Environment) -> dict[str, Any]:
-    """Mitsuba's dictionary of an environment.
+def environment_dict(environment: Environment, size: int = 1) -> dict[str, Any]:
+    """Mitsuba's dictionary of an environment, `size` x `size` pixels of its picture as one where there are enough.
 
     Mitsuba's lat-long image looks along -z at its left edge, ours in the middle: it is turned by 180 degrees about y.
     """
@@ -244,5 +252,9 @@ def environment_dict(environment: Environment) -> dict[str, Any]:
         image = read_lat_long(environment.file, environment.layout)
         scale, rotation_deg = environment.scale, environment.rotation_deg
         tilt[:3, :3] = up_turn(environment.up)
+    height, width, _ = image.shape
+    if size > 1 and min(height, width) >= FEW_PIXELS * size and height % size == width % size == 0:
+        image = image.reshape(height // size, size, width // size, size, 3).mean(axis=(1, 3))
     turned = mi.ScalarTransform4f(tilt) @ mi.ScalarTransform4f().rotate([0, 1, 0], 180 + rotation_deg)
-    return {"type": "envmap", "bitmap": mi.Bitmap(np.ascontiguousarray(image)), "scale": scale, "to_world": turned}
+    bitmap = mi.Bitmap(np.ascontiguousarray(image, np.float32))
+    return {"type": "envmap", "bitmap": bitmap, "scale": scale, "to_world": turned}

@@ -13,6 +13,7 @@ from lambent.bake.tiles import slices
 from lambent.bake.tracing.rays import leaving, vectors
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Flags, Floats
+from lambent.core.geometry import triangle_normals
 from lambent.core.sequences import cosine_hemisphere, hammersley
 from lambent.scenes.geometry import merge
 from lambent.scenes.scene import Mesh, Scene, SceneObject
@@ -54,6 +55,10 @@ class SolidTest:
         solid = [o.name in closed and o.material not in open_ for o in builder.scene.objects]
         self._scene, self._numbers = scene, builder.object_numbers()
         self._solid = mi.UInt32(np.array(solid, np.uint32))
+        # Normals by triangle: an interaction would be compiled for each mesh of the scene.
+        counts = [len(o.mesh.faces) for o in builder.scene.objects]
+        self._first_face = mi.UInt32(np.cumsum([0, *counts])[:-1].astype(np.uint32))
+        self._flat = vectors(mi.Vector3f, triangle_normals(builder.scene.corners))
 
     def within(self, scene: Any) -> SolidTest:
         """The same test in another Mitsuba scene of the same builder, with the same closed objects."""
@@ -76,8 +81,11 @@ class SolidTest:
         n = dr.gather(mi.Vector3f, vectors(mi.Vector3f, normals), at)
         local = vectors(mi.Vector3f, cosine_hemisphere(hammersley(RAYS)))
         direction = mi.Frame3f(n).to_world(dr.gather(mi.Vector3f, local, k))
-        hit = self._scene.ray_intersect(leaving(self._scene, p, n, direction), mi.RayFlags.Minimal, True)
-        number = dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, hit.shape), hit.is_valid())
-        solid = dr.gather(mi.UInt32, self._solid, number, hit.is_valid()) > 0
-        inner = hit.is_valid() & solid & (dr.dot(hit.n, direction) > 0)
+        hit = self._scene.ray_intersect_preliminary(leaving(self._scene, p, n, direction), True)
+        met = hit.is_valid()
+        number = dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, hit.shape), met)
+        face = dr.gather(mi.UInt32, self._first_face, number, met) + hit.prim_index
+        outwards = dr.gather(mi.Vector3f, self._flat, face, met)
+        solid = dr.gather(mi.UInt32, self._solid, number, met) > 0
+        inner = met & solid & (dr.dot(outwards, direction) > 0)
         return np.array(dr.block_sum(dr.select(inner, 1.0, 0.0), RAYS)) / RAYS

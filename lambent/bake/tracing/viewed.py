@@ -26,7 +26,8 @@ log = logging.getLogger(__name__)
 
 RAYS = 1 << 18
 FEW = 64  # rays that meet a part: with fewer, points on it are looked from
-LOOKS = 256  # back from each of those
+LOOKS, LEAST_LOOKS = 256, 16  # back from each of those, and from each of very many...
+MOST_LOOKS = 1 << 22  # ...where all together would be more
 NEAREST = 0.1  # of how far viewers see: what is closer is behind them, as the wall that a camera stands against
 
 
@@ -140,14 +141,15 @@ def _looked_back(traced: Any, surfaces: list[Floats], eyes: Floats, nearest: flo
     if not surfaces:
         return np.zeros(0), np.zeros(0)
     rng = np.random.default_rng(0)
+    looks = max(LEAST_LOOKS, min(LOOKS, MOST_LOOKS // len(surfaces)))
     corners = np.concatenate(surfaces)
     number = np.repeat(np.arange(len(surfaces)), [len(surface) for surface in surfaces])
     sums = np.cumsum(np.append(0.0, triangle_areas(corners)))
     first = np.searchsorted(number, np.arange(len(surfaces) + 1))
     low, high = sums[first[:-1], None], sums[first[1:], None]
-    target = low + rng.random((len(surfaces), LOOKS)) * (high - low)
+    target = low + rng.random((len(surfaces), looks)) * (high - low)
     face = np.searchsorted(sums, target.ravel(), side="right") - 1
-    face = face.clip(np.repeat(first[:-1], LOOKS), np.repeat(first[1:] - 1, LOOKS))
+    face = face.clip(np.repeat(first[:-1], looks), np.repeat(first[1:] - 1, looks))
     points, normals = points_on_triangles(corners, face, rng), triangle_normals(corners)[face]
     eye = eyes[rng.integers(len(eyes), size=len(face))]
     offset = eye - points
@@ -158,5 +160,5 @@ def _looked_back(traced: Any, surfaces: list[Floats], eyes: Floats, nearest: flo
     ray = towards(traced, *(values.astype(np.float32) for values in (points, normals, eye)))
     hidden = np.array(traced.ray_test(ray)) | (distance <= nearest)
     seen = np.where(hidden, 0.0, np.abs(cosine).clip(0, 1)) / (4 * np.pi)
-    by_cube, by_square = ((seen / distance**power).reshape(-1, LOOKS).mean(axis=1) for power in (3, 2))
+    by_cube, by_square = ((seen / distance**power).reshape(-1, looks).mean(axis=1) for power in (3, 2))
     return by_cube, by_square

@@ -60,8 +60,9 @@ class _Reading:
             through *= float(texture.channel(0).mean[0]) if texture is not None else 1.0
             notes.append("its transmission is averaged over its texture")
         surface = metallic_roughness(
-            base, metallic, along, plain, notes, weight=specular.specularFactor, aspect=aspect, through=through
-        )
+            base, metallic, along, plain, notes,
+            weight=specular.specularFactor, aspect=aspect, through=through, by_half_vector=True,
+        )  # fmt: skip
         surface = replace(self._clear_coated(self._translucent(surface)), direction=direction)
         return self._finished(surface, image, pbr.baseColorFactor[3])
 

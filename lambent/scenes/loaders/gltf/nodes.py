@@ -184,7 +184,8 @@ class _Reading:
         """A mesh in the world. Nodes that only move it share its other arrays: thousands of screws are one normal."""
         turned = (*key, world[:3, :3].tobytes())
         if turned not in self._turned:
-            self._turned[turned] = transformed(local, world)
+            self._turned[turned] = found = transformed(local, world)
+            return found
         first = self._turned[turned]
         return Mesh(positions_under(local, world), first.normals, first.tangents, first.uv, first.faces)
 

@@ -197,7 +197,8 @@ class _Reading:
             self._notes.append("the rotation of its anisotropy (anisor) is ignored")
         aspect = math.sqrt(1 - 0.9 * strength)
         along = combined(lambda a: np.clip(a, 0, 1) / aspect, alpha, notes=self._notes)
-        return metallic_roughness(base, metallic, along, np.full(3, r0), self._notes, aspect=aspect**2)
+        plain = np.full(3, r0)
+        return metallic_roughness(base, metallic, along, plain, self._notes, aspect=aspect**2, by_half_vector=True)
 
     def _phong(self, kd: Textured) -> Surface:
         ks = self._coloured("Ks", "map_Ks", 0.0)

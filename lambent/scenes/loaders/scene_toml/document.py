@@ -125,9 +125,9 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
     return replace(with_variants(scene, told), sources=tuple(files.sources))
 
 
-def _there(document: SceneDocument, path: Path, files: SceneFiles) -> tuple[list[str | GeometrySection], list[str]]:
+def _there(document: SceneDocument, path: Path, files: SceneFiles) -> tuple[list[GeometrySection], list[str]]:
     """The geometry files that are there, and a note of each that is not; a `UserError` where none is."""
-    names = [entry if isinstance(entry, str) else entry.file for entry in document.geometry]
+    names = [entry.file for entry in document.geometry]
     gone = [
         name for name in names
         if not name.startswith("builtin:") and not files.path(name, path, "geometry").is_file()
@@ -148,10 +148,10 @@ def _parse(path: Path) -> SceneDocument:
         raise invalid(error, path, known_keys()) from error
 
 
-def _geometry(entry: str | GeometrySection, path: Path, files: SceneFiles, read_geometry: ReadGeometry) -> Contents:
-    if isinstance(entry, str):
-        return read_geometry(entry, path, files)
+def _geometry(entry: GeometrySection, path: Path, files: SceneFiles, read_geometry: ReadGeometry) -> Contents:
     contents, size = read_geometry(entry.file, path, files), entry.scale
+    if size == 1:
+        return contents
     if not 1e-9 <= size <= 1e9 or max(np.abs(o.mesh.positions).max() for o in contents.objects) * size > ABSURD:
         raise UserError("scale is too large", file=path, field="geometry.scale", got=size)
     matrix = np.diag([size] * 3 + [1.0])

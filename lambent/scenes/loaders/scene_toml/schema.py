@@ -246,7 +246,7 @@ class SceneDocument(Section):
     format: Literal["lambent-scene"]
     version: Literal[1]
     name: str = "scene"
-    geometry: Annotated[tuple[str | GeometrySection, ...], Field(min_length=1)]
+    geometry: Annotated[tuple[GeometrySection, ...], Field(min_length=1)]
     exposure_ev: Annotated[float, Field(ge=-30, le=30)] | None = None
     exposure_ev100: Annotated[float, Field(ge=-30, le=30)] | None = None
     environment: Annotated[EnvironmentSection, Field(discriminator="kind")] | None = None
@@ -277,7 +277,10 @@ class SceneDocument(Section):
     @field_validator("geometry", mode="before")
     @classmethod
     def _one_or_many(cls, value: Any) -> Any:
-        return [value] if isinstance(value, str | dict) else value
+        if not isinstance(value, str | dict | list):
+            raise ValueError("names no file")
+        entries = value if isinstance(value, list) else [value]
+        return [{"file": entry} if isinstance(entry, str) else entry for entry in entries]
 
 
 def known_keys() -> set[str]:

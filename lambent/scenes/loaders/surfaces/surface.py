@@ -15,6 +15,8 @@ from lambent.scenes.scene import Texture
 
 ROUGHNESS_MIN = 0.003  # slope; below, single precision loses the lobe
 BLACK = np.zeros(3)
+# Albedo at 85 degrees of a dielectric's lobe, r0 .04, by its slope.
+AT_GRAZING = (0.25, 0.36, 0.49, 0.64, 1.0), (0.24, 0.18, 0.14, 0.1, 0.06)
 GREY = 0.5  # of surfaces that are not described
 UNDESCRIBED = "is not defined: it becomes grey"
 
@@ -109,6 +111,7 @@ def metallic_roughness(
     weight: float = 1.0,
     aspect: float = 1.0,
     through: float = 0.0,
+    by_half_vector: bool = False,
 ) -> Surface:
     """Surface of a base colour: metals reflect it without a diffuse term, dielectrics have it below a clear coat.
 
@@ -126,12 +129,17 @@ def metallic_roughness(
         Roughness across t divided by that along t.
     through : float
         Share of the dielectric's light that is transmitted, as by a thin sheet.
+    by_half_vector : bool
+        Whether the format's diffuse term is multiplied by 1 - F at the half vector, as glTF's.
 
     Notes
     -----
-    Partial metals are blends (glTF 2.0, appendix B). The diffuse term is coupled to Fresnel. Where the reflectance
-    varies, r0 is the highest and the lobe's coefficient varies: exact at normal incidence and never above 1, but places
-    of low reflectance lack Fresnel's rise at grazing incidence.
+    Partial metals are blends (glTF 2.0, appendix B). The diffuse term is coupled to Fresnel. At the half vector F
+    hardly rises towards grazing: where that is the format's, the diffuse term of rough dielectrics is not coupled, as
+    long as no more light returns than arrives. At roughness 1 and 88 degrees a base colour of .5 keeps .47 of the light
+    by glTF, and coupled .08: grounds would darken towards the horizon. Where the reflectance varies,
+    r0 is the highest and the lobe's coefficient varies: exact at normal incidence and never above 1, but places of low
+    reflectance lack Fresnel's rise at grazing incidence.
     """
     plain = np.clip(plain, 0, 1)
     left = 1 - weight * float(plain.max())
@@ -150,7 +158,11 @@ def metallic_roughness(
     if through > 0:
         passed = combined(lambda b, m: through * b * (1 - m), base, metallic, notes=notes)
         lobes.append(SpecularLobe(alpha, passed, weight * plain, aspect, side="transmission"))
-    return Surface(kd=kd, coupled=bool(weight > 0.5 and plain.max() > 0), lobes=tuple(lobes))
+    coupled = weight > 0.5 and plain.max() > 0
+    slope = float(alpha.mean[0])
+    if by_half_vector and slope >= AT_GRAZING[0][0]:
+        coupled &= bool(kd.highest.max() + np.interp(slope, *AT_GRAZING) > 1)
+    return Surface(kd=kd, coupled=bool(coupled), lobes=tuple(lobes))
 
 
 def rgb(values: Floats) -> Triple:
