@@ -316,7 +316,7 @@ def test_a_mitsuba_scene_as_geometry(tmp_path: Path) -> None:
     ("geometry", "said"),
     [
         ("3", r"geometry: names no file; found 3"),
-        ('{ file = "builtin:box", scale = 0.0 }', r"geometry.0.scale: has to be greater than 0; found 0.0"),
+        ('{ file = "builtin:box", scale = 0.0 }', r"geometry.0.scale: must be greater than 0; found 0.0"),
         (
             '["builtin:box", { file = "builtin:box", sclae = 2.0 }]',
             r"geometry.1.sclae: unknown key; did you mean 'scale'",
