@@ -22,8 +22,7 @@
                                            above, without OBJECT if meta["object_left_out"]. meta["seen_irradiance"],
                                            may be absent: luminance of the irradiance it would give, coefficients of
                                            1, x, y, z, xy, yz, 3zz - 1, xz, xx - yy of the normal; scale its light by
-                                           the light map's share r of that (times meta["occlusion_gain"]), at most 1.
-                                           With meta["even_niches"] scale by r^2 and add (1 - r) E/pi of the light map.
+                                           the light map's share of it; see store.occlusion.
                                            Objects in the document SHARED_PROBES show the probe of another
     probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
     probe/OBJECT/groups                    (n, 6, N, N, 3) float16, its radiance by light group, units as above; absent

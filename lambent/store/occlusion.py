@@ -1,9 +1,11 @@
 """How much of a probe's light arrives where it is shown.
 
 `light_map/probe_share` says it by direction: at a texel, a + b.w of the light that the probe has along unit w, held
-within 0 and MOST_SHARE. It counts for the objects in its notes. All others scale their probe's light by the light map's
-share of the irradiance that the probe alone would give: `seen_irradiance`, `occlusion_gain` and `even_niches` in its
-notes, as the head of `store.contract` has them.
+within 0 and MOST_SHARE. It counts for the objects in its notes.
+
+All others follow the notes of the probe's radiance. r is the light map's share of `seen_irradiance` (`store.contract`),
+times `occlusion_gain`, at most 1. The probe's light is scaled by r; with `even_niches` by r^2, and (1 - r) E/pi of the
+light map's irradiance E is added from all directions.
 """
 
 from __future__ import annotations

@@ -64,16 +64,17 @@ def test_gain_leaves_what_is_no_niche_its_light(niches: int, open_share: float, 
 
 
 def test_walls_of_a_niche_shine_where_they_hide_the_sky() -> None:
-    """A shelf with the sky over .16 of its directions: it has .4 of the irradiance, the rest by its bright walls."""
+    """Under a white sky: shelves with .4 of its irradiance, which show it in .36 of their directions."""
     ratio = np.repeat([0.4, 1.0], 50)
     up = np.tile([0.0, 0.0, 1.0], (100, 1))
-    shown = ratio**2 + (1 - ratio) * ratio
+    share = np.minimum(1.5 * ratio, 1)
+    shown = share**2 + (1 - share) * ratio
     seen = Mirrored(
         0 * up, up, up, np.repeat(shown[:, None], 3, axis=1), np.pi * ratio, np.ones(100), np.zeros(100, bool)
     )
     sky = np.ones((6, 8, 8, 3), np.float32)
     found = judged(seen, Probe(sky, np.full((6, 8, 8), FAR, np.float32), sky), np.zeros(3), np.zeros((0, 4)))
-    assert found.scaling == Scaling(1.0, even=True) and found.best == pytest.approx(0, abs=1e-3)
+    assert found.scaling == Scaling(1.5, even=True) and found.best == pytest.approx(0, abs=1e-3)
 
 
 def test_planes_turn_the_look_up_as_the_renderer_does() -> None:

@@ -116,7 +116,7 @@ def test_slats_in_the_penumbra_of_a_roof_leave_shadows_of_their_own(device: Any,
     baked = scene({"floor": floor(), "roof": patch(*roof), "slats": merge(patch(*one) for one in slats)}, 5.0)
     found = drawn(device, baked, camera, frames, alone=frames == 1) / TOWARDS[1]
     error = (found - expected)[binary_erosion(shown, iterations=2)]
-    assert np.sqrt((error**2).mean()) < (0.06 if frames == 1 else 0.04), ".08 by one filter"
+    assert np.sqrt((error**2).mean()) < (0.06 if frames == 1 else 0.02), ".08 by one filter, .026 by one mean distance"
     assert abs(error.mean()) < 0.01
 
 

@@ -55,6 +55,7 @@ class SunPass:
 
     def _encode(self, context: FrameContext, draws: list[Draw], view: Any) -> Steps:
         sun = context.resources.sun
+        wide = sun.is_wide and not context.state.is_alone  # a frame in motion gains little by it
         for band in context.slicing.bands("sun", context.target.depth.size[:2]):
             render = context.begin("sun", [view], band.load_op, band=band)
             render.set_bind_group(1, sun.group)
@@ -62,7 +63,7 @@ class SunPass:
             seen = context.seen(band.shares)
             for draw in draws:
                 record = draw.item.record
-                render.set_pipeline(self._pipeline(draw.is_pane, draw.material.transmits, sun.pane_layers, sun.is_wide))
+                render.set_pipeline(self._pipeline(draw.is_pane, draw.material.transmits, sun.pane_layers, wide))
                 context.counts["draw_calls"] += draw_seen(render, seen, record.first_face, record.face_count)
             render.end()
             yield

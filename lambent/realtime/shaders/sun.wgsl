@@ -20,7 +20,7 @@
 @group(1) @binding(4) var pane_colours: texture_2d_array<f32>;
 
 override PANES: u32 = 0u;        // layers of clear glass
-override WIDE: bool = false;      // the sun's disc is cut into parts
+override WIDE: bool = false;      // taps are places of the disc
 override TRANSMITS: bool = false; // surfaces show light from behind them
 
 const SUN_BLOCK = 8.0;       // texels along the side of the smallest block: BLOCK of realtime/sun.py
