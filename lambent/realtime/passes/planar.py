@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache, lru_cache
-from typing import Any, cast
+from typing import Any
 
 from lambent.realtime.context import FrameContext
 from lambent.realtime.draws import Draw
-from lambent.realtime.incident import LookUp, distance
 from lambent.realtime.integrators import Integrator
 from lambent.realtime.layouts import LIGHT, Layouts
 from lambent.realtime.passes.depth import DepthPass
@@ -32,7 +31,7 @@ def beyond_view(draw: Draw) -> Draw:
 
     Planes around a whole room leave out what stands in it, which is near to a floor's places.
     """
-    return replace(draw, look_up=cast(LookUp, distance)) if distance.serves(draw.item.light.probe) else draw
+    return replace(draw, look_up=draw.item.light.look_up("distance"))
 
 
 class PlanarPass:
