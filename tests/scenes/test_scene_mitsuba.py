@@ -315,4 +315,4 @@ def test_the_living_room(shared_data: Path) -> None:
     assert scene.environment.file.name == "Sky 19.exr" and len(scene.sources) == 1 + 65 + 4 + 1
     assert scene.cameras[0].fov_y_deg == pytest.approx(2 * np.degrees(np.arctan(9 / 16)), abs=1e-6)
     assert scene.materials["Floor"].lobes[0].mx == pytest.approx(0.15) and scene.materials["Floor"].kd_coupled
-    assert not any("not there" in w or "unknown" in w for w in scene.warnings)
+    assert not any("is missing" in w or "unknown" in w for w in scene.warnings)
