@@ -144,7 +144,7 @@ def test_a_box_within_a_box_has_no_points_and_says_so(mi: Any) -> None:
 
 def test_an_object_without_area_says_so(mi: Any) -> None:
     line = Mesh(*(np.zeros((3, n), np.float32) for n in (3, 3, 3, 2)), faces=np.array([[0, 1, 2]], np.uint32))
-    with pytest.raises(UserError, match="in the open"):
+    with pytest.raises(UserError, match="hidden everywhere"):
         placing_of(SceneObject("ball", sphere(0.3, 8, 4), "d")).points(line, 10, 0)
 
 
@@ -158,7 +158,7 @@ def test_the_root_of_a_spout_within_an_open_vessel_has_no_points(mi: Any) -> Non
     low, high = opened.bounds
     ball = placed(sphere(0.05, 24, 12), tuple(0.7 * low + 0.3 * high))
     placing = placing_of(SceneObject("vessel", opened, "d"), SceneObject("ball", ball, "m"))
-    with pytest.raises(UserError, match="in the open"):
+    with pytest.raises(UserError, match="hidden everywhere"):
         placing.points(ball, 20, 0)
     assert len(placing.points(opened, 30, 0)) == 30
 

@@ -93,7 +93,7 @@ def test_other_geometry_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture
     store = bake(more, tmp_path / "s", quality=TINY, only=["geometry"])
     with caplog.at_level(logging.WARNING):
         scene_of(store)
-    assert "other geometry" in caplog.text and len(caplog.records) == 1
+    assert "geometry of its scene" in caplog.text and len(caplog.records) == 1
 
 
 def test_a_scene_made_in_memory_has_to_be_named(tmp_path: Path) -> None:

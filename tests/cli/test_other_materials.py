@@ -104,6 +104,6 @@ def test_what_a_store_lacks_is_said(refused: Command, store: Path, tmp_path: Pat
     assert "--only answer" in refused("render", bare, "-o", tmp_path / "a.png", *SMALL, *colour)
     assert "the store has no variants" in refused("render", bare, "-o", tmp_path / "a.png", "--variants")
     assert ".png" in refused("render", store, "-o", tmp_path / "a.exr", "--variants")
-    assert "of one view" in refused("render", store, "-o", tmp_path / "a.png", "--variants", "--path", "rest")
+    assert "excludes --variants" in refused("render", store, "-o", tmp_path / "a.png", "--variants", "--path", "rest")
     missing = ("--path", "rest", "--keyframes", tmp_path / "none.toml")
     assert "none.toml" in refused("render", store, "-o", tmp_path / "a-#.png", *SMALL, *missing)

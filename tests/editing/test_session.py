@@ -226,7 +226,7 @@ def test_a_table_is_made_into_curves_and_must_not_change(tmp_path: Path) -> None
 
 REFUSED = {
     "unknown key": ({"lihgts": 5}, "lihgts"),
-    "version": ({"version": 2}, "of another version; found 2; expected 1; use the Lambent that wrote it"),
+    "version": ({"version": 2}, "unsupported session version; found 2; expected 1; use the Lambent that wrote it"),
     "format": ({"format": "lambent-views"}, "format"),
     "size": ({"size": [0, 5]}, "size"),
     "pixels": ({"size": [100000, 100000]}, "pixels"),

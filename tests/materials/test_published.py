@@ -66,7 +66,7 @@ def test_reciprocal_and_black_below(tmp_path, line):
         (WARD.replace("3e-1]", "3e-1, 4]"), "line 3"),
         (COOK.replace("eta = .04", "eta = 1.5"), "eta"),
         (LOW.replace("eta = 1.5", "eta = .5"), "eta"),
-        (f"{WARD}\n{WARD}", "one name"),
+        (f"{WARD}\n{WARD}", "the same name"),
         ("# nothing", "no material"),
     ],
 )

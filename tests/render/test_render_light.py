@@ -81,4 +81,4 @@ def test_a_mix_of_a_group_that_is_gone_is_noted(adapter: None, tmp_path: Path) -
     bare, notes = write_small_store(tmp_path / "s"), list[str]()
     change_views(bare, lambda views: views.model_copy(update={"lights": {"front": HALF}}))
     still(bare, tmp_path / "a.exr", "front", SMALL, note=notes.append)
-    assert any("left out: the store has no light group lamp, sky, sun" in note for note in notes)
+    assert any("not applied: the store has no light group lamp, sky, sun" in note for note in notes)

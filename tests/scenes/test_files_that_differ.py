@@ -30,8 +30,8 @@ def test_a_mesh_that_is_missing_is_left_out_with_a_warning(tmp_path: Path) -> No
     write(tmp_path, "models/here.obj", TRIANGLE)
     scene = load_scene(mitsuba(tmp_path, "models/here.obj", "models/gone.obj"))
     assert [o.name for o in scene.objects] == ["here"]
-    assert "gone: left out, its file models/gone.obj was not found" in scene.warnings
-    with pytest.raises(UserError, match=r"holds no triangles; .*gone\.obj was not found") as told:
+    assert "gone: left out, its file models/gone.obj is missing" in scene.warnings
+    with pytest.raises(UserError, match=r"holds no triangles; .*gone\.obj is missing") as told:
         load_scene(mitsuba(tmp_path, "models/gone.obj"))
     assert "found" not in str(told.value)
 
@@ -41,11 +41,11 @@ def test_a_file_in_other_case_is_used_and_named(tmp_path: Path) -> None:
     write(tmp_path, "Models/wood.mtl", "newmtl a\nKd .1 .2 .3\n")
     scene = load_scene(mitsuba(tmp_path, "models/chair.obj"))
     assert len(scene.objects) == 1
-    assert "models/chair.obj is Models/Chair.OBJ on disk" in scene.warnings
+    assert "models/chair.obj is spelt Models/Chair.OBJ on disk" in scene.warnings
     alone = load_scene(tmp_path / "Models/Chair.OBJ")
     assert "WOOD.mtl is Models/wood.mtl on disk" in alone.warnings or "WOOD.mtl is wood.mtl on disk" in alone.warnings
     toml = write(tmp_path, "scene.toml", _toml('"models/CHAIR.obj"'))
-    assert "models/CHAIR.obj is Models/Chair.OBJ on disk" in load_scene(toml).warnings
+    assert "models/CHAIR.obj is spelt Models/Chair.OBJ on disk" in load_scene(toml).warnings
 
 
 def test_two_files_that_differ_in_case_alone_are_not_confused(tmp_path: Path) -> None:
@@ -54,7 +54,7 @@ def test_two_files_that_differ_in_case_alone_are_not_confused(tmp_path: Path) ->
     if len(list(tmp_path.iterdir())) < 2:
         pytest.skip("this disk does not tell case")
     scene = load_scene(mitsuba(tmp_path, "A.obj", "a.obj"))
-    assert len(scene.objects) == 1 and "a: left out, its file a.obj was not found" in scene.warnings
+    assert len(scene.objects) == 1 and "a: left out, its file a.obj is missing" in scene.warnings
 
 
 def _toml(geometry: str, more: str = "") -> str:
@@ -76,7 +76,7 @@ def test_a_scene_toml_without_light_or_camera_gets_what_its_geometry_alone_gets(
 def test_geometry_that_is_missing_is_left_out_where_some_is_there(tmp_path: Path) -> None:
     write(tmp_path, "a.obj", TRIANGLE)
     scene = load_scene(write(tmp_path, "scene.toml", _toml('["a.obj", "b.glb"]')))
-    assert len(scene.objects) == 1 and "geometry b.glb was not found: left out" in scene.warnings
+    assert len(scene.objects) == 1 and "geometry b.glb is missing: left out" in scene.warnings
     with pytest.raises(UserError, match=r"no geometry file was found: b\.glb"):
         load_scene(write(tmp_path, "scene.toml", _toml('"b.glb"')))
 

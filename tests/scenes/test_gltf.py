@@ -400,7 +400,7 @@ BROKEN = {
     "path escape": (_set("buffers", 0, "uri", "../a.bin"), "leaves its folder"),
     "null in a name": (_set("buffers", 0, "uri", "a%00.bin"), "is not a file name"),
     "broken base64": (_set("buffers", 0, "uri", "data:;base64,%%%"), "base64"),
-    "nothing in it": (_set("nodes", 0, {"name": "empty"}), "holds no triangles"),
+    "it has no light": (_set("nodes", 0, {"name": "empty"}), "holds no triangles"),
     "matrix that is not affine": (_set("nodes", 0, "matrix", [*[0.0] * 15, 0.0]), "not an affine matrix"),
     "infinite transform": (_set("nodes", 0, "translation", [0, 0, float("inf")]), "finite"),
 }

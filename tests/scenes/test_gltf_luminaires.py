@@ -85,7 +85,7 @@ def test_a_light_for_other_programs_beside_it_is_not_added(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("profile", "told"),
     [
-        ({"uri": "gone.ies", "name": "spot"}, "spot: luminaire left out, gone.ies was not found"),
+        ({"uri": "gone.ies", "name": "spot"}, "spot: luminaire left out, gone.ies is missing"),
         ({"uri": "data:;base64,AAAA"}, "EXT_lights_ies.lights.0: luminaire left out, is not an IES file"),
         ({"uri": "data:;base64,!"}, "base64 data is damaged"),
         ({"uri": "http://lamps.example/a.ies"}, "is on the network"),

@@ -70,7 +70,7 @@ def test_leaves_volumes_and_what_is_not_read(tmp_path: Path) -> None:
     scene = loaded(tmp_path, worn(look, []))
     material = scene.materials["m"]
     assert material.kd == pytest.approx((0.72,) * 3) and material.kt_d == pytest.approx((0.024, 0.192, 0.048))
-    assert "material m: not read: KHR_materials_sheen" in scene.warnings
+    assert "material m: ignored: KHR_materials_sheen" in scene.warnings
     volume = {"thicknessFactor": 2, "attenuationDistance": 1, "attenuationColor": [0.5, 0.9, 1]}
     glass = {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": volume}
     look = {"name": "m", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0}, "extensions": glass}
@@ -100,4 +100,4 @@ def test_missing_pictures_are_said(tmp_path: Path) -> None:
     pbr = {"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 0.4, 0.3, 1], "metallicFactor": 0}
     scene = loaded(tmp_path, worn({"name": "m", "pbrMetallicRoughness": pbr}, ["gone.png"]))
     assert scene.materials["m"].kd == pytest.approx((0.48, 0.384, 0.288))
-    assert any("gone.png was not found" in w for w in scene.warnings)
+    assert any("gone.png is missing" in w for w in scene.warnings)

@@ -53,7 +53,7 @@ HOSTILE = {
     "a picture out": ('<shape type="sphere"><bsdf type="diffuse"><texture type="bitmap" name="reflectance"><string '
                       'name="filename" value="../../p.png"/></texture></bsdf></shape>', r"leaves its folder"),
     "not there": ('<shape type="obj"><string name="filename" value="a.obj"/></shape>',
-                  r"holds no triangles; a: left out, its file a\.obj was not found"),
+                  r"holds no triangles; a: left out, its file a\.obj is missing"),
     "not a number": ('<shape type="sphere"><float name="radius" value="big"/></shape>',
                      r"line 1 <float> radius: not a number; found big"),
     "not finite": ('<shape type="sphere"><float name="radius" value="nan"/></shape>', r"not a finite number"),
@@ -68,7 +68,7 @@ HOSTILE = {
         '<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="0"/></film></sensor>' + BALL,
         r"film has no size"),
     "an impossible view": (
-        '<sensor type="perspective"><float name="fov" value="180"/></sensor>' + BALL, r"is impossible"),
+        '<sensor type="perspective"><float name="fov" value="180"/></sensor>' + BALL, r"is out of range"),
     "nothing": ("", r"holds no triangles"),
     "flat": ('<shape type="sphere"><transform name="to_world"><scale x="1" y="0" z="1"/></transform></shape>',
              r"holds no triangles; sphere: left out, its transform is singular"),
@@ -104,7 +104,7 @@ def test_pictures_that_are_missing_damaged_or_absurd(tmp_path: Path) -> None:
     path = tmp_path / "scene.xml"
     path.write_text(body)
     scene = load_scene(path)
-    assert scene.materials["m"].kd == (0.5,) * 3 and "p.png was not found" in " ".join(scene.warnings)
+    assert scene.materials["m"].kd == (0.5,) * 3 and "p.png is missing" in " ".join(scene.warnings)
     (tmp_path / "p.png").write_bytes(_png_of(60000, 60000))
     with pytest.raises(UserError, match=r"p.png: picture"):
         load_scene(path)
@@ -224,7 +224,7 @@ def test_ply_that_is_broken(tmp_path: Path) -> None:
         (sound["ascii"].replace(b"face 2", b"face 200000000"), r"truncated"),
         (sound["binary_little_endian"].replace(b"face 2", b"face 200000000"), r"truncated"),
         (sound["ascii"].replace(b"3 0 1 2", b"3 0 1 9"), r"face index out of range; found 9"),
-        (sound["ascii"].replace(b"3 0 1 2", b"3 0 1 x"), r"no number"),
+        (sound["ascii"].replace(b"3 0 1 2", b"3 0 1 x"), r"not a number"),
         (sound["ascii"].replace(b"float x", b"floot x"), r"header cannot be read"),
         (sound["ascii"].replace(b"format ascii 1.0\n", b""), r"header cannot be read"),
         (sound["ascii"].replace(b"property float y\n", b""), r"."),

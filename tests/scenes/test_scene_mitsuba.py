@@ -255,7 +255,7 @@ def test_sheets_masks_and_what_is_lost(tmp_path: Path) -> None:
     assert m["leaf"].kd == pytest.approx((0, 1, 0))  # the mean of what is to be seen
     assert m["veil"].kd == pytest.approx((0.125,) * 3) and m["veil"].lobes[0].k == (0.75,) * 3
     for words in ("light is not refracted", "alpha channel", "bump map is ignored", "fur (hair): unknown, becomes grey",
-                  "no surface (null)", "unknown kind", "not read: shine"):  # fmt: skip
+                  "no surface (null)", "unknown kind", "ignored: shine"):  # fmt: skip
         assert said.count(words) == 1, (words, said)
     assert len(scene.objects) == 7 and m["fur"].kd == (0.5,) * 3
 
@@ -315,4 +315,4 @@ def test_the_living_room(shared_data: Path) -> None:
     assert scene.environment.file.name == "Sky 19.exr" and len(scene.sources) == 1 + 65 + 4 + 1
     assert scene.cameras[0].fov_y_deg == pytest.approx(2 * np.degrees(np.arctan(9 / 16)), abs=1e-6)
     assert scene.materials["Floor"].lobes[0].mx == pytest.approx(0.15) and scene.materials["Floor"].kd_coupled
-    assert not any("not there" in w or "unknown" in w for w in scene.warnings)
+    assert not any("is missing" in w or "unknown" in w for w in scene.warnings)

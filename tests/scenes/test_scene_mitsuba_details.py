@@ -67,7 +67,7 @@ def test_the_suns_radius_is_read(tmp_path: Path, said: str, radius_deg: float) -
     assert isinstance(scene.environment, SunSky)
     assert scene.environment.sun_radius_deg == pytest.approx(radius_deg)
     notes = " ".join(scene.warnings)
-    assert "not read: sun" not in notes and "ground of its albedo" in notes
+    assert "ignored: sun" not in notes and "ground of its albedo" in notes
     assert ("sun's radius" in notes) == (radius_deg in (0.05, 30.0))
 
 

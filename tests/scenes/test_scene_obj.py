@@ -153,7 +153,7 @@ map_Kd gone.png
     assert "material pbr: its bump map is ignored" in notes
     assert m["pane"].transmission_lobes[0].k == (0.75,) * 3 and "is transparent (75%)" in notes
     lamp = next(o for o in parts.objects if o.material == "lamp")
-    assert lamp.emission == (5, 4, 3) and "material lamp: picture gone.png was not found" in notes
+    assert lamp.emission == (5, 4, 3) and "material lamp: picture gone.png is missing" in notes
     assert {p.name for p in parts.sources} == {
         "thing.obj", "thing.mtl", "wood grain.png", "holes.png", "flat.png", "bumps.png"
     }  # fmt: skip
@@ -307,7 +307,7 @@ Frobnicate 3
         wo = np.array([np.sin(np.radians(theta_deg)), 0, np.cos(np.radians(theta_deg))])
         for name in names:
             assert MaterialBSDF(m[name]).albedo(wo).max() < 1.01, (name, theta_deg)
-    assert "Frobnicate is ignored" in notes and notes.count("nowhere.png was not found") == 2
+    assert "Frobnicate is ignored" in notes and notes.count("nowhere.png is missing") == 2
 
 
 def test_a_material_that_the_scene_describes_is_not_called_grey(tmp_path: Path) -> None:

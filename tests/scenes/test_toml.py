@@ -205,7 +205,7 @@ WRONG = {
     "[objects.sphre]\nmaterial = 'white'": r"objects.sphre: matches no object; did you mean 'sphere'\?",
     MATERIALS + "[objects.sphere]\nmaterial = 'wite'": r"unknown material; found wite; did you mean 'white'\?",
     "[[cameras]]\nname='a'\nposition=[1e308,0.0,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.position.0.*1000000000",
-    "[[cameras]]\nname='a'\nposition=[0.0,0.0,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.*same point",
+    "[[cameras]]\nname='a'\nposition=[0.0,0.0,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.*coincide",
     "[[cameras]]\nname='a'\nposition=[0.0,nan,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.position.1.*finite",
     MATERIALS + "[assign]\nsphere = 'metall'": r"assign.sphere: unknown material; found metall; did you mean 'metal'",
     "variant = 'oak'": r"variant: unknown variant; found oak; the geometry has no variants",
@@ -218,7 +218,7 @@ WRONG = {
     "[[lights]]\nkind='directional'\ndirection=[0.0,1.0,0.0]\nlux=1\ncolour=[0.0,0.0,0.0]": r"cannot be black",
     MATERIALS + "[[lights]]\nkind='ies'\nfile='../a.ies'\nposition=[0.0,0.0,0.0]": r"lights.file.*leaves its folder",
     MATERIALS + "[[lights]]\nkind='ies'\nfile='none.ies'\nposition=[0.0,0.0,0.0]": r"lights.file: file not found",
-    "[objects.lamp]\nemission=[1.0,1.0,1.0]\nlumens=5": r"has two intensities emission and lumens",
+    "[objects.lamp]\nemission=[1.0,1.0,1.0]\nlumens=5": r"has two intensities, emission and lumens",
     "[objects.sphere]\nlight_field = 'yes'": r"light_field: must be true, false, or a table of points.*; found yes",
     "[objects.sphere]\nlight_field = { poins = 9 }": r"light_field.poins: unknown key; did you mean 'points'",
     "[objects.sphere]\nlight_field = { points = 0 }": r"light_field.points.*greater than or equal to 1; found 0",
@@ -286,7 +286,7 @@ def test_a_material_of_the_scene_puts_away_the_files_picture(tmp_path: Path) -> 
     head = HEAD.replace('"builtin:box"', '["a.obj", "b.obj"]')
     scene = load_scene(written(tmp_path, "", head))
     assert set(scene.textures) == {"Wood_01"} and scene.object("b").material == "Wood_01_2"
-    assert "the second is now Wood_01_2" in " ".join(scene.warnings)
+    assert "the second is renamed to Wood_01_2" in " ".join(scene.warnings)
     walnut = "[materials.walnut]\nkd = 0.3\n"
     scene = load_scene(written(tmp_path, walnut + '[assign]\n"Wood*" = "walnut"\n', head))
     assert {o.material for o in scene.objects} == {"walnut"} and "walnut" not in scene.textures

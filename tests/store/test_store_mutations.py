@@ -235,7 +235,7 @@ BIG = 15 << 30
         ((*SCENE, "objects", 0, "first_face"), -1, "face index out of range"),
         ((*SCENE, "reflectors", 0, "parts", 0, "object"), "flood", "unknown object; found flood"),
         ((*SCENE, "reflectors", 0, "parts", 0, "faces"), [2], "face index out of range"),
-        ((*SCENE, "cameras", 0, "fov_y_deg"), float("nan"), "sees no angle"),
+        ((*SCENE, "cameras", 0, "fov_y_deg"), float("nan"), "impossible field of view"),
         ((*SCENE, "textures"), {"woof": {"parts": {}}}, "unknown material"),
         ((*SCENE, "exposure_ev"), float("inf"), "not finite"),
         ((*SCENE, "materials", "wood", "name"), "\ud800", "manifest"),

@@ -31,13 +31,13 @@ def test_round_trip(tmp_path):
     [
         (lambda d: d.update(version=2), "version"),
         (lambda d: d.update(more=1), "more"),
-        (lambda d: d["cameras"][0].update(position=[0, float("nan"), 0]), "not within 1e9 m"),
-        (lambda d: d["cameras"][0].update(position=[0, 1e308, 0]), "not within 1e9 m"),
-        (lambda d: d["cameras"][0].update(fov_y_deg=180), "sees no angle"),
-        (lambda d: d["paths"][0].update(times_s=[0, 3]), "one time per key"),
+        (lambda d: d["cameras"][0].update(position=[0, float("nan"), 0]), "beyond 1e9 m"),
+        (lambda d: d["cameras"][0].update(position=[0, 1e308, 0]), "beyond 1e9 m"),
+        (lambda d: d["cameras"][0].update(fov_y_deg=180), "impossible field of view"),
+        (lambda d: d["paths"][0].update(times_s=[0, 3]), "one time for each key"),
         (lambda d: d["paths"][0].update(times_s=[0, 3, 3]), "start at 0, increase"),
         (lambda d: d["paths"][0].update(seconds=9), "start at 0, increase"),
-        (lambda d: d["paths"][0].update(keys=[], times_s=[]), "one time per key"),
+        (lambda d: d["paths"][0].update(keys=[], times_s=[]), "one time for each key"),
     ],
 )
 def test_damage_is_said_and_nothing_is_overwritten(tmp_path, damage, word):

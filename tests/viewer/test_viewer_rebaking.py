@@ -135,7 +135,7 @@ def test_a_folder_of_somebody_else_is_left_alone(store, tmp_path):
         bake_again(store, tmp_path / "other", {}, quality=TINY)
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "letter.txt").write_text("dear")
-    with pytest.raises(UserError, match="not empty"):
+    with pytest.raises(UserError, match="neither empty"):
         bake_again(store, tmp_path / "full", {}, quality=TINY)
     assert (tmp_path / "full" / "letter.txt").read_text() == "dear"
 

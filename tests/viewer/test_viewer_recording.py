@@ -112,7 +112,7 @@ def test_record_save_rename_delete(state, tmp_path):
     before = state.recordings.recorder.draft
     state.recordings.recorder.smooth(1.5)
     assert state.recordings.recorder.draft != before
-    for name, word in (("", "name is empty"), ("tour", "name is already used"), ("a\tb", "not a name")):
+    for name, word in (("", "name is empty"), ("tour", "name is already used"), ("a\tb", "name cannot be used")):
         state.recordings.recorder.name = name
         state.recordings.save()
         assert word in state.screen.messages[-1].text and state.recordings.recorder.draft is not None

@@ -85,7 +85,7 @@ class SceneFiles:
         """The file that `name` means in `file`, as a source; None, and a note, where it is not there."""
         path, moved = self.find(name, file, field)
         if not path.is_file():
-            note(f"{what} {name} was not found{otherwise}")
+            note(f"{what} {name} is missing{otherwise}")
             return None
         if moved:
             note(f"{what} {name} was found beside {file.name}")

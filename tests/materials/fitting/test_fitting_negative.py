@@ -94,7 +94,7 @@ def test_what_was_done_is_said(metric: str, taken: str) -> None:
     assert provenance is not None and provenance.samples["below_zero"] == samples.below_zero > 0
     assert provenance.samples["used"] == len(samples) and "negative" not in provenance.samples
     (line,) = (note for note in provenance.notes if "below zero" in note)
-    assert line.startswith(f"{samples.below_zero} of {len(samples)} tuples") and "they are kept" in line
+    assert line.startswith(f"{samples.below_zero} of {len(samples)} tuples") and "a fit keeps them" in line
     assert f"the {metric} metric counts them {taken}" in line
     clean = fit(synthesise(YELLOW, replace(FEW, floor=0.0)).samples(), metric=metric).material.provenance
     assert clean is not None and not any("below zero" in note for note in clean.notes)

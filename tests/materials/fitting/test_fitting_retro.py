@@ -90,7 +90,7 @@ def test_it_is_not_taken_for_little():
     samples = synthesise(material, replace(SETUP, noise=0.1)).samples()
     result = fit(samples, ranges={"r_mx": (0.01, 0.1)})
     assert not any(lobe.retro for lobe in result.material.lobes)
-    assert any("not taken" in note for note in result.material.provenance.notes)
+    assert any("not added" in note for note in result.material.provenance.notes)
     assert fit(samples, retro=True).material.lobes[-1].retro
 
 

@@ -153,7 +153,7 @@ ROWS = "0 0 0 0 1\n0 0 20 0 1\n0 0 20 90 1\n"
             "quantity of the value columns is not stated; found value",
         ),
         ("theta_in phi_in theta_out phi_out r g b\n0 0 0 0 1 1 1\n", "quantity of the value columns is not stated"),
-        ("theta_in phi_in theta_out phi_out a b\n0 0 0 0 1 1\n", "no known kind"),
+        ("theta_in phi_in theta_out phi_out a b\n0 0 0 0 1 1\n", "unknown value columns"),
         ("theta_in phi_in theta_out phi_out brdf\n", "no rows"),
         ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 1\n0 0 0\n", "one value per column name"),
         ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 spam\n", "found spam"),
@@ -164,7 +164,7 @@ ROWS = "0 0 0 0 1\n0 0 20 0 1\n0 0 20 90 1\n"
         ("theta_in phi_in theta_out phi_out brdf\n99 0 0 0 1\n", "outside its range"),
         ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 nan\n", "no measured value"),
         ("NUM_POINTS 5\nVARS theta_i,phi_i,theta_s,phi_s,BRDF\n0,0,0,0,1\n", "NUM_POINTS: number of tuples"),
-        ("VARS theta_i,phi_i,theta_s,phi_s\n0,0,0,0\n", "no known kind; found none"),
+        ("VARS theta_i,phi_i,theta_s,phi_s\n0,0,0,0\n", "unknown value columns; found none"),
     ],
 )
 def test_refused_columns(tmp_path: Path, text: str, expected: str) -> None:

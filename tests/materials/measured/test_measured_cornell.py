@@ -91,10 +91,10 @@ def test_bad_samples_are_counted(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        (lambda text: text[:-12], "does not fit"),
+        (lambda text: text[:-12], "wrong number"),
         (lambda text: text.replace("0.2", "spam", 1), "not a number"),
         (lambda text: text.replace("\n5\n", "\n500\n"), "wavelengths are missing"),
-        (lambda text: "\n".join(text.split("\n")[:3]), "does not fit"),
+        (lambda text: "\n".join(text.split("\n")[:3]), "wrong number"),
         (lambda text: text.replace(" 0.2 0.2 0.2 0.2 0.2", " -1 nan -1 -1 -1"), "no measured value"),
     ],
 )

@@ -78,4 +78,4 @@ def test_only_more_than_the_tolerance_is_more_than_arrives(excess: float, warned
     furnace = albedos(White())
     assert any("more than arrives" in line or "measured well" in line for line in _warnings(0.0, furnace)) is warned
     document = Material(kd=albedo)
-    assert any("more than it receives" in line for line in _energy(document)) is warned
+    assert any("more light than it receives" in line for line in _energy(document)) is warned

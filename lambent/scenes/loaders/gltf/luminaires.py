@@ -57,7 +57,7 @@ class Luminaires:
     def _content(self, profile: ProfileDocument, field: str) -> bytes:
         if profile.uri is not None:
             if self._gltf.is_missing(profile.uri, field):
-                raise UserError(f"{profile.uri} was not found", field=field)
+                raise UserError(f"{profile.uri} is missing", field=field)
             content = self._gltf.resource(profile.uri, field)
         elif profile.bufferView is not None:
             buffer, start, length, _ = self._gltf.view(profile.bufferView)

@@ -64,7 +64,7 @@ class Textures:
             )
             return None
         if document.uri is not None and gltf.is_missing(document.uri, field):
-            notes.append(f"picture {document.uri} was not found: only its factor is used")
+            notes.append(f"picture {document.uri} is missing: only its factor is used")
             return None
         if document.uri is not None:
             data = gltf.resource(document.uri, field)

@@ -51,7 +51,7 @@ def _picture(plugin: Plugin, matrix: Floats) -> Environment | None:
     """Mitsuba's pictures have +y on top, as ours, and +z in the middle, where ours have -z."""
     path = plugin.file()
     if not path.is_file():
-        plugin.note(f"picture {plugin.text('filename')} was not found: left out")
+        plugin.note(f"picture {plugin.text('filename')} is missing: left out")
         return None
     plugin.reading.files.use(path)
     axes = matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)

@@ -47,7 +47,7 @@ def mesh_of_shape(plugin: Plugin, name: str, world: Floats, known: dict[int, Mad
         try:
             made: Made = make(plugin, name)
         except MissingFile as missing:
-            made = None, [f"{name}: left out, its file {missing} was not found"], False
+            made = None, [f"{name}: left out, its file {missing} is missing"], False
         local, notes, from_faces = known[key] = made
     if local is None:
         return None, notes

@@ -135,7 +135,7 @@ def _there(document: SceneDocument, path: Path, files: SceneFiles) -> tuple[list
     if len(gone) == len(names):
         raise UserError(f"no geometry file was found: {', '.join(gone)}", file=path, field="geometry")
     there = [entry for entry, name in zip(document.geometry, names, strict=True) if name not in gone]
-    return there, [f"geometry {name} was not found: left out" for name in gone]
+    return there, [f"geometry {name} is missing: left out" for name in gone]
 
 
 def _parse(path: Path) -> SceneDocument:
