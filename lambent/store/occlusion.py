@@ -1,6 +1,6 @@
 """How far the light map scales a probe's light: the notes of its radiance.
 
-r is the light map's share of `seen_irradiance` (`store.contract`), times `occlusion_gain`, at most 1. The light is scaled
+r is the share of `seen_irradiance` (`store.contract`) in the light map, times `occlusion_gain`, at most 1. Light is scaled
 by r; with `even_niches` by r^2, and (1 - r) E/pi of the light map's irradiance E is added from all directions.
 """
 
