@@ -1,7 +1,8 @@
 """How far the light map scales a probe's light: the notes of its radiance.
 
-r is the share of `seen_irradiance` (`store.contract`) in the light map, times `occlusion_gain`, at most 1. Light is scaled
-by r; with `even_niches` by r^2, and (1 - r) E/pi of the light map's irradiance E is added from all directions.
+r is the light map's share of `seen_irradiance` (`store.contract`), times `occlusion_gain`, at most 1. The probe's
+light is scaled by r; with `even_niches` by r^2, and (1 - r) E/pi is added from all directions, where the light map
+has the irradiance E.
 """
 
 from __future__ import annotations
