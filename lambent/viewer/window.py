@@ -5,6 +5,7 @@ Importing this needs a display.
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -25,6 +26,17 @@ BEFORE_IMGUI = -100  # Dear ImGui's handlers (order -99) stop events, which woul
 SETTLE_FRAMES = 3  # Dear ImGui shows what an event did one or two frames later
 FOR_IMGUI_ONLY = ("char", "resize")
 EVENTS = ("pointer_down", "pointer_move", "pointer_up", "pointer_leave", "wheel", "key_down", "key_up", *FOR_IMGUI_ONLY)
+
+
+def _interrupt_between_frames() -> None:
+    """Let Ctrl-C close the window between two frames.
+
+    The handler of the running loop closes the canvas at once. Within a frame that destroys the surface which is drawn
+    to, and the graphics library aborts the process.
+    """
+    close = signal.getsignal(signal.SIGINT)
+    if callable(close):
+        signal.signal(signal.SIGINT, lambda number, stack: loop.call_soon(close, number, stack))
 
 
 class Window:
@@ -59,6 +71,7 @@ class Window:
     def run(self) -> None:
         """Show the window until it is closed; raise the first error."""
         self.canvas.request_draw(self._draw)
+        loop.call_soon(_interrupt_between_frames)
         loop.run()
         if self._error is not None:
             raise self._error

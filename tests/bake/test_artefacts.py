@@ -169,18 +169,18 @@ NAMES = (
     "probe/floor/planes",
 )
 PINNED = {
-    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 fa0bd107 831189ee 44717c76 b3594e5a",
-    ("preview", "photons", "traced"): "1dec1a65 4cae5d96 6d3ab68c f87f05fa e5340d30 6165f354",
-    ("normal", "paths", "cached"): "6161cd22 5095e777 86bc134f b8c5136c 4d45da34 faf66d70",
-    ("normal", "photons", "traced"): "6161cd22 5095e777 75e36e29 4cdea744 30f39207 22c32f05",
-    ("final", "paths", "cached"): "a38141f9 cef94a2c 07328f74 34c98c48 a9de1d97 1adff4b8",
-    ("final", "photons", "traced"): "a38141f9 cef94a2c f1574cdd e0ee89a5 fd470811 f205164a",
+    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 62826275 b10c6153 961ea049 c473f316",
+    ("preview", "photons", "traced"): "1dec1a65 4cae5d96 493576a5 b18d77b3 8bbff745 f2524a03",
+    ("normal", "paths", "cached"): "6161cd22 5095e777 ca1bc7db c922d6f4 090fbd2f dd80d1a6",
+    ("normal", "photons", "traced"): "6161cd22 5095e777 c3dd8d8a 65c1843f 0b8a4a9a e4d0565d",
+    ("final", "paths", "cached"): "a38141f9 cef94a2c 6fbf5e5b 27f817ab 1d2942b5 68a263b9",
+    ("final", "photons", "traced"): "a38141f9 cef94a2c 95888972 2aa08bcd ce740dcb e83161eb",
 }
 
 
 @pytest.mark.parametrize("case", PINNED, ids="-".join)
 def test_stores_of_older_bakes_are_up_to_date(tmp_path: Path, case: tuple[str, str, str]) -> None:
-    """Keys since probes keep flat objects in view: where one changes without need, everybody bakes again."""
+    """Keys since light maps keep the level of their samples: where one changes without need, everybody bakes again."""
     quality, light_map, probes = case
     store = Store.create(tmp_path / "s", {})
     methods = chosen({}, light_map=light_map, probes=probes)

@@ -146,7 +146,7 @@ def test_a_worker_with_other_libraries_is_refused(two: DaskWorkers, monkeypatch:
 
     ours = cluster.made_with()
     monkeypatch.setattr(cluster, "made_with", lambda: {**ours, "mitsuba": "2.0"})
-    with pytest.raises(UserError, match=r"another mitsuba.*3"):
+    with pytest.raises(UserError, match=r"different mitsuba.*3"):
         list(two.each(abs, [1]))
 
 

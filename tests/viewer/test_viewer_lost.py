@@ -17,7 +17,7 @@ from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.state import WalkState
 from tests.viewer.small_store import write_small_store
-from tests.viewer.window_session import VirtualScreen, WindowSession, missing_tools
+from tests.viewer.window_session import INTERRUPT, VirtualScreen, WindowSession, missing_tools
 
 
 class Ended(Drawing):
@@ -105,6 +105,21 @@ def test_a_window_that_is_lost_keeps_its_material(adapter, tmp_path, how):
     rescued = read_session(tmp_path / "store" / UNSAVED_FILE).now.materials["brass"]
     assert rescued.model_dump(mode="json")["lobes"] == seen["edited"]["brass"]["lobes"]
     assert UNSAVED_FILE in session.log()
+
+
+@pytest.mark.slow
+def test_an_interrupt_within_a_frame_closes_the_window_after_it(adapter, tmp_path):
+    if missing_tools():
+        pytest.skip(f"not installed: {', '.join(missing_tools())}")
+    screen = VirtualScreen()
+    session = WindowSession(screen, write_small_store(tmp_path / "store"), tmp_path)
+    try:
+        session.tool("key", INTERRUPT)
+        code = session.process.wait(60)
+    finally:
+        session.kill()
+        screen.close()
+    assert code == 0 and "Received signal Interrupt" in session.log(), session.log()
 
 
 def test_a_walk_that_can_be_kept_nowhere_is_said(mode, state, capsys, monkeypatch):

@@ -20,10 +20,12 @@ from lambent.viewer.modes.edit.state import EditState
 from tests.viewer.panel_driver import recording
 
 MARK = "F12"  # a key that means nothing: what was sent before it has arrived when it does
+INTERRUPT = "F11"  # another: Ctrl-C, while the next frame is drawn to the window
 
 
 class WatchedWindow(window.Window):
     frames_drawn = marks_seen = 0
+    interrupt = False
 
     def __init__(self, *args, **kwargs):
         self.rects = {}
@@ -33,6 +35,13 @@ class WatchedWindow(window.Window):
     def _on_event(self, event):
         super()._on_event(event)
         self.marks_seen += event["event_type"] == "key_down" and event["key"] == MARK
+        self.interrupt |= event["event_type"] == "key_down" and event["key"] == INTERRUPT
+
+    def _clear(self):
+        super()._clear()
+        if self.interrupt:
+            self.interrupt = False
+            signal.raise_signal(signal.SIGINT)
 
     def _schedule(self):
         super()._schedule()

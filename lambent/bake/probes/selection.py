@@ -195,7 +195,12 @@ class Scaling:
 
 
 UNSCALED = Scaling(0.0)
-SCALINGS = {Scaling(1.0): WORTH, Scaling(2.0): 0.95, Scaling(1.5, even=True): 0.95}  # what each must lower the error to
+SCALINGS = {  # what each must lower the error to
+    Scaling(1.0): WORTH,
+    Scaling(2.0): 0.95,
+    Scaling(1.0, even=True): 0.95,
+    Scaling(1.5, even=True): 0.95,
+}
 
 
 @dataclass(frozen=True)

@@ -163,7 +163,7 @@ ROWS = "0 0 0 0 1\n0 0 20 0 1\n0 0 20 90 1\n"
         ("theta_in theta_inc theta_out brdf\n0 0 0 1\n", "same angle"),
         ("theta_in phi_in theta_out phi_out brdf\n99 0 0 0 1\n", "outside its range"),
         ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 nan\n", "no measured value"),
-        ("NUM_POINTS 5\nVARS theta_i,phi_i,theta_s,phi_s,BRDF\n0,0,0,0,1\n", "NUM_POINTS: number of tuples"),
+        ("NUM_POINTS 5\nVARS theta_i,phi_i,theta_s,phi_s,BRDF\n0,0,0,0,1\n", "NUM_POINTS: wrong number of tuples"),
         ("VARS theta_i,phi_i,theta_s,phi_s\n0,0,0,0\n", "unknown value columns; found none"),
     ],
 )
