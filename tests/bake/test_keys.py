@@ -48,11 +48,12 @@ from lambent.store.store import Store
 from tests.bake.small_scenes import GREY, MIRROR, TINY
 
 NOTHING: tuple[str, ...] = ()
-PROBES = ("probe/", "answer/probe/", "light_map/probe_share")
+SHARES = "light_map/probe_share"
+PROBES = ("probe/", "answer/probe/", SHARES)
 FIELDS = ("light_field/",)
 ANSWER = ("answer/",)
 BAKED = ("light_map/", *PROBES, *FIELDS, *ANSWER)
-OF_BALL = ("probe/ball/", "answer/probe/ball/")
+OF_BALL = ("probe/ball/", "answer/probe/ball/", SHARES)
 CAMERA = Camera("front", (0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
 SEEN = View(CAMERA, 8, 6)
 REFLECTED = tuple(SEEN.name("relighting", part) for part in ("spans", "points", "values", "errors", "lamps"))
@@ -167,7 +168,7 @@ SCENE: Answers = {
     "crease_deg": (30.0, NOTHING),  # the meshes have it already
     "sources": ((Path("other.toml"),), NOTHING),
     "warnings": (("a face is missing",), NOTHING),
-    "probe_planes": (lambda planes: {name: 2 * plane for name, plane in planes.items()}, ("probe/ball/planes",)),
+    "probe_planes": (lambda planes: {name: 2 * plane for name, plane in planes.items()}, ("probe/ball/planes", SHARES)),
     "probe_centres": ({"ball": (0.0, 1.0, 0.2)}, OF_BALL),
     "light_fields": ({"ball": LightFieldWish(), "other ball": LightFieldWish()}, FIELDS),
     "reflector_rules": ((ReflectorRule("floor", use=False),), NOTHING),

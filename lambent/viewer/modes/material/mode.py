@@ -87,7 +87,7 @@ def _preview(file: Path, environments: Sequence[Path]) -> Preview:
         preview.add(path)
     for path in environments:
         if not path.is_file():
-            raise UserError("no such file", file=path, field="--environment")
+            raise UserError("file does not exist", file=path, field="--environment")
         preview.choose(path)
     return preview
 
