@@ -157,7 +157,7 @@ def test_a_store_has_groups_that_add_up_to_what_it_shows(baked: Store) -> None:
     count = raw[..., 3].sum(axis=0)
     known = count > 0
     means = raw[..., :3].sum(axis=0)[known] / count[known][:, None]
-    assert parts[known].reshape(-1, 4, 3)[:, :2].sum(axis=1) == pytest.approx(means, rel=1e-4, abs=1e-5)
+    assert parts[known].reshape(-1, 4, 3)[:, :2].sum(axis=1) == pytest.approx(means, rel=2**-12, abs=1e-5)  # 12 bits of fraction
 
 
 def test_a_bake_with_groups_goes_on_where_it_was_interrupted(baked: Store, tmp_path: Path) -> None:
@@ -246,4 +246,4 @@ def test_samples_by_group_are_rounded_evenly(mi: Any) -> None:
     found = rounded(means)
     assert np.allclose(found, means, rtol=2**-13, atol=0)
     assert np.mean(found[3:] / means[3:]) == pytest.approx(1, abs=2e-6)
-    assert len(zlib.compress(found.tobytes())) < 0.7 * len(zlib.compress(means.tobytes()))
+    assert len(zlib.compress(found.tobytes())) < 0.8 * len(zlib.compress(means.tobytes()))

@@ -183,8 +183,8 @@ def test_interreflections_are_proposed_and_baked_as_the_user_wants(lambent, scen
     ("fault", "options"),
     [
         ("-o: ", ()),
-        ("--view: no view", ("--propose",)),
-        ("--view: no view", ("-o", "s", "--only", "interreflection")),
+        ("--view: is missing", ("--propose",)),
+        ("--view: is missing", ("-o", "s", "--only", "interreflection")),
         ("expected 2 to 6 numbers", (*BOUNCED[2:], "--propose", "--series", "64")),
         ("expected numbers, as in 64,1,1,1", (*BOUNCED[2:], "--propose", "--series", "a,b")),
         ("expected powers of two", (*BOUNCED[2:], "--propose", "--series", "63,1")),

@@ -18,5 +18,5 @@ def test_the_table_says_object_points_memory_seconds_and_errors():
     chosen = {"object": "bowl", "points": 64, "megabytes": 1.96, "seconds": 3.21, "probe_error": 0.388, "error": 0.114}
     asked = {"object": "teapot", "points": 9, "megabytes": 0.1, "seconds": 0.2}
     head, first, second = _light_fields_in_words([chosen, asked]).splitlines()
-    assert " ".join(head.split()) == "light field of points MB seconds error of its probe and its own"
+    assert " ".join(head.split()) == "light field of points MB seconds error with probe with light field"
     assert first.split() == ["bowl", "64", "2.0", "3.2", "0.388", "0.114"] and second.split()[:2] == ["teapot", "9"]
