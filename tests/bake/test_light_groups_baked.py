@@ -157,7 +157,7 @@ def test_a_store_has_groups_that_add_up_to_what_it_shows(baked: Store) -> None:
     count = raw[..., 3].sum(axis=0)
     known = count > 0
     means = raw[..., :3].sum(axis=0)[known] / count[known][:, None]
-    assert parts[known].reshape(-1, 4, 3)[:, :2].sum(axis=1) == pytest.approx(means, rel=2**-12, abs=1e-5)  # 12 bits of fraction
+    assert parts[known].reshape(-1, 4, 3)[:, :2].sum(axis=1) == pytest.approx(means, rel=2**-12, abs=1e-5)
 
 
 def test_a_bake_with_groups_goes_on_where_it_was_interrupted(baked: Store, tmp_path: Path) -> None:

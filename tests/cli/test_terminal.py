@@ -166,5 +166,5 @@ def test_ctrl_c_is_clean_while_libraries_are_imported(name):
     program = INTERRUPTED_IMPORT.format(name=name, before="" if name else AT_THE_END_OF_AN_OBJECT)
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
     # A slow machine has been at the step long enough for its line.
-    said = r"(\w+: stopped after [\d.]+ s\n)?lambent: interrupted; what was finished is kept\n"
+    said = r"(\w+: stopped after [\d.]+ s\n)?lambent: interrupted; finished work is kept\n"
     assert (done.returncode, done.stdout) == (130, "") and re.fullmatch(said, done.stderr), done.stderr
