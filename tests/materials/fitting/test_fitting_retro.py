@@ -67,7 +67,7 @@ def test_tapes_of_other_shape_keep_their_peak(tape):
     for theta, tolerance in ((0.0, 0.2), (25.0, 0.2), (45.0, 0.4)):  # the lobe narrows across the plane as cos theta
         wi = direction(np.radians(theta), 0.0)
         assert MaterialBSDF(with_it.material).eval(wi, wi)[0] == pytest.approx(tape.eval(wi, wi)[0], rel=tolerance)
-    assert any("removes" in note and "taken" in note for note in with_it.material.provenance.notes)
+    assert any("removes" in note and "(added)" in note for note in with_it.material.provenance.notes)
 
 
 def test_the_grid_search_fits_it_too(beads):
