@@ -137,7 +137,9 @@ def command(
     ] = None,
     recolour: Annotated[
         list[str] | None,
-        typer.Option(help="MATERIAL=#rrggbb: another diffuse colour; the light in the room follows. Repeatable."),
+        typer.Option(
+            help="MATERIAL=#rrggbb: another diffuse colour; indirect light follows. MATERIAL may have * and ?. Repeatable."
+        ),
     ] = None,
     variant: Annotated[
         str,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
 
 import numpy as np
 
@@ -42,11 +43,17 @@ def hex_colour(text: str) -> Triple | None:
 def recoloured(materials: Mapping[str, Material], colours: Mapping[str, Triple]) -> dict[str, Material]:
     """The materials that get other colours: diffuse reflection `colours` (linear RGB), which textures multiply.
 
+    A key with * or ? stands for all materials that match it; of two keys for one material the last counts.
+
     Raises
     ------
     UserError
-        Where there is no material of a name.
+        Where a name or pattern matches no material.
     """
-    for name in colours:
-        known("material", name, materials, field=FIELD)
-    return {name: materials[name].model_copy(update={"kd": colour}) for name, colour in colours.items()}
+    found: dict[str, Material] = {}
+    for name, colour in colours.items():
+        alike = [one for one in materials if fnmatchcase(one, name)] or [
+            known("material", name, materials, field=FIELD)
+        ]
+        found |= {one: materials[one].model_copy(update={"kd": colour}) for one in alike}
+    return found

@@ -32,6 +32,14 @@ def test_a_material_is_named_once_and_there() -> None:
         recoloured({"walls": GLOSSY}, {"wals": (0, 0, 0)})
 
 
+def test_a_pattern_stands_for_all_materials_that_match() -> None:
+    """Variants split a material: wall and wall_2 are one paint to a user."""
+    both = recoloured({"wall": GLOSSY, "wall_2": GLOSSY, "floor": GLOSSY}, {"wall*": (0.1, 0.2, 0.3)})
+    assert {name: one.kd for name, one in both.items()} == {"wall": (0.1, 0.2, 0.3), "wall_2": (0.1, 0.2, 0.3)}
+    with pytest.raises(UserError, match=r"roof\*"):
+        recoloured({"wall": GLOSSY}, {"roof*": (0, 0, 0)})
+
+
 def test_a_colour_changes_the_diffuse_reflection_alone() -> None:
     edited = recoloured({"wall": GLOSSY}, {"wall": (0.1, 0.2, 0.3)})["wall"]
     assert edited == GLOSSY.model_copy(update={"kd": (0.1, 0.2, 0.3)})

@@ -85,7 +85,9 @@ def test_a_file_with_a_wider_peak_is_described(tmp_path: Path):
     table, path = tape.measured(10.0), tmp_path / "wide.txt"
     gonio_text.write(replace(tape, width_deg=2 * tape.width_deg).measured(10.0), path)
     (line,) = read_back(table, path, ()).lost
-    returned, misplaced = (float(number) for number in re.findall(r"returns ([0-9.]+) times.*, (\d+)% of it misplaced", line)[0])
+    returned, misplaced = (
+        float(number) for number in re.findall(r"returns ([0-9.]+) times.*, (\d+)% of it misplaced", line)[0]
+    )
     assert returned == pytest.approx(1, abs=0.15) and misplaced == pytest.approx(88, abs=6)
 
 
