@@ -138,7 +138,7 @@ def command(
     recolour: Annotated[
         list[str] | None,
         typer.Option(
-            help="MATERIAL=#rrggbb: another diffuse colour; indirect light follows. MATERIAL may have * and ?. Repeatable."
+            help="MATERIAL=#rrggbb: another diffuse colour; indirect light follows. * and ? match names. Repeatable."
         ),
     ] = None,
     variant: Annotated[
