@@ -43,7 +43,7 @@ def serves(probe):
     return probe.distance is None
 
 
-def constants(probe):
+def constants(device, probe):
     return {"TIMES": 3}
 
 

@@ -113,5 +113,5 @@ def test_lobes_change_evenly_where_they_are_alike_and_else_stay_until_the_next()
 def test_textures_are_those_of_the_earlier_key() -> None:
     track = LookTrack({"oak": ((0.0, LOOKS["oak"]), (2.0, LOOKS["wall"]))})
     assert track.looks_at(1.9)["oak"].textures == "oak" and track.looks_at(2.0)["oak"].textures == ""
-    with pytest.raises(UserError, match="grow"):
+    with pytest.raises(UserError, match="times do not increase"):
         LookTrack({"oak": ((1.0, BLUE), (1.0, BLUE))})
