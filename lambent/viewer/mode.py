@@ -155,4 +155,4 @@ class Mode:
 def check_there(path: Path) -> None:
     """Raise `UserError` where `path` is neither a file or folder nor a built-in scene."""
     if not path.exists() and not str(path).startswith(BUILTIN_PREFIX):
-        raise UserError("does not exist", file=path)
+        raise UserError("file does not exist", file=path)

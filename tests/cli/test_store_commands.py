@@ -168,7 +168,7 @@ def test_bake_of_the_geometry(lambent, tmp_path):
 
 def test_bake_into_a_folder_that_is_something_else(refused, tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
-    assert "not a store" in refused("bake", "builtin:box", "-o", tmp_path, "--only", "geometry")
+    assert "nor a store" in refused("bake", "builtin:box", "-o", tmp_path, "--only", "geometry")
 
 
 def test_a_bake_says_what_its_scene_lost(lambent, tmp_path):

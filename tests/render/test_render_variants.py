@@ -58,7 +58,7 @@ def test_a_store_without_an_answer_shows_the_material_and_says_the_rest(adapter:
     assert red[-1, 0, 0] > 0 and red[-1, 0, 1] == 0 and any("stay as baked" in note for note in notes)
     dim = image(bare, replace(SMALL, variant="dim"), tmp_path, notes)
     assert np.array_equal(dim, image(bare, SMALL, tmp_path))
-    said = [note for note in notes if "the mix of the variant is left out: the store has no light group lamp" in note]
+    said = [note for note in notes if "light mix of the variant not applied: the store has no light group lamp" in note]
     assert len(said) == 1
     with pytest.raises(UserError, match=r"--variant: unknown variant; found rd; expected red, dim; did you mean 'red'"):
         image(bare, replace(SMALL, variant="rd"), tmp_path)

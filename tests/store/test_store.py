@@ -68,7 +68,7 @@ def test_partial_says_so_and_goes_on_where_it_stopped(tmp_path: Path) -> None:
     writer.write((1, 0, 0), ARRAY[2:4])
     store = Store.open(tmp_path / "s")
     assert "light_map/irradiance" not in store
-    with pytest.raises(UserError, match=r"partial \(1 of 3 chunks\).*--resume"):
+    with pytest.raises(UserError, match=r"partial \(1 of 3 chunks\).*run `lambent bake` again"):
         store.read("light_map/irradiance")
     store, writer = begin(tmp_path / "s")
     assert writer.missing == [(0, 0, 0), (2, 0, 0)]

@@ -70,7 +70,7 @@ def test_a_stored_state_comes_back_and_can_be_undone(state):
     edits.undo()
     assert states.all["evening"].light == OFF
     states.typed_name = "as baked"
-    with pytest.raises(UserError, match="taken"):
+    with pytest.raises(UserError, match="already used"):
         states.store()
 
 

@@ -10,7 +10,7 @@ from lambent.viewer.mode import Mode
 from lambent.viewer.screen import Screen
 
 STARTS = ("walk", "view")
-NO_DISPLAY = "the window needs a display; without one, use `lambent render` or `lambent demo --headless`"
+NO_DISPLAY = "use `lambent render` or `lambent demo --headless`"
 
 
 def check(path: Path) -> None:
