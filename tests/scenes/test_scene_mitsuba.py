@@ -254,8 +254,8 @@ def test_sheets_masks_and_what_is_lost(tmp_path: Path) -> None:
     assert leaf.opacity is not None and leaf.opacity.texels.ravel().tolist() == [1, 0]
     assert m["leaf"].kd == pytest.approx((0, 1, 0))  # the mean of what is to be seen
     assert m["veil"].kd == pytest.approx((0.125,) * 3) and m["veil"].lobes[0].k == (0.75,) * 3
-    for words in ("light is not refracted", "alpha channel", "bump map is ignored", "fur (hair): unknown, it becomes grey",
-                  "no surface (null)", "unknown kind", "ignored: shine"):  # fmt: skip
+    for words in ("light is not refracted", "alpha channel", "bump map is ignored", "no surface (null)", "unknown kind",
+                  "fur (hair): unknown, it becomes grey", "ignored: shine"):  # fmt: skip
         assert said.count(words) == 1, (words, said)
     assert len(scene.objects) == 7 and m["fur"].kd == (0.5,) * 3
 
