@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 KIND = "probe_share"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 1
+REVISION = 2
 
 
 def keys(context: BakeContext) -> dict[str, str]:

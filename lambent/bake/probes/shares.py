@@ -18,6 +18,7 @@ rays between black ones, a grey mean is right there, and wrong in a mirror.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,12 +44,13 @@ from lambent.materials.lobes import fresnel
 from lambent.store.occlusion import MOST_SHARE
 
 RAYS = 64  # from each texel, a multiple of POINTS
-SMOOTH = 4  # rounds of averaging the texels' equations over their charts
+SMOOTH = 12  # rounds of averaging the texels' equations over their charts
 PENALTY = 0.01  # of a share that changes with the direction, relative to the mean of the equations' diagonal
 WIDE = 0.1  # roughness of a lobe
 WORTH = 0.95  # times the error without, that shares must lower it to
 JUDGED = 1 << 16  # rays of an object by which its shares are judged
 RAYS_AT_ONCE = 1 << 21
+GOLDEN = math.pi * (3 - math.sqrt(5))  # radians between rays that follow each other
 UPPER = np.triu_indices(4)
 EQUATIONS = len(UPPER[0]) + 4  # of a texel: upper triangle of the matrix, right side
 
@@ -123,9 +125,9 @@ class ShareTracer:
         at = thread // RAYS * POINTS + thread % POINTS
         p, n, flat = (dr.gather(mi.Vector3f, v, at) for v in (points.position, points.normal, points.flat))
         sampler = independent(seed & 0xFFFFFFFF, count)
-        u = sampler.next_2d()
-        cosine = (mi.Float(thread % RAYS) + u.x) / RAYS  # even over the hemisphere, each in a ring of its own
-        sine, (sin_phi, cos_phi) = dr.safe_sqrt(1 - cosine * cosine), dr.sincos(2 * dr.pi * u.y)
+        k = mi.Float(thread % RAYS)  # the same spiral at every texel: other rays at its neighbour would show as mottle
+        cosine, phi = (k + 0.5) / RAYS, GOLDEN * k
+        sine, (sin_phi, cos_phi) = dr.safe_sqrt(1 - cosine * cosine), dr.sincos(phi)
         w = mi.Frame3f(n).to_world(mi.Vector3f(sine * cos_phi, sine * sin_phi, cosine))
         ray = rays.leaving(self._scene, p, flat, w)
         origin = dr.zeros(mi.SurfaceInteraction3f, count)
