@@ -14,6 +14,7 @@ from lambent.bake.light_fields.facing import turned_to_viewers
 from lambent.bake.light_fields.placing import Placing
 from lambent.bake.light_fields.trial import ProbeLight, Trial, tried
 from lambent.bake.light_fields.watched import Watched, watched
+from lambent.bake.probes.selection import Scaling
 from lambent.bake.tiles import seed_of
 from lambent.core.arrays import Floats
 from lambent.core.colour import luminance
@@ -115,7 +116,6 @@ def probe_light(store: Store, name: str) -> ProbeLight:
     radiance, distance, planes = (store.read(probe_name(owner, part)) for part in ("radiance", "distance", "planes"))
     centre = np.array(store.artefact(at).meta["centre"], float)
     unit, whole = radiance_unit(store, at), probe_irradiance(store, owner)
-    scaled = np.array(whole) / occlusion_gain(store, owner) if len(whole) else None
-    even = has_even_niches(store, owner)
+    scaling = Scaling(occlusion_gain(store, owner), has_even_niches(store, owner))
     light = radiance.astype(float) * unit
-    return ProbeLight(light, distance.astype(float), planes, centre, scaled, even_niches=even)
+    return ProbeLight(light, distance.astype(float), planes, centre, np.array(whole) if len(whole) else None, scaling)

@@ -10,10 +10,10 @@ from lambent.bake.light_fields.acquisition import Around, inverse_distances, rad
 from lambent.bake.light_fields.facing import views_in
 from lambent.bake.light_fields.placing import Placing
 from lambent.bake.light_fields.watched import Watched
+from lambent.bake.probes.selection import PLAIN, Scaling
 from lambent.core.arrays import Floats
 from lambent.core.cubemap import sample
 from lambent.core.directions import normalize
-from lambent.core.irradiance import basis_of
 from lambent.core.light_field import LightField
 from lambent.core.light_field_lookup import Place, marched
 from lambent.core.nearest_points import nearest_points
@@ -35,12 +35,11 @@ class ProbeLight:
         planes: Floats,
         centre: Floats,
         irradiance: Floats | None = None,
-        *,
-        even_niches: bool = False,
+        scaling: Scaling = PLAIN,
     ) -> None:
-        """`irradiance`, nine numbers, is what the probe alone would give, where its light is scaled (`Scaling`)."""
+        """`irradiance`, nine numbers, is what the probe alone would give, where its light is scaled."""
         self._radiance, self._centre, self._irradiance = radiance, centre, irradiance
-        self._even_niches = even_niches
+        self._scaling = scaling
         self._planes = planes + np.outer(planes[:, :3] @ centre, [0, 0, 0, 1])
         self._inverse = None if len(planes) else inverse_depth(distance)
 
@@ -49,11 +48,7 @@ class ProbeLight:
         found = self.along(watched.origins, watched.directions)
         if self._irradiance is None:
             return found
-        whole = np.maximum(basis_of(watched.normals) @ self._irradiance, 1e-6)
-        share = np.clip(watched.irradiance / whole, 0, 1)[:, None, None]
-        if not self._even_niches:
-            return np.asarray(found * share)
-        return np.asarray(found * share**2 + (1 - share) * watched.irradiance[:, None, None] / np.pi)
+        return self._scaling.shown(found, watched.irradiance, watched.normals, self._irradiance)
 
     def along(self, origins: Floats, w: Floats) -> Floats:
         """Radiance (..., 3) along rays, as the renderer finds it."""

@@ -182,21 +182,22 @@ class Scaling:
     even: bool = False
 
     def shown(self, light: Floats, lit: Floats, normals: Floats, irradiance: Floats) -> Floats:
-        """Luminance (n,) along rays that find `light` (n,) in a probe of `irradiance` (9,).
+        """Light (n, ...) along rays that find `light` (n, ...) in a probe of `irradiance` (9,).
 
         The rays begin where surfaces have `normals` (n, 3) and the light map has the luminance `lit` (n,).
         """
         if self.gain == 0:
             return light
-        share = specular_occlusion(lit, normals, irradiance / self.gain)
+        each = (len(lit), *[1] * (light.ndim - 1))
+        share = specular_occlusion(lit, normals, irradiance / self.gain).reshape(each)
         if not self.even:
             return light * share
-        return np.asarray(light * share**2 + (1 - share) * lit / np.pi)
+        return np.asarray(light * share**2 + (1 - share) * lit.reshape(each) / np.pi)
 
 
-UNSCALED = Scaling(0.0)
+UNSCALED, PLAIN = Scaling(0.0), Scaling(1.0)
 SCALINGS = {  # what each must lower the error to
-    Scaling(1.0): WORTH,
+    PLAIN: WORTH,
     Scaling(2.0): 0.95,
     Scaling(1.0, even=True): 0.95,
     Scaling(1.5, even=True): 0.95,
