@@ -2,9 +2,10 @@
 
 A changed material is drawn over the last picture at full size, on its objects only. In motion: the few-sample
 integrator, on fewer pixels where the adapter is too slow, and without the mirrored views of planar reflectors (which
-show their probes then) where even half of the width and height takes too long with them. `REST_S` after the last
-change: the same once more, whole and with everything; then every frame adds samples of `qmc` to the picture, up to a
-stated count; then nothing is drawn any more.
+show their probes then) where even half of the width and height takes too long with them. Light that changes by itself,
+after an edit, does not replace a picture of full size by a smaller one: the picture stays until the whole frame with
+the new light is complete. `REST_S` after the last change: the same once more, whole and with everything; then every
+frame adds samples of `qmc` to the picture, up to a stated count; then nothing is drawn any more.
 """
 
 from __future__ import annotations
@@ -106,6 +107,7 @@ class Pacer:
         self.accumulated = 0  # accumulated frames; 0: a frame in motion
         self._changed_s = 0.0
         self._last: Plan | None = None
+        self._sharp = False  # whether all of the last picture has full size
         self._budget_s = BUDGET_S
 
     @property
@@ -117,13 +119,18 @@ class Pacer:
         """Set the target time of a frame in motion."""
         self._budget_s = seconds
 
-    def plan(self, picture: object, now_s: float, *, refine: bool, adaptive: bool, over: bool = False) -> Plan | None:
+    def plan(
+        self, picture: object, now_s: float, *, refine: bool, adaptive: bool, over: bool = False, keeps: bool = False
+    ) -> Plan | None:
         """Plan for `now_s` to show `picture`; None when it is already shown, or not yet due.
 
-        `over`: in motion, draw the changes over the last picture, at full size.
+        `over`: in motion, draw the changes over the last picture, at full size. `keeps`: if the last picture has full
+        size, keep that size.
         """
         if picture != self.shown:
             self.shown, self._changed_s, self.accumulated = picture, now_s, 0
+            if keeps and self._sharp:
+                return WHOLE
             if over:
                 return Plan(1.0, None, self._mirrors or not adaptive, over=True)
             return self.moving if adaptive else WHOLE
@@ -145,7 +152,9 @@ class Pacer:
             self.accumulated, self._last = 0, None
 
     def drawn(self, plan: Plan) -> None:
+        """Learn that a frame is shown."""
         self._last = plan
+        self._sharp = plan.scale == 1.0 and (self._sharp or not plan.over)
         self.accumulated = 0 if plan.accumulate is None else plan.accumulate + 1
 
     def cost(self, plan: Plan, seconds: float, mirrors: int = 0) -> None:

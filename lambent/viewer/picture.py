@@ -23,7 +23,7 @@ from lambent.realtime.slices import SLICE_S, Cut
 from lambent.realtime.targets import DISPLAY_FORMAT
 from lambent.viewer.edits import unused
 from lambent.viewer.mode import Drawing
-from lambent.viewer.pacing import Pacer, Plan, prior_share
+from lambent.viewer.pacing import WHOLE, Pacer, Plan, prior_share
 from lambent.viewer.screen import Rect, Screen, Statistics, least
 
 # At rest: frames of the progressive series, and samples per pixel and lobe in each. Software takes one sample at a
@@ -78,17 +78,22 @@ class Picture:
         self._refine = pace.refine if refine is None else refine
         self.pacer.aim(share * pace.target_ms / 1e3)
         rests = wanted == self.pacer.shown
+        relit = not rests and not pace.dragging and is_relit(wanted, self.pacer.shown)
         over = not rests and bool(self._renderer.redrawn(wanted))
-        if not (rests or (over and self._under_way is not None and self._under_way.plan.over)):
+        under_way = None if self._under_way is None else self._under_way.plan
+        # Finish a frame over another one, and a whole one whose light alone has changed: the next one shows the change.
+        # Otherwise a drag, or light that arrives part by part, would show nothing until its end.
+        if not (rests or (over and under_way is not None and under_way.over) or (relit and under_way == WHOLE)):
             self._under_way = None  # another frame is wanted: drop this one
         if self._under_way is not None:
             return
-        plan = self.pacer.plan(wanted, now_s, refine=self._refine, adaptive=pace.adaptive, over=over)
+        plan = self.pacer.plan(wanted, now_s, refine=self._refine, adaptive=pace.adaptive, over=over, keeps=relit)
         if plan is None or (rests and (pace.answering or self._quiet_for_s() > 0)):
             return
         frame = self._planned(wanted, plan)
         view = self._view_of(frame.width, frame.height)
-        if (rests and self._whole_s > SLICE_S) or (over and self._over_s > LONGEST_OVER_S):
+        whole = rests or (relit and plan == WHOLE)
+        if (whole and self._whole_s > SLICE_S) or (over and self._over_s > LONGEST_OVER_S):
             self._under_way = Job(plan, view, self._renderer.slices(frame, view, self._cut))
             return
         started = time.perf_counter()
@@ -96,7 +101,7 @@ class Picture:
         # Waiting keeps the queue short, so that a frame shows the latest event, and measures its cost.
         self._renderer.finish()
         seconds = time.perf_counter() - started
-        if rests:
+        if whole:
             self._whole_s = self._part_s = seconds
         elif over:
             self._over_s = seconds
@@ -274,6 +279,11 @@ class Pair(Drawing):
 
     def wait_s(self) -> float | None:
         return least(*(picture.wait_s() for picture in self.shown))
+
+
+def is_relit(wanted: FrameState, shown: object) -> bool:
+    """Whether a picture differs from the shown one in computed light alone, which follows edits by itself."""
+    return isinstance(shown, FrameState) and wanted == replace(shown, maps=wanted.maps, mixed=wanted.mixed)
 
 
 def size_px(place: Rect, pixel_ratio: float) -> tuple[int, int]:

@@ -64,6 +64,7 @@ class Pace:
     target_ms: float = 1e3 * BUDGET_S  # target time of a frame in motion
     covers: bool | None = None  # several depth samples per pixel in motion; None: where the adapter is fast enough
     touched_s: float = -math.inf  # time of the last event
+    dragging: bool = False  # a material is being dragged: its light is shown soon rather than sharp
     answering: bool = False  # an event was just handled: draw the interface before refining the picture
 
 

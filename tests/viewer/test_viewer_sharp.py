@@ -89,6 +89,63 @@ def test_the_whole_frame_follows_at_rest(pictures, state):
     assert abs(over - whole).max() > 2, "around the ball it was the small frame"
 
 
+def relight(renderer, factor):
+    """As an answer does: another light map, and a new version of the light."""
+    layers = [np.asarray(layer * np.float16(factor), np.float16) for layer in renderer.resources.light_layers]
+    renderer.resources.show_light_map(layers)
+    renderer.resources.light_version += 1
+
+
+def test_light_that_follows_an_edit_keeps_the_picture_sharp(pictures, state, renderer):
+    rest(pictures, state)
+    before = shown(pictures)
+    relight(renderer, 0.5)
+    pictures.update(PLACE, 1.0)
+    assert pictures.under_way, "drawn in parts, beside the picture"
+    pictures.work()
+    relight(renderer, 0.5)
+    pictures.update(PLACE, 1.0)
+    finish(pictures)
+    assert state.screen.statistics.resolution == (96, 64), "more light does not start the frame again"
+    pictures.update(PLACE, 1.0)
+    finish(pictures)
+    assert state.screen.statistics.resolution == (96, 64)
+    assert shown(pictures).mean() < 0.6 * before.mean(), "the latest light, a quarter; half would leave 0.69"
+    state.screen.clock.now_s += 1.0
+    pictures.update(PLACE, 1.0)
+    finish(pictures)
+    assert state.screen.statistics.accumulated == 1, "it refines next"
+
+
+def test_light_during_a_drag_is_shown_soon(pictures, state, renderer):
+    rest(pictures, state)
+    pull(state, 0.2)
+    assert state.materials.edits.in_stroke
+    pictures.update(PLACE, 1.0)
+    slow_down(pictures)
+    relight(renderer, 0.5)
+    pictures.update(PLACE, 1.0)
+    assert state.screen.statistics.resolution == (24, 16)
+    state.materials.edits.end_stroke()
+    slow_down(pictures)
+    relight(renderer, 0.5)
+    pictures.update(PLACE, 1.0)
+    assert state.screen.statistics.resolution == (24, 16), "a coarse picture is replaced at once"
+
+
+def rest(pictures, state):
+    state.screen.clock.now_s += 1.0
+    pictures.update(PLACE, 1.0)
+    finish(pictures)
+    assert state.screen.statistics.resolution == (96, 64)
+    slow_down(pictures)
+
+
+def finish(pictures):
+    while pictures.under_way:
+        pictures.work()
+
+
 def test_a_slow_one_is_drawn_in_parts_and_not_begun_anew(pictures, state):
     pictures._a._over_s = 10.0
     pull(state, 0.2)

@@ -91,8 +91,8 @@ class Pictures(Pair):
         self._follow_exchange()
         self._lane.answer(state.materials.edits.room)
         size = size_px(place, pixel_ratio)
+        in_stroke = state.screen.pace.dragging = state.materials.edits.in_stroke
         if self._rebaked is not None and state.films.under_way is None:
-            in_stroke = state.materials.edits.in_stroke
             self._rebaked.update(self._lane, state.recordings.light, state.navigation.camera, size, in_stroke=in_stroke)
         wanted = self._frame(size)
         self._outlining.update(wanted, state.selection.record)
