@@ -13,6 +13,8 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from lambent.core.arrays import Floats
 from lambent.core.light_mix import Factors
 from lambent.realtime.baked import BakedScene
@@ -40,6 +42,7 @@ class LightMixer:
         self._layouts, self._scene, self._resources = layouts, scene, resources
         self.version = 0
         self._wanted: Floats | None = None  # None: as baked, and nothing was read yet
+        self._shown: Floats | None = None  # mix of the light map on the GPU; None: as baked
         self._made: dict[int, bytes] = {}  # state of each part that was made last
         self._ready: deque[tuple[int, Floats, Any]] = deque()
         self._work: Future[None] | None = None
@@ -51,6 +54,13 @@ class LightMixer:
     def busy(self) -> bool:
         """Whether a part of the mix is not on the GPU yet."""
         return self._work is not None or bool(self._ready)
+
+    @property
+    def lags(self) -> bool:
+        """Whether the light map on the GPU is that of another mix."""
+        if self._wanted is None:
+            return False
+        return not np.array_equal(self._wanted, np.ones_like(self._wanted) if self._shown is None else self._shown)
 
     def follow(self, light: Factors, *, waits: bool) -> None:
         """Show a mix from this frame on, all of it where the frame `waits`, else what is ready.
@@ -173,6 +183,7 @@ class LightMixer:
                 item.relight(made, item.emission)
             return
         sides, (shown, mirrored) = made
+        self._shown = factors
         resources.show_light_map(sides)
         if shown is not None and mirrored is not None:
             resources.sky_group = resources.sky_group_of(shown)

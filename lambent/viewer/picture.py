@@ -78,7 +78,8 @@ class Picture:
         self._refine = pace.refine if refine is None else refine
         self.pacer.aim(share * pace.target_ms / 1e3)
         rests = wanted == self.pacer.shown
-        relit = not rests and not pace.dragging and is_relit(wanted, self.pacer.shown)
+        soon = pace.dragging or self._renderer.mixer.lags  # rather than sharp: the user waits for this light
+        relit = not rests and not soon and is_relit(wanted, self.pacer.shown)
         over = not rests and bool(self._renderer.redrawn(wanted))
         under_way = None if self._under_way is None else self._under_way.plan
         # Finish a frame over another one, and a whole one whose light alone has changed: the next one shows the change.

@@ -7,6 +7,7 @@ end cannot outlive the window.
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 import tempfile
@@ -90,4 +91,5 @@ class WorkerProcess:
             return
         self._log.seek(0)
         words = self._log.read().decode(errors="replace").strip()[-LAST_CHARACTERS:].splitlines()
-        raise UserError(f"{self._name} ended with {code} ({words[-1] if words else 'no message'})")
+        end = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with {code}"
+        raise UserError(f"{self._name} {end} ({words[-1] if words else 'no message'})")

@@ -90,12 +90,14 @@ def test_a_window_does_not_wait_and_shows_the_same_in_the_end(device: Any, scene
     state = replace(STATE, light={"lamp": RED, "sky": DARK})
     renderer.image(STATE)
     version, ends_s = renderer.mixer.version, time.monotonic() + 60
+    assert not renderer.mixer.lags, "light as baked"
     renderer.image(state)
+    assert renderer.mixer.lags
     while renderer.mixer.busy:
         renderer.image(state)
         assert time.monotonic() < ends_s
         time.sleep(0.01)
-    assert renderer.mixer.version > version
+    assert renderer.mixer.version > version and not renderer.mixer.lags
     expected = image(device, scene, state.light)
     assert renderer.image(state) == pytest.approx(expected, rel=1e-3, abs=1e-3)
 

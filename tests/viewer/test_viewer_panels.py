@@ -62,6 +62,29 @@ def test_the_line_on_a_bake_moves_no_control(panels, state):
         assert panels.rects == places
 
 
+@pytest.mark.parametrize("size", [(640, 480), (1680, 1050)])
+def test_the_line_on_a_bake_is_shown_whole(monkeypatch, state, geometry, size):
+    line = "baking again 1:10 (first bake 3:20): light map, gathered 40 %; new light on 12 of 33 objects"
+    state.answering.possible = state.rebaking.possible = True
+    state.rebaking.line = line
+    drawn = {}
+
+    def noted(text):
+        text_disabled(text)
+        drawn[text] = imgui.get_item_rect_max()
+
+    text_disabled = imgui.text_disabled
+    monkeypatch.setattr(imgui, "text_disabled", noted)
+    panels = PanelDriver(monkeypatch, walk_mode(state, geometry), size)
+    places = dict(panels.rects)
+    assert drawn[line].x <= size[0] and drawn[line].y <= places["Material"][1]
+    state.rebaking.line = f"not baked again: {'a long path/' * 40}: cannot be opened"
+    panels.frame()
+    (cut,) = (text for text in drawn if text.startswith("not baked again"))
+    assert cut.endswith("...") and drawn[cut].x <= size[0] and panels.rects == places
+    panels.close()
+
+
 def test_a_camera_path_plays_pauses_and_is_scrubbed(panels, state):
     panels.click("play")
     assert state.navigation.path.playing

@@ -435,6 +435,7 @@ def test_an_edit_meanwhile_and_closing_end_the_process(store, screen, monkeypatc
         ("say(error='room.toml: file does not exist')", "not baked again: room.toml: file does not exist"),
         ("raise RuntimeError('no memory')", "ended with 1 (RuntimeError: no memory)"),
         ("sys.exit(0)", "not baked again: the bake ended too soon"),
+        ("import os; os.kill(os.getpid(), 9)", "the bake of edited materials was killed by SIGKILL (no message)"),
     ],
 )
 def test_faults_are_one_line_and_the_estimate_stays(store, screen, monkeypatch, tmp_path, then, line):
@@ -445,6 +446,11 @@ def test_faults_are_one_line_and_the_estimate_stays(store, screen, monkeypatch, 
     for _ in range(3):
         room.frame()
     assert room.pictures._rebaked._process is None, "it is not tried again until something changes"
+    room.state.rebaking.on = False
+    room.frame()
+    assert room.state.rebaking.line == ""
+    room.state.rebaking.on = True
+    room.until(lambda: room.pictures._rebaked._process is not None)
     room.pictures.close()
 
 

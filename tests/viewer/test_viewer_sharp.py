@@ -133,6 +133,15 @@ def test_light_during_a_drag_is_shown_soon(pictures, state, renderer):
     assert state.screen.statistics.resolution == (24, 16), "a coarse picture is replaced at once"
 
 
+def test_the_light_of_a_mix_is_shown_soon(pictures, state, renderer):
+    """Lamps that were switched change nothing in the picture before the light map does."""
+    rest(pictures, state)
+    renderer.mixer._wanted = np.zeros((1, 3), np.float32)
+    relight(renderer, 0.5)
+    pictures.update(PLACE, 1.0)
+    assert state.screen.statistics.resolution == (24, 16)
+
+
 def rest(pictures, state):
     state.screen.clock.now_s += 1.0
     pictures.update(PLACE, 1.0)

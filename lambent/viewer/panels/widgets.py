@@ -138,6 +138,38 @@ def wrapped(lines: Sequence[str], colour: Colour = AMBER) -> None:
     imgui.pop_text_wrap_pos()
 
 
+def status(lines: Sequence[str], longest: Sequence[str]) -> None:
+    """Dim texts, wrapped, in the height of the `longest` ones, so that no control below moves with the texts.
+
+    A text that does not fit ends with dots; the tooltip has all of it.
+    """
+    width = imgui.get_content_region_avail().x
+    for line, most in zip(lines, longest, strict=True):
+        height = imgui.calc_text_size(most, wrap_width=width).y
+        imgui.begin_group()
+        imgui.push_text_wrap_pos()
+        imgui.text_disabled(fitted(line, width, height))
+        imgui.pop_text_wrap_pos()
+        rest = height - imgui.get_item_rect_size().y
+        if rest > 0:
+            imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() - imgui.get_style().item_spacing.y)
+            imgui.dummy((0, rest))
+        imgui.end_group()
+        if line:
+            explain(line)
+
+
+def fitted(text: str, width: float, height: float) -> str:
+    """A text, or as many of its first letters as fit with dots after them, wrapped to a width."""
+
+    def fits(shown: str) -> bool:
+        return bool(imgui.calc_text_size(shown, wrap_width=width).y <= height)
+
+    if fits(text):
+        return text
+    return next((short for end in range(len(text), 0, -1) if fits(short := f"{text[:end].rstrip()}...")), "...")
+
+
 def shadowed(lines: imgui.ImDrawList, at: tuple[float, float], text: str, colour: Colour, shade: float = 0.8) -> None:
     """Text with a shadow, readable over any picture."""
     lines.add_text((at[0] + 1, at[1] + 1), imgui.get_color_u32((0, 0, 0, shade)), text)

@@ -64,6 +64,7 @@ class RebakedLight:
             self._want(wanted, now_s)
         if not self._shown.on or not self._shown.possible or self._is_baked:
             self._stop()
+            self._forgive()
             return
         if self._process is not None or not self._has_all:
             self._bake(now_s, in_stroke)
@@ -168,7 +169,12 @@ class RebakedLight:
 
     def _fail(self, error: str) -> None:
         self._stop()
-        self._failed, self._shown.line = True, f"not baked again: {error}"
+        self._failed, self._shown.line = True, f"not baked again: {error}; turn bake edits off and on to try again"
+
+    def _forgive(self) -> None:
+        """Forget a failure, so that the next bake may start."""
+        if self._failed:
+            self._failed, self._shown.line = False, ""
 
     def _tell(self) -> None:
         """Update the line on progress, and say once that the picture is exact."""

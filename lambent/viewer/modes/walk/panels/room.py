@@ -5,7 +5,13 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.panels.widgets import buttons, check, explain
+from lambent.viewer.panels.widgets import buttons, check, status
+
+# Usual texts at their longest, on estimated light and on a bake: they reserve the height of their lines.
+LONGEST = (
+    "indirect light: estimated, error up to 10.0 %",
+    "baking again 10:00 (first bake 10:00): light map, gathered 100 %; new light on 100 of 100 objects",
+)
 
 
 def draw(state: WalkState) -> None:
@@ -37,9 +43,6 @@ def _light(state: WalkState) -> None:
         meaning = "bakes the light of edited materials again in the background and updates the picture"
         rebaking.on = check("bake edits", rebaking.on, meaning)
     lines = [rebaking.line if rebaking.exact else answering.note]
-    if rebaking.possible:  # the second line is always there: no control may move under the mouse
+    if rebaking.possible:
         lines.append("" if rebaking.exact else rebaking.line)
-    for line in lines:
-        imgui.text_disabled(line)
-        if line:
-            explain(line)
+    status(lines, LONGEST[: len(lines)])
