@@ -139,12 +139,12 @@ class SceneResources:
             name: MaterialBuffers(layouts, textures.sampler, textures.of_material(scene.textures.get(name)))
             for name in ("", *scene.record.materials)
         }
-        self.dress({})
+        self.show_textures({})
         self.mixes_parts = any(beyond.values())
         self.sun = sun_light(layouts, scene, self)
         self.reflector_lamps = LampsOverReflectors(layouts, self)
 
-    def dress(self, looks: Mapping[str, Look]) -> None:
+    def show_textures(self, looks: Mapping[str, Look]) -> None:
         """Show materials with the textures of others, all those that are left out with their own.
 
         Documents are those of a frame's state; the sun's shadows keep the holes of the materials as baked.

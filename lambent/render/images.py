@@ -161,7 +161,7 @@ class Images(ABC):
         """`realtime.streaming.Streaming.statistics` of light fields with a memory budget, else empty."""
         return {}
 
-    def wear(self, variant: Variant) -> None:
+    def apply_variant(self, variant: Variant) -> None:
         """Show a variant from the next image on; a light mix of the settings goes before the variant's.
 
         Raises

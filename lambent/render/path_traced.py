@@ -43,12 +43,14 @@ class PathTraced(Images):
             raise UserError("the path tracer has no such choice", field="--lookup", got=got, expected="auto")
         baked = scene_of(store, scene)
         self._baked, self._note = with_replacements(baked, settings.replacements), note
-        self.wear(variant_named(variants_of(store), settings.variant) if settings.variant else Variant("as baked"))
+        self.apply_variant(
+            variant_named(variants_of(store), settings.variant) if settings.variant else Variant("as baked")
+        )
         for name in changed_inputs(store, baked):
             note(f"{name} has changed since the bake")
         engine()
 
-    def wear(self, variant: Variant) -> None:
+    def apply_variant(self, variant: Variant) -> None:
         self._variant = variant
         if variant.light.groups:
             self._note(f"the path tracer ignores the light mix of {variant.name}: it traces the light of the scene")
@@ -57,8 +59,10 @@ class PathTraced(Images):
         """The scene with the materials of the next image."""
         track = self.settings.looks
         looks = {**self._variant.looks, **(track.looks_at(self.time_s) if track else {})}
-        worn = dressed(self._baked, replace(self._variant, looks=looks))
-        return replace(worn, materials={**worn.materials, **recoloured(worn.materials, self.settings.recolour)})
+        changed = dressed(self._baked, replace(self._variant, looks=looks))
+        return replace(
+            changed, materials={**changed.materials, **recoloured(changed.materials, self.settings.recolour)}
+        )
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
         from lambent.bake.reference.path_traced import (

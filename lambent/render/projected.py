@@ -28,8 +28,8 @@ class Projected(Images):
         super().__init__(settings)
         self.quantity, self._faces = faces.quantity, faces
 
-    def wear(self, variant: Variant) -> None:
-        self._faces.wear(variant)
+    def apply_variant(self, variant: Variant) -> None:
+        self._faces.apply_variant(variant)
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
         around = Around(self.settings.view_of(camera), self.settings.width, self.settings.height)

@@ -27,8 +27,8 @@ from lambent.realtime.planar_integrators import check_planar
 from lambent.realtime.renderer import SUPERSAMPLES, Renderer
 from lambent.realtime.replaced import with_replacements
 from lambent.realtime.turned_sky import under_turned_sky
+from lambent.render.applied_materials import AppliedMaterials
 from lambent.render.images import NOISE, Images, Settings
-from lambent.render.wearing import Wearing
 from lambent.scenes.scene import Look, Variant
 from lambent.scenes.variants import variant_named
 from lambent.store.answer import read_answer
@@ -75,8 +75,8 @@ class RealTime(Images):
         self._renderer = Renderer(open_device(), baked)
         for text in self._renderer.missing:
             note(text)
-        self._wearing, self._light = Wearing(store, self._renderer, note), settings.light or MixTrack()
-        if settings.recolour and not self._wearing.answers:
+        self._applied, self._light = AppliedMaterials(store, self._renderer, note), settings.light or MixTrack()
+        if settings.recolour and not self._applied.answers:
             read_answer(store)  # raises the error that names what is missing
         self._check_light(self._light, note)
         self._looks: Mapping[str, Look] = {}
@@ -94,16 +94,16 @@ class RealTime(Images):
         if scene.light_fields:
             note(FIELDS_FOLLOW)
 
-    def wear(self, variant: Variant) -> None:
+    def apply_variant(self, variant: Variant) -> None:
         self._light, self._looks = self.settings.light or MixTrack.of(variant.light), variant.looks
 
     def _state(self, camera: Camera) -> FrameState:
         """State of the next frame, once its materials and light are on the GPU."""
         track = self.settings.looks
         looks = {**self._looks, **(track.looks_at(self.time_s) if track else {})}
-        self._wearing.wear(looks, self.settings.recolour)
+        self._applied.apply(looks, self.settings.recolour)
         light = self._light.factors_at(self.time_s)
-        return self._frame(camera, light=light, materials=self._wearing.materials, maps=self._renderer.light_version)
+        return self._frame(camera, light=light, materials=self._applied.materials, maps=self._renderer.light_version)
 
     @property
     def light_fields(self) -> dict[str, Any]:

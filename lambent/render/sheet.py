@@ -90,7 +90,7 @@ def sheet(
         part = part_of(progress, number / len(variants), (number + 1) / len(variants), variant.name)
         lit = variant if says_light(opened, variant.name) else replace(variant, light=saved)
         shown, stays = _as_possible(lit, opened, settings, note)
-        drawn.wear(shown)
+        drawn.apply_variant(shown)
         mixes = settings.light is None and settings.integrator != PATH_TRACER
         drawn.exposure_ev = metered.wanted(shown.light if mixes else LightMix())
         pictures.append(drawn.displayed(view, part))

@@ -91,7 +91,7 @@ class MaterialEdits:
         """Set the state of the whole room as one stroke; ignore materials that the scene does not have."""
         self._step(room=self._room(room))
 
-    def dress(self, materials: Mapping[str, Material]) -> None:
+    def set_materials(self, materials: Mapping[str, Material]) -> None:
         """Set several materials with their textures as one stroke."""
         textures = {name: of for name, of in self.room.textures.items() if name not in materials}
         update = {"materials": {**self.edited, **materials}, "textures": textures}
@@ -165,7 +165,7 @@ class MaterialEdits:
 
     def reset(self, name: str) -> None:
         """Restore the scene's material, as one stroke."""
-        self.dress({name: self.scene[name]})
+        self.set_materials({name: self.scene[name]})
 
     @property
     def in_stroke(self) -> bool:

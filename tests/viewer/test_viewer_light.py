@@ -175,7 +175,7 @@ def test_undo_goes_through_materials_mixes_and_keys_of_light_in_one_order(state,
 
     name = sorted(state.scene.materials)[0]
     red = state.scene.materials[name].model_copy(update={"kd": (0.6, 0.1, 0.1)})
-    edits.dress({name: red})
+    edits.set_materials({name: red})
     state.lights.mix = HALF
     edits.end_stroke()
     state.recordings.set_key()

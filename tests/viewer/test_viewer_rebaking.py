@@ -232,7 +232,7 @@ class Room:
             time.sleep(0.002)
 
     def paint(self):
-        self.state.materials.edits.dress(painted(self.state.scene))
+        self.state.materials.edits.set_materials(painted(self.state.scene))
 
 
 @pytest.fixture
@@ -358,7 +358,7 @@ def test_light_of_an_edit_that_was_given_up_is_not_shown(store, screen, monkeypa
     room.paint()
     room.until(lambda: rebaked._fade is not None and rebaked._fade.moves)
     name = sorted(state.scene.materials)[0]
-    edits.dress({name: state.scene.materials[name].model_copy(update={"kd": (0.2, 0.3, 0.7)})})
+    edits.set_materials({name: state.scene.materials[name].model_copy(update={"kd": (0.2, 0.3, 0.7)})})
     room.frame()
     assert rebaked._fade is None and rebaked._light is None and state.rebaking.share is None
     flag.touch()

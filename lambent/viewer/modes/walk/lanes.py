@@ -49,7 +49,7 @@ class Lane:
     def answer(self, room: RoomState) -> None:
         """Set the textures of this state, and advance its light."""
         if room.textures != self.room.textures:
-            dress(self.renderer, room)
+            show_textures(self.renderer, room)
         self.room = room
         if self.answering is not None:
             self.answering.update(room.materials)
@@ -80,12 +80,12 @@ class Lane:
 
     def lend_light(self, other: Renderer) -> None:
         """Let another renderer of the scene show this lane's state in any light mix."""
-        dress(other, self.room)
+        show_textures(other, self.room)
         if (groups := self.renderer.mixer.groups) is not None:
             other.mixer.answer(groups)
 
 
-def dress(renderer: Renderer, room: RoomState) -> None:
+def show_textures(renderer: Renderer, room: RoomState) -> None:
     """Show the textures of a state."""
     scene = renderer.scene.record.materials
-    renderer.resources.dress({name: Look(scene[name], of) for name, of in room.textures.items()})
+    renderer.resources.show_textures({name: Look(scene[name], of) for name, of in room.textures.items()})

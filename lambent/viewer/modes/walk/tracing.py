@@ -34,10 +34,10 @@ class Wish:
 
     def said(self) -> dict[str, Any]:
         """As a JSON object."""
-        worn = {name: material.model_dump(mode="json") for name, material in self.materials.items()}
+        materials = {name: material.model_dump(mode="json") for name, material in self.materials.items()}
         camera = None if self.camera is None else asdict(self.camera)
         view = {"number": self.number, "camera": camera, "size": list(self.size)}
-        return {**view, "materials": worn, "textures": dict(self.textures)}
+        return {**view, "materials": materials, "textures": dict(self.textures)}
 
     @classmethod
     def of(cls, said: Mapping[str, Any]) -> Wish:
@@ -46,9 +46,9 @@ class Wish:
         if camera is not None:
             places = {name: tuple(camera[name]) for name in ("position", "target", "up")}
             camera = Camera(**{**camera, **places})
-        worn = {name: Material.model_validate(one) for name, one in said["materials"].items()}
+        materials = {name: Material.model_validate(one) for name, one in said["materials"].items()}
         size = int(said["size"][0]), int(said["size"][1])
-        return cls(int(said["number"]), camera, size, worn, dict(said["textures"]))
+        return cls(int(said["number"]), camera, size, materials, dict(said["textures"]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,7 +71,7 @@ class Views:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._worn: tuple[Mapping[str, Material], Mapping[str, str]] | None = None
+        self._applied: tuple[Mapping[str, Material], Mapping[str, str]] | None = None
         self._built: Any = None
 
     def traced(self, camera: Camera, size: tuple[int, int], samples: int, seed: int) -> Floats:
@@ -80,17 +80,17 @@ class Views:
 
         return traced(self._built, camera, *size, samples, seed)[0]
 
-    def wear(self, materials: Mapping[str, Material], textures: Mapping[str, str]) -> bool:
+    def apply_materials(self, materials: Mapping[str, Material], textures: Mapping[str, str]) -> bool:
         """Set materials and textures in place of the scene's; return whether the scene must be built."""
-        if self._built is not None and (materials, textures) == self._worn:
+        if self._built is not None and (materials, textures) == self._applied:
             return False
         from lambent.bake.reference.path_traced import built
 
-        self._worn = materials, textures
+        self._applied = materials, textures
         scene = self._scene
         looks = {name: Look(scene.materials[name], of) for name, of in textures.items()}
-        worn = textures_worn(scene.textures, looks)
-        self._built = built(replace(scene, materials={**scene.materials, **materials}, textures=worn))[1]
+        applied = textures_worn(scene.textures, looks)
+        self._built = built(replace(scene, materials={**scene.materials, **materials}, textures=applied))[1]
         return True
 
 
@@ -117,7 +117,7 @@ def main(folder: Path, sky_turn_deg: float, replaced: Sequence[str], wishes: Wis
 def trace(views: Views, wish: Wish, camera: Camera, wishes: Wishes, out: BinaryIO) -> None:
     """Write pictures of a wish with more and more samples, while it is the newest."""
     say(out, what="building the scene")
-    views.wear(wish.materials, wish.textures)
+    views.apply_materials(wish.materials, wish.textures)
     coarse = max(1, wish.size[0] // COARSE), max(1, wish.size[1] // COARSE)
     if wishes.stands(wish):
         send(out, wish, views.traced(camera, coarse, COARSE_SAMPLES, 0), COARSE_SAMPLES)

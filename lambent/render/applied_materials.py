@@ -22,7 +22,7 @@ from lambent.store.store import Store
 ESTIMATED = "light and probes are estimated for the changed materials, not baked again"
 
 
-class Wearing:
+class AppliedMaterials:
     """The changed materials of a renderer's scene: `materials` replace the store's, by name, in frame states.
 
     Attributes
@@ -38,20 +38,20 @@ class Wearing:
         self.materials: dict[str, Material] = {}
         self._looks: dict[str, Look] = {}
 
-    def wear(self, looks: Mapping[str, Look], colours: Mapping[str, Triple]) -> None:
+    def apply(self, looks: Mapping[str, Look], colours: Mapping[str, Triple]) -> None:
         """Apply looks, then diffuse colours, and the light that follows; materials left out stay as baked."""
         scene = self._renderer.scene
         loaded = looks_as_loaded(scene.record.materials, scene.textures)
-        worn = {name: look for name, look in looks.items() if look != loaded[name]}
-        documents = {name: look.material for name, look in worn.items()}
+        changed = {name: look for name, look in looks.items() if look != loaded[name]}
+        documents = {name: look.material for name, look in changed.items()}
         materials = {**documents, **recoloured({**scene.record.materials, **documents}, colours)}
-        if (worn, materials) == (self._looks, self.materials):
+        if (changed, materials) == (self._looks, self.materials):
             return
-        if worn != self._looks:
-            self._renderer.resources.dress(worn)
-        self._looks, self.materials = worn, materials
+        if changed != self._looks:
+            self._renderer.resources.show_textures(changed)
+        self._looks, self.materials = changed, materials
         if materials:
-            self._tell(materials)
+            self._note_limits(materials)
         if self.answers:
             answer, shown = self._shown
             shown.show(answer.lit(materials))
@@ -62,7 +62,7 @@ class Wearing:
         answer = AnsweredLight(self._renderer.scene, read_answer(self._store), device if computes(device) else None)
         return answer, AnswerShown(self._renderer, answer)
 
-    def _tell(self, materials: Mapping[str, Material]) -> None:
+    def _note_limits(self, materials: Mapping[str, Material]) -> None:
         """Note what is estimated for these materials, and what the bake lacks for them."""
         scene = self._renderer.scene
         self._once(ESTIMATED if self.answers else f"light and probes stay as baked: {NO_ANSWER}")
