@@ -86,7 +86,7 @@ def test_the_buttons_of_the_column(driver):
     driver.click("save session")
     assert state.files.home is not None
     driver.click("export")
-    until(state, lambda: state.files.handed is not None)
+    until(state, lambda: state.files.exported is not None)
     driver.frame(2)
 
 

@@ -269,16 +269,16 @@ def test_unsaved_materials_are_named_at_the_end(ready, capsys):
     assert capsys.readouterr().err == "lambent: note: changes not saved: wall\n"
 
 
-def test_a_material_is_handed_over_as_a_document(ready):
+def test_a_material_is_exported_as_a_document(ready):
     state, _ = ready
     state.session.tint("tray", "diffuse", 2.0)
-    state.files.hand_over("tray")
+    state.files.export("tray")
     with pytest.raises(UserError, match="still fitting tray"):
-        state.files.hand_over("tray")
-    until(state, lambda: state.files.handed is not None)
+        state.files.export("tray")
+    until(state, lambda: state.files.exported is not None)
     written = load_material(state.screen.folder / "tray-001.json")
     assert np.allclose(written.kd, np.multiply(TRAY.kd, 2.0)) and written.lobes == TRAY.lobes
-    assert state.files.handed.fitted == ()
+    assert state.files.exported.fitted == ()
 
 
 def test_documents_and_tables_are_dropped(ready, tmp_path):

@@ -10,7 +10,7 @@ from pathlib import Path
 from lambent.core.errors import UserError
 from lambent.core.plain import plain_name
 from lambent.editing.document import Surroundings
-from lambent.editing.handover import Handover, hand_over
+from lambent.editing.exported import ExportedMaterial, export
 from lambent.editing.session import Session, Start
 from lambent.materials.document import load_material
 from lambent.materials.factored.opening import editable_of
@@ -42,7 +42,7 @@ class Files:
     ----------
     home : Path or None
         Where the session is saved; None until it has a file.
-    handed : Handover or None
+    exported : ExportedMaterial or None
         The last exported material.
     """
 
@@ -50,8 +50,8 @@ class Files:
         self._session, self._screen, self._tables = session, screen, tables
         self._stem = plain_name(name, "scene")
         self.home = home
-        self.handed: Handover | None = None
-        self.handed_to: Path | None = None
+        self.exported: ExportedMaterial | None = None
+        self.exported_to: Path | None = None
         self.typed: dict[str, str] = {}
         self._work: Work | None = None
         self._saved = session.document
@@ -107,11 +107,11 @@ class Files:
             names = ", ".join(changed) or "the environment"
             sys.stderr.write(f"lambent: note: changes not saved: {names}\n")
 
-    def hand_over(self, material: str) -> None:
+    def export(self, material: str) -> None:
         """Write the edited material as a document; lobes are fitted in the background."""
         session = Session(self._session.document, self._session.folder, self._tables)
 
-        def done(found: Handover) -> None:
+        def done(found: ExportedMaterial) -> None:
             folder = self._screen.folder
             file = folder / f"{unused(folder, plain_name(material), '.json')}.json"
             try:
@@ -119,10 +119,10 @@ class Files:
             except (UserError, OSError) as error:
                 self._screen.say(f"not exported: {error}")
                 return
-            self.handed, self.handed_to = found, file
+            self.exported, self.exported_to = found, file
             self._screen.say(f"saved {file}: {found.verdict}")
 
-        self._begin(lambda: hand_over(session, material), f"fitting {material}", done, "not exported")
+        self._begin(lambda: export(session, material), f"fitting {material}", done, "not exported")
 
     def open(self, text: str, material: str) -> None:
         """Open a file: a document or a table for a material, or an image as the environment."""

@@ -128,18 +128,20 @@ def draw_files(state: EditState) -> None:
     files = state.files
     buttons([
         ("save session", True, files.save, "saves the session (Ctrl+S); never overwrites another session's file"),
-        ("export", not files.busy and bool(state.material), lambda: files.hand_over(state.material),
+        ("export", not files.busy and bool(state.material), lambda: files.export(state.material),
          "saves the edited material as a document for all other commands, with fitted lobes where needed"),
     ])  # fmt: skip
     if files.home is not None:
         coloured(files.home.name + (" (changed)" if files.unsaved else ""), DIM)
     if files.busy:
         coloured(files.doing, DIM)
-    if files.handed is not None and files.handed_to is not None:
-        found = files.handed
+    if files.exported is not None and files.exported_to is not None:
+        found = files.exported
         shares = [(f"error, {name}", f"{share:.2%}") for name, share in found.shares.items()]
         fitted = ", ".join(found.fitted) or "none: exact"
-        rows([("file", files.handed_to.name), ("fitted", fitted), ("verdict", str(found.verdict)), *shares], "handed")
+        rows(
+            [("file", files.exported_to.name), ("fitted", fitted), ("verdict", str(found.verdict)), *shares], "exported"
+        )
         wrapped(found.warnings, AMBER)
 
 

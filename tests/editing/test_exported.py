@@ -9,7 +9,7 @@ import pytest
 
 from lambent.core.camera import Camera
 from lambent.editing.as_table import EditedTable
-from lambent.editing.handover import hand_over
+from lambent.editing.exported import export
 from lambent.editing.operators import Operator, Region
 from lambent.editing.session import Session
 from lambent.materials.bsdf import MaterialBSDF
@@ -45,7 +45,7 @@ def close_to(one: Session, material: Material, tolerance: float = 3e-3) -> bool:
     ],
 )
 def test_without_edits_the_document_comes_back(material: Material) -> None:
-    found = hand_over(session(material), "it")
+    found = export(session(material), "it")
     assert found.material.model_dump(exclude={"provenance", "name"}) == material.model_dump(
         exclude={"provenance", "name"}
     )
@@ -58,7 +58,7 @@ def test_parameters_and_colours_stay_exact() -> None:
     one = session(model_named("kurt")(mx=0.1, my=0.1, k=0.5))
     one.set("it", mx=0.23, my=0.23, r0=(0.2, 0.4, 0.6))
     one.tint("it", "specular", (1.0, 0.5, 0.25))
-    found = hand_over(one, "it")
+    found = export(one, "it")
     lobe = Lobe(mx=0.23, my=0.23, r0=(0.2, 0.4, 0.6), k=(0.5, 0.25, 0.125), alpha=0)
     assert found.material.lobes == (lobe,)
     assert not found.fitted
@@ -69,7 +69,7 @@ def test_curves_that_are_multiples_stay_exact() -> None:
     one = session(Material(kd=0.2, lobes=(BRUSHED,)))
     one.apply("it", "highlight along", Operator(kind="amplify_y", region=WIDE, size=0.5, channels=(0,)))
     one.apply("it", "diffuse", Operator(kind="translate_y", region=WIDE, size=1.0))
-    found = hand_over(one, "it")
+    found = export(one, "it")
     assert not found.fitted
     assert np.allclose(found.material.lobes[0].k, [0.25, 0.5, 0.5])
     assert np.allclose(found.material.kd, 0.4)
@@ -79,7 +79,7 @@ def test_curves_that_are_multiples_stay_exact() -> None:
 def test_two_tints_of_one_lobe_are_no_lobe() -> None:
     one = session(Material(lobes=(BRUSHED,)))
     one.tint("it", "grazing", 0.5)
-    assert hand_over(one, "it", lobes=1).fitted == ("specular", "grazing")
+    assert export(one, "it", lobes=1).fitted == ("specular", "grazing")
 
 
 def test_what_was_edited_is_fitted_and_the_rest_stays() -> None:
@@ -88,7 +88,7 @@ def test_what_was_edited_is_fitted_and_the_rest_stays() -> None:
     rougher = of_material(Material(lobes=(ROUND.model_copy(update={"mx": 0.25, "my": 0.25}),))).curves["highlight"]
     one = session(material)
     one.draw("it", "lobe 2 highlight", rougher)
-    found = hand_over(one, "it", lobes=1, distribution="beckmann")
+    found = export(one, "it", lobes=1, distribution="beckmann")
     assert found.fitted == ("lobe 2 specular",)
     assert found.material.lobes[0] == BRUSHED
     assert found.material.lobes[1].mx == pytest.approx(0.25, rel=0.02)
@@ -102,13 +102,13 @@ def test_what_no_lobe_can_follow_is_said() -> None:
     one = session(Material(lobes=(ROUND,)))
     ring = Region(a=0.5, b=0.55, c=0.6, d=0.65)
     one.pull("it", "highlight", ring, y=60.0)
-    found = hand_over(one, "it", lobes=1)
+    found = export(one, "it", lobes=1)
     assert found.verdict.word != "faithful"
     assert found.shares["l1"] > 0.1
 
 
 def test_models_without_a_document_are_fitted() -> None:
-    found = hand_over(session(model_named("ward")(mx=0.2, my=0.2)), "it", lobes=1, distribution="beckmann")
+    found = export(session(model_named("ward")(mx=0.2, my=0.2)), "it", lobes=1, distribution="beckmann")
     assert found.fitted == ("specular",)
     assert found.material.lobes[0].mx == pytest.approx(0.2, rel=0.05)
 
@@ -117,7 +117,7 @@ def test_provenance_says_what_it_came_from(tmp_path: Path) -> None:
     measured = Provenance(source="foil.bsdf", source_format="tensor tree", notes=("3 lobes tried",))
     one = session(Material(kd=0.2, lobes=(ROUND,), provenance=measured))
     one.tint("it", "specular", 0.5)
-    found = hand_over(one, "it")
+    found = export(one, "it")
     found.material.save(tmp_path / "it.json")
     provenance = load_material(tmp_path / "it.json").provenance
     assert provenance.source == "foil.bsdf"
@@ -127,10 +127,10 @@ def test_provenance_says_what_it_came_from(tmp_path: Path) -> None:
     assert "before the edits: 3 lobes tried" in provenance.notes
 
 
-def test_black_materials_are_handed_over() -> None:
+def test_black_materials_are_exported() -> None:
     one = session(model_named("ward")())
     one.tint("it", "specular", 0.0)
-    assert not hand_over(one, "it").material.lobes
+    assert not export(one, "it").material.lobes
 
 
 @pytest.mark.parametrize(

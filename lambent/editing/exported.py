@@ -31,7 +31,7 @@ COMPARED = 60_000  # tuples, at most
 
 
 @dataclass(frozen=True)
-class Handover:
+class ExportedMaterial:
     """An edited material as a document, and what it lost.
 
     Attributes
@@ -59,7 +59,7 @@ class Handover:
     warnings: tuple[str, ...] = ()
 
 
-def hand_over(
+def export(
     session: Session,
     name: str,
     *,
@@ -67,7 +67,7 @@ def hand_over(
     metric: str = "cuberoot",
     distribution: Literal["beckmann", "ggx", "best"] = "best",
     progress: Progress = silent,
-) -> Handover:
+) -> ExportedMaterial:
     """The document of a material of a session as it is edited now.
 
     Diffuse terms and lobes whose curves are those of a document, or multiples of them, stay what they are. Lobes, and a
@@ -96,7 +96,7 @@ def hand_over(
     verdict = verdict_of(shares, light)
     provenance = _provenance(session, name, fitted, errors, samples, metric, (str(verdict), *warnings))
     material = kept.model_copy(update={"name": name, "provenance": provenance})
-    return Handover(material, fitted, errors, shares, light, verdict, warnings)
+    return ExportedMaterial(material, fitted, errors, shares, light, verdict, warnings)
 
 
 def _document(source: OfDocument | OfModel | OfTable) -> Material | None:
