@@ -22,13 +22,14 @@ from lambent.scenes import load_scene
 from lambent.store.store import Store
 from lambent.viewer.modes.walk import rebaking
 from lambent.viewer.modes.walk.answering import AnsweringLight
-from lambent.viewer.modes.walk.arrivals import Arrived
+from lambent.viewer.modes.walk.arrivals import Arrived, Region
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.rebaked_light import (
     FADE_STEPS,
     Rebaked,
     batches_of,
     in_view_order,
+    steps,
     texel_objects,
     texel_steps,
 )
@@ -55,19 +56,19 @@ from lambent.bake.again import bake_again
 from lambent.materials.document import Material
 from tests.bake.small_scenes import TINY
 materials = {name: Material.model_validate(one) for name, one in asked["materials"].items()}
-from lambent.viewer.modes.walk.rebaking_worker import Told
-told = Told(sys.stdout.buffer)
-told.region_pause = 0.0
-bake_again(Path(sys.argv[1]), Path(sys.argv[2]), materials, quality=TINY, watch=told)
-told.say(baked=True)
+from lambent.viewer.modes.walk.rebaking_worker import StreamWatch
+watch = StreamWatch(sys.stdout.buffer)
+watch.region_pause = 0.0
+bake_again(Path(sys.argv[1]), Path(sys.argv[2]), materials, quality=TINY, watch=watch)
+watch.say(baked=True)
 """
 IN_TILES = """
 import time
 from lambent.bake.again import bake_again
 from lambent.materials.document import Material
-from lambent.viewer.modes.walk.rebaking_worker import Told
+from lambent.viewer.modes.walk.rebaking_worker import StreamWatch
 from tests.bake.small_scenes import TINY
-class Waits(Told):
+class Waits(StreamWatch):
     region_pause = 0.0
     def region(self, light, finished):
         super().region(light, finished)
@@ -75,9 +76,9 @@ class Waits(Told):
             time.sleep(0.01)
 materials = {{name: Material.model_validate(one) for name, one in asked["materials"].items()}}
 tiles = TINY.changed("tiles", light_map={{"tile_texels": 16}})
-told = Waits(sys.stdout.buffer)
-bake_again(Path(sys.argv[1]), Path(sys.argv[2]), materials, quality=tiles, watch=told)
-told.say(baked=True)
+watch = Waits(sys.stdout.buffer)
+bake_again(Path(sys.argv[1]), Path(sys.argv[2]), materials, quality=tiles, watch=watch)
+watch.say(baked=True)
 """
 ENDLESS = """
 import runpy, sys, time
@@ -348,6 +349,24 @@ def test_objects_whose_light_is_finished_go_over_while_others_are_baked(boxes, s
     off = np.abs(shown - whole)[theirs].mean() / np.abs(estimate - whole)[theirs].mean()
     assert off < 0.5, "early light is near to the final one"
     room.pictures.close()
+
+
+def test_a_region_that_finishes_no_object_changes_nothing(store):
+    """The picture goes on refining."""
+    renderer = Renderer(open_device(), Store.open(store))
+    scene, size = renderer.scene, renderer.scene.irradiance.shape[:2]
+
+    def arrived(finished, before=None):
+        light = np.zeros((1, *size, 3), np.float16)
+        return Rebaked.read(store, scene, Arrived(Region(light, np.full(size, finished))), before)
+
+    def uploads(rebaked, since):
+        return list(steps(rebaked, since, scene, renderer.resources, {}, scene.record.cameras[0], SIZE))
+
+    nothing, everything = arrived(False), arrived(True)
+    assert not nothing.lit.any() and uploads(nothing, None) == []
+    assert len(uploads(everything, nothing)) >= FADE_STEPS
+    assert uploads(arrived(True, everything), everything) == []
 
 
 def test_light_of_an_edit_that_was_given_up_is_not_shown(store, screen, monkeypatch, tmp_path):

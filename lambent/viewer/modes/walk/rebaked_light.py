@@ -210,7 +210,7 @@ def steps(
 ) -> Iterator[Step]:
     """All uploads of light that arrived `since`, in order, one per frame. Iterate in a thread: each takes a while."""
     order = in_view_order(shown.record, camera, size)
-    if since is None or not since.arrived.light_map:
+    if _has_more_texels(rebaked, since):
         before = list(resources.light_layers)
         after = rebaked.layers(light, before)
         there = [number for number in order if rebaked.lit[number]]
@@ -225,6 +225,13 @@ def steps(
         for step in range(1, PROBE_STEPS + 1):
             between = new if step == PROBE_STEPS else was + (new - was) * np.float32(step / PROBE_STEPS)
             yield _relights(users, old.relit(between, found.irradiance))
+
+
+def _has_more_texels(rebaked: Rebaked, since: Rebaked | None) -> bool:
+    """Whether there is more of the light map than `since`: all of it, or the texels of further objects."""
+    if rebaked.arrived.light_map:
+        return since is None or not since.arrived.light_map
+    return bool((rebaked.lit if since is None else rebaked.lit & ~since.lit).any())
 
 
 def _uploads_map(layers: Layers) -> Step:

@@ -75,7 +75,7 @@ class RebakedLight:
             # Wait for the complete estimate, which would otherwise overwrite this light.
             self._fade = self._fade or Fade(lane, light)
             self._fade.bring(self._light, camera, size)
-        self._tell()
+        self._update_line()
 
     def wait_s(self) -> float | None:
         """Seconds until there may be news; None: never."""
@@ -176,7 +176,7 @@ class RebakedLight:
         if self._failed:
             self._failed, self._shown.line = False, ""
 
-    def _tell(self) -> None:
+    def _update_line(self) -> None:
         """Update the line on progress, and say once that the picture is exact."""
         if self._failed:
             return

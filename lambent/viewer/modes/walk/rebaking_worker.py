@@ -32,22 +32,22 @@ NICENESS = 10  # the window has priority
 REGION_PAUSE = 10.0  # pause after sending a region, in multiples of the sending time
 
 
-class Told(Watch):
+class StreamWatch(Watch):
     """Reports finished arrays and regions to a stream, one line each, followed by the light of a region."""
 
     region_pause: float | None = REGION_PAUSE
 
     def __init__(self, out: BinaryIO) -> None:
-        self._out, self._told = out, set[str]()
+        self._out, self._reported = out, set[str]()
 
     def say(self, **words: object) -> None:
         self._out.write(json.dumps(words).encode() + b"\n")
         self._out.flush()
 
     def arrived(self, kind: str, names: Collection[str]) -> None:
-        new = sorted(set(names) - self._told)
+        new = sorted(set(names) - self._reported)
         if kind in KINDS and new:
-            self._told.update(new)
+            self._reported.update(new)
             self.say(kind=kind, there=new)
 
     def region(self, light: NDArray[np.float16], finished: Flags) -> None:
@@ -62,17 +62,17 @@ def main(store: Path, copy: Path, asked: bytes, out: BinaryIO) -> None:
     wanted = json.loads(asked)
     materials = {name: Material.model_validate(said) for name, said in wanted["materials"].items()}
 
-    told = Told(out)
+    watch = StreamWatch(out)
 
     def progress(done: float, total: float, what: str) -> None:
-        told.say(what=what, done=done, total=total)
+        watch.say(what=what, done=done, total=total)
 
     try:
-        bake_again(store, copy, materials, progress, textures=wanted["textures"], watch=told)
+        bake_again(store, copy, materials, progress, textures=wanted["textures"], watch=watch)
     except UserError as error:
-        told.say(error=str(error))
+        watch.say(error=str(error))
     else:
-        told.say(baked=True)
+        watch.say(baked=True)
 
 
 def _end_with(stream: BinaryIO) -> None:
