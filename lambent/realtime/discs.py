@@ -31,7 +31,7 @@ class Discs(Overlay):
             module = self._device.create_shader_module(code=assemble("discs.wgsl"))
             groups = [self._layouts.frame]
             self._pipeline = pipeline(self._device, module, "discs_main", groups, [DISPLAY_FORMAT], compare="greater")
-        context = self._begun(state, DISPLAY_FORMAT)
+        context = self._frame_context(state, DISPLAY_FORMAT)
         shown = target_texture(self._device, (*state.size, 1), DISPLAY_FORMAT).create_view()
         render = context.begin("depth", [], "clear", depth="clear")
         self._depth.draw(render, context)

@@ -29,7 +29,7 @@ class Overlay:
         self._frame_buffer = layouts.uniform(FRAME_DTYPE.itemsize)
         self._frame_group = layouts.group(layouts.frame, self._frame_buffer, resources.sampler)
 
-    def _begun(self, state: FrameState, format: str) -> FrameContext:
+    def _frame_context(self, state: FrameState, format: str) -> FrameContext:
         """A frame of a state into a target of `format`, before its first pass."""
         state = replace(state, accumulate=None, jitter_px=(0.0, 0.0), planar=OFF)
         data = frame_data(state, self._resources.scene.record.bounds)

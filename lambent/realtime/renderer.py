@@ -115,7 +115,7 @@ class Renderer:
         """
         started = time.perf_counter()
         whole, self._gpu_ms = Whole(self.device.create_command_encoder()), None
-        context = self._begun(whole, state, target_view)
+        context = self._frame_context(whole, state, target_view)
         for _ in self._steps(context):
             pass
         self._timer.resolve(whole.encoder)
@@ -133,7 +133,7 @@ class Renderer:
         times: dict[str, float] = {}
         encode_s, started = 0.0, time.perf_counter()
         cut.encoder = self.device.create_command_encoder()
-        context = self._begun(cut, state, target_view)
+        context = self._frame_context(cut, state, target_view)
         frame = self._frames
         for _ in self._steps(context):
             self._timer.resolve(cut.encoder)
@@ -258,7 +258,7 @@ class Renderer:
             "samples_per_pixel": max((d.n * d.lobes for d in context.draws if d.integrator.specular), default=0),
         }
 
-    def _begun(self, slicing: Whole | Cut, state: FrameState, target_view: Any) -> FrameContext:
+    def _frame_context(self, slicing: Whole | Cut, state: FrameState, target_view: Any) -> FrameContext:
         """A frame before its first pass."""
         state.check()
         self._frames += 1

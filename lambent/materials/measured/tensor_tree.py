@@ -245,33 +245,33 @@ class _Nest:
         self.children = array("i")
         self.logs = array("b")
         self.root: int | None = None
-        self._begun = False  # a brace was opened; its content is not known yet
+        self._opened = False  # a brace was opened; its content is not known yet
         self._rank, self._branches = rank, 1 << rank
         self._log_of = {1 << rank * log: log for log in range(64 // rank)}
         self._path: list[list[int]] = []  # open branches: number, halves filled
 
     @property
     def unclosed(self) -> bool:
-        return self._begun or bool(self._path)
+        return self._opened or bool(self._path)
 
     def open(self, words: int) -> None:
         if words:
             raise Malformed("a number outside the innermost braces")
         if self.root is not None:
             raise Malformed("text after the last brace")
-        if self._begun:
+        if self._opened:
             if len(self._path) == DEEPEST:
                 raise Malformed(f"more than {DEEPEST} levels of braces")
             self._path.append([len(self.children) // self._branches, 0])
             self.children.extend([0] * self._branches)
-        self._begun = True
+        self._opened = True
 
     def close(self, words: int) -> None:
-        if self._begun:
+        if self._opened:
             if words not in self._log_of:
                 raise Malformed(f"{words} values in braces, expected a power of {self._branches}")
             self.logs.append(self._log_of[words])
-            self._begun = False
+            self._opened = False
             self._put(-len(self.logs))
             return
         if not self._path:
