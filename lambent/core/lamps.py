@@ -34,7 +34,7 @@ CORNER = 12**-0.5  # four points at -+ this share of a texel have the variance o
 
 @dataclass(frozen=True, eq=False)
 class Lamp:
-    """Part of a cube map (6, N, N, 3): flattened indices `texels` (K,), and `excess` (K, 3), their radiance over `rest`.
+    """Part of a cube map (6, N, N, 3): flattened indices `texels` (K,), and their `excess` (K, 3) over `rest`.
 
     `flux` (K, 3) is excess times solid angle, in W/m^2 on a surface that faces it. `radius_rad` is sqrt(2) times the
     larger standard deviation of directions: the rms radius of a round lamp.
