@@ -1,9 +1,10 @@
 """Convergence for a still camera: the error of 1, 2, 4 ... 256 accumulated `qmc` frames.
 
-The truth is the mean of `REPLICAS` longer series of other samples: the image is moved by whole pixels, so that every
-place has another pixel's rotation of the sequence. Replicas of `qmc-lobe`, which aims at no lamp and so shares
-no density with `qmc`, tell whether the two agree, pixel by pixel, within the scatter of the replicas. Frames are
-counted, not seconds: the adapter decides how many fit into two seconds; `PROMISED` is 2 s at 30 frames per second.
+The truth is the mean of `REPLICAS` longer series with other samples: each replica shifts the image by whole pixels, so
+that every place gets another pixel's rotation of the sequence. Replicas of `qmc-lobe`, which does not sample lamps and
+so shares no density with `qmc`, test pixel by pixel whether the two agree within the scatter of the replicas. The bench
+counts frames, not seconds, because the adapter decides how many fit into two seconds; `PROMISED` is 2 s at 30 frames
+per second.
 """
 
 from __future__ import annotations
@@ -32,15 +33,15 @@ from lambent.realtime.unbaked import CAMERA, unbaked_scene
 NAME = "accumulate"
 PROMISED = 60
 TRUTH_N = 64  # samples per frame of the truth
-REPLICAS, REPLICAS_ALONE = 8, 16  # of the truth, and of `qmc-lobe`, whose rare bright samples skew a small sample
+REPLICAS, REPLICAS_ALONE = 8, 16  # of the truth, and of `qmc-lobe`, whose rare bright samples skew small sets
 MOST_MOVED = 2  # pixels
-BLOCK = 8  # pixels along the squares whose means are compared too: nearer to normal than single pixels
+BLOCK = 8  # side of squares whose means are also compared: more nearly normal than single pixels
 LOBES = tuple(material.lobes[0] for material in MATERIALS if material.name in ("satin .1", "rough .4", "miro .013/.12"))
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Pixels along each side, samples per pixel of all of the truth's replicas together, and what is measured."""
+    """Pixels along each side, samples per pixel summed over the truth's replicas, and the cases."""
 
     size_px: int = 64
     truth_spp: int = 32768
@@ -54,7 +55,7 @@ FULL, QUICK = Effort(), Effort(32, 8192)
 
 @dataclass(frozen=True)
 class Case:
-    """A lobe in a scene, and the frame that shows it: `name` is the environment, or planar."""
+    """A lobe in a scene, and the frame that shows it: `name` is the environment, or "planar"."""
 
     name: str
     renderer: Renderer
@@ -86,20 +87,20 @@ def _cases(device: Any, effort: Effort) -> Iterator[Case]:
 
 
 def replicas(case: Case, integrator: str, chosen: list[tuple[int, int]], spp: int) -> Floats:
-    """(R, H, W, 3) series of at least `spp` samples each, one per move, all moved back."""
+    """(R, H, W, 3) series of at least `spp` samples each, one per shift, all shifted back."""
     state = replace(case.state, integrator=integrator, n=TRUTH_N)
     moved = (case.renderer.converged(replace(state, jitter_px=(float(x), float(y))), spp) for x, y in chosen)
     return np.stack([np.roll(image, (y, x), axis=(0, 1)) for image, (x, y) in zip(moved, chosen, strict=True)])
 
 
 def moves() -> list[tuple[int, int]]:
-    """Whole pixels (right, down) by which replicas are moved; (0, 0) is left to the series itself."""
+    """Whole-pixel shifts (right, down) of replicas; (0, 0) is reserved for the series itself."""
     steps = range(-MOST_MOVED, MOST_MOVED + 1)
     return [(right, down) for right in steps for down in steps if (right, down) != (0, 0)]
 
 
 def z_of(a: Floats, b: Floats) -> Floats:
-    """(...) z of two means of replicas (R, ...): Welch's t, as the normal deviate of the same probability."""
+    """(...) z of two means of replicas (R, ...): Welch's t, as the normal deviate of equal probability."""
     from scipy.stats import norm, t
 
     share_a, share_b = (x.var(axis=0, ddof=1) / len(x) for x in (a, b))
@@ -110,10 +111,11 @@ def z_of(a: Floats, b: Floats) -> Floats:
 
 
 def agreement(aimed: Floats, lobe_alone: Floats, shown: Flags) -> dict[str, float]:
-    """Agreement of two sets of replicas (R, H, W, 3): of the shown pixels, of blocks of them, z_whole of their mean.
+    """Agreement of two sets of replicas (R, H, W, 3): over the shown pixels, over blocks, and z_whole of their mean.
 
-    If both are unbiased, z_rms is 1 and z_above_3 .0027, as far as means are distributed normally. Where rare samples
-    are bright, means of pixels are not: most are too dark and seem exact. Means of blocks are nearer to normal.
+    If both are unbiased, z_rms is 1 and z_above_3 .0027, as far as means are normally distributed. With rare bright
+    samples pixel means are not: most are too dark and have too small an estimated error. Block means are more nearly
+    normal.
     """
     a, b = (x[:, shown].astype(np.float64).mean(axis=-1) for x in (aimed, lobe_alone))
     z, by_block = z_of(a, b), z_of(block_means(a, shown), block_means(b, shown))
@@ -138,8 +140,8 @@ def block_means(values: Floats, shown: Flags) -> Floats:
 def errors_of(case: Case, effort: Effort) -> list[dict[str, Any]]:
     """One row per number of frames: the error of the mean so far, and the truth's agreement with `qmc-lobe`.
 
-    mse is relative to the truth's mean square. bias is the mean difference as a share of the mean, its standard error
-    from the differences of the pixels, whose samples are rotated independently.
+    mse is relative to the truth's mean square. bias is the mean difference relative to the mean; its standard error
+    comes from the differences of pixels, whose samples are rotated independently.
     """
     spp, chosen = effort.truth_spp // REPLICAS, moves()
     aimed = replicas(case, "qmc", chosen[:REPLICAS], spp)
@@ -147,7 +149,7 @@ def errors_of(case: Case, effort: Effort) -> list[dict[str, Any]]:
     truth = aimed.mean(axis=0)
     inside = np.zeros(truth.shape[:2], bool)
     inside[MOST_MOVED:-MOST_MOVED, MOST_MOVED:-MOST_MOVED] = True
-    # a silhouette may fall on either side of a pixel's centre once the image is moved
+    # shifting the image can move a silhouette across a pixel's centre
     shown = inside & np.all(aimed.max(axis=-1) > 0, axis=0) & np.all(alone.max(axis=-1) > 0, axis=0)
     agrees, reference = agreement(aimed, alone, shown), Reference.of(truth, shown)
     rows = []
@@ -185,13 +187,13 @@ def _series(case: Case, wanted: tuple[int, ...]) -> Iterator[tuple[int, Floats]]
 
 
 def slope_of(rows: list[dict[str, Any]]) -> float:
-    """Exponent of mse against frames: -1 for independent samples, less for a sequence that covers its domain evenly."""
+    """Exponent of mse against frames: -1 for independent samples, lower for a low-discrepancy sequence."""
     frames, mse = ([row[key] for row in rows] for key in ("frames", "mse"))
     return float(np.polyfit(np.log(frames), np.log(mse), 1)[0])
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Per case the slope, the PSNR after `PROMISED` frames, the agreement of the truths; bias_z_max of last frames."""
+    """Slope, PSNR after `PROMISED` frames and agreement of the truths per case; bias_z_max over the last frames."""
     cases: dict[str, list[dict[str, Any]]] = defaultdict(list)
     for row in rows:
         cases[f"{row['case']} {row['mx']:g}/{row['my']:g}"].append(row)

@@ -1,9 +1,9 @@
-"""`bake`: time and noise of each artefact, and the time that an interruption adds.
+"""`bake`: time and noise of each artefact, and the cost of an interruption.
 
-Every artefact is baked into a store that holds what it needs. Light maps are baked in turns with an interrupted twin,
-stopped halfway and resumed; the overhead of an artefact without a middle is the time that finding it finished takes.
-`noise` is relative, root mean square, before denoising: the bake's own figure for light maps; for probes the difference
-of two seeds over the root of 2. One process bakes with all cores; kernels are compiled before anything counts.
+Every artefact is baked into a store that has its inputs. Light maps are baked alternately with a twin that is stopped
+halfway and resumed; for an artefact without a middle, the overhead is the time to find it finished. `noise` is the
+relative root mean square before denoising: for light maps the bake's own figure, for probes the difference of two seeds
+over the root of 2. One process bakes on all cores; kernels are compiled before timing starts.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from lambent.scenes.scene import Scene
 from lambent.store.store import Store
 
 NAME = "bake"
-MAIN = "light_map, paths"  # the row that is scaled
-FACTORS = (0.5, 2.0)  # of the texels
+MAIN = "light_map, paths"  # the row that is repeated at other sizes
+FACTORS = (0.5, 2.0)  # on the number of texels
 
 
 @dataclass(frozen=True)
 class Effort:
-    """The quality of the bakes, and how often each of them is timed."""
+    """The quality of the bakes, and the repetitions of each timing."""
 
     quality: Quality
     runs: int = 5
@@ -49,7 +49,7 @@ QUICK = Effort(
             "samples": (8, 8),
             "gather_samples": 8,
             "photons_per_texel": 8,
-            "tile_texels": 64,  # several tiles, so that there is a middle to stop in
+            "tile_texels": 64,  # several tiles, so that a bake can be stopped in the middle
         },
         environment={"texels": 64},
         probe={"texels": 16, "samples": 4},
@@ -59,7 +59,7 @@ QUICK = Effort(
 
 @dataclass(frozen=True)
 class Case:
-    """One artefact: the kind and methods that `bake` gets, and the array whose meta and size describe it."""
+    """One artefact: the kind and methods for `bake`, and the array whose meta and size describe it."""
 
     artefact: str
     kind: str
@@ -81,7 +81,7 @@ CASES = (
 
 
 def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
-    """Rows per artefact of the first input, a scene; without one, of the built-in box."""
+    """One row per artefact of the first input, a scene; without input, of the built-in box."""
     scene, steps, rows = load_scene(str(inputs[0]) if inputs else "builtin:box"), len(CASES) + 1, []
     with tempfile.TemporaryDirectory() as folder:
         for number, case in enumerate(CASES):
@@ -123,7 +123,7 @@ def row_of(scene: Scene, case: Case, effort: Effort, folder: Path) -> dict[str, 
 
 @dataclass(frozen=True)
 class Bakes:
-    """Bakes of one artefact into stores below `folder`, each begun with all that the artefact needs."""
+    """Bakes of one artefact into stores below `folder`, each with all inputs of the artefact."""
 
     scene: Scene
     case: Case
@@ -151,20 +151,20 @@ class Bakes:
             shutil.copytree(ready, folder)
 
     def timed(self, name: str, seed: int = 0) -> tuple[float, Store]:
-        """Seconds of a whole bake, and its store."""
+        """Seconds of a complete bake, and its store."""
         self._begin(name)
         began = time.perf_counter()
         store = self._bake(name, seed=seed)
         return time.perf_counter() - began, store
 
     def again_s(self, name: str) -> float:
-        """Seconds that finding a bake finished takes."""
+        """Seconds to find a bake finished."""
         began = time.perf_counter()
         self._bake(name)
         return time.perf_counter() - began
 
     def interrupted_s(self) -> float:
-        """Seconds of a bake that is stopped when half of a step is done, and of its resumption."""
+        """Seconds of a bake that is stopped after half a step, plus its resumption."""
         self._begin("broken")
 
         def stop(done: float, total: float, what: str) -> None:
@@ -178,7 +178,7 @@ class Bakes:
         return time.perf_counter() - began
 
     def noise(self, store: Store) -> float | None:
-        """Relative noise of the artefact in `store`; None where it has none."""
+        """Relative noise of the artefact in `store`; None if it has none."""
         arrays = _arrays(store, self.case)
         if self.case.kind == "light_map":
             return float(store.artefact(arrays[0]).meta["noise"])
@@ -197,7 +197,7 @@ def _arrays(store: Store, case: Case) -> list[str]:
 
 
 def _size(store: Store, case: Case) -> tuple[int, int]:
-    """Texels, and maps: a cube counts as one."""
+    """Number of texels, and number of maps: a cube counts as one."""
     if case.kind == "geometry":
         width, height = store.artefact(case.array).meta["light_map_size"]
         return width * height, 1
@@ -206,7 +206,7 @@ def _size(store: Store, case: Case) -> tuple[int, int]:
 
 
 def _scaled(scene: Scene, effort: Effort, factor: float, folder: Path) -> dict[str, Any]:
-    """Seconds of the main row at `factor` times its texels."""
+    """Seconds of the main row with `factor` times its texels."""
     from lambent.bake.artefacts import geometry
 
     case = next(case for case in CASES if case.artefact == MAIN)

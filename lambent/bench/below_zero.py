@@ -1,6 +1,6 @@
-"""RGL files of saturated materials, and the same with readings below zero: a channel lowered, or noise about zero.
+"""RGL files of saturated materials, with variants that have readings below zero: a lowered channel, or noise.
 
-They are written and read like a user's files. A fit of the changed file can be compared with that of the clean one.
+They are written and read like user files. The fit of a variant is compared with that of the clean file.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from lambent.materials.measured.registry import load
 from lambent.materials.measured.tensor_file import read_tensors, tensor_bytes
 
 DARK = 2  # the channel near zero, blue
-SIZE = 0.005  # of the deficit and of the noise's standard deviation, as stored: f cos theta_o in 1/sr
+SIZE = 0.005  # deficit, and standard deviation of the noise, as stored: f cos theta_o in 1/sr
 _FAINT = Lobe(k=(0.6, 0.5, 0.1), mx=0.15, my=0.15, r0=(0.04,) * 3, alpha=0.3)
 _METAL = Lobe(k=(0.9, 0.7, 0.1), mx=0.2, my=0.2, r0=(0.6,) * 3)
 _MATERIALS = (
@@ -30,7 +30,7 @@ _MATERIALS = (
 
 @dataclass(frozen=True)
 class Spoilt:
-    """A clean table, and the same with readings below zero, by what was done to it."""
+    """A clean table, and its variants with readings below zero, by kind of change."""
 
     name: str
     clean: MeasuredTable

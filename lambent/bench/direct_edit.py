@@ -1,11 +1,11 @@
-"""`direct-edit`: a view whose materials are edited, from the bake to the frame, and path tracing with a denoiser.
+"""`direct-edit`: editing the materials of a view, from the bake to the frame, against path tracing with a denoiser.
 
-A row is a scene with a number of lights, each baked alone into an empty store by kernels that are compiled. Frames are
-those of a drag of one highlight, with `show`, `step` and `image`; the row `full frame` has transport of 256 bands in
-every pixel, made up. Errors are those of a picture after an edit that a material document can say too, which the path
-tracer draws: `flip` and `rival_flip` are means over the pixels with surfaces, to its converged picture of direct light.
-`rival_seconds` is the time of path tracing, guides and Open Image Denoise at the fewest samples, in powers of two, that
-come as close to that picture as the edited one does. `reference_flip` is between two halves of its samples.
+A row is a scene with a number of lights, baked separately into an empty store with compiled kernels. Frames are those
+of dragging one highlight, with `show`, `step` and `image`; the row `full frame` has synthetic transport of 256 bands in
+every pixel. Errors are those of a picture after an edit that a material document can also express, so that the path
+tracer can draw it: `flip` and `rival_flip` are means over pixels with surfaces, against its converged picture of direct
+light. `rival_seconds` is the time of path tracing, guides and Open Image Denoise with the fewest samples, in powers of
+two, that match the error of the edited picture. `reference_flip` is between two halves of the reference's samples.
 """
 
 from __future__ import annotations
@@ -49,13 +49,13 @@ from lambent.store.store import Store
 NAME = "direct-edit"
 MIB = 2**20
 BANDS = 256  # of the full frame
-SWITCHES = 3  # forth and back
+SWITCHES = 3  # back and forth
 DRAG = Region(a=-0.1, b=0.0, c=0.1, d=0.4)
 
 
 @dataclass(frozen=True)
 class Case:
-    """The material of a scene that is edited, and two of its curves; the first is dragged."""
+    """The edited material of a scene, and two of its curves; the first is dragged."""
 
     material: str
     curves: tuple[str, str]
@@ -69,9 +69,10 @@ CASES = {
 
 @dataclass(frozen=True)
 class Effort:
-    """Pixels of an edge of the picture, frames that are timed, edits of the random walk, and samples of the reference.
+    """Side of the picture in pixels, timed frames, edits of the random walk, and samples of the reference.
 
-    `rival_s` is the time that one picture of the rival may take; `checked` the points where light is summed anew.
+    `rival_s` limits the time of one picture of the rival; `checked` is the number of points at which light is summed
+    again.
     """
 
     size: int
@@ -88,7 +89,7 @@ QUICK = Effort(64, (400,), frames=8, edits=50, reference_spp=256, rival_s=2.0, c
 
 
 def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
-    """Rows per scene and number of lights; the summary has what holds for all."""
+    """Rows per scene and number of lights; the summary has figures common to all."""
     from lambent.bake.engine import engine
 
     engine()
@@ -137,7 +138,7 @@ def _scene_rows(name: str, case: Case, effort: Effort) -> list[dict[str, Any]]:
 
 
 def _edited(material: Material) -> Material:
-    """Rougher and of another colour: an edit of curves and tints that the document can say."""
+    """Rougher and of another colour: an edit of curves and tints that a document can express."""
     lobes = [lobe.model_copy(update={"mx": 1.5 * lobe.mx, "my": 1.5 * lobe.my}) for lobe in material.lobes]
     return material.model_copy(update={"lobes": tuple(lobes), "kd": triple(np.multiply(material.kd, (1.0, 0.7, 0.5)))})
 
@@ -168,7 +169,7 @@ def _shown(store: Store, session: Session) -> Flags:
 
 
 def _times(picture: EditedPicture, session: Session, case: Case, effort: Effort) -> dict[str, Any]:
-    """Times of frames and switches, and what a random walk leaves."""
+    """Times of frames and switches, and the residual after a random walk."""
     states, rng = _drag(session, case), np.random.default_rng(0)
     picture.show(case.material, next(states))
     picture.draw()
@@ -202,8 +203,7 @@ def _times(picture: EditedPicture, session: Session, case: Case, effort: Effort)
 
 
 def _drag(session: Session, case: Case) -> Iterator[Editable]:
-    """States of a drag upwards, one a frame; the curves are made by the frame before, as operators' cost is not the
-    picture's."""
+    """States of an upward drag, one per frame; curves are prepared before the frame, to exclude the operators' time."""
     k = 0
     while True:
         k += 1
@@ -226,7 +226,7 @@ def _drawn(picture: EditedPicture, case: Case, state: Editable) -> None:
 
 
 def _full_frame(effort: Effort) -> dict[str, Any]:
-    """Every pixel shows one material of one curve whose bands all count."""
+    """Every pixel shows one material with one curve, all of whose bands contribute."""
     pixels, size = effort.size**2, effort.size
     rng = np.random.default_rng(1)
     rows = np.stack([rng.random((3, pixels), np.float32).astype(np.float16) for _ in range(BANDS)])
@@ -249,13 +249,13 @@ def _full_frame(effort: Effort) -> dict[str, Any]:
 def _against_path_tracing(
     scene: Scene, pictures: list[Floats], shown: Flags, effort: Effort
 ) -> Iterator[dict[str, Any]]:
-    """Errors of edited pictures, and what path tracing with a denoiser takes for as little."""
+    """Errors of edited pictures, and the time of path tracing with a denoiser for the same error."""
     from lambent.bake.reference.denoised import DenoisedView
 
     tracer = DenoisedView(scene, scene.cameras[0], effort.size, effort.size, max_depth=1)
     halves = [tracer.image(effort.reference_spp // 2, seed) for seed in (1, 2)]
     converged = np.mean(halves, axis=0)
-    exposure_ev = display_exposure(converged)  # of the whole picture: surfaces may be less than its mean asks for
+    exposure_ev = display_exposure(converged)  # of the whole picture: surfaces alone may be darker than its mean
     reference, half = (
         Reference(light, shown, exposure_ev, displayed(light, exposure_ev))
         for light in (image * shown[..., None] for image in (converged, halves[0]))
@@ -281,7 +281,7 @@ def _against_path_tracing(
 
 
 def held_bytes(thing: object) -> int:
-    """Bytes of all arrays that a picture holds, each once."""
+    """Bytes of all arrays that a picture holds, each counted once."""
     found: dict[int, int] = {}
     left, seen = [thing], set()
     while left:

@@ -1,15 +1,15 @@
-"""`equal-time`: one frame in motion beside path tracing with Open Image Denoise, by error and by time.
+"""`equal-time`: one frame in motion against path tracing with Open Image Denoise, by error and by time.
 
-Rows are scene x method. `frame` is what the window draws while it moves; `path N spp` is N paths a pixel, albedo,
-normals and the denoiser; both as they are displayed. Times are of all cores together on a software adapter, whose
-drawing and the path tracer then share a processor; on a graphics card they are seconds. Kernels are compiled and the
-scene is loaded before anything counts. The row marked `equal` has the fewest paths that take at least the frame's time,
-so that the comparison is never kinder to the frame than its time.
+Rows are scene x method. `frame` is the window's frame in motion; `path N spp` is N paths per pixel plus albedo, normals
+and the denoiser; both are compared as displayed. Times are processor time over all cores on a software adapter, where
+drawing and path tracing share a processor; on a graphics card they are seconds. Kernels are compiled and the scene is
+loaded before timing starts. The row marked `equal` has the fewest paths that take at least the frame's time, so that
+the comparison never favours the frame.
 
 The truth is path traced with the store's own materials in two halves, or the mean of finished pictures of the first
-camera (`--reference`), whose size the rows then have. `reference_flip` is the FLIP of one half to the other, of
-every second picture to the others: two independent errors, each 1.4 times that of the truth, and a part of every
-figure. One picture alone has none.
+camera (`--reference`), which then set the size of the rows. `reference_flip` is the FLIP between the halves, or between
+every second picture and the others: two independent errors, each 1.4 times that of the truth, and a part of every
+figure. A single picture has none.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Effort:
-    """Pixels, samples of the truth, timings of a frame, paths that are tried; the scene where no store is given."""
+    """Pixels, samples of the truth, timings of a frame, tried numbers of paths; the scene if no store is given."""
 
     width: int = 960
     height: int = 540
@@ -60,9 +60,9 @@ FULL, QUICK = Effort(), Effort(320, 180, 64, 3, (1, 4), "builtin:box")
 def run(
     effort: Effort, inputs: Sequence[Path] = (), reference: Sequence[Path] = (), progress: Progress = silent
 ) -> dict[str, Any]:
-    """Rows of the inputs, baked stores; without one, of a scene that is baked here in `preview`.
+    """Rows of the inputs, which are baked stores; without inputs, of a scene baked here in `preview`.
 
-    `reference`: finished pictures of the only input's first camera, each of equally many samples and another seed.
+    `reference`: finished pictures of the only input's first camera, with equal samples and different seeds.
     """
     if reference and len(inputs) != 1:
         got, expected = f"{len(inputs)} inputs", "one store, of whose first camera it is a picture"
@@ -83,7 +83,7 @@ def rows_of(
     from lambent.bake.engine import engine
 
     engine()
-    from lambent.bake.reference.denoised import DenoisedView  # imports Mitsuba, whose variant `engine` has set
+    from lambent.bake.reference.denoised import DenoisedView  # imports Mitsuba, whose variant is set by `engine`
 
     if pictures:
         effort = replace(effort, width=pictures[0].shape[1], height=pictures[0].shape[0])
@@ -131,7 +131,7 @@ def rows_of(
 
 
 def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """By scene, how many times the frame's FLIP the rival of equal time has, and its time in frames."""
+    """By scene, FLIP of the rival of equal time relative to the frame's, and the rival's time in frames."""
     frames = {row["scene"]: row for row in rows if row["method"] == "frame"}
     equal = [row for row in rows if row["equal"]]
     return {

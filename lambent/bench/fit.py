@@ -1,11 +1,11 @@
 """`fit`: accuracy and speed of fits to measured tables.
 
-Without inputs it fits tables synthesised from the thesis's fitted materials (tables 3.1 and 3.2), whose answers are
-known, and retro-reflective tapes, with a retro lobe and without. With inputs it fits the caller's measured files, and
-each fit is judged by the metric it was fitted under, as a share of the best Lambertian surface's error; published
-parameters (`--against FILE.fit`) are judged on the same tuples. Files with readings below zero are made as well, and
-their fits compared with those of their clean versions.
-Both methods fit one lobe in turn, five times; the other rows are least squares alone.
+Without inputs it fits tables synthesised from the thesis's fitted materials (tables 3.1 and 3.2), whose parameters are
+known, and retro-reflective tapes, with and without a retro lobe. With inputs it fits the given measured files; each fit
+is judged by the metric it minimised, relative to the best Lambertian fit's error. Published parameters
+(`--against FILE.fit`) are judged on the same tuples. Files with readings below zero are generated too, and their fits
+compared with those of the clean files. Both methods fit one lobe alternately, five times; the other rows are least
+squares alone.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ MODELS = (("beckmann", 1), ("beckmann", 2), ("beckmann", 3), ("ggx", 1), ("ggx",
 
 @dataclass(frozen=True)
 class Effort:
-    """Numbers of tuples that are fitted of a measured and of a synthesised table (None: all), and of repetitions.
+    """Numbers of fitted tuples of a measured and of a synthesised table (None: all), and of repetitions.
 
-    `methods` fit the synthesised tables of `known`; all methods fit measured tables, `runs` times where time counts.
+    `methods` fit the synthesised tables of `known`; all methods fit measured tables, `runs` times if timed.
     """
 
     tuples: int | None = None
@@ -54,7 +54,7 @@ class Effort:
     methods: tuple[Method, ...] = METHODS
     runs: int = 5
     known: tuple[Material, ...] = tuple(KNOWN.values())
-    below_zero: bool = True  # whether tables with such readings are fitted
+    below_zero: bool = True  # whether to fit tables with readings below zero
     tapes: tuple[Tape, ...] = TAPES
 
 
@@ -63,7 +63,7 @@ FULL, QUICK = Effort(), Effort(6_000, 60_000, ("gradient",), 1)
 
 @dataclass(frozen=True)
 class Case:
-    """One table and the material it was made from, where that is known."""
+    """One table and, if known, the material it was made from."""
 
     name: str
     table: MeasuredTable
@@ -130,7 +130,7 @@ def _measured_rows(case: Case, effort: Effort) -> Iterator[dict[str, Any]]:
 
 
 def _below_zero_rows(effort: Effort) -> Iterator[dict[str, Any]]:
-    """Changes of the albedo at 30 degrees by readings below zero: of the bright channels, relative; of the dark one."""
+    """Changes of the albedo at 30 degrees due to readings below zero: bright channels (relative), and dark one."""
     wi = direction(np.radians(ALBEDO_THETA_DEG), 0.0)
     for spoilt in spoilt_tables():
         for metric in (KNOWN_METRIC, *METRICS):
@@ -155,7 +155,7 @@ def _fitted(case: Case, method: Method, metric: str, distribution: Any, lobes: i
 
 
 def _row(case: Case, method: str, results: Sequence[FitResult]) -> dict[str, Any]:
-    """The last of several fits that differ only in their time."""
+    """The last of several fits that differ only in time."""
     result, seconds = results[-1], [result.seconds for result in results]
     wi = direction(np.radians(ALBEDO_THETA_DEG), 0.0)
     provenance = result.material.provenance
@@ -180,7 +180,7 @@ def _row(case: Case, method: str, results: Sequence[FitResult]) -> dict[str, Any
 
 
 def _published_rows(case: Case, published: dict[str, dict[str, Published]]) -> Iterator[dict[str, Any]]:
-    """The published parameters of the material that the file is named after, under every metric."""
+    """Published parameters of the material that the file is named after, under every metric."""
     stem = Path(case.name).stem
     found = {source: fits[stem] for source, fits in published.items() if stem in fits}
     if not found:
@@ -208,7 +208,7 @@ def _compared(found: Material, truth: Material) -> list[dict[str, Any]]:
 
 
 def _parameters(material: Material) -> dict[str, float]:
-    """The parameters that can be recovered, by name; of a transmission lobe only the product kt (1 - r0) can."""
+    """The recoverable parameters by name; for a transmission lobe only the product kt (1 - r0)."""
     values = {"kd": material.kd[0]}
     for number, lobe in enumerate(material.reflection_lobes, 1):
         shape = {"ks": lobe.k[0], "mx": lobe.mx, "my": lobe.my, "r0": lobe.r0[0], "alpha": lobe.alpha}
@@ -220,7 +220,7 @@ def _parameters(material: Material) -> dict[str, float]:
 
 
 def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Largest deviation from a known parameter, geometric mean of the shares per model, both methods' comparison."""
+    """Largest deviation from a known parameter, geometric mean of the shares per model, comparison of both methods."""
     known = [row for row in rows if "parameters" in row and row["method"] == "gradient"]
     spoilt = [row for row in rows if "below_zero" in row]
     measured = [row for row in rows if "parameters" not in row and "below_zero" not in row]
@@ -253,7 +253,7 @@ def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _beside_ours(rows: list[dict[str, Any]], method: str) -> list[tuple[dict[str, Any], dict[str, Any]]]:
-    """Rows of a method, each with the row of least squares for the same file and metric, one lobe."""
+    """Rows of a method, each paired with the least squares row of the same file and metric, with one lobe."""
     keys = ("file", "metric", "method", "distribution", "lobes")
     ours = {tuple(row[key] for key in keys): row for row in reversed(rows)}  # a second lobe may have vanished
     both = ((row, ours.get((row["file"], row["metric"], "gradient", *MODELS[0]))) for row in rows)

@@ -1,10 +1,10 @@
-"""`flicker`: how much a picture changes from frame to frame where nothing has changed.
+"""`flicker`: changes of a static scene's picture from frame to frame.
 
-Rows are scene x case. `still` has two frames of one resting camera in motion's own integrator, `at rest` the pictures
-that follow while that camera converges, `walk` frames of a slow walk, STEP_M apart at REFRESH_HZ. FLIP compares each
-frame with the one before, which is first reprojected onto the surfaces that the later frame sees; pixels that the
-earlier one did not see count as unchanged. Reprojection blurs, and reflections do move: `walk, smooth` has the same of
-frames without aliases (16 places in each pixel), below which no frame comes. What is above is flicker.
+Rows are scene x case. `still` compares two frames of one resting camera in motion's own integrator, `at rest` the
+pictures that follow while that camera converges, `walk` frames of a slow walk, STEP_M apart at REFRESH_HZ. FLIP
+compares each frame with the previous one, reprojected onto the surfaces that the later frame sees; pixels hidden in the
+earlier frame count as unchanged. Reprojection blurs, and reflections really move: `walk, smooth` measures the same for
+antialiased frames (16 samples per pixel) and is the lower bound. Anything above it is flicker.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ if TYPE_CHECKING:
 
 NAME = "flicker"
 STEP_M = 0.02  # half a metre a second at 25 frames
-REST_FRAMES = 128  # of a series at rest, of one sample each, as in the window in software
+REST_FRAMES = 128  # of a series at rest, with one sample each, as in the window on a software adapter
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Pixels, places along the walk, frames compared at rest, and the scene that is baked where no store is given."""
+    """Pixels, places along the walk, frames compared at rest, and the scene that is baked if no store is given."""
 
     width: int = 960
     height: int = 540
@@ -55,18 +55,18 @@ FULL, QUICK = Effort(), Effort(240, 135, 2, 4, "builtin:box")
 
 
 def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
-    """Rows of the inputs, baked stores; without one, of a scene that is baked here in `preview`."""
+    """Rows of the inputs, which are baked stores; without inputs, of a scene baked here in `preview`."""
     with given_or_baked(inputs, effort.scene, progress) as stores:
         rows = [row for store in stores for row in rows_of(store, effort, progress)]
     return {"rows": rows, "summary": {f"{row['scene']} {row['case']}": row["flip"] for row in rows}}
 
 
 def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[dict[str, Any]]:
-    """One row per case; FLIP's mean is over all pairs of frames, the worst tile of all of them."""
+    """One row per case; FLIP's mean is over all pairs of frames, the worst tile over all."""
     from lambent.bake.engine import engine
 
     engine()
-    from lambent.bake.reference import surfaces as traced  # imports Mitsuba, whose variant `engine` has set
+    from lambent.bake.reference import surfaces as traced  # imports Mitsuba, whose variant is set by `engine`
 
     renderer = Renderer(open_device(), store)
     record, scene = renderer.scene.record, renderer.scene
@@ -106,7 +106,7 @@ def _changed(earlier: Floats, later: Floats, before: Camera, after: Camera, surf
 
 
 def _steps(record: SceneRecord, places: int) -> Iterator[tuple[Camera, Camera]]:
-    """Pairs of cameras STEP_M apart: along the first path that has a length, else sideways from each camera."""
+    """Pairs of cameras STEP_M apart: along the first path that has a length, otherwise sideways from each camera."""
     path = next((path for path in record.paths if len(path.keys) > 1 and path_length(path) > STEP_M), None)
     if path is not None:
         share = STEP_M / path_length(path)
@@ -120,7 +120,7 @@ def _steps(record: SceneRecord, places: int) -> Iterator[tuple[Camera, Camera]]:
 
 
 def _at_rest(renderer: Renderer, state: FrameState, count: int) -> Iterator[Floats]:
-    """The frame in motion, and the pictures of a series at rest that replace it."""
+    """The frame in motion, then the pictures of a series at rest that replace it."""
     yield _encoded(renderer.display_image(state))
     for index in range(count):
         prior = prior_share(index + 1, REST_FRAMES, 1)

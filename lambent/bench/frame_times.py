@@ -1,4 +1,4 @@
-"""Frame times against those of diffuse light alone; rows take turns, so that a slow machine slows all of them."""
+"""Frame times relative to diffuse light alone; rows are timed in turns, so that a slow machine slows all of them."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from lambent.core.progress import Progress
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 
-BY_N = ("rings", "lobe-4.25", "fis")  # split-sum and diffuse do not know n
+BY_N = ("rings", "lobe-4.25", "fis")  # split-sum and diffuse do not depend on n
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Size of the frame in pixels, the sample counts n, and how often every row is measured."""
+    """Size of the frame in pixels, the sample counts n, and the repetitions of each row."""
 
     width: int = 1680
     height: int = 1050
@@ -41,7 +41,7 @@ class Row:
     wall_ms: list[float] = field(default_factory=list)
 
     def in_floors(self, floor: Row) -> list[float]:
-        """The times, each over the diffuse frame of the same round."""
+        """The times, each relative to the diffuse frame of the same round."""
         return [a / b for a, b in zip(self.wall_ms, floor.wall_ms, strict=True)]
 
 
@@ -51,7 +51,7 @@ def report(effort: Effort, scenes: Mapping[str, tuple[Renderer, FrameState]], pr
     Parameters
     ----------
     scenes : mapping
-        For each coverage, "full" and "half": a renderer, and the frame that fills that share of the image.
+        For each coverage, "full" and "half": a renderer, and a frame that fills that share of the image.
     """
     kinds = [("diffuse", None), ("split-sum", None), *((name, n) for n in effort.ns for name in BY_N)]
     rows = [
@@ -102,7 +102,7 @@ def row_of(row: Row, floor: Row) -> dict[str, Any]:
 
 
 def linear_fit(rows: Sequence[Row], floor: Row) -> dict[str, float]:
-    """Time = offset + per_sample n, both in diffuse frames, and the largest deviation of a row from that line."""
+    """Fit time = offset + per_sample n, in diffuse frames; also the largest deviation of a row from the line."""
     n = np.array([row.state.n for row in rows], float)
     times = np.array([median(row.in_floors(floor)) for row in rows])
     slope, offset = np.polyfit(n, times, 1)
@@ -111,7 +111,7 @@ def linear_fit(rows: Sequence[Row], floor: Row) -> dict[str, float]:
 
 
 def summary_of(rows: Sequence[Row], floors: Mapping[str, Row], scaled: Sequence[Row]) -> dict[str, Any]:
-    """Milliseconds per integrator and n at full coverage, lines through the times, the exponent of time in pixels."""
+    """Milliseconds per integrator and n at full coverage, linear fits, and the exponent of time in pixels."""
     small, large = scaled
     growth = np.log(median(large.wall_ms) / median(small.wall_ms)) / np.log(4)
     wall_ms: dict[str, dict[str, float]] = {}

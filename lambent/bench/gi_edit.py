@@ -1,18 +1,19 @@
-"""`gi-edit`: a view edited with its interreflections, from the bake to the frame, beside path tracing and a denoiser.
+"""`gi-edit`: editing a view with interreflections, from the bake to the frame, against path tracing with a denoiser.
 
-Rows with `samples` are scenes with the series of their published figures; `thesis_seconds` is what the published
-number of samples would take at the measured rate. Errors are those of smaller pictures of `error_size` with
-`error_samples`, to path traced pictures of as many surfaces: `opened_` of the materials as the scene has them, the
-others means over random `settings` that no bake has seen (`gi_edit_states`), of each kind, and the worst. `flip` is of
-all pixels; `relmse` and `flip_inside` of those whose neighbours show the same object, as a stored pixel is a point and
-a path traced one a mean. `noise_flip` is between two halves of the reference, `noise_relmse` that of the whole. A
-`_limit` is extrapolated from half the samples and all of them to infinitely many, without the reference's noise, as if
-squares added up: what more samples would not mend. `rival_` is path tracing, guides and Open Image Denoise of the first
-setting, at the fewest samples, in powers of two, whose FLIP is as low; the seconds are those of the large picture.
+Rows with `samples` are scenes with the series of their published figures; `thesis_seconds` is the time for the
+published number of samples at the measured rate. Errors are those of smaller pictures of `error_size` with
+`error_samples`, against path traced pictures with as many surfaces. `opened_` refers to the scene's own materials; the
+others are means over random `settings` unknown to the bake (`gi_edit_states`), for each kind, and the worst. `flip`
+covers all pixels; `relmse` and `flip_inside` only those whose neighbours show the same object, because a stored pixel
+is a point and a path traced one a mean. `noise_flip` is between two halves of the reference, `noise_relmse` is the
+noise of the whole. A `_limit` is extrapolated from half and all of the samples to infinitely many, without the
+reference's noise, assuming that squares add up: the error that more samples would not remove. `rival_` is path tracing,
+guides and Open Image Denoise of the first setting, with the fewest samples, in powers of two, that reach the same FLIP;
+its seconds are those of the large picture.
 
-Rows with `error_mib` compare series in small pictures with paths of up to `surfaces` surfaces, so that what a short
-series leaves out counts: the relative error (root of `relmse`) times MiB, and times seconds of the bake. The summary
-names the least of each scene.
+Rows with `error_mib` compare series in small pictures with paths of up to `surfaces` surfaces, so that light omitted by
+a short series counts: the relative error (root of `relmse`) times MiB, and times seconds of the bake. The summary names
+the smallest per scene.
 """
 
 from __future__ import annotations
@@ -53,12 +54,12 @@ from lambent.store.store import Store
 NAME = "gi-edit"
 DRAG = Region(a=-0.1, b=0.0, c=0.1, d=0.4)
 SERIES = ((64, 1), (64, 1, 1), (64, 1, 1, 1), (128, 1, 1, 1), (64, 16), (128, 8, 1), (16, 8, 1, 1))
-SURFACES = 8  # on the longest paths that series are compared with
+SURFACES = 8  # on the longest paths against which series are compared
 
 
 @dataclass(frozen=True)
 class Case:
-    """A scene with a series as it was published: size, samples a pixel, and the material that is dragged."""
+    """A scene with its published series: size, samples per pixel, and the dragged material."""
 
     scene: str
     series: tuple[int, ...]
@@ -81,10 +82,10 @@ CASES = (
 
 @dataclass(frozen=True)
 class Effort:
-    """Pictures are smaller by `shrink`, those of errors by `error_shrink` more; samples are those of a pixel.
+    """Pictures are smaller by `shrink`, those for errors by a further `error_shrink`; samples are per pixel.
 
-    `settings` are random ones of each row; `rival_s` is the time that one picture of the rival may take; `edge` that of
-    the pictures by which `series` are compared.
+    `settings` is the number of random settings per row; `rival_s` limits the time of one picture of the rival; `edge`
+    is the side of the pictures for comparing `series`.
     """
 
     shrink: int = 1
@@ -111,7 +112,7 @@ QUICK = Effort(
 def run(effort: Effort, settings: int | None = None, progress: Progress = silent) -> dict[str, Any]:
     """Rows per scene and series; the summary has the best series of each scene.
 
-    `settings` are random ones of each row, where they are not those of the effort.
+    `settings` overrides the effort's number of random settings per row.
     """
     from lambent.bake.engine import engine
 
@@ -134,7 +135,7 @@ def run(effort: Effort, settings: int | None = None, progress: Progress = silent
 
 
 class _Room:
-    """One view of a scene in a store of its own, and its direct light."""
+    """One view of a scene in its own store, with its direct light."""
 
     def __init__(self, case: Case, size: tuple[int, int], folder: Path, lights: int) -> None:
         self.case, self.size, self._folder = case, size, folder
@@ -146,7 +147,7 @@ class _Room:
         self.store = bake(self.scene, folder, quality=quality, only={"transport"}, views=[View(self.camera, *size)])
 
     def bake(self, series: tuple[int, ...], samples: int) -> float:
-        """Bring the interreflections to so many samples; seconds."""
+        """Bake the interreflections up to `samples`; returns seconds."""
         began, view, bounces = time.perf_counter(), View(self.camera, *self.size), Bounces(series, samples, self.fixed)
         self.store = bake(self.scene, self._folder, only={"interreflection"}, views=[view], bounces=bounces)
         return time.perf_counter() - began
@@ -164,7 +165,7 @@ class _Room:
         return whole
 
     def settings(self, count: int) -> list[dict[str, Editable]]:
-        """Random ones of each kind in turn; materials that are fixed stay."""
+        """Random settings of each kind in turn; uneditable materials stay."""
         found = []
         for k in range(count):
             rng = np.random.default_rng(k)
@@ -177,7 +178,7 @@ class _Room:
         return found
 
     def reference(self, materials: dict[str, Editable], surfaces: int, spp: int) -> tuple[Floats, Floats]:
-        """Two halves of a path traced picture."""
+        """A path traced picture in two halves."""
         from lambent.bake.reference.path_traced import render_reference
 
         edited = {name: one for name, one in materials.items() if name not in self.fixed}
@@ -231,7 +232,7 @@ def _row(case: Case, effort: Effort) -> dict[str, Any]:
 
 
 def _times(room: _Room, light: Interreflections, effort: Effort) -> dict[str, Any]:
-    """Freezing of each material for edits of its sharpest curve, and frames of a drag of one."""
+    """Times of freezing each material for edits of its sharpest curve, and of frames while dragging one."""
     whole, freezing = room.picture(light), {}
     whole.draw()
     for name in light.parts:
@@ -259,7 +260,7 @@ def _times(room: _Room, light: Interreflections, effort: Effort) -> dict[str, An
 
 
 def _sharpest(part: PartLight) -> str:
-    """The curve that has the most bands."""
+    """The curve with the most bands."""
     pairs = zip(part.start.terms, part.terms, strict=True)
     counts = [one for term, light in pairs for one in zip(light.counts, term.factors, strict=True)]
     return max(counts, key=lambda one: one[0])[1].curve
@@ -276,7 +277,7 @@ def _drag(room: _Room, material: str, curve: str) -> Iterator[Editable]:
 
 
 def _errors(room: _Room, large: _Room, effort: Effort) -> dict[str, Any]:
-    """Of the scene as it is, of the settings, and what the rival takes in the large view for the first of these."""
+    """Errors for the scene as it is and for the settings; the rival's time in the large view for the first one."""
     states, pictures = [room.start, *room.settings(effort.settings)], []
     for samples in (effort.error_samples // 2, effort.error_samples):
         room.bake(room.case.series, samples)
@@ -297,7 +298,7 @@ def _errors(room: _Room, large: _Room, effort: Effort) -> dict[str, Any]:
 
 
 def _error(half: Floats, full: Floats, references: tuple[Floats, Floats], inner: Flags) -> dict[str, float]:
-    """Of pictures of half the samples and of all of them."""
+    """Errors of pictures with half the samples and with all."""
     converged = np.mean(references, axis=0)
     noise = relative_mse(*references, inner) / 4  # of the mean of both
     relmse = [relative_mse(one, converged, inner) for one in (half, full)]
@@ -314,7 +315,7 @@ def _error(half: Floats, full: Floats, references: tuple[Floats, Floats], inner:
 def _rival(
     room: _Room, large: _Room, state: dict[str, Editable], converged: Floats, wanted: float, effort: Effort
 ) -> dict[str, Any]:
-    """The fewest samples that come as close in the small view, and the seconds that they take in the large one."""
+    """The fewest samples that reach the error in the small view, and their seconds in the large one."""
     from lambent.bake.reference.denoised import DenoisedView
 
     edited = {name: one for name, one in state.items() if name not in room.fixed}
@@ -337,7 +338,7 @@ def _rival(
 
 
 def _series(case: Case, effort: Effort) -> list[dict[str, Any]]:
-    """Each series in one small picture, with the same samples, against paths of any length."""
+    """Each series in one small picture, with equal samples, against paths of any length."""
     size = effort.edge, round(effort.edge * case.size[1] / case.size[0])
     rows = []
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""Random settings of materials that no bake has seen, and how far pictures of them are from a reference."""
+"""Random settings of materials unknown to the bake, and errors of their pictures against a reference."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from lambent.store.contract import view_artefact_name
 from lambent.store.store import Store
 
 KINDS = ("bands", "colours", "widths")
-STEPS, SMOOTH_STEPS = 16, SMOOTH  # of a curve of random steps; over angles without narrow peaks
-WHITEST = 0.8  # albedo of what is random
+STEPS, SMOOTH_STEPS = 16, SMOOTH  # of a random step curve; fewer over angles without narrow peaks
+WHITEST = 0.8  # highest albedo of random materials
 
 
 def setting(kind: str, material: Material, rng: np.random.Generator) -> Editable:
-    """A material at random.
+    """A random variant of a material.
 
     Parameters
     ----------
     kind : {'colours', 'widths', 'bands'}
-        Another diffuse colour; wide or narrow lobes as well; or curves of random steps, in all terms.
+        Another diffuse colour; also wide or narrow lobes; or random step curves in all terms.
     """
     lobes = list(material.lobes)
     if kind == "widths":
@@ -46,9 +46,9 @@ def setting(kind: str, material: Material, rng: np.random.Generator) -> Editable
 
 
 def stepped(editable: Editable, rng: np.random.Generator) -> Editable:
-    """Curves of random steps, about as large as they were: a narrow lobe might be even over the bands it meets.
+    """Replace curves by random step curves of about the same size: a narrow lobe might be even over the bands it meets.
 
-    Steps are as wide as bands, or as several.
+    Steps are as wide as one band, or as several.
     """
     curves = {}
     over = {factor.curve: factor.over for term in editable.terms for factor in term.factors}
@@ -60,7 +60,7 @@ def stepped(editable: Editable, rng: np.random.Generator) -> Editable:
 
 
 def _no_whiter(editable: Editable) -> Editable:
-    """Terms scaled so that no albedo is above `WHITEST`."""
+    """Scale the terms so that no albedo exceeds `WHITEST`."""
     most = max((float(albedo(editable, side).max()) for side in editable.sides), default=0.0)
     factor = min(1.0, WHITEST / max(most, 1e-9))
     terms = tuple(replace(term, scale=triple(np.multiply(term.scale, factor))) for term in editable.terms)
@@ -68,13 +68,13 @@ def _no_whiter(editable: Editable) -> Editable:
 
 
 def relative_mse(image: Floats, reference: Floats, shown: Flags) -> float:
-    """Mean of (a - b)^2 / (b^2 + a hundredth of the squared mean) over the pixels that are shown."""
+    """Mean of (a - b)^2 / (b^2 + a hundredth of the squared mean) over the shown pixels."""
     a, b = image[shown], reference[shown]
     return float(np.mean((a - b) ** 2 / (b**2 + 0.01 * b.mean() ** 2)))
 
 
 def flip_between(reference: Floats, image: Floats, shown: Flags | None = None) -> float:
-    """Mean FLIP; of pixels that are `shown`, where the others are alike in both."""
+    """Mean FLIP; over `shown` pixels only, if all others are equal in both."""
     exposure_ev = display_exposure(reference)
     if shown is None:
         return float(flip_error(displayed(reference, exposure_ev), displayed(image, exposure_ev)).mean())
@@ -83,7 +83,7 @@ def flip_between(reference: Floats, image: Floats, shown: Flags | None = None) -
 
 
 def summed_up(errors: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Means over settings, FLIP and relMSE of each kind, and of the worst; setting k is of kind k modulo `KINDS`."""
+    """Means over settings: FLIP and relMSE per kind, and of the worst; setting k is of kind k modulo `KINDS`."""
     means = {key: np.mean([one[key] for one in errors]) for key in errors[0]}
     kinds = {
         f"{key}_{kind}": np.mean([one[key] for one in errors[k :: len(KINDS)]])
@@ -95,7 +95,7 @@ def summed_up(errors: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 
 def interior(store: Store, camera: Camera, size: tuple[int, int]) -> Flags:
-    """(H, W) pixels that show a surface, and whose neighbours show the same object."""
+    """(H, W) pixels that show a surface and whose neighbours show the same object."""
     pixel, number = (
         store.read(view_artefact_name(camera, *size, "view_points", part)).astype(np.int64)
         for part in ("pixel", "object")

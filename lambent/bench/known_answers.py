@@ -1,7 +1,7 @@
-"""The thesis's fitted materials (tables 3.1 and 3.2), and the device that measures them again in software.
+"""The thesis's fitted materials (tables 3.1 and 3.2), and simulated measurements of them.
 
-Their tables have the thesis's incident grids, 2 % sensor noise and a sector that the lamp's arm hides. The parameters
-that a fit finds in them can be compared with the true ones.
+Their tables have the thesis's incident grids, 2 % sensor noise and a sector hidden by the lamp's arm. A fit's
+parameters can be compared with the true ones.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import replace
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.synthetic import ANISOTROPIC, Setup
 
-NARROW = 0.02  # below this roughness, outgoing directions have to be closer than usual
+NARROW = 0.02  # roughness below which outgoing directions must be denser than usual
 NARROW_STEP_DEG = 0.25
 
 
@@ -45,6 +45,6 @@ KNOWN = {material.name: material for material in _MATERIALS}
 
 
 def setup_of(material: Material) -> Setup:
-    """The device for a material: the thesis's anisotropic grid, with close directions around narrow lobes."""
+    """The device for a material: the thesis's anisotropic grid, with dense directions around narrow lobes."""
     narrow = min(min(lobe.mx, lobe.my) for lobe in material.lobes) < NARROW
     return replace(ANISOTROPIC, fine_deg=NARROW_STEP_DEG) if narrow else ANISOTROPIC

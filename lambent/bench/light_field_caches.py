@@ -1,4 +1,4 @@
-"""How often a cache of a light field's maps misses, as tables 6.3 to 6.6 of thesis R have it."""
+"""Miss rates of caches of a light field's maps, as in tables 6.3 to 6.6 of thesis R."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ FACE_TEXELS = 128  # along a face of the thesis's cube maps
 def caches(
     field: LightField, place: Place, view: LightFieldView, capacities: tuple[int, ...]
 ) -> Iterator[dict[str, Any]]:
-    """Misses in percent of what is read, pixel by pixel: in rows, as the thesis's renderer shades, or in tiles.
+    """Misses in percent of reads, pixel by pixel: in rows, as the thesis's renderer shades, or in tiles.
 
     Maps are read whole: for the surface (the first point), for reflections (all four), and for SCATTERED samples of a
-    BRDF, with the points in the outer loop: each map is read so often in a row. Of the sample map, rows are read.
+    BRDF with the points in the outer loop, which reads each map that often in a row. The sample map is read by rows.
     """
     pixel, first = np.unique(view.shown.pixel, return_index=True)
     row, column = np.divmod(pixel, view.size[0])
@@ -57,10 +57,10 @@ def caches(
 def thesis_reads(
     place: Place, w: Floats, orders: dict[str, NDArray[np.int64]], capacities: tuple[int, ...]
 ) -> Iterator[dict[str, Any]]:
-    """Misses of reflections in the thesis's own count: of each texel of bilinear look-ups in cube maps.
+    """Misses of reflections by the thesis's count: of each texel of bilinear look-ups in cube maps.
 
-    An item is a face of a cube map, read on demand: from its first row to that of the texel (section 4.3; compressed
-    TIFF files have rows one after another).
+    An item is a face of a cube map, read on demand from its first row to that of the texel (section 4.3; rows are
+    consecutive in compressed TIFF files).
     """
     for order, pixels in orders.items():
         face, _, row = face_places(np.repeat(w[pixels, None], place.points.shape[1], axis=1), FACE_TEXELS)
@@ -75,7 +75,7 @@ def thesis_reads(
 
 
 def partial_misses(reads: list[tuple[int, int]], capacity: int) -> int:
-    """Reads (item, row) that find their item missing, or read up to an earlier row; the least recent goes."""
+    """Reads (item, row) that find their item missing or read only to an earlier row; evicts the least recent item."""
     held, missed = OrderedDict[int, int](), 0
     for item, row in reads:
         end = held.pop(item, -1)

@@ -1,6 +1,6 @@
-"""One object of a scene in a view, and its light fields: what the bench of light fields compares.
+"""One object of a scene in a view, with its light fields: the test case for the bench of light fields.
 
-The scene is lit by its baked light map, in which maps and truth are traced alike.
+The scene is lit by its baked light map, for both maps and truth.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ SEED = 1
 
 @dataclass(frozen=True)
 class Compared:
-    """Pixels of an object in a view, cut to it, against a reference; radiance is compared as it is displayed."""
+    """Pixels of an object in a view, cropped to it, against a reference; radiance is compared as displayed."""
 
     pixel: Indices
     shape: tuple[int, int]
@@ -45,7 +45,7 @@ class Compared:
 
     @classmethod
     def of(cls, pixel: Indices, size: tuple[int, int], truth: Floats) -> Compared:
-        """Places (k,) by the number of their pixel in an image of `size` (width, height), and their radiance (k, 3)."""
+        """Places (k,) by pixel number in an image of `size` (width, height), and their radiance (k, 3)."""
         row, column = pixel // size[0], pixel % size[0]
         row, column = row - row.min(), column - column.min()
         shape = int(row.max()) + 1, int(column.max()) + 1
@@ -54,11 +54,11 @@ class Compared:
         return cls(at, shape, Reference.of(_means(at, shape, truth), shown))
 
     def image(self, radiance: Floats) -> Floats:
-        """Radiance (k, 3) as an image: the mean of each pixel's places, black around them."""
+        """Radiance (k, 3) as an image: the mean of each pixel's places, black elsewhere."""
         return _means(self.pixel, self.shape, radiance)
 
     def errors(self, radiance: Floats) -> dict[str, Any]:
-        """flip, psnr and worst_tile of the object's pixels; rmse_rgb and rmse_lab, L* / 100, of light exposed alike."""
+        """flip, psnr and worst_tile over the object's pixels; rmse_rgb and rmse_lab, L* / 100, at equal exposure."""
         image, shown = self.image(radiance), self.reference.shown
         found = self.reference.errors(image)
         both = self.reference.radiance[shown], image[shown]
@@ -86,9 +86,9 @@ class LightFieldView:
     Attributes
     ----------
     shown : Shown
-        Places of it that pixels show, some to each.
-    truth, surface : (k, 3) radiance that they mirror, and of the object itself without lobes.
-    distance_m : (k,) of what they mirror, infinite for the sky.
+        Places of the object that pixels show, several per pixel.
+    truth, surface : (k, 3) radiance in its mirror direction, and of the object itself without lobes.
+    distance_m : (k,) distance in the mirror direction, infinite for the sky.
     """
 
     def __init__(
@@ -118,11 +118,11 @@ class LightFieldView:
         return cube if sun is None else sky_without(cube, sun)
 
     def sky(self, w: Floats) -> Floats:
-        """Radiance (k, 3) of the environment along w (k, 3), without the disc of its sun."""
+        """Radiance (k, 3) of the environment along w (k, 3), without the sun's disc."""
         return np.asarray(sample(self._sky, w), float)
 
     def field(self, points: int, texels: int, strata: int) -> LightField:
-        """A light field of the object; points that no pixel shows stay black, which saves half of the time."""
+        """A light field of the object; points that no pixel shows stay black, which halves the time."""
         from lambent.bake.light_fields.placing import Placing
         from lambent.bake.light_fields.sample_map import sample_map
 
@@ -149,14 +149,14 @@ class LightFieldView:
         return field
 
     def single(self, texels: int, strata: int) -> LightField:
-        """One map from the object's middle, without it: reflection mapping as a light field of one point."""
+        """One map from the object's centre, without the object: reflection mapping as a light field of one point."""
         middle, radiance, nearness = self._tracer.map_from_middle(texels, strata, SEED)
         nothing = np.full((1, 1, 4), NO_POINT, np.uint16)
         at = middle.astype(np.float32)
         return LightField(at, 0 * at, radiance, nearness, nothing, (0, 0), (1, 1), 0.0)
 
     def place(self, field: LightField) -> Place:
-        """The pixels' places, with the points of a light field near them."""
+        """The pixels' places, with the nearby points of a light field."""
         return Place.at(field, self.shown.x, self.shown.n, self.shown.uv2)
 
 

@@ -1,8 +1,8 @@
 """`load`: time from a cold start to a command's first frame, and its peak memory.
 
-Every run is a process of its own, so that the figure includes imports, pipelines and reading the store. `render` ends
-with its frame; `walk` is a window that closes after one frame and needs a display; `--help` is the start-up alone.
-`gpu_mb` is the size of the buffers and textures of that frame, counted where they are made; no driver is asked.
+Every run is a separate process, so that the figure includes imports, pipelines and reading the store. `render` ends
+with its frame; `walk` is a window that closes after one frame and needs a display; `--help` is start-up alone.
+`gpu_mb` is the size of the buffers and textures of that frame, counted at creation, not reported by a driver.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ print("bytes", wgpu.diagnostics.object_counts.get_dict()["total"]["resource_mem"
 
 @dataclass(frozen=True)
 class Effort:
-    """Size of the frame in pixels, and how often every command is run."""
+    """Size of the frame in pixels, and the runs per command."""
 
     width: int = 1680
     height: int = 1050
@@ -64,7 +64,7 @@ FULL, QUICK = Effort(), Effort(640, 400)
 
 
 def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
-    """Rows per command on the first input, a baked store; without one, on the built-in box baked here."""
+    """Rows per command on the first input, a baked store; without input, on the built-in box baked here."""
     with tempfile.TemporaryDirectory() as folder:
         store = inputs[0] if inputs else _box(Path(folder) / "box.store", progress)
         size, runs = (effort.width, effort.height), effort.runs
@@ -82,8 +82,8 @@ def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent
 
 
 def timed(command: list[str]) -> tuple[float, float | None]:
-    """(seconds, peak resident memory in MB or None where the system does not tell) of one process."""
-    # Through a small process of its own: a child's peak starts at what its parent held when it was forked.
+    """(seconds, peak resident memory in MB or None if the system does not report it) of one process."""
+    # Through a small separate process: a forked child's peak starts at its parent's memory.
     done = subprocess.run([sys.executable, "-c", _TIMED, *command], capture_output=True, text=True, timeout=TIMEOUT_S)
     if done.returncode != 0:
         last = done.stderr.strip().splitlines()[-1:] or [f"code {done.returncode}"]
@@ -115,7 +115,7 @@ def _row(name: str, runs: list[tuple[float, float | None]], gpu_mb: float | None
 
 
 def _box(folder: Path, progress: Progress) -> Path:
-    """The built-in box, baked coarsely: the values of its texels do not matter here."""
+    """The built-in box, baked coarsely: its texel values do not matter here."""
     from lambent.bake.bake import bake
     from lambent.bake.quality import quality_named
     from lambent.scenes import load_scene

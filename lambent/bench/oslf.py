@@ -1,8 +1,8 @@
-"""Errors of reflections from an offset surface light field, by method; how often a cache of its maps misses.
+"""Errors of reflections from an offset surface light field, by method, and miss rates of caches of its maps.
 
-Every look-up of `core.light_field_lookup` against traced mirror rays of the teapot's pixels in the pavilion, as in
-tables 6.1 and 6.2 of thesis R; caches as in its tables 6.3 to 6.6. Look-ups count texels of radiance and distance.
-Pixels are means over the same places for all: what is compared is the look-up, not its sampling.
+Every look-up of `core.light_field_lookup` is compared with traced mirror rays of the teapot's pixels in the pavilion,
+as in tables 6.1 and 6.2 of thesis R; caches as in its tables 6.3 to 6.6. Look-ups count texels of radiance and
+distance. Pixels are means over the same places for all methods: the look-up is compared, not its sampling.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ from lambent.scenes import load_scene
 
 NAME = "oslf"
 POWERS = (1, 4, 8, 16)
-STORED = ("B_n 4", "march 1", "march 1, sky", "march 4", "march 4, sky")  # methods that are measured in blocks, too
+STORED = ("B_n 4", "march 1", "march 1, sky", "march 4", "march 4, sky")  # methods also measured with stored blocks
 ONE, FOUR = March(candidates=1), March()
-PER_POINT = FOUR.steps + 1 + FOUR.secants + 1  # distances, that at infinity among them, and the radiance
+PER_POINT = FOUR.steps + 1 + FOUR.secants + 1  # reads of distances, including the one at infinity, plus the radiance
 PREVIEW = Quality("preview")
 SMALL = PREVIEW.changed("small", geometry={"texels": 64}, light_map={"gather_samples": 0}, environment={"texels": 16})
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Scene, object, view; light fields by points and texels; strata along a texel's side, places in a pixel."""
+    """Scene, object, view; light fields by points and texels; strata along a texel's side, places per pixel."""
 
     scene: str = "builtin:pavilion"
     object: str = "teapot"
@@ -58,7 +58,7 @@ QUICK = Effort("builtin:box", "sphere", 0, (96, 96), ((64, 32),), 1, 4, (4, 16),
 
 @dataclass(frozen=True)
 class Method:
-    """A look-up: its texels a pixel, and the radiance (k, 3) it finds along the mirrored directions."""
+    """A look-up: its texel reads per pixel, and its radiance (k, 3) along the mirror directions."""
 
     name: str
     look_ups: int
@@ -94,7 +94,7 @@ def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
 
 
 def methods(field: LightField, single: LightField, place: Place, view: LightFieldView) -> Iterator[Method]:
-    """Every look-up, from reflection mapping to the one that knows the true hit."""
+    """All look-ups, from reflection mapping to the one that knows the true hit."""
     w, k = view.shown.w, len(place.x)
     middle = Place(place.x, place.n, np.stack([np.zeros(k, np.int64), *[np.full(k, NO_POINT)] * 3], axis=-1))
     far = March(1, first=0.02, last=4.0)
@@ -123,7 +123,7 @@ def _marched(
 
 
 def true_hit(field: LightField, place: Place, w: Floats, distance_m: Floats, sky: Sky | None = None) -> Floats:
-    """Radiance (k, 3) of the maps towards what the traced rays meet: the error that their texels leave."""
+    """Radiance (k, 3) of the maps towards the traced hits: the remaining error is that of their texels."""
     is_open = ~np.isfinite(distance_m)
     q = place.offsets(field) + np.where(is_open, 1e6, distance_m)[:, None, None] * w[:, None]
     seen = radiance_along(field, place.named(), q)
@@ -134,7 +134,7 @@ def true_hit(field: LightField, place: Place, w: Floats, distance_m: Floats, sky
 def stored_rows(
     field: LightField, single: LightField, view: LightFieldView, mirror: Compared, said: dict[str, Any]
 ) -> Iterator[dict[str, Any]]:
-    """Some of the methods with the light field in the blocks that a store and a GPU have, and their MB uncompressed."""
+    """Some methods with the light field in the blocks of a store and a GPU, and their MB uncompressed."""
     stored = in_blocks(field)
     assert stored.blocks is not None and stored.distances is not None, "it is in blocks"
     megabytes = {"light_mb": stored.blocks.nbytes / 1e6, "distances_mb": stored.distances.nbytes / 1e6}
@@ -147,7 +147,7 @@ def stored_rows(
 def surface_rows(
     field: LightField, place: Place, view: LightFieldView, said: dict[str, Any]
 ) -> Iterator[dict[str, Any]]:
-    """The object itself from its light field, and the share of pixels that a point sees; none of a black one."""
+    """The object itself from its light field, and the share of pixels that a point sees; no rows for a black object."""
     if view.surface.any():
         light, seen = look.surface(field, place)
         found = Compared.of(view.shown.pixel, view.size, view.surface).errors(light)
@@ -155,12 +155,12 @@ def surface_rows(
 
 
 def raw_mb(field: LightField) -> float:
-    """Half floats of radiance and inverse distance, and the sample map, uncompressed."""
+    """MB of radiance and inverse distance in half floats, and of the sample map, uncompressed."""
     return round((field.radiance.nbytes + field.inverse_distance.nbytes + field.sample_map.nbytes) / 1e6, 1)
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """By light field, FLIP and PSNR of every method; the misses of least-recent caches."""
+    """FLIP and PSNR of every method by light field; misses of least-recently-used caches."""
     found: dict[str, Any] = {}
     for row in rows:
         if "method" in row:

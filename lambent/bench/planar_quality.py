@@ -1,8 +1,8 @@
-"""Errors of planar reflectors: every method of drawing them against exact ray casting and the converged image.
+"""Errors of planar reflectors: every drawing method against exact ray casting and the converged image.
 
-The specular light of the floor of planar_scene, seven lobes. PSNR is taken over the floor's pixels; FLIP over the
-image, black where no floor is, and over the floor's pixels alone. The error against `qmc` is that of sampling; the
-error against exact casting also holds what the planar reflection buffer cannot know.
+The test is the specular light of the floor of planar_scene, for seven lobes. PSNR covers the floor's pixels; FLIP
+covers the image, black outside the floor, and the floor's pixels alone. The error against `qmc` is sampling error; the
+error against exact casting also includes the limits of the planar reflection buffer.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ ROUGHNESSES = ((0.01, 0.01), (0.02, 0.02), (0.05, 0.05), (0.1, 0.1), (0.2, 0.2),
 
 @dataclass(frozen=True)
 class Effort:
-    """Size in pixels, samples per pixel of the references, whether `qmc` is one of them, and what is compared."""
+    """Size in pixels, samples per pixel of the references, whether `qmc` is one of them, and the cases."""
 
     width: int = 1024
     height: int = 768
@@ -88,7 +88,7 @@ def _errors(
 
 
 def summary(rows: list[dict[str, Any]], converged: list[dict[str, float]]) -> dict[str, Any]:
-    """Means over the lobes by method and n, and of the converged image's own error; of the worst tiles the worst."""
+    """Means over the lobes by method and n, and of the converged image's own error; the maximum of the worst tiles."""
     keys = ["psnr_path", "flip_path", "flip_floor_path", *(["psnr_qmc"] if converged else [])]
     found: dict[str, Any] = {key: by_n(rows, "way", key, mean(4)) for key in keys}
     found["flip_worst_tile_path"] = by_n(rows, "way", "flip_worst_tile_path", max)

@@ -1,7 +1,7 @@
 """The scene of the planar benches, in memory: a floor and a wall, with a cube, a cylinder, a ball, a lamp and a pole.
 
 Everything above the floor is diffuse and patterned, so that its reflection can be traced exactly: `exact_reflection`
-casts rays at the triangles that the renderer draws and reads the same light map.
+casts rays at the triangles that the renderer draws, and reads the same light map.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def meshes(lamps: Lamps = LAMPS) -> dict[str, Mesh]:
 
 
 def floor_state(lobe: Lobe, width: int, height: int) -> FrameState:
-    """The frame that shows the specular light of a floor of one lobe."""
+    """The frame that shows the specular light of a floor with one lobe."""
     materials = {FLOOR: Material(name=FLOOR, lobes=(lobe,))}
     return FrameState(CAMERA, width, height, show="specular", antialias=False, materials=materials)
 
@@ -73,7 +73,7 @@ def planar_scene(lobe: Lobe, lamps: Lamps = LAMPS) -> BakedScene:
 
 
 def light_map(shapes: Iterable[str]) -> Floats:
-    """Irradiance (TILE_TEXELS, TILE_TEXELS shapes, 3): for each shape a tile of checks, brighter to the right."""
+    """Irradiance (TILE_TEXELS, TILE_TEXELS shapes, 3): a tile of checks per shape, brighter to the right."""
     at = (np.arange(TILE_TEXELS) + 0.5) / TILE_TEXELS
     u, v = np.meshgrid(at, at)
     checks = np.where((np.floor(u * 10) + np.floor(v * 10)) % 2 == 0, 1.0, 0.45) * (0.6 + 0.6 * u)
@@ -95,10 +95,9 @@ def light_map_places(shapes: Mapping[str, Mesh]) -> dict[str, Floats]:
 def exact_reflection(
     lobe: Lobe, camera: Camera, width: int, height: int, spp: int, progress: Progress = silent, lamps: Lamps = LAMPS
 ) -> tuple[Floats, Flags]:
-    """Radiance (height, width, 3) of the floor by ray casting, and where the floor is (height, width) bool.
+    """Radiance (height, width, 3) of the floor by ray casting, and the floor's pixels (height, width) bool.
 
-    `spp` samples of the lobe at every pixel's centre, as the renderer's `qmc` takes them, each traced to the triangle
-    that it hits.
+    `spp` samples of the lobe at every pixel's centre, as in the renderer's `qmc`, each traced to the triangle it hits.
     """
     from lambent.bake.engine import engine
 

@@ -1,8 +1,8 @@
 """Errors of a few samples per pixel: every integrator against the converged image of the same frame.
 
-The specular term of a sphere and a torus, ten materials and the caller's under several environments. The error against
-qmc is that of sampling; the error against path tracing also holds what a probe cannot know, the light between the
-shapes. The converged image's own error against path tracing stands beside it.
+The test is the specular term of a sphere and a torus, ten materials plus the caller's, under several environments. The
+error against qmc is sampling error; the error against path tracing also includes light between the shapes, which a
+probe does not know. The converged image's own error against path tracing is reported with it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ INTEGRATORS = ("lamps", "rings", "lobe-4.24", "lobe-4.25", "fis", "split-sum")
 
 @dataclass(frozen=True)
 class Effort:
-    """Pixels along each side; samples per pixel of the references (no path tracing where 0); what is compared."""
+    """Pixels along each side; samples per pixel of the references (0: no path tracing); the cases."""
 
     size_px: int = 128
     qmc_spp: int = 4096
@@ -47,7 +47,7 @@ FULL, QUICK = Effort(), Effort(size_px=48, path_spp=0)
 
 @dataclass(frozen=True)
 class Case:
-    """A material under an environment: the frame that shows it, converged and, where wanted, path traced."""
+    """A material under an environment: the frame that shows it, converged and, on request, path traced."""
 
     material: Material
     environment: str
@@ -57,7 +57,7 @@ class Case:
     path: Reference | None
 
     def errors(self, image: Floats) -> dict[str, float | None]:
-        """Against qmc and against path tracing, None where it was left out."""
+        """Against qmc and against path tracing; None if omitted."""
         found: dict[str, float | None] = {}
         for name, reference in (("qmc", self.qmc), ("path", self.path)):
             errors: Mapping[str, float] = reference.errors(image) if reference else {}
@@ -69,7 +69,7 @@ class Case:
 def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
     """Rows material x environment x n x integrator; `inputs` are environments and materials, added to ours.
 
-    `split-sum` does not know n: its one image stands in every row of its material and environment.
+    `split-sum` does not depend on n: its one image appears in every row of its material and environment.
     """
     more, measured = read_inputs(inputs, progress)
     environments = {name: make() for name, make in effort.environments.items()} | more
@@ -99,7 +99,7 @@ def _cases(environments: Mapping[str, Floats], materials: Sequence[Material], ef
             qmc, path = renderer.converged(replace(frame, n=64), effort.qmc_spp), None
             if effort.path_spp:
                 traced = path_traced(meshes, material, cube, CAMERA, size, effort.path_spp)
-                path = Reference.of(traced, eroded(shown))  # its pixels are areas: silhouettes show what is behind
+                path = Reference.of(traced, eroded(shown))  # pixels are areas, and silhouettes include background
             yield Case(material, environment, renderer, frame, Reference.of(qmc, shown), path)
 
 
@@ -117,13 +117,13 @@ def _rows(case: Case, ns: Sequence[int]) -> list[dict[str, Any]]:
 
 
 def eroded(shown: Flags) -> Flags:
-    """Pixels whose four neighbours are shown too."""
+    """Shown pixels whose four neighbours are shown too."""
     beside = (np.roll(shown, step, axis) for axis in (0, 1) for step in (1, -1))
     return np.asarray(np.logical_and.reduce([shown, *beside]))
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Mean psnr_qmc per integrator and n, and how far `rings` stands above the others."""
+    """Mean psnr_qmc per integrator and n, and the lead of `rings` over the others."""
     means = by_n(rows, "integrator", "psnr_qmc", mean(2))
     rings = means["rings"]
     others = {name: series for name, series in means.items() if name != "rings"}

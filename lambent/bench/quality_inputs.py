@@ -1,7 +1,7 @@
-"""The materials and environments of `quality`: its own, and the caller's.
+"""The materials and environments of `quality`: built-in ones, and the caller's.
 
-A caller's file is a lat-long image (an environment), a material document (.json), or a measured table, which is
-fitted first: one lobe, as `lambent fit` does it.
+A caller's file is a lat-long image (an environment), a material document (.json), or a measured table, which is fitted
+first with one lobe, as by `lambent fit`.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def read_inputs(paths: Iterable[Path], progress: Progress = silent) -> tuple[dic
     Raises
     ------
     UserError
-        Where a file is of none of the three kinds, broken, or a material without specular reflection.
+        If a file is of none of the three kinds, is broken, or is a material without specular reflection.
     """
     environments: dict[str, Floats] = {}
     materials: list[Material] = []

@@ -1,4 +1,4 @@
-"""Reference images, and how far images are from them."""
+"""Reference images, and errors of images against them."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from lambent.core.images import HDR_SUFFIXES, read_image
 
 @dataclass(frozen=True)
 class Reference:
-    """Radiance (H, W, 3), the pixels (H, W) that are compared, and the exposure of `metrics.display_exposure`.
+    """Radiance (H, W, 3), the compared pixels (H, W), and the exposure of `metrics.display_exposure`.
 
-    Images are compared as clip(2^exposure_ev L)^(1/2.2), black where they are not compared.
+    Images are compared as clip(2^exposure_ev L)^(1/2.2), black outside the compared pixels.
     """
 
     radiance: Floats
@@ -35,7 +35,7 @@ class Reference:
         return cls(radiance, shown, exposure_ev, metrics.displayed(radiance, exposure_ev))
 
     def errors(self, image: Floats) -> dict[str, float]:
-        """psnr of the compared pixels; flip: its mean over the image, over those pixels, and its worst tile."""
+        """psnr over the compared pixels; flip: its mean over the image, over those pixels, and its worst tile."""
         test = metrics.displayed(image * self.shown[..., None], self.exposure_ev)
         flip = metrics.flip_error(self.encoded, test)
         return {
@@ -52,7 +52,7 @@ def finished(paths: Sequence[Path]) -> list[Floats]:
     Raises
     ------
     UserError
-        Where a file cannot be read, is a displayed picture, is black, or has another size than the first.
+        If a file cannot be read, holds display values, is black, or differs in size from the first.
     """
     found: list[Floats] = []
     for path in paths:
@@ -70,7 +70,7 @@ def finished(paths: Sequence[Path]) -> list[Floats]:
 
 
 def mean(digits: int) -> Callable[[list[float]], float]:
-    """Rounded mean, for `by_n`."""
+    """A rounding mean, for `by_n`."""
     return lambda values: round(float(np.mean(values)), digits)
 
 

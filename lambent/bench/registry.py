@@ -1,10 +1,10 @@
-"""Benches: found by discovery, run in one form.
+"""Benches, found by discovery, with a common interface.
 
-A bench is a module of this package with `NAME`, its efforts `FULL` and `QUICK` (instances of a frozen dataclass of its
-own), and `run(effort, progress=silent)`, which returns {"rows": [...], "summary": {...}}. If it reads files, `run` also
-takes `inputs`; if it compares with published figures, `against`; with finished pictures, `reference`; if it draws
-settings at random, `settings`. Names, rows and fields are those of docs/performance.md; times are medians of at least
-five runs taken in turns, their spread beside them.
+A bench is a module of this package with `NAME`, its efforts `FULL` and `QUICK` (instances of its own frozen dataclass),
+and `run(effort, progress=silent)`, which returns {"rows": [...], "summary": {...}}. If it reads files, `run` also takes
+`inputs`; if it compares with published figures, `against`; with finished pictures, `reference`; if it draws random
+settings, `settings`. docs/performance.md defines names, rows and fields; times are medians of at least five alternating
+runs, reported with their spread.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from lambent.core.progress import Progress, silent
 
 
 def benches() -> dict[str, ModuleType]:
-    """Module of every bench by the bench's name, sorted; imports all of them."""
+    """Module of every bench by its name, sorted; imports all of them."""
     return dict(sorted((module.NAME, module) for module in modules_in(bench, having="NAME").values()))
 
 
@@ -39,17 +39,23 @@ def run_bench(
     settings: int | None = None,
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Run one bench; the report holds bench, machine, inputs, rows and summary, ready for JSON.
+    """Run one bench; the report has bench, machine, inputs, rows and summary, ready for JSON.
 
     Parameters
     ----------
+    name : str
+        `NAME` of the bench.
     effort : {'full', 'quick'} or object
-        Sizes and sample counts: those of the bench by name, or an instance of its `Effort`.
+        Sizes and sample counts: one of the bench's efforts by name, or an instance of its `Effort`.
+    inputs, against, reference : sequence of Path
+        Files for a bench that takes them; see the head of this module.
+    settings : int, optional
+        Number of random settings, for a bench that draws them.
 
     Raises
     ------
     UserError
-        Where there is no such bench, an input cannot be read, or an option is not one of this bench.
+        If there is no such bench, an input cannot be read, or the bench does not take an option.
     """
     files = [*inputs, *against, *reference]
     for path in files:
@@ -72,14 +78,14 @@ def run_bench(
     if isinstance(effort, str):
         effort = {"full": module.FULL, "quick": module.QUICK}[effort]
     measured = module.run(effort, progress=progress, **options)
-    # Of a store, the manifest's hash stands for all of it.
+    # The hash of a store's manifest stands for the whole store.
     hashed = [{"path": p.name, "sha256": sha256_of(p / "manifest.json" if p.is_dir() else p)} for p in files]
     figures = {key: measured[key] for key in ("rows", "summary")}
     return {"bench": name, "machine": machine(), "inputs": hashed, **figures}
 
 
 def machine() -> dict[str, Any]:
-    """cpu, cores; adapter, adapter_type and driver, or None without one; the path tracer's variant where it runs."""
+    """cpu, cores; adapter, adapter_type and driver, or None without one; the path tracer's variant if it runs."""
     from lambent.realtime.device import adapter_info, choose_adapter
 
     try:

@@ -1,4 +1,4 @@
-"""A picture of one camera as another sees its surfaces: what does not flicker stays where it is on them."""
+"""Reproject a picture to another camera by its surfaces: without flicker, it stays fixed on them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from lambent.bake.reference.surfaces import Surfaces
 
 NEAR_M = 1e-3
-HIDDEN = 2e-3  # share of the distance by which a point may lie behind what the other camera sees there
+HIDDEN = 2e-3  # relative distance by which a point may lie behind the surface that the other camera sees
 
 
 def reprojected(picture: Floats, before: Camera, after: Camera, surfaces: Surfaces) -> tuple[Floats, Flags]:
-    """A picture (H, W, 3) of the camera `before` as `after` sees it, and where that shows the same surface (H, W)."""
+    """A picture (H, W, 3) of camera `before` reprojected to `after`, and (H, W) whether both see the same surface."""
     height, width = picture.shape[:2]
     rays = pixel_rays(after, width, height).reshape(-1, 3)
     points = np.asarray(after.position) + rays * surfaces.distance(np.asarray(after.position), rays)[:, None]

@@ -1,7 +1,7 @@
-"""Retro-reflective tapes and their measurement in software: a peak about the light, whatever its direction.
+"""Retro-reflective tapes and their simulated measurement: a peak about the light, for every direction of the light.
 
-They are made of angles on the sphere, not of our lobe: exp(-(d / width)^2) of the angle d between light and viewer,
-less towards grazing as a power of both cosines, on a diffuse base, below a weak varnish.
+They are defined by angles on the sphere, not by our lobe: exp(-(d / width)^2) of the angle d between light and viewer,
+reduced towards grazing by a power of both cosines, on a diffuse base, below a weak varnish.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ _VARNISH = Lobe(mx=0.08, my=0.08)
 
 @dataclass(frozen=True)
 class Tape:
-    """A tape; `share` is that of light along the normal that returns in the peak, `width_deg` the peak's half-width.
+    """A tape; `share` is the fraction of light along the normal that the peak returns, `width_deg` its half-width.
 
     At that angle from the light the peak has fallen to 1/e. `falloff` is the power of cos_i cos_o; `varnish` scales the
-    mirroring lobe.
+    mirror-like lobe.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Tape:
         return np.asarray(peak[..., None] + MaterialBSDF(base).eval(wi, wo)[..., :1])
 
     def measured(self, step_deg: float = 5.0) -> GonioTable:
-        """The tape's table: nine incident directions, noise of 2 %, readings close together about light and mirror."""
+        """The tape's table: nine incident directions, noise of 2 %, dense readings about light and mirror direction."""
         fine = min(max(self.width_deg / 5, 0.1), 1.0)
         setup = Setup(
             (0, 5, 10, 20, 30, 40, 50, 60, 70), step_deg=step_deg, fine_deg=fine,

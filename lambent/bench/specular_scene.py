@@ -19,14 +19,14 @@ from lambent.scenes.scene import ImageEnvironment, Mesh, Scene, SceneObject
 
 
 def torus(radius: float, thickness: float, around: int, section: int) -> Mesh:
-    """Torus about the y axis, brushed along its length."""
+    """Torus about the y axis, brushed along its circumference."""
     phi = 2 * np.pi * np.arange(24) / 24
     points = radius * np.stack([np.cos(phi), 0 * phi, np.sin(phi)], axis=-1)
     return tube(points, thickness, around=section, rows=around // 24, closed=True)
 
 
 def sphere_and_torus(detail: int = 96) -> dict[str, Mesh]:
-    """A sphere in a tilted torus: every normal, curvature of both signs. `detail`: steps round the torus."""
+    """A sphere in a tilted torus: every normal, curvature of both signs. `detail`: segments around the torus."""
     tilt = np.array([[1, 0, 0], [0, np.cos(0.9), -np.sin(0.9)], [0, np.sin(0.9), np.cos(0.9)]])
     ring = torus(1.0, 0.24, around=detail, section=detail // 2)
     return {"sphere": sphere(0.62, around=detail, rows=detail // 2), "torus": placed(ring, rotation=tilt)}

@@ -19,7 +19,7 @@ from lambent.scenes.triangle_lights import TriangleLights, surface_triangles
 from lambent.store.contract import transport_lights, view_artefact_name
 from lambent.store.store import Store
 
-PIECE = 0.008  # of unit directions: the longest edge of the pieces that lights are cut into; with .02 the sum of a
+PIECE = 0.008  # longest edge, in unit directions, of the pieces that lights are cut into; with .02 the sum of a
 # highlight of slope .045 errs by .3 % itself
 WORDS = 32
 
@@ -27,12 +27,12 @@ WORDS = 32
 def errors_of_sums(
     store: Store, session: Session, scene: Scene, material: str, image: Floats, count: int
 ) -> dict[str, float]:
-    """Mean deviation of a picture from the sum over all lights, over the mean, at `count` points of a material.
+    """Mean deviation of a picture from the sum over all lights, relative to the mean, at `count` points of a material.
 
-    `sum_error` is that from the sum with curves as the transport has them, straight from node to node; `curve_error`
-    from the sum with the curves themselves.
+    `sum_error` is against the sum with curves as in the transport, linear between nodes; `curve_error` against the sum
+    with the exact curves.
 
-    The light is an environment's; the material has no textures, and reflects.
+    The light is an environment's; the material has no textures and reflects.
     """
     from lambent.bake.transport.view_tracer import ViewTracer
     from lambent.bake.view import View
@@ -63,7 +63,7 @@ def _sums(
 ) -> Floats:
     """(P, 3) radiance towards wo (P, 3), local, of lights where `seen` (M, P).
 
-    Quotient and cosine are those of each light's centre, curves means over its pieces (Ben-Artzi 2007, eq. 4.11).
+    Quotient and cosine are those of each light's centre, curves are means over its pieces (Ben-Artzi 2007, eq. 4.11).
     `nodes` are their numbers by curve.
     """
     total = np.zeros((len(wo), 3))
@@ -83,12 +83,12 @@ def _sums(
 
 
 def _at(curve: Curve, angle: Floats, nodes: int | None, polar: int) -> Floats:
-    """(..., 3) of a curve, or of straight lines between so many nodes."""
+    """(..., 3) values of a curve, or of its linear interpolation between `nodes` nodes."""
     if nodes is not None:
         curve = Curve.through((np.arange(nodes) + 0.5) * END_RAD / nodes, curve.node_values(nodes, polar))
     return np.asarray(curve.at(angle))
 
 
 def _pieces(corners: Floats) -> Floats:
-    """(S, 3) directions within a light, spread evenly."""
+    """(S, 3) evenly spread directions within a light."""
     return np.asarray(normalize(surface_triangles(corners[None], np.ones((1, 3)), PIECE).centres))

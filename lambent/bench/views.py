@@ -1,4 +1,4 @@
-"""Stores whose first view is measured: those given, or one of a scene that is baked for the bench."""
+"""Stores whose first view is measured: the given ones, or one of a scene baked for the bench."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from lambent.store.store import Store
 
 @contextmanager
 def given_or_baked(inputs: Sequence[Path], scene: str, progress: Progress) -> Iterator[list[Store]]:
-    """The inputs, baked stores; without one, of a scene that is baked here in `preview`."""
+    """The inputs, which are baked stores; without inputs, a scene baked here in `preview`."""
     from lambent.bake.bake import bake
     from lambent.scenes import load_scene
 
@@ -26,7 +26,7 @@ def given_or_baked(inputs: Sequence[Path], scene: str, progress: Progress) -> It
 
 
 def first_camera(store: Store, record: SceneRecord) -> Camera:
-    """The camera whose view is measured; a `UserError` where a store has none."""
+    """The camera of the measured view; `UserError` if a store has none."""
     if not record.cameras:
         raise UserError("store has no camera", file=store.folder, expected="a camera whose view is compared")
     return record.cameras[0]

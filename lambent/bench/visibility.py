@@ -1,9 +1,9 @@
-"""`visibility`: shadow rays that coherence saves (Ben-Artzi 2007, chapter 8), and whether that saves time.
+"""`visibility`: shadow rays saved by coherence (Ben-Artzi 2007, chapter 8), and whether that saves time.
 
-Each variant predicts the visibility of the lights from every pixel and traces what is in doubt; `TRUE` traces all rays,
-as the transport of a view does. `traced_percent` and `wrong_percent` are shares of the pairs of a pixel and a light
-before its surface; those behind it, which transmission needs, take time only in `TRUE`. `ray_seconds` is the part of
-`seconds` in which rays are traced.
+Each variant predicts the visibility of the lights from every pixel and traces the doubtful ones; `TRUE` traces all
+rays, as the transport of a view does. `traced_percent` and `wrong_percent` are shares of the pairs of a pixel and a
+light in front of its surface; lights behind it, which transmission needs, take time only in `TRUE`. `ray_seconds` is
+the part of `seconds` spent tracing rays.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ NAME = "visibility"
 
 @dataclass(frozen=True)
 class Effort:
-    """Pixels of an edge of the picture, numbers of lights, and how often each method is timed, in turns."""
+    """Side of the picture in pixels, numbers of lights, and timings per method, taken in turns."""
 
     size: int
     lights: tuple[int, ...]
@@ -37,7 +37,7 @@ QUICK = Effort(65, (200,))
 
 
 def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
-    """Rows per scene, number of lights and method; the summary has the fastest method of each scene and number."""
+    """Rows per scene, number of lights and method; the summary has the fastest method per scene and number."""
     rows, fastest = [], []
     for name, count in tracked([(n, c) for n in CASES for c in effort.lights], progress, "scenes"):
         rows += (found := _rows(name, count, effort))

@@ -1,6 +1,6 @@
-"""Scenes of the visibility bench: simple shapes, a smooth animal, dominos and a plant, each under its own light.
+"""Scenes of the visibility bench: simple shapes, a smooth animal, dominos and a plant, each with its own light.
 
-They are made after the pictures of Ben-Artzi 2007 (figures 8.2, 8.7 and 8.9), whose files were not published here.
+They are modelled on the pictures of Ben-Artzi 2007 (figures 8.2, 8.7 and 8.9), whose files were not published.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ TEXELS = 64  # of an edge of an environment
 
 @dataclass(frozen=True)
 class Case:
-    """Objects on a floor that fills the picture, and an environment (6, n, n, 3)."""
+    """Objects on a floor that fills the picture, with an environment (6, n, n, 3)."""
 
     meshes: Callable[[], dict[str, Mesh]]
     camera: Camera
@@ -77,7 +77,7 @@ def animal() -> dict[str, Mesh]:
 
 
 def _furrowed(centre: Floats, axes: Floats) -> Mesh:
-    """An ellipsoid with furrows, of depths in proportion."""
+    """An ellipsoid with proportionally deep furrows."""
     ball = sphere(1.0, 256, 128)
     x, y, z = np.asarray(ball.positions, float).T
     bumps = np.sin(7 * x + 2 * y) * np.sin(6 * y + 1) * np.sin(8 * z + 2 * x)
@@ -89,7 +89,7 @@ def _furrowed(centre: Floats, axes: Floats) -> Mesh:
 
 
 def dominos() -> dict[str, Mesh]:
-    """Dominos along an S, the first of them falling."""
+    """Dominos along an S, the first one falling."""
     stone, found = box((0.5, 1.0, 0.15)), {}
     s = np.linspace(-1, 1, 2001)
     x, z = 2.2 * s, 1.3 * np.sin(2.6 * s)
@@ -104,7 +104,7 @@ def dominos() -> dict[str, Mesh]:
 
 
 def plant() -> dict[str, Mesh]:
-    """A pot with forty stems of leaves."""
+    """A pot of forty stems with leaves."""
     random = np.random.default_rng(8)
     stems, leaves = [], []
     for _ in range(40):

@@ -48,7 +48,7 @@ def scenes(width: int, height: int) -> dict[str, tuple[Renderer, FrameState]]:
 
 
 def bulge(x0: float, x1: float, y: float = 1.0) -> Mesh:
-    """A sheet at z = 0 from x0 to x1 with the normals of a sphere: reflections go everywhere, nothing is hidden."""
+    """A sheet at z = 0 from x0 to x1 with the normals of a sphere: reflections in all directions, no occlusion."""
     x, height = np.meshgrid(np.linspace(x0, x1, 33), np.linspace(-y, y, 33))
     positions = np.stack([x, height, np.zeros_like(x)], axis=-1)
     normals = normalize(positions + np.array([0, 0, 1.2]))

@@ -1,7 +1,7 @@
 """Frame times of a planar reflector: its reflection buffer, MIP levels and shading.
 
-A floor fills the image, or half of it, and mirrors the room of planar_scene. split-sum leaves planes to the probes, and
-diffuse knows no light of them.
+A floor fills the image, or half of it, and mirrors the room of planar_scene. split-sum shows probes on planes, and
+diffuse ignores planar reflections.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from lambent.realtime.renderer import Renderer
 __all__ = ["FULL", "NAME", "QUICK", "run"]
 
 NAME = "walk-planar"
-# From above, so that the floor fills the image; and lower, so that the wall fills the upper half.
+# From above, so that the floor fills the image; and lower, with the wall in the upper half.
 CAMERAS = {
     "full": Camera(name="full", position=(-2.4, 1.6, 3.2), target=(-2.4, 0.0, 2.2), fov_y_deg=40.0),
     "half": Camera(name="half", position=(-2.0, 1.2, 3.2), target=(-2.0, -0.05, -1.0), fov_y_deg=40.0),

@@ -1,7 +1,7 @@
-"""Compiled loops of `answer`: light between patches, exitance of points, gathering, and the light of texels.
+"""Compiled loops of `answer`: light between patches, exitance of points, gathering, and interpolation at texels.
 
 Light of points is (K, G, 4) float32, groups side by side, so that a ray reads the light of all groups from one place.
-The fourth channel is padding, with which a processor adds the channels of a group at once (`by_lanes`).
+The fourth channel is padding; it lets the processor add all channels of a group in one vector (`by_lanes`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _COMPILING, _NUMBA = Lock(), cast(Any, numba.config)
 
 
 def by_lanes(loop: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a loop whose sums over neighbouring channels are vectors: a pass of LLVM that Numba leaves out."""
+    """Compile a loop with LLVM's SLP vectorizer, which Numba leaves out: sums over channels become vector sums."""
     compiled = numba.njit(parallel=True, cache=True, nogil=True)(loop)
 
     @wraps(loop)
@@ -38,10 +38,10 @@ def by_lanes(loop: Callable[..., Any]) -> Callable[..., Any]:
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def solve(starts, ends, senders, shares, direct, reflected, transmitted, paired, tolerance, sweeps, light):  # type: ignore[no-untyped-def]
-    """Bring light (G, P, 3) to B = F (a (D + B) + t (D + B) of the other side) + D by Gauss and Seidel's method.
+    """Bring light (G, P, 3) to B = F (a (D + B) + t (D + B) of the other side) + D by Gauss-Seidel sweeps.
 
-    F is sparse by group and row: `senders` and `shares` from `starts` to `ends` (G, P). Groups stop one by one, when no
-    patch changes by more than `tolerance` of its light. Returns the sweeps of each (G,), and whether it stopped (G,).
+    F is sparse by group and row: `senders` and `shares` from `starts` to `ends` (G, P). Each group stops when no patch
+    changes by more than `tolerance` of its light. Returns (G,) the number of sweeps, and (G,) whether each converged.
     """
     groups, patches = light.shape[:2]
     taken, done = np.zeros(groups, np.int64), np.zeros(groups, np.bool_)
@@ -64,7 +64,7 @@ def solve(starts, ends, senders, shares, direct, reflected, transmitted, paired,
                 other = paired[p]
                 for c, arrived in enumerate((red, green, blue)):
                     new = max(direct[group, p, c] + arrived, np.float32(0))  # an equivalent albedo may be negative
-                    # Not `>`: a difference of infinities, which is not a number, does not stand.
+                    # `not <=` instead of `>`: NaN, the difference of infinities, must not count as converged.
                     if not abs(new - light[group, p, c]) <= tolerance * new + NO_LIGHT:
                         stands = False
                     light[group, p, c] = new
@@ -77,7 +77,7 @@ def solve(starts, ends, senders, shares, direct, reflected, transmitted, paired,
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def exitance(direct, light, ratio, of, other, reflected, transmitted):  # type: ignore[no-untyped-def]
-    """Exitance (K, G, 4) of points whose indirect light is ratio (n, G, 4) at `of` (K,) times as baked."""
+    """Exitance (K, G, 4) of points whose indirect light is the baked times ratio (n, G, 4) at index `of` (K,)."""
     groups, points = direct.shape[:2]
     found = np.zeros((points, groups, 4), np.float32)
     for k in numba.prange(points):
@@ -96,7 +96,7 @@ def exitance(direct, light, ratio, of, other, reflected, transmitted):  # type: 
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def ratios(now, baked, least, most_ratio):  # type: ignore[no-untyped-def]
-    """`answer.ratios` of light of points (K, G, 4); a ratio is 1 where as baked there was `least` (G,) or less."""
+    """`answer.ratios` of light of points (K, G, 4); 1 where the baked light is at most `least` (G,)."""
     found = np.ones(now.shape, np.float32)
     for k in numba.prange(len(now)):
         for group in range(now.shape[1]):
@@ -109,7 +109,7 @@ def ratios(now, baked, least, most_ratio):  # type: ignore[no-untyped-def]
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
-    """`answer.packed_rays` (K, R, 3), all 0 before, of rays to `numbers` (K, R) that weigh (K, R)."""
+    """`answer.packed_rays` into `rays` (K, R, 3), zeroed before, for rays to `numbers` (K, R) with `weights` (K, R)."""
     for k in numba.prange(len(numbers)):
         order = np.argsort(numbers[k])
         sums = np.zeros(len(order), np.float32)
@@ -124,7 +124,7 @@ def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
                 sums[count - 1] += weights[k, r]
         place, last = 0, np.int64(0)
         for n in range(count):
-            # Steps are wide, so that a byte is the one below or above as chance has it: sums of many stay right.
+            # Steps are wide; dithered rounding to the byte above or below keeps sums of many weights right.
             dither = np.float32((n * 0.6180339887 + ends[n] * 0.7548776662) % 1)
             code = np.floor(np.log2(sums[n]) * steps + dither) + one
             if code >= 1:
@@ -137,7 +137,7 @@ def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def unpack(rays, starts, points, weights):  # type: ignore[no-untyped-def]
-    """Points and weights (N,) of packed rays (K, R, 3), those of each k from `starts` (K + 1,) on."""
+    """Points and weights (N,) of packed rays (K, R, 3); those of row k begin at `starts` (K + 1,)."""
     for k in numba.prange(len(rays)):
         last = np.int64(0)
         for n in range(starts[k + 1] - starts[k]):
@@ -148,9 +148,9 @@ def unpack(rays, starts, points, weights):  # type: ignore[no-untyped-def]
 
 @by_lanes
 def gather_one(starts, points, weights, table, scale, sent):  # type: ignore[no-untyped-def]
-    """Sums (K, 1, 4) of exitance (n, 1, 4) at `points` (N,), those of each k from `starts` (K + 1,) on.
+    """Sums (K, 1, 4) of exitance (n, 1, 4) at `points` (N,); those of row k begin at `starts` (K + 1,).
 
-    `table` has the weights that bytes stand for; the sums of each k are times `scale` (K,).
+    `table` maps bytes to weights; `scale` (K,) multiplies the sums.
     """
     found = np.empty((len(scale), 1, 4), np.float32)
     for k in numba.prange(len(scale)):
@@ -168,7 +168,7 @@ def gather_one(starts, points, weights, table, scale, sent):  # type: ignore[no-
 
 @by_lanes
 def gather_four(starts, points, weights, table, scale, sent, first, found):  # type: ignore[no-untyped-def]
-    """The same for four groups from `first` on, into found (K, G, 4); where there are fewer, the last once more."""
+    """Likewise for four groups from `first` on, into found (K, G, 4); the last group repeats if fewer are left."""
     last = sent.shape[1] - 1
     two, three, four = min(first + 1, last), min(first + 2, last), min(first + 3, last)
     for k in numba.prange(len(scale)):
@@ -203,7 +203,7 @@ def gather_four(starts, points, weights, table, scale, sent, first, found):  # t
 
 @by_lanes
 def upsampled(light, points, shares):  # type: ignore[no-untyped-def]
-    """Means (G, T, 3) over the points near each texel (T, 8) of light (K, G, 4)."""
+    """Weighted means (G, T, 3), over the points (T, 8) near each texel, of light (K, G, 4)."""
     groups = light.shape[1]
     found = np.empty((groups, len(points), 3), np.float32)
     for t in numba.prange(len(points)):
@@ -224,7 +224,7 @@ def upsampled(light, points, shares):  # type: ignore[no-untyped-def]
 
 @by_lanes
 def texel_light(points, shares, edited, reference, direct, baked, least, most_ratio, most_excess):  # type: ignore[no-untyped-def]
-    """`answer.answered` at texels (G, T, 3), of means over the points near each of `edited` (K, G, 4)."""
+    """`answer.answered` at texels (G, T, 3), from means of `edited` (K, G, 4) over the points near each texel."""
     found = np.empty(direct.shape, np.float32)
     groups, near = direct.shape[0], points.shape[1]
     for t in numba.prange(direct.shape[1]):

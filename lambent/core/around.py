@@ -1,4 +1,4 @@
-"""A picture around the eye from pinhole pictures of a cube's faces."""
+"""A panorama around the eye, assembled from pinhole pictures of a cube's faces."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from lambent.core.camera import Camera, camera_axes
 from lambent.core.plain import triple
 from lambent.core.projections import Projection, View
 
-RIM_PX = 2  # of a face beyond 45 degrees, so that look-ups at its border blend with what is next to it
+RIM_PX = 2  # beyond 45 degrees on each face, so that look-ups near its border interpolate
 SUBSAMPLES = 2  # look-ups along each side of a pixel
 MOST_FACE_PX = 4096
-# Forward and up of the faces in the camera's right, up and forward; the one ahead first.
+# Forward and up axis of each face in the camera's (right, up, forward) coordinates; the face ahead comes first.
 _FACES = (((0, 0, 1), (0, 1, 0)), ((1, 0, 0), (0, 1, 0)), ((-1, 0, 0), (0, 1, 0)), ((0, 0, -1), (0, 1, 0)),
           ((0, 1, 0), (0, 0, -1)), ((0, -1, 0), (0, 0, 1)))  # fmt: skip
 
 
 def face_px(view: View, width: int) -> int:
-    """Pixels along a face, rim included: as fine in its middle as a picture of this width in its own."""
+    """Pixels along a face, rim included: as fine at its centre as the centre of a picture of this width."""
     wide = math.radians(view.width_deg)
     across = 2 * math.sin(wide / 2) if view.projection is Projection.hemispherical else wide
     return int(np.clip(math.ceil(2 * width / across), 16, MOST_FACE_PX)) + 2 * RIM_PX
 
 
 class Around:
-    """A picture that is filled face by face.
+    """A panorama that is filled face by face.
 
     Attributes
     ----------
     cameras : list of Camera
-        Of the faces that the view shows, each for a square picture of `side_px` pixels.
+        One per face that the view shows, each for a square picture of `side_px` pixels.
     """
 
     def __init__(self, view: View, width: int, height: int) -> None:
@@ -46,12 +46,12 @@ class Around:
         self.cameras = [faces[number] for number in self._numbers]
 
     def fill(self, index: int, picture: Floats) -> None:
-        """Take the picture (side_px, side_px, 3) of `cameras[index]`."""
+        """Store the picture (side_px, side_px, 3) of `cameras[index]`."""
         mine = self._nearest == self._numbers[index]
         self._found[mine] = _looked_up(picture, self.cameras[index], self._rays[mine])
 
     def image(self) -> Floats:
-        """(height, width, 3); 0 outside of the view."""
+        """The panorama (height, width, 3); 0 outside the view."""
         height, width = (n // SUBSAMPLES for n in self._rays.shape[:2])
         return np.asarray(self._found.reshape(height, SUBSAMPLES, width, SUBSAMPLES, 3).mean(axis=(1, 3)))
 
@@ -65,7 +65,7 @@ def _face_cameras(camera: Camera, side_px: int) -> list[Camera]:
 
 
 def _looked_up(picture: Floats, camera: Camera, rays: Floats) -> Floats:
-    """(..., 3) of a square picture along rays (..., 3), between its pixels."""
+    """Bilinear look-up (..., 3) of a square picture along rays (..., 3)."""
     right, up, forward = camera_axes(camera)
     over = 1 / (math.tan(math.radians(camera.fov_y_deg) / 2) * (rays @ forward))
     places = np.stack([1 - (rays @ up) * over, 1 + (rays @ right) * over]) * (len(picture) / 2) - 0.5

@@ -1,11 +1,11 @@
-"""Light in blocks of 4 x 4 texels and 128 bits: BC6H, unsigned, the modes with one subset (11 to 14).
+"""Light compressed as BC6H: unsigned, blocks of 4 x 4 texels in 128 bits, the modes with one subset (11 to 14).
 
-A block has two colours and, per texel, which of 16 colours on the line between them it shows. Colours are half floats
-seen as whole numbers, so that lines are nearly straight in the logarithm and errors are relative. Modes differ in how
-they share 60 bits between the first colour and the distance to the second:
+A block stores two colours, and for each texel one of 16 colours on the line between them. Channels are half floats
+read as integers: lines are then nearly straight in the logarithm, and errors relative. Modes differ in how they split
+60 bits between the first colour and the second:
 
     mode (number)   bits of the first   of the second
-    11 (3)          10                  10, itself
+    11 (3)          10                  10, as it is
     12 (7)          11                  9, as a difference
     13 (11)         12                  8, as a difference
     14 (15)         16                  4, as a difference
@@ -27,13 +27,13 @@ BLOCK = 4  # texels a side
 LARGEST = 65504.0
 _WEIGHTS = np.array([0, 4, 9, 13, 17, 21, 26, 30, 34, 38, 43, 47, 51, 55, 60, 64], np.int64)
 _MODES = np.array([[3, 10, 10], [7, 11, 9], [11, 12, 8], [15, 16, 4]], np.int64)  # number, bits of both colours
-_FITS = 3  # times that the line is fitted to the choice of the texels
-_POWERS = 4  # iterations towards the main axis
-_AT_ONCE = 1 << 16  # blocks of one thread's turn
+_FITS = 3  # rounds of fitting the line to the texels' indices
+_POWERS = 4  # power iterations towards the principal axis
+_AT_ONCE = 1 << 16  # blocks that a thread takes at a time
 
 
 def encoded(rgb: NDArray[Any]) -> NDArray[np.uint32]:
-    """Blocks (..., H/4, W/4, 4) of light (..., H, W, 3); what is negative or not a number becomes 0.
+    """Blocks (..., H/4, W/4, 4) of light (..., H, W, 3); negative values and NaN become 0.
 
     H and W must be multiples of 4.
     """
@@ -55,7 +55,7 @@ def decoded(blocks: NDArray[np.uint32]) -> NDArray[np.float16]:
     Raises
     ------
     ValueError
-        For blocks of a mode that `encoded` does not write.
+        If a block has a mode that `encoded` does not write.
     """
     *lead, rows, columns, _ = blocks.shape
     flat = np.ascontiguousarray(blocks, np.uint32).reshape(-1, 4)
@@ -68,7 +68,7 @@ def decoded(blocks: NDArray[np.uint32]) -> NDArray[np.float16]:
 
 
 def _in_threads(work: Any, given: NDArray[Any], made: NDArray[Any]) -> None:
-    """`work` on parts of both arrays: loops in parallel take numba four times as long to compile."""
+    """Run `work` on parts of both arrays in threads; numba's parallel loops take four times as long to compile."""
     with ThreadPoolExecutor() as pool:
         parts = [slice(first, first + _AT_ONCE) for first in range(0, len(given), _AT_ONCE)]
         list(pool.map(lambda part: work(given[part], made[part]), parts))
@@ -76,7 +76,7 @@ def _in_threads(work: Any, given: NDArray[Any], made: NDArray[Any]) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _unquantised(value: int, bits: int) -> int:
-    """A colour's channel of so many bits on the scale of 16."""
+    """Expand a channel of `bits` bits to the 16-bit scale."""
     if bits >= 15 or value == 0:
         return value
     if value == (1 << bits) - 1:
@@ -86,19 +86,19 @@ def _unquantised(value: int, bits: int) -> int:
 
 @numba.njit(cache=True, nogil=True)
 def _half(a: int, b: int, weight: int) -> int:
-    """Bits of the half float between two channels on the scale of 16 bits."""
+    """Bits of the half float interpolated between two channels on the 16-bit scale."""
     return (((a * (64 - weight) + b * weight + 32) >> 6) * 31) >> 6
 
 
 @numba.njit(cache=True, nogil=True)
 def _quantised(value: float, bits: int) -> int:
-    """The channel of so many bits that is nearest to the bits of a half float."""
+    """The channel of `bits` bits nearest to the bits of a half float."""
     return min(max(int(value * (64.0 / 31.0)) >> (16 - bits), 0), (1 << bits) - 1)
 
 
 @numba.njit(cache=True, nogil=True)
 def _weigh(texels: Any, weights: Any) -> None:
-    """Weights (16,) of texels: 1, and more the brighter one is than the mean of them.
+    """Weights (16,) of texels: 1, and more for texels brighter than the mean.
 
     Errors are relative: without weights, dark texels around a lamp would take 4 % of its light.
     """
@@ -116,7 +116,7 @@ def _weigh(texels: Any, weights: Any) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _chosen(texels: Any, weights: Any, ends: Any, bits: int, index: Any) -> float:
-    """Weighted squared error of the best colour for each texel, which goes to `index`; `ends` (2, 3) are quantised."""
+    """Write the best colour of each texel to `index`; returns the weighted squared error. `ends` (2, 3): quantised."""
     total = 0.0
     palette = np.empty((16, 3), np.int64)
     for c in range(3):
@@ -144,7 +144,7 @@ def _chosen(texels: Any, weights: Any, ends: Any, bits: int, index: Any) -> floa
 
 @numba.njit(cache=True, nogil=True)
 def _principal_ends(texels: Any, weights: Any, ends: Any) -> None:
-    """The ends (2, 3) of the texels' extent along the line that fits them best."""
+    """Ends (2, 3) of the texels' extent along their principal axis."""
     mean, axis, next_axis, spread = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((3, 3))
     for i in range(16):
         for c in range(3):
@@ -179,7 +179,7 @@ def _principal_ends(texels: Any, weights: Any, ends: Any) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _fitted_ends(texels: Any, weights: Any, index: Any, ends: Any) -> None:
-    """The ends that fit the texels best in least squares, as they have chosen; left alone where all chose one."""
+    """Fit the ends to the texels in least squares for the chosen indices; unchanged if all texels chose one index."""
     aa, ab, bb = 0.0, 0.0, 0.0
     a_x, b_x = np.zeros(3), np.zeros(3)
     for i in range(16):
@@ -200,7 +200,7 @@ def _fitted_ends(texels: Any, weights: Any, index: Any, ends: Any) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _bounded(texels: Any, ends: Any) -> None:
-    """Ends within the range of the texels: on this scale, what lies beyond is brighter by powers."""
+    """Clamp the ends to the range of the texels: on this scale, anything beyond is brighter by powers of two."""
     for c in range(3):
         low, high = texels[0, c], texels[0, c]
         for i in range(1, 16):
@@ -211,7 +211,7 @@ def _bounded(texels: Any, ends: Any) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _quantised_ends(ends: Any, mode: Any, found: Any) -> bool:
-    """Both ends in a mode's bits; whether it can hold them."""
+    """Quantise both ends to a mode's bits; returns whether the mode can hold them."""
     bits, second = mode[1], mode[2]
     most = (1 << (second - 1)) - 1
     for c in range(3):
@@ -240,7 +240,7 @@ def _get(block: Any, at: int, count: int) -> int:
 
 @numba.njit(cache=True, nogil=True)
 def _write(block: Any, mode: Any, ends: Any, index: Any) -> None:
-    """A block of ends (2, 3) and indices (16,)."""
+    """Write a block from ends (2, 3) and indices (16,)."""
     bits, second = mode[1], mode[2]
     swapped = index[0] >= 8  # the first index has no highest bit
     first, last = (1, 0) if swapped else (0, 1)
@@ -250,7 +250,7 @@ def _write(block: Any, mode: Any, ends: Any, index: Any) -> None:
     for c in range(3):
         value = ends[last, c] - (0 if mode[0] == 3 else ends[first, c])
         at = _put(block, at, value & ((1 << second) - 1), second)
-        for i in range(bits - 1, 9, -1):  # of the first colour, downwards
+        for i in range(bits - 1, 9, -1):  # high bits of the first colour, in descending order
             at = _put(block, at, ends[first, c] >> i & 1, 1)
     for i in range(16):
         at = _put(block, at, 15 - index[i] if swapped else index[i], 3 if i == 0 else 4)
@@ -258,7 +258,7 @@ def _write(block: Any, mode: Any, ends: Any, index: Any) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _encode(texels: Any, blocks: Any) -> None:
-    """Bits of half floats (B, 16, 3) to blocks (B, 4)."""
+    """Encode bits of half floats (B, 16, 3) into blocks (B, 4)."""
     values, weights = np.zeros((16, 3)), np.zeros(16)
     for b in range(len(texels)):
         for i in range(16):
@@ -289,7 +289,7 @@ def _encode(texels: Any, blocks: Any) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _decode(blocks: Any, texels: Any) -> None:
-    """Blocks (B, 4) to bits of half floats (B, 16, 3)."""
+    """Decode blocks (B, 4) into bits of half floats (B, 16, 3)."""
     for b in range(len(blocks)):
         block = blocks[b]
         m = int(block[0] & np.uint32(31)) >> 2

@@ -1,6 +1,7 @@
 """Pinhole cameras for loaders, bake, renderer and window: the record, its axes, its projection and its rays.
 
-Clip space is WebGPU's, depth reversed (1 at the near plane, 0 at infinity). World space is right-handed, y up, metres.
+Clip space is WebGPU's with reversed depth (1 at the near plane, 0 at infinity). World space is right-handed, y up,
+metres.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike
 from lambent.core.directions import Floats, normalize
 from lambent.core.plain import Triple, triple
 
-FARTHEST_M = 1e9  # from the origin: in float32, squares of more would be infinite
+FARTHEST_M = 1e9  # from the origin: in float32, squares of larger distances overflow
 OVERVIEW_FROM = np.array([0.5, 0.35, 0.8])
 OVERVIEW_FOV_Y_DEG = 45.0
 
@@ -34,9 +35,9 @@ class Camera:
 
 @dataclass(frozen=True)
 class CameraPath:
-    """Key cameras on a smooth curve, passed at constant speed, or each key at its time in `times_s`.
+    """Key cameras on a smooth curve, travelled at constant speed or with one time per key.
 
-    `times_s` has one time per key, begins at 0, increases, and ends at `seconds`.
+    `times_s`, if given, has one time per key, starts at 0, increases, and ends at `seconds`.
     """
 
     name: str
@@ -47,15 +48,15 @@ class CameraPath:
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012
 
     def frames(self, fps: float) -> int:
-        """Number of frames of a film along the path, at least two."""
+        """Number of frames of a film along the path, at least 2."""
         return max(2, round(self.seconds * fps))
 
 
 def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
     """Unit vectors (right, up, forward); looking along -z with up +y, right is +x.
 
-    A camera whose target is its position looks along -z. Where `up` is parallel to the view, +z stands in for it, and
-    +x where the view is along z.
+    A camera whose target is its position looks along -z. An `up` parallel to the view is replaced by +z, or by +x if
+    the view is along z.
     """
     forward = normalize(np.subtract(camera.target, camera.position).astype(float))
     if not forward.any():
@@ -111,7 +112,7 @@ def clip_from_world(
 
 
 def overview(low: ArrayLike, high: ArrayLike) -> Camera:
-    """Camera that sees the whole bounding sphere of the box (low, high), from the front, the right and a bit above."""
+    """Camera that sees the bounding sphere of the box (low, high) from the front, the right and slightly above."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     distance = radius / math.sin(math.radians(OVERVIEW_FOV_Y_DEG) / 2)

@@ -1,8 +1,8 @@
-"""The ceilings of input: how large a file of each kind may be, and how much it may ask for.
+"""Ceilings of input: the largest size of each kind of file, and the largest counts that a file may request.
 
-A file beyond one is a `UserError` with the ceiling and what was found, before memory is taken for it. `NAME_BYTES` are
-sizes of files, for `inputs.read_bytes`; the others are counts, each with its own `check`. docs/reliability.md lists
-them.
+Input beyond a ceiling raises `UserError`, with the ceiling and the value found, before memory is allocated for it.
+`NAME_BYTES` are file sizes, for `inputs.read_bytes`; the others are counts, each with its own `check`.
+docs/reliability.md lists all.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ IES_BYTES = 16 << 20
 
 @dataclass(frozen=True)
 class Ceiling:
-    """The most of something that input may ask for; `fault` is said of input that asks for more."""
+    """Upper limit of one count in the input; `fault` describes input that exceeds it."""
 
     fault: str
     most: int
     unit: str
 
     def check(self, found: int, *, file: Path | str | None = None, field: str | None = None, got: str = "") -> None:
-        """`UserError` where `found` is more; `got` says it in other words."""
+        """Raise `UserError` if `found` exceeds the limit; `got` describes it in other words."""
         if found > self.most:
             expected = f"at most {self.most} {self.unit}"
             raise UserError(self.fault, file=file, field=field, got=got or f"{found} {self.unit}", expected=expected)

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 
-# IEC 61966-2-1. The inverse is computed, not quoted, so that the round trip is exact to rounding.
+# IEC 61966-2-1. The inverse is computed, not quoted: the round trip is exact up to rounding.
 RGB_TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 XYZ_TO_RGB = np.linalg.inv(RGB_TO_XYZ)
 WHITE_XYZ = RGB_TO_XYZ.sum(axis=1)
 _LAB_EDGE = 6 / 29
-HALF_MAX = 65504.0  # the largest half float; brighter light is clipped to it
-MOST_UNIT = 2.0**24  # of light that is stored as half floats
+HALF_MAX = 65504.0  # largest half float; brighter light is clipped to it
+MOST_UNIT = 2.0**24  # largest unit of light stored as half floats
 
 
 def luminance(rgb: Floats) -> Floats:
@@ -25,21 +25,21 @@ def luminance(rgb: Floats) -> Floats:
 
 
 def in_halves(light: Floats) -> tuple[NDArray[np.float16], float]:
-    """Light (...) >= 0 as half floats and their unit, the least power of two, at least 1, in which it has room.
+    """Light (...) >= 0 as half floats, and their unit: the least power of two, at least 1, that avoids overflow.
 
-    The sun shows 7e6 W/(sr m^2), a hundred times the largest half float.
+    The sun's radiance is 7e6 W/(sr m^2), a hundred times the largest half float.
     """
     unit = unit_of_halves(float(light.max(initial=0.0)))
     return halves(light, unit), unit
 
 
 def unit_of_halves(brightest: float) -> float:
-    """The least power of two, from 1 to MOST_UNIT, in which half floats have room for light."""
+    """The least power of two, from 1 to MOST_UNIT, in which light up to `brightest` fits into half floats."""
     return float(2.0 ** np.ceil(np.log2(min(max(brightest / HALF_MAX, 1.0), MOST_UNIT))))
 
 
 def halves(light: Floats, unit: float) -> NDArray[np.float16]:
-    """Light (...) >= 0 in multiples of a unit; what is brighter than half floats can be is clipped."""
+    """Light (...) >= 0 in multiples of `unit`, as half floats; clipped to HALF_MAX."""
     return np.asarray(np.minimum(light / unit, HALF_MAX), np.float16)
 
 
@@ -64,7 +64,7 @@ def rgb_to_lab(rgb: Floats) -> Floats:
 def srgb_encode(linear: Floats) -> Floats:
     """Linear values to sRGB, clipped to [0, 1]."""
     x = np.clip(linear, 0, 1)
-    # The power is taken of max(x, edge) because np.where evaluates both sides.
+    # np.where evaluates both sides, so the power is taken of max(x, edge).
     curve = 1.055 * np.maximum(x, 0.0031308) ** (1 / 2.4) - 0.055
     return np.where(x <= 0.0031308, 12.92 * x, curve).astype(x.dtype)
 
@@ -88,7 +88,7 @@ def filmic(linear: Floats, exposure_ev: float = 0.0) -> Floats:
 
 
 def neutral(linear: Floats, exposure_ev: float = 0.0) -> Floats:
-    """Scene radiance to display-linear [0, 1] that keeps colours below .76: Khronos PBR Neutral (2024)."""
+    """Scene radiance to display-linear [0, 1]; colours below .76 are unchanged. Khronos PBR Neutral (2024)."""
     x = np.maximum(linear, 0) * np.asarray(2.0**exposure_ev, linear.dtype)
     low = _across(np.minimum, x)
     x = x - np.where(low < 0.08, low - 6.25 * low * low, 0.04)
@@ -101,7 +101,7 @@ def neutral(linear: Floats, exposure_ev: float = 0.0) -> Floats:
 
 
 def _across(least_or_most: np.ufunc, rgb: Floats) -> Floats:
-    """(..., 1): of the three channels; several times as fast as a reduction of so short an axis."""
+    """Least or largest of the three channels (..., 1); several times faster than a reduction over so short an axis."""
     return np.asarray(least_or_most(least_or_most(rgb[..., :1], rgb[..., 1:2]), rgb[..., 2:]))
 
 

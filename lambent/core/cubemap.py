@@ -26,7 +26,7 @@ def directions_at(face: NDArray[np.integer], s: Floats, t: Floats) -> Floats:
 
 
 def faces_at(s: Any, t: Any) -> list[tuple[Any, Any, Any]]:
-    """By face, x, y and z (the largest 1) at face coordinates s, t in [-1, 1], t downwards: arrays of any library."""
+    """x, y, z (the largest 1) by face, at face coordinates s, t in [-1, 1], t downwards; arrays of any library."""
     return [(1.0, -t, -s), (-1.0, -t, s), (s, 1.0, t), (s, -1.0, -t), (s, -t, 1.0), (-s, -t, -1.0)]
 
 
@@ -57,14 +57,14 @@ def sample(cube: Floats, w: Floats) -> Floats:
 
 
 def face_places(w: Floats, n: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Face, column and row (...) of the first of 2 x 2 texels, n a side, that `sample` reads along w (..., 3)."""
+    """Face, column and row (...) of the first of the 2 x 2 texels that `sample` reads along w (..., 3), of n a side."""
     face, s, t = _on_face(w)
     column, row = np.floor(((np.stack([s, t]) + 1) / 2 * n - 0.5).clip(0, n - 2)).astype(np.int64)
     return face.astype(np.int64), column, row
 
 
 def _on_face(w: Floats) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """Face, and its coordinates s, t (...) of directions w (..., 3)."""
+    """Face (...) and face coordinates s, t (...) of directions w (..., 3)."""
     x, y, z = w[..., 0], w[..., 1], w[..., 2]
     axis = np.argmax(np.abs(w), axis=-1)
     major = np.take_along_axis(w, axis[..., None], axis=-1)[..., 0]

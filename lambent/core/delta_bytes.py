@@ -1,4 +1,4 @@
-"""Numbers that go up and down in small steps, as bytes that files pack well: those of the steps, place by place."""
+"""Delta coding: slowly changing integers as the bytes of their differences, which compress well."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ PLACES = 4
 
 
 def delta_bytes(numbers: NDArray[np.integer]) -> NDArray[np.uint8]:
-    """(4, ...) bytes of numbers (...) below 2^32, lowest first: of the steps from each to the next, row by row."""
+    """(4, ...) bytes, lowest first, of the differences between successive numbers (...) below 2^32, row by row."""
     steps = np.diff(numbers.astype(np.uint32).reshape(-1), prepend=np.uint32(0))
     places = steps.astype("<u4").view(np.uint8).reshape(-1, PLACES)
     return np.ascontiguousarray(places.T).reshape(PLACES, *numbers.shape)
 
 
 def from_delta_bytes(places: NDArray[np.uint8]) -> NDArray[np.uint32]:
-    """The numbers (...) of `delta_bytes` (4, ...)."""
+    """Inverse of `delta_bytes`: numbers (...) of bytes (4, ...)."""
     steps = np.ascontiguousarray(places.reshape(PLACES, -1).T).view("<u4")[:, 0]
     return np.cumsum(steps, dtype=np.uint32).reshape(places.shape[1:])

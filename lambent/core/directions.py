@@ -11,10 +11,10 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lambent.core.arrays import Floats as Floats  # most users of directions want their type too
+from lambent.core.arrays import Floats as Floats  # re-exported: most users of directions need the type
 
-FLIP_Z = np.array([1.0, 1.0, -1.0])  # times a direction: mirrored at the surface
-HALF_TURN = np.array([-1.0, -1.0, 1.0])  # times a direction: turned by 180 degrees about n
+FLIP_Z = np.array([1.0, 1.0, -1.0])  # factor that mirrors a direction at the surface
+HALF_TURN = np.array([-1.0, -1.0, 1.0])  # factor that turns a direction by 180 degrees about n
 
 
 def direction(theta_rad: ArrayLike, phi_rad: ArrayLike) -> Floats:
@@ -38,7 +38,7 @@ def elevation(w: Floats) -> Floats:
 
 
 def raised(w: Floats) -> Floats:
-    """Directions (..., 3) on the upper side: those below are mirrored at the surface."""
+    """Directions (..., 3) on the upper side: those below the surface are mirrored at it."""
     return np.stack([w[..., 0], w[..., 1], np.abs(w[..., 2])], axis=-1)
 
 

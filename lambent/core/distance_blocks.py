@@ -1,19 +1,19 @@
-"""Inverse distances of a light field's maps in blocks of 4 x 4 texels, at 64 bits a block and a pool for hard blocks.
+"""Inverse distances of a light field's maps in blocks of 4 x 4 texels: 64 bits a block, plus a pool for hard blocks.
 
-Codes are logarithms of inverse distances: code c, 1 to 255, is the share (c - 1)/254 of the way from
-the least to the largest of a map, 0 the sky. A block is two numbers of 32 bits; its lowest bytes are codes a and b:
+Codes are logarithmic: code c, 1 to 255, lies at the share (c - 1)/254 between the logarithms of a map's least and
+largest inverse distance; 0 is the sky. A block is two 32-bit words; its lowest bytes are codes a and b:
 
     a > b      texel i has a - (a - b) k/7, k its three bits from bit 16 + 3 i on
-    a <= b     two bits from bit 32 + 2 i on are the lowest of k; the kind, in bits 16 and 17, says what k is:
+    a <= b     two bits from bit 32 + 2 i on are the lowest of k; the kind, in bits 16 and 17, gives its meaning:
       kind 0   0 is the sky; 1, 2 and 3 are a, (a + b)/2 and b
-      kind 1   a + (b - a) k/3; texels show the sky in part, and an entry of the pool has `LightField.cover`
-      kind 2   any distances: an entry has four more bits of k, 0 is the sky, others are a + (b - a) (k - 1)/62
-      kind 3   both: an entry with cover, another with four more bits of k; a + (b - a) k/63
+      kind 1   a + (b - a) k/3; some texels show the sky in part, and a pool entry has their `LightField.cover`
+      kind 2   any distances: an entry has four more bits of k; 0 is the sky, others are a + (b - a) (k - 1)/62
+      kind 3   both: an entry with cover, and one with four more bits of k; a + (b - a) k/63
 
-Bits 18 to 31 number the (first) entry, of 64 bits, four of each texel. A map's blocks lie row by row, its pool in rows
-below them; the last entry has the bits of the logarithms, base 2, of the least and the largest. Mixed texels come
-first, then blocks whose distances would be farthest off. A shader reads whole numbers alone: every adapter can.
-Importing this file imports numba.
+Bits 18 to 31 number the (first) entry. An entry has 64 bits, four per texel. A map's blocks lie row by row, its pool in
+rows below them; the last entry holds the base-2 logarithms of the least and the largest inverse distance, as float
+bits. Entries go to mixed texels first, then to the blocks of the largest distance error. A shader reads integers only,
+which every adapter supports. Importing this file imports numba.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from numpy.typing import NDArray
 
 from lambent.core.light_field_tiles import BLOCK, pool_rows
 
-LEAST_ERROR = 0.02  # in the logarithm, of a block's texels: below, it needs no entry
-MOST_ERROR = 0.3  # farther off is as bad
+LEAST_ERROR = 0.02  # of a block's texels, in the logarithm: below it, a block needs no entry
+MOST_ERROR = 0.3  # larger errors count as this
 LEAST_SPAN = 0.01  # octaves
 MOST_ENTRIES = 1 << 14
 
 
 def encoded(inverse: NDArray[Any], cover: NDArray[np.uint8] | None) -> NDArray[np.uint32]:
-    """Blocks (P, h/4 + pool, w/4, 2) of inverse distances (P, h, w), 1/m, and cover.
+    """Blocks (P, h/4 + pool, w/4, 2) of inverse distances (P, h, w), 1/m, and cover (P, h, w).
 
-    Without cover, texels show a surface where their inverse distance is above 0.
+    Without cover, texels with an inverse distance above 0 show a surface.
     """
     count, height, width = inverse.shape
     if height % BLOCK or width % BLOCK:
@@ -81,7 +81,7 @@ def decoded(blocks: NDArray[np.uint32], rows: int) -> tuple[NDArray[np.float16],
 
 
 def _span(octaves: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Logarithms of base 2 of the least and the largest inverse distance; 0 and 1 where there is none."""
+    """Base-2 logarithms of the least and the largest inverse distance; 0 and 1 if nothing is hit."""
     if not octaves.size:
         return np.array([0, 1], np.float32)
     low, high = float(octaves.min()), float(octaves.max())
@@ -101,7 +101,7 @@ def _in_blocks(texels: NDArray[Any]) -> NDArray[Any]:
 
 @numba.njit(cache=True, nogil=True)
 def _ends(code: Any) -> tuple[int, int]:
-    """The least and the largest code of a block's surfaces, as whole numbers that enclose them; 0, 0 of the sky."""
+    """Least and largest code of a block's surfaces, rounded outwards to integers; 0, 0 for sky alone."""
     low, high = 256.0, 0.0
     for i in range(16):
         if code[i] > 0:
@@ -113,7 +113,7 @@ def _ends(code: Any) -> tuple[int, int]:
 
 @numba.njit(cache=True, nogil=True)
 def _error(code: Any, low: int, high: int, steps: int, most: float) -> float:
-    """Squared error of a block's surfaces between two codes in so many steps, at most `most` a texel."""
+    """Squared error of a block's surfaces with `steps` steps between two codes, at most `most` a texel."""
     wrong = 0.0
     for i in range(16):
         if code[i] > 0:
@@ -150,7 +150,7 @@ def _put_in_line(code: Any, low: int, high: int, words: Any) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _put_with_entries(code: Any, cover: Any, kind: int, low: int, high: int, number: int, words: Any) -> None:
-    """Write a block (words 0) and its entries (words 1 and 2) of a kind with such."""
+    """Write a block (words 0) and its entries (words 1 and 2), of a kind that has entries."""
     block = np.zeros((3, 2), np.uint32)
     block[0, 0] = np.uint32(low | high << 8 | kind << 16 | number << 18)
     of_cover, of_code = (1, 2) if kind == 3 else (1, 1)
@@ -169,7 +169,7 @@ def _put_with_entries(code: Any, cover: Any, kind: int, low: int, high: int, num
 
 @numba.njit(cache=True, nogil=True)
 def _whole(code: Any, cover: Any, whole: Any) -> bool:
-    """Codes of texels that are the sky, or a surface, as most of their quarters are; whether any texel is both."""
+    """Codes of texels as sky or surface, by the majority of their quarters; returns whether any texel is mixed."""
     mixed = False
     for i in range(16):
         mixed |= cover[i] != 0 and cover[i] != 15
@@ -180,7 +180,7 @@ def _whole(code: Any, cover: Any, whole: Any) -> bool:
 
 @numba.njit(cache=True, nogil=True)
 def _encode(code: Any, cover: Any, words: Any, octaves: float) -> None:
-    """A map: codes and cover (B, 16) to words (B + pool, 2). A code more is so many octaves."""
+    """Encode a map: codes and cover (B, 16) to words (B + pool, 2). One code step is `octaves` octaves."""
     count = len(code)
     room = min(len(words) - count, MOST_ENTRIES)
     least, most = 16 * (LEAST_ERROR / (0.6931 * octaves)) ** 2, (MOST_ERROR / (0.6931 * octaves)) ** 2
@@ -216,7 +216,7 @@ def _encode(code: Any, cover: Any, words: Any, octaves: float) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _decode(words: Any, code: Any, cover: Any) -> None:
-    """Words (B + pool, 2) to codes and cover (B, 16)."""
+    """Decode words (B + pool, 2) to codes and cover (B, 16)."""
     count = len(code)
     for b in range(count):
         first, second = int(words[b, 0]), int(words[b, 1])

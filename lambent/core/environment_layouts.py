@@ -1,9 +1,9 @@
-"""Pictures of everything around a point, in the layouts that tools write, as lat-long pictures (`core.latlong`).
+"""Convert pictures of the surroundings from the layouts that tools write to lat-long (`core.latlong`).
 
-Every layout shows what the eye sees from within, unmirrored: front -z, right +x, top +y.
+Every layout shows the surroundings from within, unmirrored: front -z, right +x, top +y.
 
     lat-long   the middle column is front, the top row top
-    angular    light probe (Debevec 1998): the middle is front, the angle from it grows with the radius, to 180 degrees
+    angular    light probe (Debevec 1998): the centre is front, the angle from it grows with the radius, to 180 degrees
                at the rim of the disc; right and top as in the picture
     cross      six faces of a cube unfolded. 4:3: left, front, right, back in a row, top and bottom above and below the
                front. 3:4: the back below the bottom instead, turned by 180 degrees
@@ -24,7 +24,7 @@ from lambent.core.errors import UserError
 from lambent.core.latlong import lat_long_directions
 from lambent.core.surroundings import Layout
 
-DARK, MOSTLY = 1e-3, 0.75  # of the picture's mean is black; share of unused pixels that are (captions are not)
+DARK, MOSTLY = 1e-3, 0.75  # black, relative to the mean; share of unused pixels that are (captions are not)
 MOST_ROWS, SAMPLES = 4096, 3  # of a resampled picture; samples per pixel and axis
 ROWS_AT_ONCE = 64
 LEFT_HANDED = np.array([1.0, 1.0, -1.0])
@@ -37,15 +37,15 @@ HINT = 'set layout = "lat-long", "angular", "cross" or "strip"'
 
 
 def layout_of(picture: Image, file: Path | None = None) -> Layout:
-    """Find the layout of a picture (H, W, 3) from its proportions and from the parts that a layout leaves black.
+    """Detect the layout of a picture (H, W, 3) from its proportions and its black regions.
 
-    1:6 and 6:1 are strips; 3:4 and 4:3 are crosses where the empty cells are black; squares are angular maps where
-    the corners are black; everything else is lat-long.
+    1:6 and 6:1 are strips; 3:4 and 4:3 are crosses if the empty cells are black; squares are angular maps if the
+    corners are black; everything else is lat-long.
 
     Raises
     ------
     UserError
-        A square picture is no angular map.
+        If a square picture is not an angular map.
     """
     height, width = picture.shape[:2]
     if height == 6 * width or width == 6 * height:
@@ -62,12 +62,12 @@ def layout_of(picture: Image, file: Path | None = None) -> Layout:
 
 
 def as_lat_long(picture: Image, layout: Layout, file: Path | None = None) -> Image:
-    """A picture (H, W, 3) as lat-long, in about its own resolution; a lat-long picture as it is.
+    """Resample a picture (H, W, 3) to lat-long at about its own resolution; lat-long pictures are returned unchanged.
 
     Raises
     ------
     UserError
-        The proportions are not those of the layout.
+        If the proportions do not fit the layout.
     """
     height, width = picture.shape[:2]
     if layout == "lat-long":
@@ -103,7 +103,7 @@ def _cross(height: int, width: int) -> tuple[int, int] | None:
 
 
 def _empty(height: int, width: int, shape: tuple[int, int]) -> Flags:
-    """(H, W) bool: the cells of a cross that show nothing."""
+    """(H, W) bool: the empty cells of a cross."""
     cells = np.ones(shape, bool)
     cells[tuple(np.transpose(CELLS[shape]))] = False
     return np.repeat(np.repeat(cells, height // shape[0], axis=0), width // shape[1], axis=1)
@@ -119,7 +119,7 @@ def _angular(picture: Image, w: Floats) -> Floats:
     """Bilinear look-up (..., 3) of an angular map at unit directions (..., 3)."""
     n = len(picture)
     across = np.hypot(w[..., 0], w[..., 1])
-    radius = np.minimum(np.arctan2(across, -w[..., 2]) / np.pi, 1 - 2.0 / n)  # beyond the rim lies black
+    radius = np.minimum(np.arctan2(across, -w[..., 2]) / np.pi, 1 - 2.0 / n)  # beyond the rim the picture is black
     scale = radius / np.maximum(across, 1e-12)
     column, row = ((1 + w[..., 0] * scale) / 2 * n - 0.5), ((1 - w[..., 1] * scale) / 2 * n - 0.5)
     c0, r0 = (np.clip(np.floor(x).astype(int), 0, n - 2) for x in (column, row))

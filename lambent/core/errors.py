@@ -1,4 +1,4 @@
-"""The one exception for faults of a user's input; everything else is a bug and keeps its traceback."""
+"""The one exception for faults in a user's input; every other exception is a bug and keeps its traceback."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ LONGEST = 600  # characters of a message or a path
 
 
 class UserError(Exception):
-    """Input that cannot be used, said in one line: file, field, found, expected, hint.
+    """Input that cannot be used, reported in one line: file, field, found, expected, hint.
 
     Parameters
     ----------
@@ -20,12 +20,11 @@ class UserError(Exception):
     file, field : path-like and str, optional
         Its place: the file, and the field, key, option or line.
     got, expected : object, optional
-        The value found there, and the values that belong there.
+        The value found there, and the values allowed there.
     hint : str, optional
         A remedy.
 
-    What may come from a file is cut to a length that a terminal shows. What is expected may be four times
-    as long. The hint is shown whole.
+    `got` is cut to a length that fits a terminal, `expected` to four times that; the hint is shown whole.
     """
 
     def __init__(
@@ -66,18 +65,18 @@ EXPECTED_TYPES = {
     "float_parsing": NUMBER,
     "int_parsing": "a whole number",
     "int_from_float": "a whole number",
-}  # by pydantic's types of errors: users write tables and lists, not dictionaries
+}  # pydantic's error types, reworded: users write tables and lists, not dictionaries
 
 
 def invalid(error: Any, file: str | Path, known: Iterable[str] = ()) -> UserError:
-    """The first fault of a pydantic `ValidationError`; `known` are the keys that an unknown one may have meant."""
+    """The first fault of a pydantic `ValidationError`; `known` are keys to suggest for an unknown one."""
     first = error.errors()[0]
     field = ".".join(str(part) for part in first["loc"]) or None
     if first["type"] == "extra_forbidden":
         return UserError("unknown key", file=file, field=field, hint=did_you_mean(str(first["loc"][-1]), known))
     if first["type"] == "missing":
         return UserError("is missing", file=file, field=field)
-    got = None if isinstance(first["input"], dict) else first["input"]  # a table is too long to be shown
+    got = None if isinstance(first["input"], dict) else first["input"]  # a table is too long to show
     if first["type"] == "union_tag_invalid":  # a table of one of several kinds
         tag, key = str(first["ctx"]["tag"]), first["ctx"]["discriminator"].strip("'")
         kinds = [kind.strip("' ") for kind in first["ctx"]["expected_tags"].split(",")]
@@ -95,13 +94,13 @@ def invalid(error: Any, file: str | Path, known: Iterable[str] = ()) -> UserErro
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str | None:
-    """Hint for an unknown name, or None when nothing is close."""
+    """Hint for a misspelt name, or None if no known name is close."""
     close = difflib.get_close_matches(name, list(known), n=1)
     return f"did you mean {_short(close[0])!r}?" if close else None
 
 
 def _end_of(file: object) -> str:
-    """A path, or the end of a long one, where its name is."""
+    """A path; of a long one only its end, which has the file name."""
     text = str(file)
     return text if len(text) <= LONGEST else f"...{text[3 - LONGEST :]}"
 
@@ -109,6 +108,6 @@ def _end_of(file: object) -> str:
 def _short(value: object, limit: int = 120) -> str:
     try:
         text = str(value)
-    except ValueError:  # Python writes no integers of more than 4300 digits
+    except ValueError:  # Python refuses to write integers of more than 4300 digits
         text = "a number of more digits than can be shown"
     return text if len(text) <= limit else text[: limit - 3] + "..."

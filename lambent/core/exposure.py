@@ -1,7 +1,7 @@
-"""Exposure: stops on radiance, EV100, and the exposure that shows a picture's middle as middle grey.
+"""Exposure: stops on radiance, EV100, and a light meter that maps a picture's log-average to middle grey.
 
-Displayed light is radiance times 2^exposure_ev. EV100 (ISO 100, saturation-based speed, ISO 12232) is the exposure at
-which 1.2 cd/m^2 x 2^EV100 is the brightest that has detail, shown as 1: the larger, the darker the picture.
+Displayed light is radiance times 2^exposure_ev. EV100 (ISO 100, saturation-based speed, ISO 12232): 1.2 cd/m^2 x
+2^EV100 is the brightest luminance with detail, displayed as 1; a larger EV100 darkens the picture.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.photometry import LM_PER_W, photometric
 
-KEY = 0.18  # middle grey: where the meter puts the log-average (Reinhard et al. 2002)
+KEY = 0.18  # middle grey: the meter's target for the log-average (Reinhard et al. 2002)
 SATURATED_CD_M2 = 1.2  # at EV100 0
 LIMIT_EV = 12.0
-BRIGHT_SHARE = 0.005  # of the pixels, those of suns and lamps, which do not count
-SPAN_STOPS = 10.0  # below the brightest that count: what is darker surrounds the picture
-TRIM = 0.05  # of the rest, at both ends
+BRIGHT_SHARE = 0.005  # share of the pixels that the meter ignores as suns and lamps
+SPAN_STOPS = 10.0  # below the brightest metered pixel; darker pixels count as black surroundings
+TRIM = 0.05  # share of the remaining pixels trimmed at each end
 
 
 def ev100_of(exposure_ev: float) -> float:
@@ -32,9 +32,9 @@ def exposure_of(ev100: float) -> float:
 
 
 def metered(radiance: Floats) -> float | None:
-    """Exposure in stops that shows the log-average of a picture (H, W, 3) as `KEY`, within +-LIMIT_EV; None if black.
+    """Exposure in stops that maps the log-average of a picture (H, W, 3) to `KEY`, within +-LIMIT_EV; None if black.
 
-    Neither a sun or a lamp in view nor black surroundings change it: see the constants.
+    Suns or lamps in view and black surroundings do not change it: see the constants.
     """
     y = photometric(np.asarray(radiance, np.float64)).ravel() / LM_PER_W
     stops = np.sort(np.log2(y[np.isfinite(y) & (y > 0)]))

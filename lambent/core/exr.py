@@ -1,6 +1,6 @@
-"""OpenEXR pictures: decoded where the header keeps to the limit and OpenEXR finds every chunk in the file.
+"""OpenEXR pictures; decoding requires a header within the size limit and a file with every chunk.
 
-OpenEXR reports damaged files on the process's stderr and on stdout; both are silenced while it reads.
+OpenEXR reports damaged files on stderr and stdout; both are silenced while it reads.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ _silencing = threading.Lock()
 
 
 def decode(file: Path) -> Image:
-    """Linear RGB (H, W, 3) of the data window; a picture of luminance alone becomes grey.
+    """Linear RGB (H, W, 3) of the data window; a luminance-only picture becomes grey.
 
     Raises
     ------
     UserError
-        Where the file is damaged or cut off, deep or multi-part, larger than `PIXELS` of four channels, or has
-        neither R, G, B nor Y.
+        If the file is damaged, truncated, deep or multi-part, larger than `PIXELS` of four channels, or has neither
+        R, G, B nor Y.
     """
     with _opened(file, header_only=True) as exr:
         header = exr.header()
@@ -61,7 +61,7 @@ def decode(file: Path) -> Image:
 
 
 def encode(image: Image, path: Path) -> None:
-    """Write linear RGB (H, W, 3) as 32-bit float, ZIP compressed (without loss); OSError where that cannot be."""
+    """Write linear RGB (H, W, 3) as 32-bit float with lossless ZIP compression; raises OSError on failure."""
     import OpenEXR
 
     header: dict[str, Any] = {
@@ -69,14 +69,14 @@ def encode(image: Image, path: Path) -> None:
     }  # fmt: skip
     try:
         OpenEXR.File(header, {"RGB": np.ascontiguousarray(image, np.float32)}).write(str(path))
-    except RuntimeError as error:  # the library's only kind: its text ends with what the system says
+    except RuntimeError as error:  # the library's only exception; its text ends with the system's message
         code = errno.ENOSPC if os.strerror(errno.ENOSPC) in str(error) else errno.EIO
         raise OSError(code, str(error).rsplit('". ', 1)[-1].rstrip("."), str(path)) from error
 
 
 @contextmanager
 def _opened(file: Path, **kind: bool) -> Iterator[Any]:
-    """The file as OpenEXR has it. With its pixels only if complete, because they are allocated before they are read."""
+    """Open with OpenEXR; read pixels only if the file is complete, because OpenEXR allocates before it reads."""
     import OpenEXR
 
     damaged = UserError("EXR is damaged or cut off", file=file, hint="copy or download it again")
@@ -92,7 +92,7 @@ def _opened(file: Path, **kind: bool) -> Iterator[Any]:
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """Drop what is written to the file descriptor of stderr, and to Python's stdout."""
+    """Drop output to the file descriptor of stderr and to Python's stdout."""
     with _silencing, open(os.devnull, "w") as nowhere, redirect_stdout(nowhere):
         try:
             kept = os.dup(_STDERR)

@@ -1,4 +1,4 @@
-"""Luminance in false colour, with a scale of numbers, for people who plan light."""
+"""False-colour images of luminance with a numbered scale, for lighting designers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.photometry import LUMINANCE
 
-# Encoded colours at even steps from the low end to the high one; also in realtime/shaders/false_colour.wgsl.
+# Encoded colours at even steps from the low end to the high one; realtime/shaders/false_colour.wgsl has a copy.
 STOPS = np.array(
     [
         (0.11, 0.07, 0.28), (0.16, 0.27, 0.62), (0.12, 0.52, 0.78), (0.09, 0.70, 0.64), (0.30, 0.76, 0.35),
@@ -26,14 +26,14 @@ SIGNED = np.array(
     ]
 )  # fmt: skip
 BELOW, ABOVE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-LEAST, MOST = 1e-4, 1e9  # numbers that a range can hold
+LEAST, MOST = 1e-4, 1e9  # limits of the ends of a range
 DECADES = 3.0  # of a logarithmic range fitted to an image
-ROUND = (1, 2, 5, 10)  # digits of round numbers
+ROUND = (1, 2, 5, 10)  # leading digits of round numbers
 
 
 @dataclass(frozen=True)
 class Range:
-    """From `low` (dark blue) to `high` (red), in a quantity's unit; below is black, above white."""
+    """Scale from `low` (dark blue) to `high` (red), in a quantity's unit; black below, white above."""
 
     low: float = 1.0
     high: float = 1000.0
@@ -41,25 +41,25 @@ class Range:
 
     @property
     def stops(self) -> Floats:
-        """Colours at even steps."""
+        """Encoded colours at even steps."""
         return STOPS
 
     def check(self) -> None:
-        """`UserError` where no scale can be drawn."""
+        """Raise `UserError` if no scale can be drawn."""
         least = LEAST if self.log else 0.0
         if not (least <= self.low < self.high <= MOST):
             expected = f"{least:g} <= LOW < HIGH <= {MOST:g}"
             raise UserError("is not a luminance range", got=f"{self.low:g}:{self.high:g}", expected=expected)
 
     def share(self, values: Floats) -> Floats:
-        """Places of values on the scale: 0 at `low`, 1 at `high`."""
+        """Positions of values on the scale: 0 at `low`, 1 at `high`."""
         if self.log:
             lowest = math.log(self.low)
             return np.asarray((np.log(np.maximum(values, 1e-12)) - lowest) / (math.log(self.high) - lowest))
         return np.asarray((values - self.low) / (self.high - self.low))
 
     def marks(self) -> list[float]:
-        """Round numbers for the scale, the ends among them where they are round: 1, 2 and 5 of each decade."""
+        """Round numbers for the scale: 1, 2 and 5 of each decade, and the ends if they are round."""
         if self.log:
             decades = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
             digits = ROUND[:1] if math.log10(self.high / self.low) > 4 else ROUND[:3]
@@ -72,7 +72,7 @@ class Range:
 
 
 class SignedRange(Range):
-    """Of differences, evenly from -most (light blue) over 0 (black) to most (light orange), and these beyond."""
+    """Linear scale of differences from -most (light blue) over 0 (black) to most (light orange); clamped beyond."""
 
     def __init__(self, most: float) -> None:
         super().__init__(-most, most, log=False)
@@ -86,13 +86,13 @@ class SignedRange(Range):
 
     @classmethod
     def fitting(cls, values: Floats) -> SignedRange:
-        """A range that holds nearly all differences of an image (but the largest half percent)."""
+        """A range that holds all differences of an image but the largest half percent."""
         sizes = np.abs(values[np.isfinite(values)])
         return cls(_round_up(min(max(float(np.percentile(sizes, 99.5)) if sizes.size else 0.0, LEAST), MOST)))
 
 
 def fitting_range(values: Floats, *, log: bool = True) -> Range:
-    """A range of round numbers that holds nearly all values of an image (but the brightest half percent).
+    """A range of round numbers that holds all values of an image but the brightest half percent.
 
     Logarithmic ranges span at most `DECADES` below the high end.
     """
@@ -117,13 +117,13 @@ def false_colour(values: Floats, scale: Range) -> Floats:
 
 
 def ramp(share: Floats, stops: Floats = STOPS) -> Floats:
-    """Colours (..., 3) at shares (...) of a scale, between `stops` (N, 3) at even steps."""
+    """Colours (..., 3) at positions `share` (...) in [0, 1], interpolated in `stops` (N, 3) at even steps."""
     at = np.clip(share, 0, 1) * (len(stops) - 1)
     return np.stack([np.interp(at, np.arange(len(stops)), channel) for channel in stops.T], axis=-1)
 
 
 def number(value: float) -> str:
-    """A number of the scale as people write it: three digits, no exponent."""
+    """A number of the scale in plain notation: three digits, no exponent."""
     if value < 0:
         return f"-{number(-value)}"
     digits = max(0, 2 - math.floor(math.log10(value))) if value > 0 else 0
@@ -132,7 +132,7 @@ def number(value: float) -> str:
 
 
 def with_scale(picture: NDArray[np.uint8], scale: Range, unit: str = LUMINANCE.unit) -> NDArray[np.uint8]:
-    """A copy of an encoded image (H, W, 3) with the scale and its numbers over its right edge."""
+    """A copy of an encoded image (H, W, 3) with the numbered scale drawn over its right edge."""
     from PIL import Image, ImageDraw, ImageFont
 
     height, width = picture.shape[:2]
@@ -156,7 +156,7 @@ def with_scale(picture: NDArray[np.uint8], scale: Range, unit: str = LUMINANCE.u
     last = math.inf
     for value, text in zip(scale.marks(), labels, strict=True):
         y = y1 - float(scale.share(np.array(value))) * (y1 - y0)
-        if last - y >= 1.1 * size:  # a number that would touch the one below is left out
+        if last - y >= 1.1 * size:  # skip numbers that would touch the one below
             draw.line((x0 + bar - gap // 2, y, x0 + bar, y), fill=(255, 255, 255, 255))
             draw.text((x0 + bar + gap, y), text, font=font, fill=(255, 255, 255, 255), anchor="lm")
             last = y

@@ -1,4 +1,4 @@
-"""File safety: whole files or none, nothing but regular files, names that stay inside their folder."""
+"""File safety: atomic writes, regular files only, and names that stay inside their folder."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ from pathlib import Path
 
 from lambent.core.errors import UserError
 
-# Of files that are being written: the machine, the process, its run (a new process may get the number of a dead one).
+# Part of temporary file names: the machine, the process and its run (a later process may reuse a dead one's number).
 _MACHINE = f".lambent-{hashlib.sha256(platform.node().encode()).hexdigest()[:8]}-"
 _RUN = secrets.token_hex(4)
 _BESIDE = re.compile(re.escape(_MACHINE) + r"(\d+)-([0-9a-f]{8})-")
-_STALE_S = 86400.0  # where one cannot ask whether a process lives: nothing is written for so long
+_STALE_S = 86400.0  # fallback where liveness of a process cannot be queried: no write takes this long
 _numbers = count()
 _cleared: set[Path] = set()
 
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """Path to write beside `path`; on leaving without an error it is flushed to disk and renamed into place.
+    """Temporary path beside `path`; a clean exit of the block flushes it to disk and renames it into place.
 
-    A reader sees the old file or the new one, never a part; a crash leaves the old one. A missing folder is made. A
+    A reader sees the old file or the new one, never a part; a crash leaves the old one. A missing folder is created. A
     symbolic link stays and its target is replaced. A new file gets its mode from the umask; a replaced file keeps its
     mode. Temporary files of killed processes are removed.
 
     Raises
     ------
     UserError
-        Where `path` is a folder, a device or a pipe, or the disk is full, read-only or fails. It names `path`.
+        If `path` is a folder, a device or a pipe, or the disk is full, read-only or fails. It names `path`.
     """
     target = real_file(path)
     beside = target.with_name(f"{_MACHINE}{os.getpid()}-{_RUN}-{next(_numbers)}{target.suffix}")
@@ -59,7 +59,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
         os.replace(beside, target)
     except OSError as error:
         if error.filename is not None and str(error.filename) != str(beside):
-            raise  # of another file
+            raise  # raised for another file
         raise _unwritable(path, error) from error
     finally:
         with suppress(OSError):
@@ -67,9 +67,9 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 
 def real_file(path: Path) -> Path:
-    """The place of the file that `path` names, links followed; `UserError` where something other than a file is there.
+    """Resolve the links of `path`; `UserError` if the target exists but is not a regular file.
 
-    A device, a pipe or a socket is not replaced by a file, whoever asks.
+    No caller may replace a device, a pipe or a socket by a file.
     """
     target = Path(os.path.realpath(path))
     try:
@@ -86,13 +86,13 @@ def real_file(path: Path) -> Path:
 
 
 def check_place(path: Path) -> None:
-    """`UserError` where no file can be written at `path`, before long work begins. Leaves nothing behind."""
+    """Raise `UserError` if no file can be written at `path`; called before long work, leaves nothing behind."""
     target = real_file(path)
     folder = next((p for p in target.parents if p.exists()), target.parent)
     try:
         with tempfile.TemporaryFile(dir=folder):
             pass
-        target.with_name(f"{_MACHINE}{target.suffix}").exists()  # an ending can be too long
+        target.with_name(f"{_MACHINE}{target.suffix}").exists()  # fails if the suffix makes the name too long
     except OSError as error:
         raise _unwritable(path, error) from error
     if target.exists() and not os.access(target, os.W_OK):
@@ -100,8 +100,8 @@ def check_place(path: Path) -> None:
 
 
 def remove_left_over(folder: Path) -> None:
-    """Remove what processes of this machine were writing in `folder` when they were killed."""
-    with suppress(OSError):  # what is left over does not stop what comes
+    """Remove temporary files in `folder` of killed processes of this machine."""
+    with suppress(OSError):  # leftovers must not stop the caller
         for path in Path(folder).iterdir():
             found = _BESIDE.match(path.name)
             if found is not None and not _is_alive(int(found[1]), found[2], path):
@@ -109,10 +109,10 @@ def remove_left_over(folder: Path) -> None:
 
 
 def _is_alive(process: int, run: str, path: Path) -> bool:
-    """Whether the process that began to write `path` still runs."""
+    """Whether the process that wrote temporary file `path` still runs."""
     if process == os.getpid():
         return run == _RUN
-    if sys.platform == "win32":  # where asking after a process can end it
+    if sys.platform == "win32":  # where querying a process can end it
         return time.time() - path.stat().st_mtime < _STALE_S
     try:
         os.kill(process, 0)
@@ -128,18 +128,18 @@ def _unwritable(path: Path, error: OSError) -> UserError:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write `text` as UTF-8, atomically; what UTF-8 cannot hold, from names of files, is written as an escape."""
+    """Write `text` as UTF-8, atomically; surrogates, as in file names, are escaped."""
     with atomic_path(path) as beside:
         beside.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def inside(folder: Path, name: str) -> Path:
-    """`folder / name` as a real path, or a `UserError` where the name would leave the folder."""
+    """`folder / name` as a real path; `UserError` if it lies outside the folder."""
     folder = Path(folder).resolve()
     try:
         path = (folder / name).resolve()
-        path.is_file()  # a name that is too long fails here
-    except (ValueError, OSError, RuntimeError) as error:  # zeros, halves of characters, links that run in circles
+        path.is_file()  # raises if the name is too long
+    except (ValueError, OSError, RuntimeError) as error:  # null characters, lone surrogates, circular links
         raise UserError("is not a file name", file=folder, got=ascii(name)) from error
     if not path.is_relative_to(folder):
         raise UserError("path leaves its folder", file=folder, got=name, expected="a path below it")
@@ -147,5 +147,5 @@ def inside(folder: Path, name: str) -> Path:
 
 
 def folder_bytes(folder: Path) -> int:
-    """Of all files below a folder."""
+    """Total size of all files below a folder."""
     return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())

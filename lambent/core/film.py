@@ -1,4 +1,4 @@
-"""Films: H.264 in MP4, frame by frame, whole or not at all; or sequences of pictures, each of them whole."""
+"""Films, H.264 in MP4, and sequences of pictures. A film appears whole or not at all; so does each picture."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from lambent.core.outputs import MARK, check_output
 Frame = NDArray[np.uint8]
 FILM = ".mp4"
 SEQUENCES = (".png", ".exr")
-# The matrix is converted and named: players take small films for BT.601 and large ones for BT.709 when it is not.
+# Convert and tag the matrix explicitly: untagged, players assume BT.601 for small films and BT.709 for large ones.
 _BT709 = ["-vf", "scale=out_color_matrix=bt709:out_range=tv", "-colorspace", "bt709", "-color_primaries", "bt709",
           "-color_trc", "bt709", "-color_range", "tv"]  # fmt: skip
 _MARKED = ["-metadata", f"comment={MARK}"]
@@ -30,7 +30,7 @@ _CONSTANT_QUALITY = ["-crf", "18", "-preset", "medium", "-movflags", "+faststart
 
 @contextmanager
 def film_writer(path: Path, width: int, height: int, fps: float = 30) -> Iterator[Callable[[Frame], None]]:
-    """Function that takes the next frame, (height, width, 3) uint8 encoded; the film is complete on leaving.
+    """Yield a function that takes the next frame, (height, width, 3) uint8 encoded; the film is complete on leaving.
 
     An error or an interruption within the block leaves no file. No frame is kept in memory.
 
@@ -44,7 +44,7 @@ def film_writer(path: Path, width: int, height: int, fps: float = 30) -> Iterato
     Raises
     ------
     UserError
-        Where there is no ffmpeg or it fails.
+        If ffmpeg is missing or fails.
     """
     import imageio_ffmpeg
 
@@ -71,7 +71,7 @@ def film_writer(path: Path, width: int, height: int, fps: float = 30) -> Iterato
                 yield write
             finally:
                 writer.close()
-            if not _is_whole(beside):  # ffmpeg does not report errors at its end, such as a full disk
+            if not _is_whole(beside):  # ffmpeg does not report late errors such as a full disk
                 raise OSError(errno.ENOSPC, "the end of the film could not be written: is the disk full?")
         except (OSError, RuntimeError) as error:
             said = str(error).replace(str(beside), str(path))
@@ -79,7 +79,7 @@ def film_writer(path: Path, width: int, height: int, fps: float = 30) -> Iterato
 
 
 def _is_whole(path: Path) -> bool:
-    """Whether the boxes of an MP4 file (ISO 14496-12) fill it to its end, and an index is among them."""
+    """Whether the boxes of an MP4 file (ISO 14496-12) end exactly at its end and include an index."""
     kinds, at, end = set(), 0, path.stat().st_size
     with path.open("rb") as file:
         while at + 8 <= end:
@@ -95,12 +95,12 @@ def _is_whole(path: Path) -> bool:
 
 
 def even_size(width: int, height: int) -> tuple[int, int]:
-    """The size cut to even numbers, at least 2 x 2."""
+    """The size rounded down to even numbers, at least 2 x 2."""
     return max(2, width - width % 2), max(2, height - height % 2)
 
 
 def sequence_file(path: Path, number: int) -> Path:
-    """Name of a sequence's picture: `number` replaces the # signs of `path`, or is added with four digits."""
+    """Path of picture `number` of a sequence: it replaces the # signs of `path`, or is appended with four digits."""
     stem, signs, rest = re.fullmatch(r"([^#]*)(#*)(.*)", path.stem, re.DOTALL).groups()  # type: ignore[union-attr]
     if "#" in rest:
         raise UserError(
@@ -111,7 +111,7 @@ def sequence_file(path: Path, number: int) -> Path:
 
 
 def pictures_there(path: Path) -> list[Path]:
-    """The film, or the pictures of the sequence, that are there already."""
+    """The existing film, or the existing pictures of the sequence."""
     if path.suffix.lower() == FILM or not path.parent.is_dir():
         return [path] if path.exists() else []
     numbered = ((file, map(int, re.findall(r"[0-9]+", file.stem))) for file in path.parent.iterdir())
@@ -119,7 +119,7 @@ def pictures_there(path: Path) -> list[Path]:
 
 
 def check_pictures(path: Path, *, force: bool) -> None:
-    """`check_output` of a film, or of every picture of a sequence."""
+    """`check_output` for a film, or for every picture of a sequence."""
     check_output(path if path.suffix.lower() == FILM else sequence_file(path, 1), (FILM, *SEQUENCES), force=force)
     for file in pictures_there(path):
         check_output(file, force=force)
@@ -127,14 +127,14 @@ def check_pictures(path: Path, *, force: bool) -> None:
 
 @contextmanager
 def sequence_writer(path: Path) -> Iterator[Callable[[NDArray[Any]], None]]:
-    """Function that takes the next picture of a sequence and writes it, named by `sequence_file` from number 1.
+    """Yield a function that writes the next picture of a sequence, named by `sequence_file` from number 1.
 
     PNG takes (height, width, 3) uint8 encoded, EXR linear radiance. An interruption leaves the earlier pictures.
 
     Raises
     ------
     UserError
-        Where a picture cannot be written.
+        If a picture cannot be written.
     """
     from lambent.core.images import check_writable, write_image, write_shown
 
@@ -160,5 +160,5 @@ def pictures_writer(
 
 
 def radiance_wanted(path: Path) -> bool:
-    """Whether a picture sequence of this name takes radiance instead of what a display shows."""
+    """Whether a picture sequence of this suffix takes radiance instead of display values."""
     return path.suffix.lower() == ".exr"

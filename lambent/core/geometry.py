@@ -1,4 +1,4 @@
-"""Triangles: normals, areas, points on them. Arrays of corners (..., 3, 3): triangle, corner, coordinate."""
+"""Triangles: normals, areas, random points. Arrays of corners (..., 3, 3): triangle, corner, coordinate."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from lambent.core.directions import normalize
 
 
 def area_vectors(corners: Floats) -> Floats:
-    """Normals (..., 3) of counter-clockwise triangles (..., 3, 3), with twice the area of each as length."""
+    """Normals (..., 3) of counter-clockwise triangles (..., 3, 3), scaled to twice the area."""
     a, b, c = corners[..., 0, :], corners[..., 1, :], corners[..., 2, :]
     return np.asarray(np.cross(b - a, c - a))
 
@@ -21,12 +21,12 @@ def triangle_areas(corners: Floats) -> Floats:
 
 
 def triangle_normals(corners: Floats) -> Floats:
-    """Unit normals (..., 3) of triangles (..., 3, 3); 0 where one has no area."""
+    """Unit normals (..., 3) of triangles (..., 3, 3); 0 for degenerate ones."""
     return normalize(area_vectors(corners))
 
 
 def points_on_triangles(corners: Floats, face: NDArray[np.integer], rng: np.random.Generator) -> Floats:
-    """A point (K, 3), uniform by area, on each of the triangles `face` (K,) of all triangles (F, 3, 3)."""
+    """One point (K, 3) on each of the triangles `face` (K,), uniform by area; corners (F, 3, 3) of all triangles."""
     weights = rng.dirichlet((1, 1, 1), size=len(face))
     return np.asarray(np.einsum("kcx,kc->kx", corners[face], weights))
 

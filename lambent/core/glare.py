@@ -1,15 +1,15 @@
-"""Discomfort glare of a picture around an eye: daylight glare probability and unified glare rating.
+"""Discomfort glare at an eye, from a picture: daylight glare probability and unified glare rating.
 
-Angles are about the view direction of a person who looks into the middle of the picture, up as the picture's. Sources:
+Angles refer to the view direction of a person who looks at the picture's centre, with the picture's up. Sources:
 
 - DGP: J. Wienold, J. Christoffersen, "Evaluation methods and development of a new glare prediction model for daylight
-  environments with the use of CCD cameras", Energy and Buildings 38 (2006), eq. 8. Radiance's evalglare 3 takes .092
-  and .159 for its last two numbers, which differs by .001 at most.
+  environments with the use of CCD cameras", Energy and Buildings 38 (2006), eq. 8. Radiance's evalglare 3 uses .092
+  and .159 as its last two constants; the results differ by .001 at most.
 - UGR: CIE 117 (1995).
 - Position index: R. E. Levin, "Position index in VCP calculations", Journal of the IES 4 (1975), eq. 6, above the line
   of sight; below it the formula of evalglare after T. Iwata, M. Tokura (1997).
-- What is a glare source: as evalglare 3 finds them by default, luminance above 2000 cd/m2, parts closer than .1 rad
-  together, peaks above 50,000 cd/m2 apart from what is around them.
+- Glare sources: evalglare 3's default rule. Pixels above 2000 cd/m2 are grouped if closer than .1 rad; peaks above
+  50,000 cd/m2 are sources of their own.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from lambent.core.projections import View
 THRESHOLD_CD_M2, PEAK_CD_M2 = 2000.0, 50_000.0
 GAP_RAD = 0.1
 MOST_INDEX = 16.0
-LEAST_LX = 380.0  # below, DGP says less than people do
+LEAST_LX = 380.0  # below, DGP underestimates people's ratings
 COMFORT = ((0.35, "imperceptible"), (0.40, "perceptible"), (0.45, "disturbing"))  # of DGP; above, intolerable
-COVERED_SR = 2 * math.pi * 0.97  # of the half space ahead, less is no view of an eye
+COVERED_SR = 2 * math.pi * 0.97  # solid angle of a view that counts as the half space ahead
 
 
 @dataclass(frozen=True)
 class Source:
-    """A source of glare: mean luminance in cd/m2, solid angle in sr, position index of its middle, and where that is.
+    """One glare source: mean luminance in cd/m2, solid angle in sr, position index and direction of its centre.
 
     `azimuth_deg` is to the right of the view direction, `elevation_deg` above it.
     """
@@ -57,15 +57,15 @@ class Glare:
     dgp : float
         Daylight glare probability, about .16 to 1.
     ugr : float
-        Unified glare rating, of what is not a source as background; 0 where nothing glares.
+        Unified glare rating, with all that is not a source as background; 0 without sources.
     illuminance_lx : float
         At the eye, facing the view direction.
     background : float
         Mean luminance without the sources, cd/m2.
     sources : tuple of Source
-        The brightest for the eye first.
+        In descending order of brightness at the eye.
     numbers : ndarray
-        (H, W) the source of each pixel, counted from 1; 0 where none is.
+        (H, W) number of each pixel's source, from 1; 0 outside sources.
     """
 
     dgp: float
@@ -77,19 +77,19 @@ class Glare:
 
     @property
     def comfort(self) -> str:
-        """The DGP in words, or that it is too dark for one."""
+        """The DGP in words, or a note that it is too dark for one."""
         if self.illuminance_lx < LEAST_LX and not self.sources:
             return f"too dark for DGP (below {LEAST_LX:g} lx)"
         return next((word for limit, word in COMFORT if self.dgp < limit), "intolerable")
 
 
 def glare(radiance: Floats, view: View, threshold: float = THRESHOLD_CD_M2) -> Glare:
-    """Glare in a picture (H, W, 3) of radiance in W/(sr m2) that shows the half space ahead, as a fisheye does.
+    """Glare in a picture (H, W, 3) of radiance in W/(sr m2) that shows the half space ahead, such as a fisheye.
 
     Raises
     ------
     UserError
-        Where the picture shows less than the half space ahead.
+        If the picture shows less than the half space ahead.
     """
     rays, solid_angle = view.directions(radiance.shape[1], radiance.shape[0])
     right, up, ahead = (rays @ axis for axis in camera_axes(view.camera))
@@ -124,11 +124,11 @@ def glare(radiance: Floats, view: View, threshold: float = THRESHOLD_CD_M2) -> G
 
 
 def position_index(right: ArrayLike, up: ArrayLike, ahead: ArrayLike) -> Floats:
-    """Guth's position index (...) of directions by their parts, at least 1."""
+    """Guth's position index (...), at least 1, of directions given by their components."""
     right, up, ahead = (np.asarray(part, float) for part in (right, up, ahead))
     across = np.hypot(right, up)
     sigma = np.degrees(np.arctan2(across, ahead))
-    tau = np.degrees(np.arctan2(np.abs(right), up))  # from straight above the line of sight
+    tau = np.degrees(np.arctan2(np.abs(right), up))  # angle from straight above the line of sight
     above = (35.2 - 0.31889 * tau - 1.22 * np.exp(-2 * tau / 9)) * 1e-3 * sigma
     above += (21 + 0.26667 * tau - 0.002963 * tau * tau) * 1e-5 * sigma * sigma
     lower = across * np.sqrt(1 + 0.3225 * np.cos(np.radians(tau)) ** 2)
@@ -138,7 +138,7 @@ def position_index(right: ArrayLike, up: ArrayLike, ahead: ArrayLike) -> Floats:
 
 
 def _numbered(shown: Floats, rays: Floats, threshold: float) -> NDArray[np.int32]:
-    """(H, W) numbers of sources from 1: bright pixels in groups, and the peaks within them in groups of their own."""
+    """(H, W) source numbers from 1: groups of bright pixels, and the peaks within them as groups of their own."""
     groups = _groups(shown > threshold, rays)
     count = int(groups.max())
     if count == 0:
@@ -150,9 +150,9 @@ def _numbered(shown: Floats, rays: Floats, threshold: float) -> NDArray[np.int32
 
 
 def _groups(bright: Flags, rays: Floats) -> NDArray[np.int32]:
-    """(H, W) numbers of groups from 1, of which no two come as close as `GAP_RAD`; 0 where it is not bright.
+    """(H, W) group numbers from 1, 0 where not bright; different groups are at least `GAP_RAD` apart.
 
-    The spherical Delaunay triangulation, a convex hull, holds the shortest links between groups.
+    The spherical Delaunay triangulation, computed as a convex hull, contains the shortest links between groups.
     """
     from scipy.ndimage import binary_erosion, label
     from scipy.sparse import coo_matrix

@@ -1,4 +1,4 @@
-"""A view with its sources of glare marked, for people."""
+"""A picture of a view with its glare sources marked."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from lambent.core.colour import luminance, shown
 from lambent.core.glare import Glare
 from lambent.core.images import to_bytes
 
-MARK_SHARE = 0.6  # of the colour over a source
+MARK_SHARE = 0.6  # opacity of the mark over a source
 
 
 def marked(radiance: Floats, found: Glare) -> NDArray[np.uint8]:
-    """(H, W, 3) display values: what is no source at a fitting exposure, each source in a hue of its own."""
+    """(H, W, 3) display values: the background at a fitting exposure, each source in its own hue."""
     lit = luminance(radiance)[(found.numbers == 0) & (radiance.max(axis=-1) > 0)]
     exposure_ev = float(np.log2(0.18 / np.exp(np.log(lit).mean()))) if len(lit) and lit.min() > 0 else 0.0
     picture = np.asarray(shown(radiance, "filmic", exposure_ev), float)

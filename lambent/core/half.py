@@ -1,4 +1,4 @@
-"""Half floats in compiled loops, which know no such type: their bits."""
+"""Half floats in compiled loops: numba has no such type, so functions work on their bits."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 from lambent.core.colour import HALF_MAX
 
 LEAST_NORMAL = np.float32(2.0**-14)
-TINY = np.float32(2.0**24)  # over the smallest half float
+TINY = np.float32(2.0**24)  # reciprocal of the smallest half float
 LARGEST = np.float32(HALF_MAX)
 
 
 @numba.njit(cache=True, inline="always")
 def half_bits(value):  # type: ignore[no-untyped-def]
-    """Bits (uint16) of the half float nearest to a float32, ties to even; of negative ones and NaN those of 0."""
+    """Bits (uint16) of the half float nearest to a float32, ties to even; negative values and NaN give 0."""
     if not value > np.float32(0):
         return np.uint16(0)
     if value < LEAST_NORMAL:
@@ -27,7 +27,7 @@ def half_bits(value):  # type: ignore[no-untyped-def]
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def put_sums(bits, values, rows, places, factors):  # type: ignore[no-untyped-def]
-    """Put sums over n of values (n, T, 3) at `rows` (K,), times factors (n, 3), as half floats into bits (m, 4)."""
+    """Write sums over n of values (n, T, 3) x factors (n, 3), at `rows` (K,), to bits (m, 4) at `places` (K,)."""
     for k in numba.prange(len(rows)):
         for c in range(3):
             total = np.float32(0)

@@ -1,8 +1,8 @@
 """Reading and writing pictures: float32, linear Rec.709, (H, W, 3), row 0 at the top.
 
-The content decides how a file is read: EXR, Radiance HDR, PNG and JPEG (8 or 16 bit, taken as sRGB). A header that
-promises more than `PIXELS`, or more than its file can hold, is refused before anything is allocated. The suffix
-decides how a file is written: .exr and .hdr keep linear values, .png encodes them as 8-bit sRGB.
+Reading detects the format from the content: EXR, Radiance HDR, PNG and JPEG (8 or 16 bit, taken as sRGB). A header that
+promises more than `PIXELS`, or more than its file can hold, is refused before anything is allocated. Writing follows
+the suffix: .exr and .hdr keep linear values, .png encodes them as 8-bit sRGB.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ WRITABLE = (".exr", ".hdr", ".png")
 
 
 def read_image(path: Path) -> Image:
-    """Linear RGB (H, W, 3) float32 of an EXR, HDR, PNG or JPEG file; an alpha channel is left out.
+    """Linear RGB (H, W, 3) float32 of an EXR, HDR, PNG or JPEG file; an alpha channel is dropped.
 
     Raises
     ------
     UserError
-        Where the file is missing, of another kind, cut off, too large, or holds values that are not finite.
+        If the file is missing, of another kind, truncated, too large, or has values that are not finite.
     """
     path = Path(path)
     data = read_bytes(path, PICTURE_BYTES)
@@ -53,12 +53,12 @@ def read_image(path: Path) -> Image:
 
 
 def read_encoded(path: Path) -> Image:
-    """Values (H, W, 3 or 4) in [0, 1] of a PNG or JPEG as stored: for normal maps, masks and alpha."""
+    """Values (H, W, 3 or 4) in [0, 1] of a PNG or JPEG as stored, undecoded: for normal maps, masks and alpha."""
     return _values(_stored(path))
 
 
 def _stored(path: Path) -> NDArray[Any]:
-    """Values of a PNG or JPEG in its own integers: (H, W, 3 or 4) of 8 bits, or (H, W) of 16."""
+    """Integers of a PNG or JPEG as stored: (H, W, 3 or 4) of 8 bits, or (H, W) of 16."""
     from PIL import Image as Pillow
 
     data = read_bytes(Path(path), PICTURE_BYTES)
@@ -76,8 +76,8 @@ def _stored(path: Path) -> NDArray[Any]:
 def write_image(path: Path, image: NDArray[Any], view: str | None = None) -> None:
     """Write linear RGB (H, W, 3), atomically, in the format of the suffix: .exr, .hdr or .png.
 
-    PNG values are clipped to [0, 1] and sRGB-encoded: apply `colour.filmic` first to scene radiance. `view` is written
-    to .hdr as Radiance's options of the view.
+    PNG values are clipped to [0, 1] and sRGB-encoded: apply `colour.filmic` first to scene radiance. `view`, Radiance's
+    view options, goes into the header of an .hdr file.
     """
     path = Path(path)
     rgb = np.asarray(image, np.float32)
@@ -109,7 +109,7 @@ def _save_png(path: Path, picture: NDArray[np.uint8]) -> None:
 
 
 def check_writable(path: Path, suffixes: tuple[str, ...] = WRITABLE) -> None:
-    """`UserError` where a picture cannot be written at `path`, or not with its suffix; called before long work."""
+    """Raise `UserError` if no picture with one of `suffixes` can be written at `path`; called before long work."""
     check_output(Path(path), suffixes, force=True)
 
 
@@ -119,14 +119,14 @@ def to_bytes(encoded: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 def _values(stored: NDArray[Any]) -> Image:
-    """Integers of a file as (..., 3 or 4) float32 in [0, 1]."""
+    """Stored integers as (..., 3 or 4) float32 in [0, 1]."""
     values = stored.astype(np.float32)
     values /= np.float32(65535 if stored.ndim == 2 else 255)
     return np.repeat(values[..., None], 3, axis=-1) if stored.ndim == 2 else values
 
 
 def _linear(stored: NDArray[Any]) -> Image:
-    """Linear RGB of sRGB integers; a few rows at a time, because a large picture has its memory only once."""
+    """Linear RGB of sRGB integers, a few rows at a time: temporaries of a whole large picture would not fit."""
     image = np.empty((*stored.shape[:2], 3), np.float32)
     for top in range(0, len(image), ROWS_AT_ONCE):
         rows = slice(top, top + ROWS_AT_ONCE)

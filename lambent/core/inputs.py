@@ -21,23 +21,23 @@ _LONGEST_FAULT = 120
 
 @contextmanager
 def open_input(path: Path) -> Iterator[BufferedReader]:
-    """Open a user's file for reading; raise `UserError` where it is missing, unreadable or no regular file.
+    """Open a user's file for reading; raise `UserError` if it is missing, unreadable or not a regular file.
 
-    Every file of a user is opened here: a pipe would block for ever, a device may never end, and opening a device may
-    have effects.
+    All user files must go through here: a pipe would block for ever, a device may never end, and opening a device may
+    have side effects.
     """
     path = Path(path)
     try:
         _check_regular(path.stat().st_mode, path)
         flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
         handle = os.open(path, flags)
-    except ValueError as error:  # a zero or half of a character in it
+    except ValueError as error:  # a null character or a lone surrogate in the name
         raise UserError("is not a file name", file=ascii(str(path))) from error
     except OSError as error:
         raise UserError(f"cannot be read ({error.strerror})", file=path) from error
     try:
         with open(handle, "rb") as file:
-            _check_regular(os.fstat(handle).st_mode, path)  # the name may mean another file by now
+            _check_regular(os.fstat(handle).st_mode, path)  # the name may refer to another file by now
             yield file
     except OSError as error:
         raise UserError(f"cannot be read ({error.strerror})", file=path) from error
@@ -69,7 +69,7 @@ def foreign_bytes(reader: str, path: Path) -> Iterator[None]:
 
 
 def sha256_of(path: Path) -> str:
-    """SHA-256 of a user's file, as hex."""
+    """SHA-256 of a user's file, as hex digits."""
     with open_input(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -81,11 +81,11 @@ def read_head(path: Path, size: int) -> bytes:
 
 
 def read_bytes(path: Path, limit_bytes: int) -> bytes:
-    """Content of a user's file; raise `UserError` where `open_input` rejects it or it exceeds `limit_bytes`."""
+    """Content of a user's file; raise `UserError` if `open_input` rejects it or it exceeds `limit_bytes`."""
     with open_input(path) as file:
         size = os.fstat(file.fileno()).st_size
         parts, read = [], 0
-        # The reported size is a hint: files of /proc report 0, others grow while they are read.
+        # The reported size is a hint: files of /proc report 0, and other files grow while they are read.
         while size <= limit_bytes and (part := file.read(max(size - read, 1 << 16))):
             parts.append(part)
             read += len(part)
@@ -99,7 +99,7 @@ _HALF_CHARACTER = re.compile(rb"\\u[dD][89a-fA-F]")
 
 
 def parse_json(text: bytes, file: Path) -> Any:
-    """The value of a JSON text, whose strings can all be encoded as UTF-8; else raise `UserError`."""
+    """The value of a JSON text; raise `UserError` if it is invalid or has strings that UTF-8 cannot encode."""
     try:
         value = json.loads(text.decode("utf-8-sig"))
         if _HALF_CHARACTER.search(text):

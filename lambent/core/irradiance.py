@@ -1,4 +1,4 @@
-"""Irradiance by the normal, of radiance all around, to the second band of harmonics (Ramamoorthi & Hanrahan 2001)."""
+"""Irradiance by normal from distant radiance, to second-order spherical harmonics (Ramamoorthi & Hanrahan 2001)."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from lambent.core.colour import luminance
 from lambent.core.cubemap import face_directions, texel_solid_angles
 from lambent.core.directions import normalize
 
-# E(n) is a sum over `basis_of` n (eq. 10): the weight of each is the cosine lobe's coefficient times the square of the
+# E(n) is a sum over `basis_of` n (eq. 10). Each weight is the cosine lobe's coefficient times the square of the
 # harmonic's norm.
 WEIGHTS = np.array([1 / 4, 1 / 2, 1 / 2, 1 / 2, 15 / 16, 15 / 16, 5 / 64, 15 / 16, 15 / 64])
 
 
 def basis_of(n: Floats) -> Floats:
-    """(..., 9) products of the components of unit vectors that WEIGHTS belong to."""
+    """(..., 9) products of the components of unit vectors, in the order of WEIGHTS."""
     x, y, z = n[..., 0], n[..., 1], n[..., 2]
     return np.stack([np.ones_like(x), x, y, z, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y], axis=-1)
 
 
 def irradiance_from(w: Floats, flux: Floats) -> Floats:
-    """Irradiance that light of `flux` (K,), W/m^2 on what faces it, from unit w (K, 3) gives: (9,) by `basis_of`."""
+    """Coefficients (9,), by `basis_of`, of irradiance by `flux` (K,), W/m^2 at normal incidence, from unit w (K, 3)."""
     return np.asarray(WEIGHTS * (flux @ basis_of(w)))
 
 
 def irradiance_of(radiance: Floats) -> Floats:
-    """Luminance of the irradiance that a cube of radiance (6, N, N, 3) gives, as a sum (9,) over `basis_of` normals."""
+    """Coefficients (9,), by `basis_of` normals, of the luminance of irradiance from a radiance cube (6, N, N, 3)."""
     n = radiance.shape[1]
     flux = luminance(radiance.astype(float)) * texel_solid_angles(n)
     return irradiance_from(normalize(face_directions(n)).reshape(-1, 3), flux.ravel())

@@ -1,8 +1,8 @@
 """Irradiance within a volume, from the maps of a light field's points (Greger et al. 1998, "The irradiance volume").
 
-Each point has the irradiance by the normal that its map gives, to the second band of harmonics. Between points it is
-interpolated by Shepard's weights in the form of Franke and Little, which vanish at the first point that is left out, so
-that light is continuous.
+Each point stores irradiance by normal, computed from its map, to second-order spherical harmonics. Between points it is
+interpolated with Shepard's weights in the form of Franke and Little. These vanish at the first point left out, which
+makes the interpolation continuous.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ MAPS_AT_ONCE = 64
 
 
 class IrradianceVolume:
-    """The irradiance within the volume of a light field."""
+    """Irradiance within the volume of a light field."""
 
     def __init__(self, field: LightField) -> None:
         from scipy.spatial import cKDTree
@@ -31,7 +31,7 @@ class IrradianceVolume:
         self._tree = cKDTree(field.points)
 
     def at(self, x: Floats, n: Floats) -> Floats:
-        """(k, 3) W/m^2 at places x of unit normals n, (k, 3) each."""
+        """(k, 3) irradiance, W/m^2, at places x (k, 3) with unit normals n (k, 3)."""
         count = len(self._by_normal)
         distance, point = self._tree.query(x, min(NEAREST + 1, count))
         distance, point = distance.reshape(len(x), -1), point.reshape(len(x), -1)
@@ -47,5 +47,5 @@ def _parts(maps: Floats) -> list[Floats]:
 
 
 def _summed(maps: Floats, flux: Floats) -> Floats:
-    """(P, 9, 3) of maps (P, E, E, 3)."""
+    """Coefficients (P, 9, 3) of maps (P, E, E, 3)."""
     return np.asarray(np.einsum("pkc,kb->pbc", maps.reshape(len(maps), -1, 3).astype(float), flux, optimize=True))

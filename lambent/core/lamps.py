@@ -1,9 +1,9 @@
-"""Lamps of a cube map: connected bright texels, and the cube map without them.
+"""Find lamps in a cube map: connected bright texels.
 
-A lamp is brighter than `BRIGHT` times the mean of all directions and holds at least `LEAST_SHARE` of the light. It
-leaves the map, its texels get the median of the ring around them, and the search is made again: for fainter ones, then
-for those within what is too large for a lamp, as the sun in a bright sky. Large lamps are cut, so that all are small
-beside wide lobes: first the sun from the window that it shines through.
+A lamp is brighter than `BRIGHT` times the mean of all directions and holds at least `LEAST_SHARE` of the light. It is
+removed, its texels get the median of the ring around them, and the search repeats: for fainter lamps, and for lamps
+inside regions too large for one, such as the sun in a bright sky. Large lamps are cut until all are small relative to
+wide lobes; the sun is first separated from the window it shines through.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from lambent.core.colour import luminance
 from lambent.core.cubemap import directions_at, texel_solid_angles
 from lambent.core.directions import normalize
 
-BRIGHT = (2.0, 2.0, 4.0, 8.0)  # times the mean of what is left, one search after the other
+BRIGHT = (2.0, 2.0, 4.0, 8.0)  # multiples of the remaining mean, one per search
 LEAST_SHARE = 0.001  # of all light
-LARGEST_SR = 1.0  # of what is a lamp, before it is cut: a bright half of the sky is none
+LARGEST_SR = 1.0  # of a lamp before cutting; a bright half of the sky is larger and not a lamp
 MOST = 32
-CONTRAST = 16.0  # of the brightest texel of a lamp to its median, from which on the two are apart: the sun in a window
-LEAST_RADIUS = 0.06  # of lamps that are cut in two while there are fewer than `MOST`
-CUT_INSTEAD = 8.0  # times as bright as the faintest: better cut than that kept
-RING = 3  # texels around a lamp whose median takes its place
-CORNER = 12**-0.5  # four points at -+ this share of a texel have its variance
+CONTRAST = 16.0  # brightest texel over the median of a lamp, above which the two are separated: the sun in a window
+LEAST_RADIUS = 0.06  # lamps above are cut in two while there are fewer than `MOST`
+CUT_INSTEAD = 8.0  # a lamp this many times as bright as the faintest is cut, and the faintest dropped
+RING = 3  # width in texels of the ring around a lamp whose median replaces it
+CORNER = 12**-0.5  # four points at -+ this share of a texel have the variance of its area
 
 
 @dataclass(frozen=True, eq=False)
 class Lamp:
-    """Part of a cube map (6, N, N, 3): `texels` (K,) of its flattened directions, `excess` (K, 3) radiance over `rest`.
+    """Part of a cube map (6, N, N, 3): flattened indices `texels` (K,), and their `excess` (K, 3) over `rest`.
 
-    `flux` (K, 3) is the excess times solid angle, W/m^2 on a surface that faces it; `radius_rad` sqrt(2) times the
-    larger deviation of directions, the rms radius of a round lamp.
+    `flux` (K, 3) is excess times solid angle, in W/m^2 on a surface that faces it. `radius_rad` is sqrt(2) times the
+    larger standard deviation of directions: the rms radius of a round lamp.
     """
 
     texels: NDArray[np.intp]
@@ -52,7 +52,7 @@ class Lamp:
 
 
 def find_lamps(cube: Floats) -> list[Lamp]:
-    """The brightest lamps of a cube map (6, N, N, 3), finite and not negative; at most `MOST`, the smallest first."""
+    """The brightest lamps of a cube map (6, N, N, 3) of finite values >= 0; at most `MOST`, smallest first."""
     n = cube.shape[1]
     omega = np.tile(texel_solid_angles(n).ravel(), 6)
     rest = cube.reshape(-1, 3).astype(np.float64)
@@ -79,7 +79,7 @@ def _worth_cutting(lamp: Lamp) -> float:
 
 
 def _halves(lamp: Lamp, omega: Floats, n: int) -> list[Lamp]:
-    """A lamp, cut through its middle across its length; or its brightest part and the rest, where these differ much."""
+    """Cut a lamp in two: the brightest part from the rest if they differ much, else at its middle across its length."""
     bright = luminance(lamp.excess)
     peak, median = float(bright.max()), float(np.median(bright))
     if peak > CONTRAST * median:
@@ -97,7 +97,7 @@ def _lamp(texels: NDArray[np.intp], excess: Floats, omega: Floats, n: int) -> La
 
 
 def _search(rest: Floats, omega: Floats, n: int, total: float, times: float) -> list[Lamp]:
-    """Lamps of radiance `rest` (6 N N, 3), so many `times` as bright as its mean."""
+    """Lamps in radiance `rest` (6 N N, 3): at least `times` as bright as its mean."""
     bright = luminance(rest)
     light = bright * omega
     at = np.flatnonzero(bright > times * light.sum() / (4 * np.pi))
@@ -120,7 +120,7 @@ def _search(rest: Floats, omega: Floats, n: int, total: float, times: float) -> 
 
 
 def _around(rest: Floats, texels: NDArray[np.intp], bright: NDArray[np.intp], beside: NDArray[np.intp]) -> Floats:
-    """(3,) median of the ring of dim texels around `texels`, 0 where there is none."""
+    """(3,) median of the ring of dim texels around `texels`; 0 without a ring."""
     inside = np.unique(texels)
     reached = inside
     for _ in range(RING):
@@ -144,7 +144,7 @@ def moments(points: Floats, weight: Floats) -> tuple[Floats, Floats]:
 
 
 def corners(texels: NDArray[np.intp], n: int) -> Floats:
-    """(K, 4, 3) directions, the largest component 1, of four points of each texel with the variance of its area."""
+    """(K, 4, 3) directions, largest component 1, of four points per texel with the variance of its area."""
     face, row, column = np.unravel_index(texels, (6, n, n))
     step = np.array([[-CORNER, -CORNER], [-CORNER, CORNER], [CORNER, -CORNER], [CORNER, CORNER]]) / n
     s, t = (((place + 0.5) / n * 2 - 1)[:, None] + step[:, k] for k, place in enumerate((column, row)))
@@ -154,7 +154,7 @@ def corners(texels: NDArray[np.intp], n: int) -> Floats:
 
 @lru_cache(4)
 def neighbours(n: int) -> NDArray[np.intp]:
-    """(6 n n, 4) the texels left, right, above and below each, across the edges of the faces."""
+    """(6 n n, 4) texels to the left, right, top and bottom of each, across the edges of the faces."""
     index = np.arange(6 * n * n).reshape(6, n, n)
     wide = np.pad(index, ((0, 0), (1, 1), (1, 1)))
     row, column = np.nonzero(np.pad(np.zeros((n, n), bool), 1, constant_values=True))
@@ -167,7 +167,7 @@ def neighbours(n: int) -> NDArray[np.intp]:
 
 
 def texel_at(w: Floats, n: int) -> NDArray[np.intp]:
-    """(...) flattened index of the texel of a cube map of n x n faces that directions (..., 3) lie in."""
+    """(...) flattened texel index of directions (..., 3) in a cube map of n x n faces."""
     axis = np.abs(w).argmax(axis=-1)
     major = np.take_along_axis(w, axis[..., None], -1)[..., 0]
     face = 2 * axis + (major < 0)

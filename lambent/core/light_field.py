@@ -1,6 +1,6 @@
 """An offset surface light field: incident light at many points just above the surface of one object.
 
-Spec: thesis R, "Offset surface light fields", chapter 3. What a store holds of it is in `store.contract`.
+Spec: thesis R, "Offset surface light fields", chapter 3. `store.contract` documents the stored form.
 """
 
 from __future__ import annotations
@@ -13,28 +13,28 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 
-Sky = Callable[[Floats], Floats]  # radiance (n, 3) of directions (n, 3) in which nothing is hit
+Sky = Callable[[Floats], Floats]  # radiance (n, 3) of directions (n, 3) in which rays hit nothing
 NO_POINT = 0xFFFF  # in a sample map: no further point
-NO_EXIT = -1.0  # in place of a distance: no face is behind
-CANDIDATES = 4  # points that a texel of the sample map names at most
+NO_EXIT = -1.0  # instead of a distance: no face behind
+CANDIDATES = 4  # points per texel of the sample map, at most
 MOST_POINTS = NO_POINT  # indices are 16 bits wide
-# By the bits of `LightField.cover`, the share of a texel that is sky while it has the light of a surface.
+# Sky share of a texel that has the light of a surface, by the bits of `LightField.cover`.
 SKY_SHARE = np.array([0.0, *[1 - bits.bit_count() / 4 for bits in range(1, 16)]])
 LEAST_TEXELS, MOST_TEXELS = 8, 1024  # along a side of a map
 
 
 @dataclass(frozen=True, eq=False)
 class Glass:
-    """The second interface that light passes, which enters a thin piece of glass: thesis R, "Thin Lens Refractions".
+    """The second interface of a thin piece of glass: thesis R, "Thin Lens Refractions".
 
     Parameters
     ----------
     exits : (h, w, 4) float16, by texel of the sample map: the normal of the face behind it, out of the glass, times the
-        share of light that further faces of the object let pass at normal incidence; and its distance along the
-        normal of the surface, in metres. The distance is -1 where no face is behind: the surface is a sheet.
+        transmittance of further faces of the object at normal incidence; and the distance to the face along the normal
+        of the surface, in metres. The distance is -1 if there is no face behind: the surface is a sheet.
     eta : index of refraction, inside over outside.
-    tint : the share of light that an interface lets pass at normal incidence, RGB.
-    power : of the cosine, by which an interface lets less pass at others (`materials.clear`).
+    tint : transmittance of one interface at normal incidence, RGB.
+    power : exponent of the cosine by which transmittance falls off at other angles (`materials.clear`).
     """
 
     exits: NDArray[np.float16]
@@ -45,29 +45,30 @@ class Glass:
 
 @dataclass(frozen=True, eq=False)
 class LightField:
-    """Points above an object, what each sees, and which of them are near a place on the surface.
+    """Points above an object, the light and distances they see, and a map of the points near each place on the surface.
 
     Parameters
     ----------
-    points : (P, 3) float32, world space, metres: where the light was taken, off the surface.
+    points : (P, 3) float32, world space, metres: origins of the maps, off the surface.
     normals : (P, 3) float32, unit: the surface's normal below each point, along which it was moved out.
     radiance : (P, E, E, 3) float32 or float16: octahedral maps (core.octahedral) of incident radiance in world axes, in
         units of the scene's `unit`.
     inverse_distance : (P, E, E) float16, 1/m, at the texels' centres along unit directions; 0 where nothing is hit.
-    sample_map : (h, w, 4) uint16: the nearest points that a place on the surface has above its horizon, nearest first,
-        then NO_POINT.
+    sample_map : (h, w, 4) uint16: the nearest points above the horizon of a place on the surface, nearest first, padded
+        with NO_POINT.
     corner : row and column of the sample map's first texel in a grid of `grid` (rows, columns) over the light map's uv2
         in [0, 1]: texel (row, column) has its centre at uv2 = ((column + 1/2)/columns, (row + 1/2)/rows).
-    offset_m : how far off the surface the points are.
+    offset_m : distance of the points from the surface.
     own_diffuse : whether the maps show the object itself without its lobes.
-    volume : whether points fill a box that the object stands in, and maps are without it, so that another may stand
-        there. `normals` point away from the middle of the box.
+    volume : whether points fill the bounding box of the object and maps leave it out, so that another object may stand
+        there. `normals` then point away from the centre of the box.
     cover : (P, E, E) uint8, or None: bit 2 i + j is set where the quarter (row i, column j) of a texel shows a surface;
-        others show the sky, whatever the texel's distance is. A texel with a surface has its light and its distance.
-    glass : what refracts the light that the object transmits, or None; maps are then without the object.
-    blocks : (P, B, B, 4) uint32, or None: where a store has the radiance so, as `core.light_field_blocks` makes it.
-    distances : (P, R, B, 2) uint32, or None: where a store has inverse_distance and cover so, as
-        `core.light_field_blocks` makes it.
+        other quarters show the sky, whatever the texel's distance. A texel with a surface has its light and its
+        distance.
+    glass : the refraction of the object's transmitted light, or None; with it, maps leave the object out.
+    blocks : (P, B, B, 4) uint32, or None: radiance as stored in blocks, by `core.light_field_blocks`.
+    distances : (P, R, B, 2) uint32, or None: inverse_distance and cover as stored in blocks, by
+        `core.light_field_blocks`.
     """
 
     points: NDArray[np.float32]
@@ -87,5 +88,5 @@ class LightField:
 
     @property
     def without_object(self) -> bool:
-        """Whether the maps are without the object."""
+        """Whether the maps leave the object out."""
         return self.volume or self.glass is not None

@@ -1,11 +1,11 @@
-"""Reflections and surfaces from an offset surface light field: every look-up of the renderer, as numpy.
+"""Reflections and surfaces from an offset surface light field: numpy versions of all look-ups of the renderer.
 
-Thesis R, chapters 3 and 4, with a look-up that knows distances. A `Place` is what a pixel shows of the object; w is the
-unit direction whose radiance is wanted there, for a mirror 2 (n.wo) n - wo. Directions are in world space.
+Thesis R, chapters 3 and 4, plus look-ups corrected by distance. A `Place` is the object's surface at each pixel; w is
+the unit direction whose radiance is wanted there, for a mirror 2 (n.wo) n - wo. Directions are in world space.
 
-The uncorrected methods read the maps of near points along w itself (4.3 to 4.12). They err where surroundings are near:
-the ray from x meets them elsewhere than the ray from the point. The corrected ones find in each map where the ray from
-x goes behind what the point sees, and read there.
+Uncorrected methods read the maps of near points along w itself (4.3 to 4.12). They err when surroundings are near:
+the ray from x then meets them elsewhere than the ray from the point. Corrected methods find in each map where the ray
+from x goes behind the surfaces that the point sees, and read there.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from lambent.core.light_field import NO_POINT, LightField, Sky
 from lambent.core.light_field_maps import nearest_points, nearness_along, radiance_along
 
 Basis = Literal["nearest", "angle", "average", "reflection", "normal"]
-POWER = 4  # N of B_n and B_r
-CONES_DEG = (65.0, 75.0)  # about the normal, of points that show the surface: the first that holds one
-SURFACE_TOLERANCE = 0.15  # of the distance at which a point sees the surface
+POWER = 4  # exponent N of B_n and B_r
+CONES_DEG = (65.0, 75.0)  # half angles about the normal of the cones tried in order for a point
+SURFACE_TOLERANCE = 0.15  # relative to the distance at which a point sees the surface
 
 
 @dataclass(frozen=True)
 class March:
-    """How rays are followed through the maps of points.
+    """Parameters of marching rays through the maps of points.
 
-    Of n `steps`, lengths grow from `first` times the distance c of x from the point, to where what lies farther off is
-    displaced by `last` texels; one more step is at infinity. What is found is a surface if its distance from the
-    point is that of the texel to `tolerance` of it, and of the ray's length: near x, texels of the object itself are
-    that far off without being met. It is the same surface for points whose rays have nearly (`alike`) the same length.
+    The n `steps` grow from `first` times the distance c of x from the point, until the parallax of anything farther is
+    `last` texels; one more step is at infinity. A hit is a surface if its distance from the point matches the texel's
+    to `tolerance`, relative to that distance and to the ray's length: near x, texels of the object itself match the
+    distance without being hit. Points hit the same surface if their ray lengths agree to `alike`.
     """
 
     candidates: int = 4
@@ -47,7 +47,7 @@ class March:
 
 @dataclass(frozen=True)
 class Place:
-    """x, n (k, 3): positions and unit shading normals, float64; points (k, 4): those near, or NO_POINT."""
+    """x, n (k, 3): positions and unit shading normals, float64; points (k, 4): nearby points, or NO_POINT."""
 
     x: Floats
     n: Floats
@@ -55,16 +55,16 @@ class Place:
 
     @classmethod
     def at(cls, field: LightField, x: Floats, n: Floats, uv2: Floats) -> Place:
-        """Places (k,) of the object by their coordinates uv2 (k, 2) of the light map."""
+        """Places (k,) of the object, given their light map coordinates uv2 (k, 2)."""
         return cls(np.asarray(x, float), np.asarray(n, float), nearest_points(field, uv2))
 
     @property
     def known(self) -> Flags:
-        """(k, 4): which of the points there are."""
+        """(k, 4): which entries name a point."""
         return np.asarray(self.points != NO_POINT)
 
     def named(self, count: int = 4) -> Indices:
-        """The first points (k, count), 0 in place of those that there are not."""
+        """The first `count` points (k, count); 0 where an entry names none."""
         return np.where(self.known, self.points, 0)[:, :count]
 
     def offsets(self, field: LightField, count: int = 4) -> Floats:
@@ -74,18 +74,18 @@ class Place:
 
 @dataclass(frozen=True)
 class Marched:
-    """radiance (k, 3); which places met a surface, and at which the ray ends in the sky, (k,) each."""
+    """radiance (k, 3), and flags (k,): the ray hit a surface; the ray ends in the sky."""
 
     radiance: Floats
     met: Flags
     sky: Flags
-    distance_m: Floats  # (k,) along w, infinite where no surface was met
+    distance_m: Floats  # (k,) along w; infinite without a hit
 
 
 def basis_weights(field: LightField, place: Place, w: Floats, basis: Basis, power: int = POWER) -> Floats:
-    """(k, 4) weights B_j, 1 in all, of the points near a place; all 0 where there is none (4.5, 4.9 to 4.11).
+    """(k, 4) weights B_j, of sum 1, of the points near a place; all 0 without points (4.5, 4.9 to 4.11).
 
-    The plain average stands in where all points are below the horizon of the basis.
+    If all points are below the horizon of the basis, the weights are equal.
     """
     towards = normalize(-place.offsets(field))
     known = place.known
@@ -99,7 +99,7 @@ def basis_weights(field: LightField, place: Place, w: Floats, basis: Basis, powe
     else:
         axis = w if basis == "reflection" else place.n
         cosine = np.where(known, np.maximum(np.einsum("kjc,kc->kj", towards, axis), 0), 0.0)
-        largest = cosine.max(axis=1, keepdims=True)  # of which powers of small cosines are shares: they would vanish
+        largest = cosine.max(axis=1, keepdims=True)  # normalize first: powers of small cosines would underflow
         weight = np.where(largest > 0, (cosine / np.maximum(largest, 1e-30)) ** power, known)
     weight = np.where(known, weight, 0.0)
     return np.asarray(weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-30))
@@ -108,13 +108,13 @@ def basis_weights(field: LightField, place: Place, w: Floats, basis: Basis, powe
 def blended(
     field: LightField, place: Place, w: Floats, basis: Basis = "normal", power: int = POWER, sky: Sky | None = None
 ) -> Floats:
-    """(k, 3) radiance sum_j B_j L(p_j, w) (4.7); a `sky` has its share of texels that show surfaces as well."""
+    """(k, 3) radiance sum_j B_j L(p_j, w) (4.7); a given `sky` also fills its share of texels that show surfaces."""
     seen = radiance_along(field, place.named(), np.broadcast_to(w[:, None], (*place.points.shape, 3)), sky)
     return np.asarray(np.einsum("kj,kjc->kc", basis_weights(field, place, w, basis, power), seen))
 
 
 def fixed_point(field: LightField, place: Place, w: Floats, rounds: int = 4, edges: Sky | None = None) -> Marched:
-    """As `marched`, by the iteration t = d(x + t w) instead of a search: cheaper, and blind to what stands before."""
+    """`marched`, with the iteration t = d(x + t w) in place of the search: cheaper, but blind to occluders in front."""
     offset, point, known = place.offsets(field), place.named(), place.known
     direction = np.broadcast_to(w[:, None], offset.shape)
     along = np.einsum("kjc,kjc->kj", offset, direction)
@@ -135,11 +135,12 @@ def marched(
     field: LightField, place: Place, w: Floats, rule: March | None = None, sky: Sky | None = None,
     edges: Sky | None = None,
 ) -> Marched:  # fmt: skip
-    """Radiance of the surface that rays from x along w (k, 3) meet first, as the points near x see it.
+    """Radiance of the first surface that rays from x along w (k, 3) hit, as seen by the points near x.
 
-    A surface that a point verifies is there, so the nearest of all points counts, and those that agree are blended.
-    Where none verifies one, the ray ends in the sky if a point sees it there; else the answer is B_n of the maps.
-    A `sky` answers for the sky; without one, the maps do, with the share of `edges` in texels that show both.
+    A surface confirmed by any point exists, so the nearest hit of all points counts, and agreeing points are blended.
+    If no point confirms one, the ray ends in the sky if a point sees sky there; otherwise the result is B_n of the
+    maps. `sky` gives the radiance of the sky; without it, the maps do, with the share of `edges` in texels that show
+    both.
     """
     rule = rule or March()
     q, t, open_sky = _searched(field, place, w, rule)
@@ -147,10 +148,10 @@ def marched(
 
 
 def _searched(field: LightField, place: Place, w: Floats, rule: March) -> tuple[Floats, Floats, Flags]:
-    """By point: from p_j to the surface (k, j, 3), its distance on the ray, infinite for none, and if it saw the sky.
+    """Per point: vector from p_j to the surface (k, j, 3), distance along the ray (infinite: no hit), and sky flag.
 
-    The ray is in front of what the point sees where 1/|q| is above the map's inverse distance, and the difference is
-    linear in 1/t for planes. So the secant is taken in that.
+    The ray is in front of the surfaces that the point sees where 1/|q| exceeds the map's inverse distance. For planes,
+    the difference is linear in 1/t, so the secant method works in 1/t.
     """
     count = rule.candidates
     offset, point, known = place.offsets(field, count), place.named(count), place.known[:, :count]
@@ -185,7 +186,7 @@ def _searched(field: LightField, place: Place, w: Floats, rule: March) -> tuple[
         far, g_far = np.where(g < 0, far, middle), np.where(g < 0, g_far, g)
     q = offset + direction / np.maximum(middle, 1e-9)[..., None]
     t, length = 1 / np.maximum(middle, 1e-9), np.linalg.norm(q, axis=-1)
-    off = np.abs(g) * length  # |q|/d - 1, of the maps' last answer
+    off = np.abs(g) * length  # |q|/d - 1 for the map's last value
     met = known & found & (off * np.maximum(length / t, 1) < rule.tolerance)
     return q, np.where(met, t, np.inf), open_sky
 
@@ -194,7 +195,7 @@ def _answered(
     field: LightField, place: Place, w: Floats, rule: March, q: Floats, t: Floats, open_sky: Flags, sky: Sky | None,
     edges: Sky | None,
 ) -> Marched:  # fmt: skip
-    """The answer of all points from what each has found."""
+    """Combine the hits of all points."""
     count = t.shape[1]
     known = place.known[:, :count]
     first = t.min(axis=1)
@@ -211,10 +212,10 @@ def _answered(
 
 
 def surface(field: LightField, place: Place) -> tuple[Floats, Flags]:
-    """Radiance (k, 3) of the surface itself, and where a point sees it, (k,) (3.11).
+    """Radiance (k, 3) of the surface itself, and whether a point sees it, (k,) (3.11).
 
-    The nearest point answers that lies within a cone about the normal and sees the surface where x is; failing that one
-    in the wider cone, any that sees it, the nearest.
+    The result comes from the nearest point that lies in a cone about the normal and sees the surface at x: first in the
+    narrow cone, then in the wider one, then anywhere.
     """
     offset, point, known = place.offsets(field), place.named(), place.known
     distance = np.linalg.norm(offset, axis=-1)

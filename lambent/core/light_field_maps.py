@@ -1,6 +1,6 @@
-"""Reading a light field: the points near a place on the surface, and what their octahedral maps hold along directions.
+"""Look-ups in a light field: the points near a place on the surface, and the values of their octahedral maps.
 
-numpy's version of the renderer's shaders, tested for parity with them. Points are named by their index, (...) integers;
+These are numpy versions of the renderer's shaders, tested for parity. Points are given by index, (...) integers;
 directions (..., 3) need not be unit.
 """
 
@@ -15,9 +15,9 @@ from lambent.core.octahedral import texel_directions, to_square
 
 
 def nearest_points(field: LightField, uv2: Floats) -> Indices:
-    """(..., 4) points that the sample map names at places uv2 (..., 2) of the light map, nearest first, or NO_POINT.
+    """(..., 4) points named by the sample map at uv2 (..., 2) of the light map, nearest first, or NO_POINT.
 
-    The nearest texel is read; beyond the map's rectangle, that of its edge.
+    Reads the nearest texel, clamped to the map's rectangle.
     """
     rows, columns = field.grid
     column = np.floor(uv2[..., 0] * columns).astype(np.int64) - field.corner[1]
@@ -30,7 +30,7 @@ def nearest_points(field: LightField, uv2: Floats) -> Indices:
 def radiance_along(field: LightField, point: Indices, w: Floats, sky: Sky | None = None) -> Floats:
     """(..., 3) radiance that points see along directions: bilinear between the four nearest texels.
 
-    Texels that show surfaces and the sky have the light of the surfaces; with a `sky`, its share is mixed in.
+    Texels that show both surfaces and sky hold the light of the surfaces; a given `sky` is mixed in by its share.
     """
     n = field.radiance.shape[1]
     at = to_square(w) * n - 0.5
@@ -53,7 +53,7 @@ def radiance_along(field: LightField, point: Indices, w: Floats, sky: Sky | None
 
 
 def whole_texels(radiance: Floats, cover: NDArray[np.uint8], sky: Sky) -> Floats:
-    """Maps (P, E, E, 3) of all that texels show: the sky has its share of those with the light of a surface."""
+    """Maps (P, E, E, 3) with the sky mixed in by its share of the texels that hold the light of a surface."""
     n = cover.shape[1]
     behind = sky(texel_directions(n).reshape(-1, 3)).reshape(n, n, 3)
     found, share = np.array(radiance, np.float32), SKY_SHARE[cover]
@@ -64,9 +64,9 @@ def whole_texels(radiance: Floats, cover: NDArray[np.uint8], sky: Sky) -> Floats
 
 
 def nearness_along(field: LightField, point: Indices, w: Floats) -> Floats:
-    """(...) inverse distance, 1/m, of what points see in the texels nearest to directions; 0 for the sky.
+    """(...) inverse distance, 1/m, of the nearest texel along directions; 0 for the sky.
 
-    Of texels that show both, quarters tell them apart.
+    In texels that show both, the quarter decides.
     """
     n = field.inverse_distance.shape[1]
     place = to_square(w) * n
@@ -80,7 +80,7 @@ def nearness_along(field: LightField, point: Indices, w: Floats) -> Floats:
 
 
 def _on_map(row: Indices, column: Indices, n: int) -> tuple[Indices, Indices]:
-    """Texels at most one beyond the edges, as those of the map that lie there: mirrored, as `octahedral.bordered`."""
+    """Map texels at most one beyond an edge back into the map, mirrored as in `octahedral.bordered`."""
     row_beyond, column_beyond = (row < 0) | (row >= n), (column < 0) | (column >= n)
     row, column = row.clip(0, n - 1), column.clip(0, n - 1)
     return np.where(column_beyond, n - 1 - row, row), np.where(row_beyond, n - 1 - column, column)

@@ -1,6 +1,6 @@
-"""Surfaces of any material, and surroundings that turn, from an offset surface light field.
+"""Shading with an offset surface light field: surfaces of any material, and rotated surroundings.
 
-Thesis R, chapter 5: the BRDF draws directions, a look-up of `light_field_lookup` gives their light.
+Thesis R, chapter 5: the BRDF draws directions, a look-up of `light_field_lookup` gives their radiance.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from lambent.core.light_field_lookup import POWER, Basis, Place, basis_weights
 from lambent.core.light_field_maps import radiance_along
 from lambent.core.octahedral import texel_directions
 
-Scatter = Callable[[int], tuple[Floats, Floats]]  # number of a sample -> w (k, 3) in world space, f cos / pdf (k, 3)
+Scatter = Callable[[int], tuple[Floats, Floats]]  # sample number -> w (k, 3) in world space, f cos / pdf (k, 3)
 
 
 def scattered(scatter: Scatter, look_up: Callable[[Floats], Floats], samples: int) -> Floats:
-    """(k, 3) radiance towards the viewer, samples in the outer loop: each is looked up with all points (5.12).
+    """(k, 3) radiance towards the viewer, samples in the outer loop: each sample is looked up in all points (5.12).
 
-    Weights of the points follow each direction, and any look-up will do.
+    The points' weights follow each direction, so any look-up works.
     """
     total: Floats = np.zeros(1)
     for number in range(samples):
@@ -38,7 +38,8 @@ def scattered_by_points(
 ) -> Floats:  # fmt: skip
     """(k, 3) likewise, points in the outer loop: one map is read at a time, and the points' results are blended (5.12).
 
-    The weights are those of the mirrored direction (k, 3), so that B_r differs from the other order and B_n does not.
+    The weights use the mirrored direction (k, 3): with B_r the result differs from the other order, with B_n it does
+    not.
     """
     weights = basis_weights(field, place, mirror, basis, power)
     total: Floats = np.zeros(place.x.shape)
@@ -48,14 +49,14 @@ def scattered_by_points(
 
 
 def shown(surface: Floats, colour: Floats, reflection: Floats) -> Floats:
-    """Radiance (..., 3) of a surface under a mirror of some colour (4.12)."""
+    """Radiance (..., 3) of a surface under a coloured mirror (4.12)."""
     return np.asarray(surface + colour * reflection)
 
 
 def refracted(wo: Floats, n: Floats, eta: float) -> Floats:
-    """Directions (k, 3) into which rays from the viewer, wo unit, go on through a surface; eta is inside over outside.
+    """Directions (k, 3) of rays from the viewer refracted at a surface; wo is unit, eta is inside over outside.
 
-    Mirrored where all is reflected.
+    On total internal reflection, the mirrored direction.
     """
     cosine = np.sum(wo * n, axis=-1, keepdims=True)
     inside = np.where(cosine >= 0, eta, 1 / eta)
@@ -66,13 +67,13 @@ def refracted(wo: Floats, n: Floats, eta: float) -> Floats:
 
 
 def turned(sky: Sky, rotation: Floats) -> Sky:
-    """The sky under a rotation (3, 3)."""
+    """The sky rotated by a matrix (3, 3)."""
     return lambda w: sky(w @ rotation)
 
 
 def under_sky(field: LightField, sky: Sky) -> LightField:
-    """The light field with another sky in its maps; what it lights keeps the light it had."""
+    """The light field with another sky in its maps; light that surfaces received from the old sky stays."""
     n = field.radiance.shape[1]
     behind = sky(texel_directions(n).reshape(-1, 3)).reshape(n, n, 3).astype(field.radiance.dtype)
     radiance = np.where((field.inverse_distance == 0)[..., None], behind, field.radiance)
-    return replace(field, radiance=radiance, blocks=None)  # which are those of the other sky
+    return replace(field, radiance=radiance, blocks=None)  # blocks hold the old sky

@@ -1,6 +1,6 @@
-"""The mix of light groups: how bright each is, and of which colour, beside the light that was baked.
+"""Light mix: brightness and colour of each light group, relative to the baked light.
 
-Light adds up, so that a picture of any mix is exact: E = sum over groups g of s_g E_g, with a factor s_g by channel.
+Light adds up, so the picture of any mix is exact: E = sum over groups g of s_g E_g, with a factor s_g per channel.
 """
 
 from __future__ import annotations
@@ -17,19 +17,18 @@ from lambent.core.errors import UserError
 from lambent.core.plain import Triple, triple
 
 WHITE: Triple = (1.0, 1.0, 1.0)
-LEAST_K, MOST_K = 1667.0, 25000.0  # of the fit to the Planckian locus
+LEAST_K, MOST_K = 1667.0, 25000.0  # valid range of the fit to the Planckian locus
 MOST_INTENSITY = 1000.0
 EXPECTED = "NAME=VALUE, with VALUE an intensity, off, 2700K, #rrggbb, or several joined by commas"
-Factors = Mapping[str, Triple]  # by group; a group that is left out stays as it was baked
+Factors = Mapping[str, Triple]  # by group; groups left out stay as baked
 
 
 @dataclass(frozen=True)
 class GroupMix:
-    """One group: its light is multiplied by `intensity` and by a tint, whose luminance is 1.
+    """One group's mix: `intensity` and a tint of luminance 1 multiply its light.
 
-    The tint is the colour of a black body of `temperature_k`, LEAST_K to MOST_K, times the linear `colour`, of which
-    the luminance does not matter. White light takes the tint's colour; light that is coloured already is tinted as by a
-    filter.
+    The tint is the colour of a black body at `temperature_k`, LEAST_K to MOST_K, times the linear `colour`, whose
+    luminance has no effect. White light takes the tint's colour; coloured light is tinted as by a filter.
     """
 
     on: bool = True
@@ -53,13 +52,13 @@ class GroupMix:
 
     @property
     def factor(self) -> Triple:
-        """Factor on the group's light, by channel."""
+        """Factor on the group's light per channel, (3,)."""
         if not self.on:
             return 0.0, 0.0, 0.0
         tint = np.array(self.colour, float)
         if self.temperature_k is not None:
             tint = tint * black_body(self.temperature_k)
-        if (level := float(luminance(tint))) <= 0:  # a blue filter before a candle
+        if (level := float(luminance(tint))) <= 0:  # a blue filter on candle light
             return 0.0, 0.0, 0.0
         return triple(tint * (self.intensity / level))
 
@@ -69,7 +68,7 @@ AS_BAKED = GroupMix()
 
 @dataclass(frozen=True)
 class LightMix:
-    """The mixes of groups by name; other groups are as baked."""
+    """Mixes of groups by name; other groups stay as baked."""
 
     groups: Mapping[str, GroupMix] = field(default_factory=dict)
 
@@ -79,22 +78,22 @@ class LightMix:
         return self.groups.get(name, AS_BAKED)
 
     def changed(self, name: str, mix: GroupMix) -> LightMix:
-        """A copy with another mix for one group."""
+        """A copy with a new mix for one group."""
         others = {key: value for key, value in self.groups.items() if key != name}
         return LightMix(others if mix == AS_BAKED else {**others, name: mix})
 
     @property
     def factors(self) -> dict[str, Triple]:
-        """Factors of the groups that are not as baked."""
+        """Factors of the groups that differ from the bake."""
         found = {name: mix.factor for name, mix in self.groups.items()}
         return {name: factor for name, factor in found.items() if factor != WHITE}
 
 
 @dataclass(frozen=True)
 class MixTrack:
-    """Mixes of groups over time: by name, increasing times in seconds, each with a mix.
+    """Mixes over time: for each group name, keys of increasing time in seconds and mix.
 
-    A group's factor is interpolated linearly, and constant before the first and after the last time.
+    A group's factor is linear between keys, and constant before the first and after the last.
     """
 
     groups: Mapping[str, tuple[tuple[float, GroupMix], ...]] = field(default_factory=dict)
@@ -108,11 +107,11 @@ class MixTrack:
 
     @classmethod
     def of(cls, mix: LightMix) -> MixTrack:
-        """The same mix at all times."""
+        """A track that holds one mix at all times."""
         return cls({name: ((0.0, one),) for name, one in mix.groups.items()})
 
     def factors_at(self, time_s: float) -> dict[str, Triple]:
-        """Factors at a time, for the groups that are not as baked."""
+        """Factors at a time, of the groups that differ from the bake."""
         found = {}
         for name, keys in self.groups.items():
             times, factors = [key[0] for key in keys], np.array([mix.factor for _, mix in keys])
@@ -121,9 +120,9 @@ class MixTrack:
 
 
 def black_body(temperature_k: float) -> np.ndarray:
-    """Linear RGB (3,) of luminance 1 of a black body of LEAST_K to MOST_K; nowhere negative.
+    """Linear RGB (3,), luminance 1, of a black body at LEAST_K to MOST_K; no channel is negative.
 
-    Chromaticity by the cubic fit of Kang & others 2002, "Design of advanced color temperature control system for HDTV".
+    Chromaticity by the cubic fit of Kang et al. 2002, "Design of advanced color temperature control system for HDTV".
     """
     t = 1e3 / temperature_k
     if temperature_k < 4000:
@@ -141,9 +140,9 @@ def black_body(temperature_k: float) -> np.ndarray:
 
 
 def parse_light(texts: Iterable[str]) -> MixTrack:
-    """The track given by texts such as "lamp=off", "lamp=0.3", "lamp=2700K", "lamp=0.5,#ffd0a0" and "lamp=0.5@4".
+    """Parse a track from texts such as "lamp=off", "lamp=0.3", "lamp=2700K", "lamp=0.5,#ffd0a0" and "lamp=0.5@4".
 
-    The number after @ is a time in seconds, by default 0. Values between two times are interpolated.
+    The number after @ is a time in seconds, 0 by default. Values are interpolated between times.
     """
     said: dict[str, dict[float, GroupMix]] = {}
     for text in texts:
@@ -160,7 +159,7 @@ def parse_light(texts: Iterable[str]) -> MixTrack:
 
 
 def mix_of(value: str, text: str) -> GroupMix:
-    """The mix given by a value such as "0.5,2700K"; errors show `text`, of which it is a part."""
+    """Parse the mix of a value such as "0.5,2700K"; errors quote `text`, the whole argument."""
     mix, said = AS_BAKED, set[str]()
     for word in (part.strip() for part in value.split(",")):
         if word.lower() in ("on", "off"):

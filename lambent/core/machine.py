@@ -1,4 +1,4 @@
-"""The machine this runs on: processor, memory, display."""
+"""The machine: processor, memory, display."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 def cpu_name() -> str:
-    """Model of the processor, as the system names it."""
+    """Processor model as reported by the system."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text(encoding="utf-8", errors="replace").splitlines() if info.exists() else []
     models = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
@@ -22,7 +22,7 @@ def core_count() -> int:
 
 
 def memory_bytes() -> int:
-    """Physical memory."""
+    """Size of physical memory."""
     if sys.platform == "win32":
         import ctypes
 
@@ -33,5 +33,5 @@ def memory_bytes() -> int:
 
 
 def has_display() -> bool:
-    """Whether a window can be opened."""
+    """Whether a window can open."""
     return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -1,7 +1,7 @@
-"""Caches of maps within a budget: which map goes when another is wanted, and how often one is missing.
+"""Map caches with a fixed budget: eviction policies and miss counts.
 
-A read names one map. `LeastRecent` is the thesis's (R, section 4.3). `Adaptive` also keeps maps that are wanted again
-and again while others pass through once (Megiddo & Modha 2003, "ARC"). No cache does better than `fewest_misses`.
+Each read names one map. `LeastRecent` is the thesis's policy (R, section 4.3). `Adaptive` also keeps repeatedly read
+maps while others pass through once (Megiddo & Modha 2003, "ARC"). `fewest_misses` is the lower bound for any policy.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ NEVER = 1 << 62
 
 
 class MapCache(Protocol):
-    """Holds at most `capacity` maps."""
+    """A cache of at most `capacity` maps."""
 
     capacity: int
 
     def read(self, name: int) -> bool:
-        """Whether a map was there; it is now."""
+        """Read a map into the cache; returns whether it was there already."""
         ...
 
     @property
     def held(self) -> Collection[int]:
-        """The maps that are there."""
+        """The maps in the cache."""
         ...
 
 
 class LeastRecent:
-    """Drops the map that was read longest ago (LRU)."""
+    """Evicts the least recently read map (LRU)."""
 
     def __init__(self, capacity: int) -> None:
         self.capacity = capacity
@@ -50,7 +50,10 @@ class LeastRecent:
 
 
 class Adaptive:
-    """Divides its room between maps read once and maps read again, by which of both it misses more (ARC)."""
+    """Splits its capacity between maps read once and maps read repeatedly (ARC).
+
+    A miss on a recently evicted map enlarges the share of the list that it was evicted from.
+    """
 
     def __init__(self, capacity: int) -> None:
         self.capacity = capacity
@@ -83,7 +86,7 @@ class Adaptive:
         return self._once.keys() | self._again.keys()
 
     def _forget(self) -> None:
-        """Room for a map that nothing is known of, and for what is remembered of those dropped."""
+        """Make room for a map without history, in the cache and in the lists of evicted maps."""
         if len(self._once) + len(self._left_once) == self.capacity:
             if len(self._once) < self.capacity:
                 self._left_once.popitem(last=False)
@@ -108,12 +111,12 @@ class Adaptive:
 
 
 def misses(reads: Sequence[int], cache: MapCache) -> int:
-    """Reads, one after another, that find their map missing."""
+    """Number of `reads` that miss when run through `cache` in order."""
     return sum(not cache.read(name) for name in reads)
 
 
 def fewest_misses(reads: Sequence[int], capacity: int) -> int:
-    """Misses of a cache that knows the future and drops the map wanted last (Belady 1966)."""
+    """Misses of the optimal policy, which knows the future and evicts the map read again last (Belady 1966)."""
     following, seen = [NEVER] * len(reads), dict[int, int]()
     for at in range(len(reads) - 1, -1, -1):
         following[at] = seen.get(reads[at], NEVER)

@@ -1,6 +1,6 @@
-"""Differences of two images. A mean hides a hole, so the worst 16x16 tile always stands beside it.
+"""Differences of two images. A mean hides a hole, so the worst 16x16 tile is always reported with it.
 
-Images are linear RGB (H, W, 3), unless they are `encoded` for a display: sRGB values in [0, 1].
+Images are linear RGB (H, W, 3), unless `encoded` for a display: sRGB values in [0, 1].
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from lambent.core.arrays import Floats
 from lambent.core.colour import rgb_to_lab, srgb_encode
 
 TILE = 16  # pixels
-MOST_LIT = 2 / 3  # mean of what is not black, as it is displayed
+MOST_LIT = 2 / 3  # limit for the displayed mean of pixels that are not black
 
 
 @dataclass(frozen=True)
 class Flip:
-    """FLIP error (Andersson et al. 2020): 0 is no visible difference, 1 the largest."""
+    """FLIP error (Andersson et al. 2020): 0 is no visible difference, 1 the maximum."""
 
     error: Floats  # (H, W)
     picture: Floats  # (H, W, 3) encoded, in false colour: black no error, yellow-white 1
@@ -35,7 +35,7 @@ class Flip:
 
     @property
     def worst_tile_at(self) -> tuple[int, int]:
-        """Row and column of the worst tile's upper left pixel."""
+        """Row and column of the worst tile's top left pixel."""
         means = tile_means(self.error)
         row, column = np.unravel_index(int(means.argmax()), means.shape)
         return int(row) * TILE, int(column) * TILE
@@ -63,7 +63,7 @@ def flip(reference: Floats, test: Floats) -> Flip:
 
 
 def flip_error(reference: Floats, test: Floats) -> Floats:
-    """The error (H, W) of `flip` alone, in half its time."""
+    """The error (H, W) of `flip` alone, in half the time."""
     error = _flip(reference, test, in_colour=False)
     return error[..., 0] if error.ndim == 3 else error
 
@@ -77,7 +77,7 @@ def _flip(reference: Floats, test: Floats, in_colour: bool) -> Floats:
 
 
 def compare(reference: Floats, test: Floats, *, radiance: bool) -> tuple[dict[str, Any], Floats]:
-    """All figures for two linear images, and the FLIP error in false colour (encoded)."""
+    """All metrics of two linear images, and the FLIP error in false colour (encoded)."""
     shown = display_pair(reference, test) if radiance else (srgb_encode(reference), srgb_encode(test))
     seen = flip(*shown)
     return {
@@ -93,7 +93,7 @@ def compare(reference: Floats, test: Floats, *, radiance: bool) -> tuple[dict[st
 
 
 def tile_means(error: Floats, tile: int = TILE) -> Floats:
-    """Means of the tiles of (H, W), (ceil H/tile, ceil W/tile); tiles at the lower and right border may be smaller."""
+    """Means (ceil H/tile, ceil W/tile) over the tiles of (H, W); tiles at the lower and right border may be smaller."""
     rows, columns = np.arange(0, error.shape[0], tile), np.arange(0, error.shape[1], tile)
     sums = np.add.reduceat(np.add.reduceat(error.astype(np.float64), rows, axis=0), columns, axis=1)
     heights, widths = np.diff([*rows, error.shape[0]]), np.diff([*columns, error.shape[1]])
@@ -101,16 +101,16 @@ def tile_means(error: Floats, tile: int = TILE) -> Floats:
 
 
 def display_pair(reference: Floats, test: Floats, mean: float = 0.3) -> tuple[Floats, Floats]:
-    """Two images of radiance encoded as clip(e L)^(1/2.2), with e such that the reference has mean `mean`."""
+    """Two images of radiance encoded as clip(e L)^(1/2.2), with e chosen to give the reference mean `mean`."""
     exposure_ev = display_exposure(reference, mean)
     return displayed(reference, exposure_ev), displayed(test, exposure_ev)
 
 
 def display_exposure(reference: Floats, mean: float = 0.3) -> float:
-    """log2 of the e at which `displayed` of an image of radiance has mean `mean`.
+    """log2 of the factor e at which `displayed` gives an image of radiance the mean `mean`.
 
-    Values above 0 have a mean of at most `MOST_LIT`: little light before black would else be clipped, whatever it is.
-    Found by bisection because clipping makes the mean a monotone, not linear, function of e.
+    The mean over values above 0 stays at most `MOST_LIT`: otherwise a small light on black would clip at any
+    brightness. Found by bisection: clipping makes the mean monotone in e, but not linear.
     """
     mean = min(mean, MOST_LIT * float(np.mean(np.asarray(reference) > 0)))
     low, high = -40.0, 40.0  # stops

@@ -1,7 +1,7 @@
-"""Multisets: which members occur how often, in any order.
+"""Multisets: how often each member occurs, regardless of order.
 
-The light of a path depends on how often it met each object, not on the order (Ben-Artzi 2007, section 5.2): there are
-binom(size + members - 1, size) multisets where there are members^size orders.
+The light of a path depends on how often it hit each object, not on the order (Ben-Artzi 2007, section 5.2): there are
+binom(size + members - 1, size) multisets, but members^size orders.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Multisets:
 
     @cached_property
     def number_of_order(self) -> NDArray[np.int64]:
-        """(members^size,) number of the multiset of each order, by the order's digits in base `members`."""
+        """(members^size,) multiset number of each order, read as a number in base `members`."""
         orders = np.arange(self.members**self.size)
         digits = orders[:, None] // self.members ** np.arange(self.size)[::-1] % max(self.members, 1)
         counts = np.sort(digits, axis=1) @ self.members ** np.arange(self.size)[::-1]

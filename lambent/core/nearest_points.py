@@ -1,6 +1,6 @@
-"""The points of a light field that a place on a surface has above its horizon.
+"""The points of a light field above the horizon of a place on a surface.
 
-Thesis R, section 3: of a place t the nearest points p with n_t . normalize(p - t) > cos 85 deg, nearest first.
+Thesis R, section 3: the nearest points p to a place t with n_t . normalize(p - t) > cos 85 deg, nearest first.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.light_field import CANDIDATES, NO_POINT
 
 HORIZON_DEG = 85.0
-FIRST_ASKED = 12  # points by distance, of which most places find their four
+FIRST_ASKED = 12  # nearest points searched first; most places find their four among them
 AT_ONCE = 1 << 16
 
 
-Sees = Callable[[Floats, Floats, Floats], Flags]  # places, normals, points (n, 3): whether nothing is between (n,)
+Sees = Callable[[Floats, Floats, Floats], Flags]  # places, normals, points (n, 3) -> unoccluded (n,)
 
 
 def nearest_points(places: Floats, normals: Floats, points: Floats, sees: Sees | None = None) -> NDArray[np.uint16]:
-    """(n, 4) the nearest points (P, 3) above the horizon of places (n, 3) of unit normals (n, 3), then NO_POINT.
+    """(n, 4) nearest points (P, 3) above the horizon of places (n, 3) with unit normals (n, 3), padded with NO_POINT.
 
-    With `sees`, points behind other things are left out, where a place sees any of the FIRST_ASKED nearest: what stands
-    beyond a wall knows nothing of the light before it.
+    With `sees`, occluded points are left out if any of the FIRST_ASKED nearest is visible: a point beyond a wall does
+    not know the light on this side.
     """
     from scipy.spatial import cKDTree
 
@@ -50,7 +50,7 @@ def nearest_points(places: Floats, normals: Floats, points: Floats, sees: Sees |
 
 @dataclass(frozen=True)
 class _Near:
-    """Places and normals (n, 3), all points (P, 3), and of each place the nearest by `index` and `distance` (n, k)."""
+    """Places and normals (n, 3), all points (P, 3), and each place's nearest by `index` and `distance` (n, k)."""
 
     places: Floats
     normals: Floats
@@ -59,20 +59,20 @@ class _Near:
     index: Indices
 
     def above(self) -> Flags:
-        """(n, k) which points are above the horizon."""
+        """(n, k) whether each point is above the horizon."""
         offset = self.points[self.index] - self.places[:, None]
         length = np.linalg.norm(offset, axis=-1)
         return np.asarray((offset * self.normals[:, None]).sum(axis=-1) > np.cos(np.radians(HORIZON_DEG)) * length)
 
     def seen(self, sees: Sees) -> Flags:
-        """(n, k) which of them a place sees, too."""
+        """(n, k) whether each point is also visible from its place."""
         found = self.above()
         row, column = np.nonzero(found)
         found[row, column] = sees(self.places[row], self.normals[row], self.points[self.index[row, column]])
         return found
 
     def chosen(self, which: Flags) -> tuple[NDArray[np.uint16], Flags]:
-        """The nearest CANDIDATES of some points (n, k), and where no other point can be nearer."""
+        """The nearest CANDIDATES of the flagged points (n, k), and whether no farther point can replace them (n,)."""
         key = np.where(which, self.distance, np.inf)
         order = np.lexsort((self.index, key))[:, :CANDIDATES]
         best, at = np.take_along_axis(key, order, axis=1), np.take_along_axis(self.index, order, axis=1)

@@ -1,9 +1,9 @@
-"""Octahedral maps: all directions in one square, for maps of which thousands fit into one texture.
+"""Octahedral maps: all directions in one square, so that thousands of maps fit into one texture.
 
 A direction is scaled to |x| + |y| + |z| = 1; the lower half (z < 0) is folded outwards over the edges of the square
 [-1, 1]^2 (Praun and Hoppe 2003; Engelhardt and Dachsbacher 2008). Column and u grow with x, row and v with y; texel
 (row, column) of a map of E texels a side has its centre at uv = ((column + 1/2)/E, (row + 1/2)/E).
-The square's edges are glued to themselves, mirrored about their middles, which `bordered` uses.
+Each edge of the square is joined to itself, mirrored about its middle; `bordered` uses this.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from lambent.core.directions import normalize
 
 
 def to_square(w: Floats) -> Floats:
-    """uv (..., 2) in [0, 1] of directions w (..., 3), which need not be unit but not zero."""
+    """uv (..., 2) in [0, 1] of directions w (..., 3) of any length but zero."""
     p = w / np.abs(w).sum(axis=-1, keepdims=True)
     return np.asarray(_folded(p[..., :2], p[..., 2:]) / 2 + 0.5)
 
@@ -36,17 +36,17 @@ def texel_directions(n: int) -> Floats:
 
 
 def texel_solid_angles(n: int) -> Floats:
-    """(n, n) solid angles of the texels, sr, by the density at their centres: 4 pi in all to 1/n^2.
+    """(n, n) solid angles of the texels, sr, by the density at their centres; their sum is 4 pi to within 1/n^2.
 
-    The square's area element stands for (|x| + |y| + |z|)^3 of solid angle at the unit direction.
+    The square's area element times (|x| + |y| + |z|)^3, at the unit direction, is solid angle.
     """
     return np.asarray(np.abs(texel_directions(n)).sum(axis=-1) ** 3 * (4 / (n * n)))
 
 
 def bordered(maps: Any, width: int) -> Any:
-    """Maps (..., E, E, C) with `width` texels around them, so that filters find what lies beyond an edge.
+    """Maps (..., E, E, C) with a border of `width` texels, for filters that read beyond an edge.
 
-    Beyond an edge lies the edge itself, mirrored about its middle.
+    The border continues each edge with the same edge, mirrored about its middle.
     """
     n = maps.shape[-2]
     if not 0 <= width <= n:
@@ -63,5 +63,5 @@ def bordered(maps: Any, width: int) -> Any:
 
 
 def _folded(p: Floats, z: Floats) -> Floats:
-    """p (..., 2), folded over the square's diagonals where z (..., 1) is negative. Folding twice is nothing."""
+    """p (..., 2), folded over the square's diagonals where z (..., 1) is negative; its own inverse."""
     return np.where(z >= 0, p, (1 - np.abs(p[..., ::-1])) * np.where(p >= 0, 1.0, -1.0))

@@ -1,8 +1,8 @@
-"""Which existing files a command may replace.
+"""Which existing files a command may overwrite.
 
-What Lambent draws (pictures, films, plots, reports) carries a mark in its metadata, and the next run replaces it:
-nobody edits it by hand. Everything else that exists is replaced only where the user says so: documents and converted
-tables are edited, and other programs' files are not ours. A command's own input is never replaced unasked.
+Pictures, films, plots and reports drawn by Lambent carry a mark in their metadata, and the next run overwrites them:
+nobody edits them by hand. Any other existing file is overwritten only on request: users edit documents and converted
+tables, and other programs' files are not ours. A command's own input is never overwritten without a request.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from lambent.core.files import check_place
 from lambent.core.inputs import open_input
 
 MARK = "Lambent made this file and may replace it"
-_HEAD_BYTES, _TAIL_BYTES = 8 << 20, 1 << 16  # a film's mark stands behind the sizes of its frames, 8 bytes each
+_HEAD_BYTES, _TAIL_BYTES = 8 << 20, 1 << 16  # a film's mark follows the sizes of its frames, 8 bytes each
 
 
 def check_output(path: Path, suffixes: Iterable[str] = (), *, force: bool, inputs: Iterable[Path | str] = ()) -> None:
-    """`UserError` where a command cannot, or may not, write `path`; called before long work.
+    """Raise `UserError` if a command cannot, or may not, write `path`; called before long work.
 
     Parameters
     ----------
     path : Path
         The file to write.
     suffixes : iterable of str
-        Endings that it may have; any where there are none.
+        Allowed suffixes; any if empty.
     force : bool
-        The user has said that it may be replaced, whatever it is.
+        Overwrite any existing file, as the user requested.
     inputs : iterable of path
         Files that the command reads.
     """
@@ -45,7 +45,7 @@ def check_output(path: Path, suffixes: Iterable[str] = (), *, force: bool, input
 
 
 def is_marked(path: Path) -> bool:
-    """Whether Lambent drew the file at `path`; False where it cannot be read."""
+    """Whether the file at `path` carries Lambent's mark; False if it cannot be read."""
     try:
         with open_input(path) as file:
             head = file.read(_HEAD_BYTES)

@@ -1,11 +1,11 @@
-"""Photometry: one luminous efficacy, and one meaning of every photometric unit.
+"""Photometry: one luminous efficacy for all photometric units.
 
 Every array in Lambent is radiometric, linear Rec.709: radiance in W/(sr m^2), irradiance in W/m^2, intensity in W/sr.
-`LM_PER_W` times Y turns radiance into luminance in cd/m^2, irradiance into illuminance in lx, intensity into luminous
-intensity in cd, flux into luminous flux in lm. Readers of photometric files divide by the same number.
+`LM_PER_W` times Y converts radiance to luminance in cd/m^2, irradiance to illuminance in lx, intensity to luminous
+intensity in cd, flux to luminous flux in lm. Readers of photometric files divide by the same constant.
 
-179 lm/W is the efficacy that Radiance (Ward 1994) gives white light over the visible range; spectral radiance weighted
-by V(lambda) would take 683 lm/W, but the three channels each stand for a broad band.
+179 lm/W is Radiance's efficacy of white light over the visible range (Ward 1994). Spectral radiance weighted by
+V(lambda) would take 683 lm/W, but each of the three channels stands for a broad band.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ LM_PER_W = 179.0
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity that images are shown as: its unit, and its value where Y is 1."""
+    """A displayed quantity: its unit, and its value at Y = 1."""
 
     unit: str
     per_y: float
@@ -33,10 +33,10 @@ NOISE = Quantity("%", 100.0)  # of a relative standard error
 
 
 def photometric(radiance: Floats, quantity: Quantity = LUMINANCE) -> Floats:
-    """cd/m^2 (...) of linear radiance (..., 3); lx of irradiance; or another quantity."""
+    """cd/m^2 (...) of linear radiance (..., 3); lx of irradiance; or another `quantity`."""
     return np.asarray(quantity.per_y * luminance(radiance))
 
 
 def radiometric(values: Floats) -> Floats:
-    """W/(sr m^2), W/m^2 or W/sr of cd/m^2, lx or cd."""
+    """W/(sr m^2) of cd/m^2, W/m^2 of lx, or W/sr of cd."""
     return np.asarray(values / LM_PER_W)

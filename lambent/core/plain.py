@@ -1,4 +1,4 @@
-"""Plain values: results for JSON, words that are numbers, triples of floats, names for files."""
+"""Plain values: JSON-ready results, words that are numbers, tuples of floats, file names."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Triple = tuple[float, float, float]
 
 
 def plain(value: Any) -> Any:
-    """`value` for JSON: arrays and tuples as lists, paths as text, numbers that are not finite as null."""
+    """`value` for JSON: arrays and tuples as lists, paths as text, non-finite numbers as null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple | set):
@@ -26,16 +26,15 @@ def plain(value: Any) -> Any:
 
 
 def printable(text: str) -> str:
-    """`text` as one line that a terminal shows and does not obey, `\\x1b` for an escape.
+    """`text` as one line that is safe to print on a terminal; an escape character becomes `\\x1b`.
 
-    Escaped are control characters, line ends among them, marks that change the direction of writing or have no width,
-    and halves of characters.
+    Escapes control characters, line ends among them, bidirectional and zero-width marks, and lone surrogates.
     """
     return "".join(c if unicodedata.category(c) not in _UNSHOWN else ascii(c)[1:-1] for c in text)
 
 
 def is_number(word: str) -> bool:
-    """Whether Python reads the word as a number, nan and inf included."""
+    """Whether Python parses the word as a number, nan and inf included."""
     try:
         float(word)
     except ValueError:
@@ -56,5 +55,5 @@ def quad(values: Iterable[Any]) -> tuple[float, float, float, float]:
 
 
 def plain_name(name: str, otherwise: str = "material") -> str:
-    """A file name for any name from a user or a file; `otherwise` if nothing of it is left."""
+    """A file name made from any user-supplied name; `otherwise` if no character survives."""
     return "".join(c if c.isalnum() or c in " ._-" else "_" for c in name).strip(" .") or otherwise

@@ -1,4 +1,4 @@
-"""Cells of floor plans, filled and counted in compiled loops: plans have millions, and floors many triangles."""
+"""Compiled loops over the cells of floor plans: plans have millions of cells, and floors many triangles."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from lambent.core.arrays import Flags, Floats
 
 @numba.njit(cache=True)
 def filled(triangles: Floats, rows: int, columns: int) -> Flags:
-    """(rows, columns) cells whose centre, at whole coordinates (column, row), lies in a triangle (K, 3, 2)."""
+    """(rows, columns) cells whose centre, at integer coordinates (column, row), lies in a triangle (K, 3, 2)."""
     cells = np.zeros((rows, columns), np.bool_)
     for k in range(len(triangles)):
         t = triangles[k]
@@ -35,7 +35,7 @@ def filled(triangles: Floats, rows: int, columns: int) -> Flags:
 
 @numba.njit(cache=True)
 def share_filled(cells: Flags, size: int) -> Floats:
-    """(rows, columns) share of the squares of `size` x `size` cells that are filled."""
+    """(rows, columns) filled fraction of each square of `size` x `size` cells."""
     rows, columns = cells.shape[0] // size, cells.shape[1] // size
     share = np.zeros((rows, columns))
     for row in range(rows):
@@ -50,7 +50,7 @@ def share_filled(cells: Flags, size: int) -> Floats:
 
 @numba.njit(cache=True)
 def within(cells: Flags, reach: float) -> Flags:
-    """Cells whose centre is at most `reach` cells from that of one of `cells`."""
+    """Cells whose centre is within `reach` cells of the centre of one of `cells`."""
     rows, columns = cells.shape
     found = np.zeros_like(cells)
     steps = int(np.floor(reach))
@@ -68,7 +68,7 @@ def within(cells: Flags, reach: float) -> Flags:
 
 @numba.njit(cache=True)
 def inner(cells: Flags) -> Flags:
-    """Cells whose four neighbours are filled, too."""
+    """Filled cells whose four neighbours are filled too."""
     found = np.zeros_like(cells)
     for row in range(1, cells.shape[0] - 1):
         for column in range(1, cells.shape[1] - 1):
@@ -81,7 +81,7 @@ def inner(cells: Flags) -> Flags:
 def without_strips(covered: Flags, pieces: NDArray[np.int32], count: int, width: float) -> Flags:
     """`covered` without those of its `count` numbered pieces that are strips along its edge.
 
-    A strip is up to `width` cells wide in the mean: its cells are at most half as many times its border.
+    A strip is up to `width` cells wide on average: it has at most width/2 cells per border cell.
     """
     rows, columns = pieces.shape
     cells, border, at_edge = np.zeros(count + 1, np.int64), np.zeros(count + 1, np.int64), np.zeros(count + 1, np.bool_)

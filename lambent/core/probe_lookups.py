@@ -1,7 +1,7 @@
-"""Where in a probe a ray finds its light: numpy's version of the renderer's shaders, tested for parity with them.
+"""Probe look-ups with parallax: numpy versions of the renderer's shaders, tested for parity.
 
-Points x are about the probe's centre, directions w unit. A direction that is returned need not be unit; it is w where
-the look-up knows of nothing on the ray.
+Points x are relative to the probe's centre, directions w unit. Returned directions need not be unit; they equal w if
+the look-up finds nothing on the ray.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from lambent.core.arrays import Floats
 from lambent.core.cubemap import face_directions, sample
 from lambent.core.directions import normalize
 
-PLANE_ACTIVE_M = 1e-6  # planes that x is nearer to, or behind, are left out
-NEARNESS_MIN = 1e-6  # 1/m: farther planes are at infinity
-# The march through a distance map: steps, their growth, the first step as a share of the distance seen along w, and
+PLANE_ACTIVE_M = 1e-6  # planes closer to x than this, or behind it, are ignored
+NEARNESS_MIN = 1e-6  # 1/m: farther planes count as infinitely far
+# The march through a distance map: number of steps, their growth, the first step relative to the distance seen along w,
 # bounds of the secant's shares.
 STEPS, GROWTH, FIRST = 12, 1.6, 0.05
 SECANTS = ((0.05, 0.95), (0.05, 0.95), (0.05, 0.95), (0.0, 1.0))
@@ -22,9 +22,9 @@ DEPTH_MIN_M, INVERSE_MIN = 1e-3, 1e-4
 
 
 def planes_lookup(x: Floats, w: Floats, planes: Floats) -> Floats:
-    """Directions (n, 3) from the probe's centre to where rays meet the first of its bounding planes (P, 4).
+    """Directions (n, 3) from the probe's centre to the first hit of rays with its bounding planes (P, 4).
 
-    Thesis M, 4.4.1; planes (n, d) are those with n.p + d = 0.
+    Thesis M, 4.4.1; a plane (n, d) satisfies n.p + d = 0.
     """
     height = x @ planes[:, :3].T + planes[:, 3]
     nearness = np.divide(-(w @ planes[:, :3].T), height, out=np.zeros(height.shape), where=height > PLANE_ACTIVE_M)
@@ -33,7 +33,7 @@ def planes_lookup(x: Floats, w: Floats, planes: Floats) -> Floats:
 
 
 def distances_to_planes(w: Floats, planes: Floats) -> Floats:
-    """(M,) distances from the probe's centre along unit w (M, 3) to the first of its planes (P, 4); inf for none."""
+    """(M,) distances from the probe's centre along unit w (M, 3) to its nearest plane (P, 4); inf without a hit."""
     height = planes[:, 3]
     nearness = np.divide(
         -(w @ planes[:, :3].T), height, out=np.zeros((len(w), len(planes))), where=height > PLANE_ACTIVE_M
@@ -43,15 +43,15 @@ def distances_to_planes(w: Floats, planes: Floats) -> Floats:
 
 
 def inverse_depth(distance: Floats) -> Floats:
-    """(6, N, N, 1) 1/max(|x|, |y|, |z|), 1/m, of the points at `distance` (6, N, N): linear over planes."""
+    """(6, N, N, 1) 1/max(|x|, |y|, |z|), 1/m, of points at `distance` (6, N, N); linear across planes."""
     length = np.linalg.norm(face_directions(distance.shape[1]), axis=-1)
     return np.asarray((length / np.clip(distance, DEPTH_MIN_M, None))[..., None])
 
 
 def distance_lookup(x: Floats, w: Floats, inverse: Floats) -> Floats:
-    """Directions (n, 3) from the probe's centre to where rays pass behind what it sees, of `inverse_depth`.
+    """Directions (n, 3) from the probe's centre to where rays pass behind its surfaces; `inverse` is `inverse_depth`.
 
-    A distance impostor (Szirmay-Kalos et al. 2005): growing steps, then the secant.
+    A distance impostor (Szirmay-Kalos et al. 2005): growing steps, then the secant method.
     """
 
     def behind(t: Floats) -> Floats:

@@ -1,8 +1,8 @@
-"""Views that no pinhole camera has: fisheyes and a cylinder around a camera's eye, and their names in Radiance.
+"""Projections beyond the pinhole camera: fisheyes and a cylinder around a camera's eye, and their Radiance options.
 
-A point of the picture is (x, y) in [-1, 1], x to the right, y upwards. Directions are in the camera's own axes:
-right, up, forward. Sources: G. Ward, "The RADIANCE lighting simulation and rendering system" (1994); view types of
-Radiance's rpict, whose options stand in the VIEW line of its pictures.
+A picture point is (x, y) in [-1, 1], x to the right, y upwards. Directions are in the camera's own axes: right, up,
+forward. Sources: G. Ward, "The RADIANCE lighting simulation and rendering system" (1994); view types of Radiance's
+rpict, whose options are in the VIEW line of its pictures.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from lambent.core.plain import triple
 
 
 class Projection(StrEnum):
-    """How directions lie in the picture."""
+    """Mapping of directions to the picture."""
 
     perspective = "perspective"
-    fisheye = "fisheye"  # angle from the view direction grows evenly with the distance from the middle
-    hemispherical = "hemispherical"  # its sine does: area in the picture is projected solid angle
-    cylinder = "cylinder"  # angle around the up axis grows evenly, height as in perspective
+    fisheye = "fisheye"  # angle from the view direction is proportional to the distance from the centre
+    hemispherical = "hemispherical"  # its sine is: picture area is projected solid angle
+    cylinder = "cylinder"  # angle around the up axis is proportional to x, height as in perspective
 
 
 MOST_DEG: Mapping[Projection, float] = {
@@ -53,7 +53,7 @@ class View:
     width_deg : float
         Field of view from edge to edge. A fisheye's circle touches both edges of the picture.
     height_deg : float
-        The same upwards: of a fisheye as `width_deg`, of a cylinder the angle of a perspective picture.
+        Vertical field of view: equals `width_deg` for a fisheye; for a cylinder, as in a perspective picture.
     """
 
     camera: Camera
@@ -62,7 +62,7 @@ class View:
     height_deg: float
 
     def check(self) -> None:
-        """Raise `UserError` where a field of view cannot be."""
+        """Raise `UserError` if a field of view is out of range."""
         most = MOST_DEG[self.projection]
         upwards = most if self.projection is not Projection.cylinder else 170.0
         for found, limit in ((self.width_deg, most), (self.height_deg, upwards)):
@@ -72,14 +72,14 @@ class View:
                 )
 
     def directions(self, width: int, height: int) -> tuple[Floats, Floats]:
-        """World directions (H, W, 3), 0 outside of the view, and solid angles (H, W) in sr of the pixels."""
+        """World directions (H, W, 3), 0 outside the view, and solid angles (H, W) in sr of the pixels."""
         x, y = np.meshgrid(2 * (np.arange(width) + 0.5) / width - 1, 1 - 2 * (np.arange(height) + 0.5) / height)
         local, density = self._local(x, y)
         axes = np.stack(camera_axes(self.camera))
         return local @ axes, density * (4.0 / (width * height))
 
     def _local(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-        """Directions (..., 3) by right, up, forward, and the solid angle per unit of picture area (...)."""
+        """Directions (..., 3) as (right, up, forward), and solid angle per unit of picture area (...)."""
         half_x, half_y = (math.radians(angle) / 2 for angle in (self.width_deg, self.height_deg))
         if self.projection is Projection.perspective:
             u, v = x * math.tan(half_x), y * math.tan(half_y)
@@ -104,7 +104,7 @@ class View:
         return rays * inside[..., None], density * inside
 
     def radiance_options(self) -> str:
-        """The VIEW line's options."""
+        """The options for the VIEW line."""
         _, up, forward = camera_axes(self.camera)
         places = ((" -vp", self.camera.position), (" -vd", triple(forward)), (" -vu", triple(up)))
         text = f"-vt{RADIANCE[self.projection]}" + "".join(
@@ -116,10 +116,10 @@ class View:
     def of(
         cls, camera: Camera, projection: Projection, width: int, height: int, field_deg: float | None = None
     ) -> View:
-        """View of a picture's size, with square pixels in its middle.
+        """View for a picture of `width` x `height` with square pixels at its centre.
 
-        `field_deg` is the field of view across the width: of fisheyes 180 by default, of a cylinder 360, of a
-        perspective the camera's own.
+        `field_deg` is the field of view across the width. Default: 180 for fisheyes, 360 for a cylinder, the camera's
+        own for perspective.
         """
         shape = height / width
         if projection is Projection.perspective:

@@ -1,4 +1,4 @@
-"""Views of Radiance pictures: the options in the last VIEW line of a header, or of the program that drew it."""
+"""Views of Radiance pictures: the options in a header's last VIEW line, or in the command line of its renderer."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from lambent.core.inputs import read_bytes
 from lambent.core.plain import is_number, triple
 from lambent.core.projections import RADIANCE, View
 
-_PROGRAMS = ("VIEW=", "rpict", "rview", "rvu", "rpiece", "pinterp")  # lines that begin so hold a view
+_PROGRAMS = ("VIEW=", "rpict", "rview", "rvu", "rpiece", "pinterp")  # prefixes of header lines that hold a view
 _COUNTS = {"p": 3, "d": 3, "u": 3, "h": 1, "v": 1, "o": 1, "a": 1, "s": 1, "l": 1}
 
 
@@ -25,7 +25,7 @@ def read_view(path: Path) -> View:
     Raises
     ------
     UserError
-        Where the file is no such picture, says no view, or one that Lambent does not know.
+        If the file is not a Radiance picture, states no view, or states one that Lambent does not support.
     """
     data = read_bytes(Path(path), PICTURE_BYTES)
     lines = rgbe.header_lines(data) if data.startswith(rgbe.MAGICS) else []
@@ -37,7 +37,7 @@ def read_view(path: Path) -> View:
 
 
 def view_of(line: str, file: Path) -> View:
-    """View of a line of options; `file` is named in errors."""
+    """View of a line of options; errors name `file`."""
     kinds = {letter: projection for projection, letter in RADIANCE.items()}
     kind, found = "v", {"p": [0.0] * 3, "d": [0.0, 1.0, 0.0], "u": [0.0, 0.0, 1.0], "h": [45.0], "v": [45.0]}
     try:

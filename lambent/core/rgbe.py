@@ -22,24 +22,24 @@ from lambent.core.plain import is_number
 MAGICS = (b"#?RADIANCE", b"#?RGBE")
 REC_709 = ".64 .33 .30 .60 .15 .06 .3127 .3290"  # x and y of red, green, blue and white
 _RESOLUTION = re.compile(rb"([-+])([XY]) (\d{1,9}) ([-+])([XY]) (\d{1,9})\n")
-FORWARD = {b"Y": b"-", b"X": b"+"}  # signs of rows from the top and columns from the left
-_MIN_RUN_WIDTH, _MAX_RUN_WIDTH = 8, 0x7FFF  # widths outside are never run-length encoded per channel
+FORWARD = {b"Y": b"-", b"X": b"+"}  # signs for rows from the top and columns from the left
+_MIN_RUN_WIDTH, _MAX_RUN_WIDTH = 8, 0x7FFF  # other widths are never run-length encoded per channel
 
 
 def decode(data: bytes, file: Path) -> Image:
-    """Linear RGB (H, W, 3) of a whole file's bytes; `file` is named in errors."""
+    """Linear RGB (H, W, 3) of a whole file's bytes; errors name `file`."""
     header_end = data.find(b"\n\n", 0, 1 << 16)
     match = _RESOLUTION.match(data, header_end + 2) if header_end >= 0 else None
     if match is None or match[2] == match[5]:
         raise UserError("Radiance header has no '-Y height +X width' line", file=file)
-    height, width = int(match[3]), int(match[6])  # of scanlines, which are columns where X comes first
+    height, width = int(match[3]), int(match[6])  # of scanlines, which are columns if X comes first
     PIXELS.check(width * height, file=file, got=f"{width} x {height}")
     if width * height == 0:
         raise UserError("picture has no pixels", file=file, got=f"{width} x {height}")
     header = data[:header_end]
     pixels = _pixels(data, match.end(), height, width, file)
     image = np.empty((height, width, 3), np.float32)
-    for row, into in zip(pixels, image, strict=True):  # row by row: doubles of a whole picture take twice its memory
+    for row, into in zip(pixels, image, strict=True):  # row by row: float64 of a whole picture takes twice its memory
         scale = np.ldexp(1.0, row[:, 3].astype(np.int32) - 136) * (row[:, 3] > 0)
         into[:] = row[:, :3] * scale[:, None]
     for exposure in re.findall(r"^EXPOSURE=\s*([-+.\deE]+)\s*$", header.decode("latin-1"), re.MULTILINE):
@@ -54,7 +54,7 @@ def decode(data: bytes, file: Path) -> Image:
 
 
 def header_lines(data: bytes) -> list[str]:
-    """Lines of the header of a picture's bytes; none where it does not end."""
+    """Header lines of a picture's bytes; empty if the header does not end."""
     end = data.find(b"\n\n", 0, 1 << 16)
     return data[:end].decode("latin-1").splitlines() if end >= 0 else []
 
@@ -62,8 +62,8 @@ def header_lines(data: bytes) -> list[str]:
 def encode(image: Image, view: str | None = None) -> bytes:
     """Bytes of a flat (not run-length encoded) file of linear RGB (H, W, 3); negative values become 0.
 
-    `view` holds Radiance's options of the view. Values are W/(sr m^2) as they stand, so EXPOSURE is 1; the primaries
-    are Rec.709's, which other programs take every .hdr to have and Radiance does not.
+    `view` holds Radiance's view options. Values are W/(sr m^2) unscaled, so EXPOSURE is 1. The primaries are Rec.709's,
+    which other programs assume for every .hdr, but Radiance does not.
     """
     rgb = np.maximum(image, 0)
     _, exponent = np.frexp(rgb.max(axis=-1))
@@ -78,11 +78,11 @@ def encode(image: Image, view: str | None = None) -> bytes:
 
 
 def _pixels(data: bytes, at: int, height: int, width: int, file: Path) -> NDArray[np.uint8]:
-    """(H, W, 4) bytes. Sizes are checked against the file before anything is allocated."""
+    """(H, W, 4) bytes; checks sizes against the file before allocating."""
     truncated = UserError("file is truncated", file=file, got=f"{len(data)} bytes", hint="copy or download it again")
     marked = data[at : at + 2] == b"\x02\x02" and data[at + 2 : at + 3] < b"\x80"
     run_length = marked and _MIN_RUN_WIDTH <= width <= _MAX_RUN_WIDTH
-    # A run covers at most 127 bytes with 2: less than this cannot hold the picture.
+    # A run takes 2 bytes and covers at most 127: a shorter file cannot hold the picture.
     if run_length and len(data) - at < height * (4 + 4 * 2 * -(-width // 127)):
         raise truncated
     if not run_length and b"\x01\x01\x01" not in data[at:]:  # flat
@@ -127,7 +127,7 @@ def _run_length(data: bytes, at: int, height: int, width: int) -> NDArray[np.uin
 
 
 def _old_run_length(data: bytes, at: int, count: int) -> NDArray[np.uint8]:
-    """The scheme before 1991: a pixel (1, 1, 1, n) repeats the last one n times; several in a row are digits of n."""
+    """The scheme before 1991: a pixel (1, 1, 1, n) repeats the last one n times; consecutive ones are digits of n."""
     pixels = np.empty((count, 4), np.uint8)
     done, digit = 0, 0
     while done < count:

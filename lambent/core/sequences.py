@@ -1,4 +1,4 @@
-"""Low-discrepancy sequences and the warps that carry them to the hemisphere."""
+"""Low-discrepancy sequences, and the warps that map them to the hemisphere."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from lambent.core.arrays import Floats
 
 
 def radical_inverse(index: NDArray[np.integer], base: int) -> Floats:
-    """Digits of `index` in `base`, mirrored at the point: values in [0, 1)."""
+    """Digits of `index` in `base`, mirrored about the radix point: values in [0, 1)."""
     rest, scale = np.array(index, dtype=np.int64), 1.0 / base
     value = np.zeros(rest.shape)
     while rest.any():
@@ -26,7 +26,7 @@ def hammersley(n: int) -> Floats:
 
 
 def r2(n: int, offset: tuple[float, float] = (0.5, 0.5)) -> Floats:
-    """(n, 2) points of the additive sequence of the plastic number (Roberts 2018), in [0, 1)^2."""
+    """(n, 2) points of the additive R2 sequence, based on the plastic number (Roberts 2018), in [0, 1)^2."""
     plastic = 1.32471795724474602596
     k = np.arange(1, n + 1)[:, None]
     return np.asarray((np.asarray(offset) + k * np.array([1 / plastic, 1 / plastic**2])) % 1.0)

@@ -1,4 +1,4 @@
-"""How a picture of everything around is laid out, and along which axis of the world its up points."""
+"""Layouts of pictures of the surroundings, and the world axis of their up."""
 
 from typing import Literal
 

@@ -1,10 +1,10 @@
-"""Light that passes a thin piece of glass: refracted where it enters and where it leaves.
+"""Light through thin pieces of glass, refracted on entry and on exit.
 
-Thesis R, "Thin Lens Refractions", looks light up along the refracted direction. Here both faces refract: the second is
-taken for the plane that lies behind the first one along its normal (`light_field.Glass`). So a pane displaces light and
-keeps its direction, a lens turns it, and a thick body is approximate. What faces mirror instead of passing comes from
-where the surface itself mirrors, as if all were parallel: so clear glass in even light is not darker than what is
-behind it. Directions are unit, of rays that go on from the viewer. The shader is realtime/shaders/thin_glass.wgsl.
+Thesis R, "Thin Lens Refractions", looks light up along the refracted direction. Here both faces refract; the second is
+approximated by the plane behind the first along its normal (`light_field.Glass`). A pane then displaces light and keeps
+its direction, a lens bends it, and a thick body is approximate. Light mirrored by inner faces comes from the surface's
+own mirror direction, as if all faces were parallel: clear glass in even light is then as bright as its background.
+Directions are unit, of rays from the viewer onwards. The shader is realtime/shaders/thin_glass.wgsl.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 
-MOST_R0 = 0.9  # of which an index of refraction is derived
-LEAST_COSINE = 0.1  # to the second face: rays along it would leave it far away
+MOST_R0 = 0.9  # largest r0 from which an index of refraction is derived
+LEAST_COSINE = 0.1  # to the second face: at grazing rays the exit would be too far away
 
 
 def eta_of(r0: float) -> float:
@@ -26,30 +26,29 @@ def eta_of(r0: float) -> float:
 
 
 def normal_transmittance(lobe: Any) -> Floats:
-    """(3,) share of light that an interface with this lobe of transmission passes at normal incidence."""
+    """(3,) transmittance at normal incidence of an interface with this transmission lobe."""
     return np.asarray(np.asarray(lobe.k, float) * (1 - np.asarray(lobe.r0, float)))
 
 
 def mirrored_back(cosine: Floats, share: Floats, eta: float, tint: tuple[float, float, float]) -> Floats:
-    """Share (k,) of the light within the glass that its second face and those beyond mirror, and so do not pass.
+    """Share (k,) of the light within the glass that its second face and further faces mirror instead of passing.
 
     Parameters
     ----------
     cosine, share : (k,) as from `through_glass`.
-    tint : what an interface lets pass at normal incidence: 1 - r0 (Fresnel), and less where glass is coloured.
+    eta : index of refraction, inside over outside.
+    tint : transmittance of an interface at normal incidence: 1 - r0 (Fresnel), less for coloured glass.
     """
     passes = 1 - ((eta - 1) / (eta + 1)) ** 2
-    colourless = np.log(passes) / min(
-        float(np.log(max(float(np.mean(np.asarray(tint))), 1e-6))), -1e-6
-    )  # of each face's share
+    colourless = np.log(passes) / min(float(np.log(max(float(np.mean(np.asarray(tint))), 1e-6))), -1e-6)  # of each face
     under_fresnel = 1 - (1 - np.minimum(cosine, 1)) ** 5
     return np.asarray(1 - passes * under_fresnel * np.maximum(share, 1e-6) ** min(colourless, 1.0))
 
 
 def refracted(w: Floats, n: Floats, ratio: float) -> tuple[Floats, Floats]:
-    """Rays w (k, 3) through a face of normals n (k, 3) against them, and which are (k,); others are mirrored.
+    """Refract rays w (k, 3) at faces whose normals n (k, 3) oppose them; returns rays and flags (k,): refracted.
 
-    `ratio` is the index of refraction that they come from over that they go to.
+    The others are mirrored. `ratio` is the index of refraction on the incoming side over that on the outgoing side.
     """
     cosine = -np.sum(w * n, axis=-1, keepdims=True)
     square = 1 - ratio**2 * (1 - cosine**2)
@@ -59,16 +58,17 @@ def refracted(w: Floats, n: Floats, ratio: float) -> tuple[Floats, Floats]:
 
 
 def through_glass(w: Floats, n: Floats, exits: Floats, eta: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Rays w (k, 3) that pass the surface of normals n (k, 3), and then what lies behind it.
+    """Trace rays w (k, 3) through a surface of normals n (k, 3) and the face behind it.
 
     Parameters
     ----------
     exits : (k, 4) as in `light_field.Glass`.
+    eta : index of refraction, inside over outside.
 
     Returns
     -------
-    offset (k, 3) from the surface to where they leave the glass, their direction (k, 3) there, the cosine (k,) to the
-    second face's normal outside, and the share (k,) that further faces let pass.
+    offset (k, 3) from the surface to the exit from the glass, direction (k, 3) there, cosine (k,) to the second face's
+    normal outside, and transmittance (k,) of further faces.
     """
     is_sheet = exits[:, 3] < 0
     share = np.where(is_sheet, 1.0, np.linalg.norm(exits[:, :3], axis=-1))

@@ -1,7 +1,7 @@
 """Daubechies' orthonormal wavelets with four taps, periodic (Daubechies 1988; Ben-Artzi 2007, table 4.1).
 
-Coefficients are in the order of their levels, coarse to fine: the mean, then 1, 2, 4, ... details. The transform is
-orthonormal, so dot products stay: c . T = transformed(c) . transformed(T) (Ben-Artzi 2007, eqs 4.18, 4.19).
+Coefficients are ordered by level, coarse to fine: the mean, then 1, 2, 4, ... details. The transform is orthonormal and
+preserves dot products: c . T = transformed(c) . transformed(T) (Ben-Artzi 2007, eqs 4.18, 4.19).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ TAPS = np.array([1 + ROOT3, 3 + ROOT3, 3 - ROOT3, 1 - ROOT3]) / (4 * np.sqrt(2))
 
 
 def transformed(values: Floats) -> Floats:
-    """Wavelet coefficients of `values` (J, ...) along the first axis; J a power of two."""
+    """Wavelet coefficients of `values` (J, ...) along the first axis; J must be a power of two."""
     a, b, c, d = TAPS.astype(values.dtype)
     out, size = np.array(values), _power_of_two(len(values))
     while size > 1:

@@ -1,6 +1,6 @@
-"""The whole flow on the built-in room: measure, fit, place, bake, walk, compare.
+"""The whole workflow on the built-in room: measure, fit, place, bake, walk, compare.
 
-Each step writes its results to one folder, and the next step reads only those, as the commands do:
+Each step writes its results to one folder, and the next step reads only them, as the commands do:
 
     measured/NAME.txt      gonio tables of four specimens
     materials/NAME.json    the fitted materials, each with its plots NAME_*.png
@@ -49,22 +49,22 @@ from lambent.scenes.scene import Scene
 from lambent.store.store import Store
 
 SCENE = "builtin:room"
-SPECIMEN_OF = {  # material of the room -> specimen that is measured for it
+SPECIMEN_OF = {  # room material -> specimen measured for it
     "copper": "rough copper",
     "brushed_aluminium": "brushed aluminium",
     "varnished_wood": "varnished wood",
     "frosted_glass": "frosted glass",
 }
-PACE_M_S = 1.2  # of the film: somebody who looks around
+PACE_M_S = 1.2  # of the film: somebody looking around
 STILLS = 8
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Sizes of a demo: images in pixels, frames of the film per second, samples per pixel of the compared view.
+    """Sizes of a demo: images in pixels, film frames per second, samples per pixel of the compared view.
 
-    `tuples` of each table are fitted, all where None; `still_frames` are averaged to a still, `moving_frames` to the
-    view in motion, so that its edges can be compared.
+    The fit uses `tuples` samples of each table, or all if None. `still_frames` are averaged to a still; `moving_frames`
+    are averaged to the view in motion, so that its edges can be compared.
     """
 
     quality: Quality
@@ -91,12 +91,12 @@ QUICK = Effort(DRAFT, 3_000, (960, 600), 1, (480, 300), 10, (420, 262), 32, 128,
 
 
 def cameras(path: CameraPath, count: int) -> list[Camera]:
-    """`count` cameras along a path, at even steps of time."""
+    """`count` cameras along a path, evenly spaced in time."""
     return [camera_at(path, k / (count - 1) * path.seconds) for k in range(count)]
 
 
 def walked(path: CameraPath, fps: int) -> list[Camera]:
-    """Cameras of a film that walks a path at `PACE_M_S`."""
+    """Cameras of a film along a path at `PACE_M_S`."""
     return cameras(path, max(2, round(path_length(path) / PACE_M_S * fps)))
 
 
@@ -118,12 +118,12 @@ class Flow:
         return self.out / "store"
 
     def prepare(self) -> Scene:
-        """Everything before the walk; returns the scene as it was baked."""
+        """Run all steps before the walk; returns the scene as baked."""
         tables = self.measure()
         try:
             scene = self.place(self.fit(tables))
             self.bake(scene)
-            with self._timed("plot"):  # the rest of it, after the bake
+            with self._timed("plot"):  # the remaining plots, after the bake
                 for plotted in self._plotted:
                     plotted.result()
         finally:
@@ -131,7 +131,7 @@ class Flow:
         return scene
 
     def measure(self) -> dict[str, Path]:
-        """Gonio tables of the specimens, by the room's material names."""
+        """Gonio tables of the specimens, by room material."""
         paths = {}
         with self._timed("measure"):
             for seed, (name, specimen) in enumerate(SPECIMEN_OF.items()):
@@ -140,9 +140,9 @@ class Flow:
         return paths
 
     def fit(self, tables: Mapping[str, Path]) -> dict[str, Path]:
-        """Material documents fitted to the table files, with a plot beside each.
+        """Material documents fitted to the tables, each with a plot.
 
-        A process of its own draws the plots during the bake: both have times when they use one core.
+        A separate process draws the plots during the bake: both have phases that use one core.
         """
         paths = {}
         for name, path in tables.items():
@@ -157,7 +157,7 @@ class Flow:
         return paths
 
     def place(self, materials: Mapping[str, Path]) -> Scene:
-        """The room with the fitted materials in place of its own."""
+        """The room with the fitted materials."""
         with self._timed("place"):
             scene = load_scene(SCENE)
             fitted = {name: load_material(path) for name, path in materials.items()}
@@ -167,7 +167,7 @@ class Flow:
         return scene
 
     def bake(self, scene: Scene) -> None:
-        """Bake the store; after an interruption, the rest of it."""
+        """Bake the store, or resume an interrupted bake."""
         with self._timed("bake"):
             store = bake(scene, self.store_path, quality=self.effort.quality, progress=self.progress)
         self.report["bake"] = {
@@ -177,12 +177,12 @@ class Flow:
         }
 
     def walk(self) -> None:
-        """Stills along the walk and the film of it, from the frame code of the window."""
+        """Stills and a film of the walk, drawn by the window's frame code."""
         effort, renderer = self.effort, self._renderer
         path, exposure_ev = renderer.scene.record.paths[0], renderer.scene.record.exposure_ev or 0.0
 
         views = [FrameState(camera, *effort.still, exposure_ev=exposure_ev) for camera in cameras(path, STILLS)]
-        renderer.display_image(views[0])  # the first frame also builds the pipelines
+        renderer.display_image(views[0])  # the first frame also compiles the pipelines
         with self._timed("stills"):
             for number, view in enumerate(views, 1):
                 started = time.perf_counter()
@@ -191,7 +191,7 @@ class Flow:
                 self.report.setdefault("frame_ms", []).append(frame_ms)
                 write_shown(self.out / f"walk_{number}.png", image)
                 self.progress(number, STILLS, "stills")
-        planar = "interleaved" if adapter_info(renderer.device).is_software else "auto"  # half the time, seen in motion
+        planar = "interleaved" if adapter_info(renderer.device).is_software else "auto"  # takes half the time
         frame = FrameState(views[0].camera, *effort.film, exposure_ev=exposure_ev, planar=planar)
 
         def draw(camera: Camera) -> Any:
@@ -202,9 +202,9 @@ class Flow:
             write_frames(self.out / "walk.mp4", shown, draw, effort.film, effort.film_fps, self.progress)
 
     def compare(self, scene: Scene) -> None:
-        """One view by three methods: in motion (`rings`), at rest (`qmc`), and path traced."""
+        """Compare one view by three methods: in motion (`rings`), at rest (`qmc`), and path traced."""
         from lambent.bake.reference.path_traced import (
-            render_reference,  # imports Mitsuba, whose variant the bake has set
+            render_reference,  # imports Mitsuba, whose variant is set by the bake
         )
 
         effort, renderer, camera = self.effort, self._renderer, scene.cameras[0]
@@ -220,8 +220,8 @@ class Flow:
             write_image(folder / f"{name}.exr", image)
         self.report["compare"] = {"camera": camera.name, "spp": effort.path_spp}
         for name, reference, test in (
-            ("sampling", rest, moving),  # the error of few, filtered samples
-            ("total", truth, rest),  # the error of probes, parallax and light map
+            ("sampling", rest, moving),  # error of few, filtered samples
+            ("total", truth, rest),  # error of probes, parallax and light map
             ("moving_total", truth, moving),
         ):
             self.report["compare"][name], difference = compare(reference, test, radiance=True)

@@ -1,7 +1,7 @@
-"""Edited curves as a measured table, so that lobes are fitted to them as to any measurement.
+"""Edited curves as a measured table, so that lobes can be fitted to them as to any measurement.
 
-Its tuples lie on a grid of half vectors that is fine where the curves of the highlight are steep: a highlight of any
-width is met, and so is a ring that somebody pulled up anywhere.
+Its tuples lie on a grid of half vectors that is fine where the highlight's curves are steep. It resolves a highlight of
+any width, and any ring drawn by hand.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ PER_HALF_VECTOR = {"theta_h": 1.0, "slope_t": 1.0, "slope_b": 1.0, "gamma_t": 1.
 
 
 class EditedTable(MeasuredTable):
-    """The table that a gonio-photometer would measure of a material made of curves, without noise."""
+    """The table that a gonio-photometer would measure, without noise, from a material made of curves."""
 
     def __init__(self, material: Editable, name: str) -> None:
         self.material = material
@@ -65,7 +65,7 @@ def _half_vectors(material: Editable, sectors: int) -> tuple[Floats, Floats, Flo
 
 
 def _edges(material: Editable) -> Floats:
-    """(RINGS + 1,) edges of rings of theta_h in radians: half of them where curves change, half closer to 0."""
+    """(RINGS + 1,) edges of rings of theta_h in radians: half of them where curves change, half denser towards 0."""
     theta = angles_rad()
     rise = np.zeros(len(theta))
     for term in material.terms:
@@ -84,7 +84,7 @@ def _edges(material: Editable) -> Floats:
 
 
 def _is_isotropic(material: Editable) -> bool:
-    """Whether f stays as both directions turn about the normal."""
+    """Whether f is unchanged when both directions turn about the normal."""
     rng = np.random.default_rng(0)
     theta, phi = np.arccos(rng.uniform(0.1, 1, (2, 500))), rng.uniform(0, 2 * np.pi, (2, 500))
     theta[1, :250], phi[1, :250] = theta[0, :250] + 0.05, phi[0, :250] + np.pi  # near the mirror direction
@@ -99,7 +99,7 @@ def _is_isotropic(material: Editable) -> bool:
 
 
 def part_of(material: Editable, names: set[str]) -> Editable:
-    """The terms of these names with their curves."""
+    """The terms of these names, with their curves."""
     terms = tuple(term for term in material.terms if term.name in names)
     used = {curve for term in terms for curve in term.curves}
     return replace(material, terms=terms, curves={n: c for n, c in material.curves.items() if n in used})

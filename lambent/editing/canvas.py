@@ -1,7 +1,7 @@
-"""What an edited picture is drawn on: terms, pixel by pixel, added to what is not edited.
+"""Canvases of an edited picture: terms are added, pixel by pixel, to the unedited part.
 
-`HostCanvas` is in memory and the truth. `lambent.realtime.edited` has the same on a GPU; the window joins them
-(`lambent.viewer.edited`).
+`HostCanvas` is in memory and the reference. `lambent.realtime.edited` implements the same on a GPU; the window combines
+both (`lambent.viewer.edited`).
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from lambent.materials.factored.curve import END_RAD, KNOTS, Curve
 
 
 class Layer(Protocol):
-    """One term of one material: products of its transport, and what multiplies them."""
+    """One term of one material: products of its transport, and their factors."""
 
     def hold(self, transport: Halves) -> Products:
-        """Take transport (J, 3, P) float16; the layer shows its products from now on."""
+        """Take transport (J, 3, P) float16; the layer shows its products from then on."""
 
     def fold(self, pairs: PairTransport, idle: int, means: Floats) -> tuple[Products, float]:
-        """Take transport with curve `idle` folded in (`PairTransport.fold`); products, and radiance of a value of 1."""
+        """Take transport with curve `idle` folded in (`PairTransport.fold`); products, and radiance of value 1."""
 
     def view(self, curve: Curve | None) -> None:
         """Multiply by the curve of the viewer's angle."""
@@ -36,13 +36,13 @@ class Canvas(Protocol):
     """The picture (H, W) of all layers."""
 
     def layer(self, pixel: Indices, theta_o: Floats, texture: Floats | None) -> Layer:
-        """A new layer over pixels (P,), with the viewer's angle (P,) and a texture (P, 3) or none."""
+        """A new layer over pixels (P,), with the viewer's angles (P,) and an optional texture (P, 3)."""
 
     def compose(self, shown: Sequence[tuple[Layer, NDArray[np.float32]]]) -> None:
         """Draw the sum of layers, each with its scale (3,)."""
 
     def image(self) -> Image:
-        """(H, W, 3) float32, linear radiance, as last composed."""
+        """(H, W, 3) float32, linear radiance, as of the last `compose`."""
 
 
 class HostLayer:
@@ -69,7 +69,7 @@ class HostLayer:
 
 
 class HostCanvas:
-    """`Canvas` in memory; `background` (H, W, 3) is what layers are added to."""
+    """`Canvas` in memory; `background` (H, W, 3) is the unedited part."""
 
     def __init__(self, background: Image) -> None:
         self._background = np.array(background, np.float32)

@@ -1,6 +1,6 @@
-"""The session document: a JSON file with the view that is edited and every edit of its materials.
+"""The session document: a JSON file with a view and all edits of its materials.
 
-Angles are in radians, colours linear Rec.709. Files are named relative to the document's folder, or whole.
+Angles are in radians, colours linear Rec.709. File names are absolute or relative to the document's folder.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from lambent.store.consistency import is_usable
 LIMIT_BYTES, VERSION = 256 << 20, 1
 MOST_MATERIALS, MOST_LAYERS, MOST_PARAMETERS = 1000, 4096, 100
 MOST_PIXELS = 1 << 26
-LARGEST = 1e9  # of a curve or a colour: its square still fits float32
+LARGEST = 1e9  # limit for curves and colours: its square still fits float32
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Place = Annotated[str, Field(min_length=1, max_length=4096, pattern=r"^[^\x00]*$")]
@@ -45,14 +45,14 @@ class _Strict(BaseModel):
 
 
 class OfDocument(_Strict):
-    """A material that begins as a material document."""
+    """A material that starts as a material document."""
 
     kind: Literal["document"] = "document"
     material: Material
 
 
 class OfModel(_Strict):
-    """A material that begins as a model with its parameters."""
+    """A material that starts as a model with its parameters."""
 
     kind: Literal["model"] = "model"
     model: Name
@@ -62,7 +62,7 @@ class OfModel(_Strict):
 
 
 class OfTable(_Strict):
-    """A material that begins as the factors of a measured table, or of a file of factors."""
+    """A material that starts as the factors of a measured table, or of a file of factors."""
 
     kind: Literal["table"] = "table"
     file: Place
@@ -73,7 +73,7 @@ Source = Annotated[OfDocument | OfModel | OfTable, Field(discriminator="kind")]
 
 
 class Drawn(_Strict):
-    """A curve drawn freehand: straight lines through points, constant beyond the outermost."""
+    """A curve drawn freehand: linear between points, constant beyond the outermost."""
 
     angle_rad: Annotated[tuple[Annotated[float, Field(ge=0, le=END_RAD)], ...], Field(max_length=KNOTS + 1)]
     values: Annotated[tuple[RGB, ...], Field(max_length=KNOTS + 1)]
@@ -97,14 +97,14 @@ class Drawn(_Strict):
 
 
 class CurveEdit(_Strict):
-    """What was done to one curve: drawn anew or not, then operators in their order."""
+    """Edits of one curve: an optional freehand curve, then operators in order."""
 
     drawn: Drawn | None = None
     layers: Annotated[tuple[Operator, ...], Field(max_length=MOST_LAYERS)] = ()
 
 
 class EditedMaterial(_Strict):
-    """A material's source, the edits of its curves by name, and the colours by which its terms are multiplied."""
+    """A material's source, the edits of its curves by name, and the colours that multiply its terms."""
 
     source: Source
     curves: dict[Name, CurveEdit] = Field(default_factory=dict, max_length=MOST_PARAMETERS)
@@ -112,7 +112,7 @@ class EditedMaterial(_Strict):
 
 
 class Surroundings(_Strict):
-    """An image that lights the scene instead of the scene's own environment; fields as in `scenes.ImageEnvironment`."""
+    """An image that lights the scene instead of its own environment; fields as in `scenes.ImageEnvironment`."""
 
     file: Place
     scale: Annotated[float, Field(gt=0, le=LARGEST)] = 1.0
@@ -122,7 +122,7 @@ class Surroundings(_Strict):
 
 
 class SessionDocument(_Strict):
-    """All of a session.
+    """A whole session.
 
     Attributes
     ----------
@@ -131,11 +131,11 @@ class SessionDocument(_Strict):
     size
         Width and height of the picture in pixels.
     lights
-        Number of triangles that the environment is cut into.
+        Number of triangles that the environment is divided into.
     merged
-        Materials whose objects are made of another one here, by that one's name.
+        Replaced materials: name of the replacement, by material.
     crease_deg
-        Above which angle edges of the scene's meshes are sharp; None where normals are as its files have them.
+        Angle in degrees above which edges of the scene's meshes are sharp; None to use the normals of its files.
     """
 
     format: Literal["lambent-edit-session"] = "lambent-edit-session"
@@ -167,7 +167,7 @@ def load_document(path: Path) -> SessionDocument:
     Raises
     ------
     UserError
-        The file is not JSON, not a session, of another version, too large, or holds an unknown or impossible field.
+        If the file is not JSON, not a session, of another version, too large, or has an unknown or invalid field.
     """
     try:
         data = json.loads(read_bytes(path, LIMIT_BYTES).decode("utf-8-sig"))

@@ -1,4 +1,4 @@
-"""Edited materials as material documents: exact where their curves still are a document's, fitted lobes elsewhere."""
+"""Edited materials as material documents: exact where curves still match a document's, otherwise fitted lobes."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ from lambent.materials.models import model_named
 from lambent.materials.models.kurt import Kurt
 from lambent.materials.models.lambert import Lambert
 
-SAME = 1e-9  # relative difference of curves that are a multiple of each other
+SAME = 1e-9  # relative difference up to which curves count as multiples of each other
 COMPARED = 60_000  # tuples, at most
 
 
 @dataclass(frozen=True)
 class ExportedMaterial:
-    """An edited material as a document, and what it lost.
+    """An edited material as a document, and the loss of the conversion.
 
     Attributes
     ----------
     material : Material
         With its provenance.
     fitted : tuple of str
-        Names of the terms that lobes were fitted to; none where the document is exact.
+        Names of the terms replaced by fitted lobes; empty if the document is exact.
     errors, shares : dict of float
-        By metric: E between the edited curves and the document, and the same as a share of the curves' own size.
+        By metric: E between the edited curves and the document, and E relative to the curves' own size.
     light : dict of float
-        By side, light that the document scatters over that of the curves.
+        By side: scattered light, document over curves.
     verdict : Verdict
         faithful, approximate or unusable, as for exports.
     warnings : tuple of str
@@ -68,10 +68,10 @@ def export(
     distribution: Literal["beckmann", "ggx", "best"] = "best",
     progress: Progress = silent,
 ) -> ExportedMaterial:
-    """The document of a material of a session as it is edited now.
+    """Convert a material of a session, as edited now, to a document.
 
-    Diffuse terms and lobes whose curves are those of a document, or multiples of them, stay what they are. Lobes, and a
-    diffuse term, are fitted to the sum of the others; `lobes`, `metric` and `distribution` are as in `fitting.fit`.
+    Diffuse terms and lobes whose curves are a document's, or multiples of them, are kept. Lobes and a diffuse term are
+    fitted to the sum of the others; `lobes`, `metric` and `distribution` are as in `fitting.fit`.
     """
     edited, start = session.editable(name), session.original(name)
     document = _document(session.document.materials[name].source)
@@ -100,7 +100,7 @@ def export(
 
 
 def _document(source: OfDocument | OfModel | OfTable) -> Material | None:
-    """The document that a material began as; None where it began as curves that no document holds."""
+    """The document that a material started as; None if it started as curves that no document represents."""
     if isinstance(source, OfDocument):
         return source.material
     if isinstance(source, OfModel):
@@ -113,7 +113,7 @@ def _document(source: OfDocument | OfModel | OfTable) -> Material | None:
 
 
 def _kept(document: Material, start: Editable, edited: Editable) -> tuple[Material, set[str]]:
-    """The part of a document that edits left, or multiplied by a colour, and the names of the terms beyond it."""
+    """The part of a document that edits left unchanged or multiplied by a colour, and the names of the other terms."""
     assert {term.name for term in of_material(document).terms} == {term.name for term in start.terms}
     multiples = _multiples(start, edited)
     lobes: list[Lobe] = []
@@ -135,7 +135,7 @@ def _kept(document: Material, start: Editable, edited: Editable) -> tuple[Materi
 
 
 def _multiples(start: Editable, edited: Editable) -> dict[str, Floats | None]:
-    """By term, the colour (3,) by which edits multiplied it; None where they did anything else."""
+    """By term, the colour (3,) by which edits multiplied it; None for any other edit."""
     found: dict[str, Floats | None] = {}
     for before, after in zip(start.terms, edited.terms, strict=True):
         scale = np.divide(after.scale, before.scale, out=np.ones(3), where=np.array(before.scale) != 0)
@@ -146,7 +146,7 @@ def _multiples(start: Editable, edited: Editable) -> dict[str, Floats | None]:
 
 
 def _multiple(before: Curve, after: Curve) -> Floats | None:
-    """The colour (3,) that makes `after` of `before`, or None."""
+    """The colour (3,) with `after` = colour x `before`, or None."""
     if before is after:
         return np.ones(3)
     peak = before.values.argmax(axis=0), np.arange(3)
@@ -157,14 +157,14 @@ def _multiple(before: Curve, after: Curve) -> Floats | None:
 
 
 def _common(multiples: list[Floats | None]) -> Floats | None:
-    """The multiple that all of a lobe's terms have, or None."""
+    """The multiple that all terms of a lobe share, or None."""
     first = multiples[0]
     same = [by is not None and first is not None and np.allclose(by, first, rtol=SAME) for by in multiples]
     return first if all(same) else None
 
 
 def _sum(one: Material, other: Material) -> Material:
-    """Two documents whose light adds up; the diffuse terms of both are coupled, or neither is."""
+    """The sum of two documents; the diffuse terms of both are coupled, or neither is."""
     kd, kt_d = (triple(np.add(getattr(one, name), getattr(other, name))) for name in ("kd", "kt_d"))
     return one.model_copy(update={"kd": kd, "kt_d": kt_d, "lobes": (*one.lobes, *other.lobes)})
 
@@ -198,7 +198,7 @@ def _provenance(
 
 
 def _origin(source: OfDocument | OfModel | OfTable) -> tuple[str, str | None, str]:
-    """Name, hash and format of what a material began as."""
+    """Name, hash and format of the source of a material."""
     if isinstance(source, OfDocument):
         return source.material.name, None, "material document"
     if isinstance(source, OfModel):

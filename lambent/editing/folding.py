@@ -1,8 +1,8 @@
-"""Switching curves: transport of two curves folded with the one that stays (Ben-Artzi 2007, eq. 4.16).
+"""Switching the edited curve: transport over two curves is folded with the idle one (Ben-Artzi 2007, eq. 4.16).
 
     T_A = U c_B,   T_B = (c_A)^T U
 
-The result is transport of one curve, in the wavelets that `IncrementalPicture` wants.
+The result is transport over one curve, in wavelets, as `IncrementalPicture` needs it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from lambent.core.wavelets import TAPS
 from lambent.editing.packed_light import add_light
 from lambent.editing.products import Halves, half_of_float
 
-TOGETHER = 16  # points whose rows stay in the first-level cache, in another set of it each
+TOGETHER = 16  # points whose rows stay in the first-level cache, each in another of its sets
 
 
 def folded(
@@ -27,30 +27,30 @@ def folded(
     edited: int,
     bands: int,
 ) -> tuple[Halves, float]:
-    """Transport of the edited one of two curves, with the other's coefficients folded in.
+    """Transport over the edited one of two curves, with the other's coefficients folded in.
 
     Parameters
     ----------
     spans : (P, 2)
         First entry of each point, and the one past its last.
     steps : (N,)
-        From each entry's pair of bands to the next entry's. With K bands of the second curve, bands j and k are pair
-        j K + k; each point begins at -1.
+        Difference of each entry's pair of bands to the previous one's. With K bands of the second curve, bands j and k
+        are pair j K + k; each point begins at -1.
     values : (N,)
-        Transport by these, RGB9E5 (`core.shared_exponent`).
+        Transport by these pairs, RGB9E5 (`core.shared_exponent`).
     idle : (K, 3)
-        Means of the curve that stays over its bands.
+        Means of the idle curve over its bands.
     edited : {0, 1}
-        Which of the two is edited.
+        Index of the edited curve.
     bands : int
         Its number of bands, a power of two.
 
     Returns
     -------
     transport : (bands, 3, P) float16
-        By wavelets, for an idle curve whose largest coefficient is 1.
+        By wavelets, for an idle curve scaled to a largest coefficient of 1.
     scale : float
-        That coefficient: what transport is to be multiplied by. Half floats would overflow with narrow peaks.
+        That coefficient, to multiply transport by. Without scaling, narrow peaks would overflow half floats.
     """
     scale = float(np.abs(idle).max()) or 1.0
     out = np.empty((bands, 3, len(spans)), np.uint16)
@@ -65,7 +65,7 @@ def folded(
 
 @numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
 def _fold(out, spans, steps, values, means, places, taps):  # type: ignore[no-untyped-def]
-    """`places` are the bits of a pair's number that are bands of the edited curve, and of the idle one: shift, mask."""
+    """`places` locates the bands in a pair's number: shift and mask of the edited curve, then of the idle one."""
     bands, _, points = out.shape
     shift, mask, idle_shift, idle_mask = places
     for block in numba.prange((points + TOGETHER - 1) // TOGETHER):
@@ -83,7 +83,7 @@ def _fold(out, spans, steps, values, means, places, taps):  # type: ignore[no-un
 
 @numba.njit(fastmath=True, cache=True)
 def write_wavelets(out, first, rows, before, taps):  # type: ignore[no-untyped-def]
-    """out[:, :, first:] (J, 3, P) = halves of `core.wavelets.transformed` of rows (J, TOGETHER, 4), which change."""
+    """out[:, :, first:] (J, 3, P) = halves of `core.wavelets.transformed` of rows (J, TOGETHER, 4); overwrites rows."""
     bands, _, points = out.shape
     a, b, c, d = taps
     size = bands

@@ -1,4 +1,4 @@
-"""Tables with an entry for every half float: any function of one channel, fast enough for every frame of a drag."""
+"""Tables with an entry for every half float: any function of one channel, fast enough for each frame of a drag."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from lambent.editing.products import half_of_float
 
 
 def looked_up(radiance: Image, table: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """(H, W, 4): entries of `table` (32768,), by the bits of the half floats next to radiance (H, W, 3); alpha 255.
+    """(H, W, 4): entries of `table` (32768,), by the bits of the half floats nearest to radiance (H, W, 3); alpha 255.
 
-    What is below 0 counts as 0, what is above the largest half float as that.
+    Values are clamped to the range from 0 to the largest half float.
     """
     out = np.empty((*radiance.shape[:2], 4), np.uint8)
     _look_up(out.reshape(-1, 4), np.ascontiguousarray(radiance, np.float32).reshape(-1, 3), table)

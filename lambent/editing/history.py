@@ -1,4 +1,4 @@
-"""Undo and redo without limit. States are frozen and share all that did not change, so a step costs little memory."""
+"""Unlimited undo and redo. States are frozen and share everything unchanged, so that a step costs little memory."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ State = TypeVar("State")
 
 
 class History(Generic[State]):
-    """A state and those before it. A stroke is what one drag does: any number of changes, undone as a whole.
+    """A state and its predecessors. A stroke groups the changes of one drag, to be undone together.
 
     Attributes
     ----------
     now
-        The present state.
+        The current state.
     """
 
     def __init__(self, state: State) -> None:
@@ -23,7 +23,7 @@ class History(Generic[State]):
         self._stroke: list[State] = []  # the state before the open stroke
 
     def change(self, state: State) -> None:
-        """Go to `state`: a step of its own, or a part of the open stroke."""
+        """Go to `state`, as a step of its own or as part of the open stroke."""
         if self._stroke:
             self.now = state
         else:
@@ -34,7 +34,7 @@ class History(Generic[State]):
         self._stroke = [self.now]
 
     def restart_stroke(self) -> None:
-        """Back to the state before the open stroke, from which the next move of a drag begins."""
+        """Return to the state before the open stroke, from which the next move of a drag starts."""
         if self._stroke:
             self.now = self._stroke[0]
 
@@ -55,7 +55,7 @@ class History(Generic[State]):
 
     @property
     def previous(self) -> State | None:
-        """The state before the open stroke, else before the last step; None where there is none."""
+        """The state before the open stroke, else before the last step; None if there is none."""
         return next(iter(self._stroke or self._past[-1:]), None)
 
     @property

@@ -1,8 +1,8 @@
 """Operators on curves: translate and amplify a region, in x and in y (Ben-Artzi 2007, chapter 9).
 
-An operator acts fully in [b, c], falls smoothly to nothing at a and d, and changes nothing outside. Its helper function
-has derivatives of every order, so no kink is made. Operators are layered: those in y first, then those in x, because an
-operator in x moves the regions of the others.
+An operator has full effect in [b, c], fades smoothly to none at a and d, and changes nothing outside. Its step function
+is infinitely differentiable, so it creates no kinks. Operators are layered: first those in y, then those in x, because
+operators in x move the regions of the others.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class _Record(BaseModel):
 
 
 class Region(_Record):
-    """Where an operator acts, in radians: a < b <= c < d. The ends may lie outside of the curve."""
+    """Region of an operator, in radians: a < b <= c < d. The ends may lie outside the curve."""
 
     a: Finite
     b: Finite
@@ -40,7 +40,7 @@ class Region(_Record):
         return self
 
     def weight(self, x: Floats) -> Floats:
-        """Strength (...) of an operator at x: 1 in [b, c], 0 outside of (a, d), smooth in between."""
+        """Strength (...) of an operator at x: 1 in [b, c], 0 outside (a, d), smooth in between."""
         rise, fall = (x - self.a) / (self.b - self.a), (self.d - x) / (self.d - self.c)
         return smooth_step(np.minimum(rise, fall))
 
@@ -72,7 +72,7 @@ class Operator(_Record):
         return self
 
     def source(self, x: Floats) -> Floats:
-        """Where the edited curve at x takes its value from; x itself for operators in y."""
+        """Angle whose value the edited curve takes at x; x itself for operators in y."""
         weight = self.region.weight(x)
         if self.kind == "translate_x":
             return np.asarray(x - self.size * weight)
@@ -81,7 +81,7 @@ class Operator(_Record):
         return x
 
     def applied(self, curve: Curve) -> Curve:
-        """The edited curve, not below 0."""
+        """The edited curve, clamped at 0."""
         x = angles_rad()
         weight = self.region.weight(x)[:, None]
         if self.kind == "translate_y":
@@ -95,20 +95,20 @@ class Operator(_Record):
 
 
 def layered(curve: Curve, operators: Iterable[Operator]) -> Curve:
-    """The curve after all operators, in their order."""
+    """The curve after all operators, in order."""
     for operator in operators:
         curve = operator.applied(curve)
     return curve
 
 
 def translation(region: Region, x: float, y: float, channels: tuple[Literal[0, 1, 2], ...]) -> tuple[Operator, ...]:
-    """A drag by x radians and y: the translation in y first, so that it acts where the region is."""
+    """A drag by x radians and y: the translation in y comes first, to act where the region is."""
     sizes: tuple[tuple[Kind, float], ...] = (("translate_y", y), ("translate_x", x))
     return tuple(Operator(kind=kind, region=region, size=size, channels=channels) for kind, size in sizes if size)
 
 
 def room_for(region: Region, x: float) -> Region:
-    """`region` with ramps as wide as a translation by x radians needs."""
+    """`region` with ramps widened as far as a translation by x radians needs."""
     need = abs(x) * STEEPEST * 1.01
     a = min(region.a, region.b - need) if x > 0 else region.a
     d = max(region.d, region.c + need) if x < 0 else region.d
@@ -116,7 +116,7 @@ def room_for(region: Region, x: float) -> Region:
 
 
 def smooth_step(t: Floats) -> Floats:
-    """0 for t <= 0, 1 for t >= 1, e(t) / (e(t) + e(1 - t)) between with e(t) = exp(-1/(2t)^2): C-infinity."""
+    """0 for t <= 0, 1 for t >= 1, in between e(t) / (e(t) + e(1 - t)) with e(t) = exp(-1/(2t)^2): C-infinity."""
     inside = np.clip(t, 1e-3, 1 - 1e-3)  # beyond, the step is 0 or 1 in float64
     difference = 1 / (2 * inside) ** 2 - 1 / (2 * (1 - inside)) ** 2
     step = 1 / (1 + np.exp(np.clip(difference, -700, 700)))

@@ -1,6 +1,7 @@
-"""Sums of packed colours (`core.shared_exponent`), the channels side by side.
+"""Sums of packed colours (`core.shared_exponent`), with vectorized channels.
 
-numba does not find this by itself: an entry takes a third of the time. Places are flat numbers in contiguous arrays.
+numba does not vectorize this by itself; each entry takes a third of the time. Positions are flat indices of contiguous
+arrays.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ def _each(*numbers: int) -> ir.Constant:
 
 
 def _place(context: Any, builder: Any, signature: Any, args: Any, k: int) -> Any:
-    """Where the array of argument k is, at the number of the next argument."""
+    """Address in array argument k, at the index given by the next argument."""
     data = context.make_array(signature.args[k])(context, builder, args[k]).data
     return builder.bitcast(builder.gep(data, [args[k + 1]]), REAL.as_pointer())
 

@@ -1,8 +1,8 @@
-"""Per-band incremental pictures, for edits that change everything, such as a turning environment.
+"""Per-band incremental pictures, for edits that change everything, such as rotating the environment.
 
-Each level of the wavelets is its own incremental picture. Every frame gives each level a share of the terms, and either
-adds its changes or draws it anew from its largest coefficients, whichever leaves less error (Overbeck et al. 2006,
-"Exploiting temporal coherence for incremental all-frequency relighting").
+Each level of the wavelets is a separate incremental picture. Every frame gives each level a share of the terms, and
+either adds its changes or redraws it from its largest coefficients, whichever leaves the smaller error (Overbeck et al.
+2006, "Exploiting temporal coherence for incremental all-frequency relighting").
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ class PerBandPicture:
     Parameters
     ----------
     transport
-        (J, C, P) float16 of wavelets, coarse to fine; or rows that are sparse.
+        (J, C, P) float16 by wavelets, coarse to fine; or sparse rows.
     levels
-        (J,) level of each, not decreasing (`core.wavelets.levels`).
+        (J,) level of each, in ascending order (`core.wavelets.levels`).
     """
 
     def __init__(self, transport: Halves | SparseRows, levels: NDArray[np.integer]) -> None:
@@ -49,24 +49,24 @@ class PerBandPicture:
         return np.concatenate([level.effective for level in self._levels])
 
     def want(self, coefficients: Floats) -> None:
-        """Set the coefficients (J, C) that the picture is to show."""
+        """Set the coefficients (J, C) for the picture to show."""
         for level, part in zip(self._levels, self._ranges, strict=True):
             level.want(coefficients[part])
 
     def step(self, terms: int = TERMS) -> None:
-        """One frame of `terms` terms, or fewer where they make the picture exact."""
+        """One frame of `terms` terms, or fewer if they make the picture exact."""
         for level, (share, anew) in zip(self._levels, self._shares(terms), strict=True):
             if anew:
                 level.clear()
             level.step(share)
 
     def draw(self) -> None:
-        """The exact picture at once, from every coefficient."""
+        """Draw the exact picture at once, from every coefficient."""
         for level in self._levels:
             level.draw()
 
     def _shares(self, terms: int) -> list[tuple[int, bool]]:
-        """(terms, whether drawn anew) of each level: the largest drops of squared error per term come first."""
+        """(terms, whether to redraw) for each level: the largest drops of squared error per term come first."""
         changed = [_errors_left(level.wanted - level.effective) for level in self._levels]
         anew = [_errors_left(level.wanted) for level in self._levels]
         best = [np.minimum(a, b) for a, b in zip(changed, anew, strict=True)]
@@ -81,7 +81,7 @@ class PerBandPicture:
 
 
 def _errors_left(coefficients: Floats) -> Floats:
-    """(J + 1,) squared error after the 0, 1, ... J largest of the coefficients (J, C) were drawn."""
+    """(J + 1,) squared error after drawing the 0, 1, ... J largest of the coefficients (J, C)."""
     energy = np.sort(np.sum(coefficients * coefficients, axis=1))
     return np.concatenate([[0.0], np.cumsum(energy)])[::-1]
 

@@ -1,4 +1,4 @@
-"""The edited picture of a view: every term of every material, each an incremental picture, over what is not edited.
+"""The edited picture of a view: every term of every material as an incremental picture, over the unedited part.
 
     radiance = sum over terms of  f_q f_o(theta_o) texture  sum over j of  c_j T_j        (Ben-Artzi 2007, eqs 3.1, 4.6)
 
@@ -31,15 +31,15 @@ class Part:
     Attributes
     ----------
     start : Editable
-        What the transport was computed for.
+        The material for which transport was computed.
     pixel : (P,) int
-        row * width + column, each once.
+        row * width + column, without repeats.
     theta_o : (P,)
         Angle between the viewer and the normal, in radians.
     transport : tuple
-        Of each term of `start`. `Rows` of a term with two curves hold for the other curve as it is in `start`.
+        For each term of `start`. `Rows` of a term with two curves are valid for the other curve as it is in `start`.
     diffuse, specular : (P, 3), optional
-        What textures multiply diffuse and other terms by; None where there are none, or the transport has them.
+        Textures that multiply diffuse and other terms; None if there are none, or if transport includes them.
     """
 
     start: Editable
@@ -51,13 +51,13 @@ class Part:
 
 
 class TransportNeeded(Exception):
-    """The transport of a material does not serve the edit: another quotient, or a second curve without its matrix.
+    """Transport of a material cannot show an edit: another quotient, or a second curve without its matrix.
 
     Attributes
     ----------
     material : str
     terms : tuple of str
-        Names of the terms whose transport has to be computed.
+        Names of the terms that need new transport.
     """
 
     def __init__(self, material: str, terms: tuple[str, ...]) -> None:
@@ -71,11 +71,11 @@ class EditedPicture:
     Parameters
     ----------
     background : (H, W, 3) float32
-        Linear radiance of what is not edited; where a part is, what its surfaces emit.
+        Linear radiance of the unedited part; in pixels of parts, the emission of their surfaces.
     parts
-        By name of the material.
+        By material name.
     canvas
-        Makes what holds the picture; by default in memory.
+        Creates the canvas; by default in memory.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class EditedPicture:
             self.put(name, part)
 
     def put(self, material: str, part: Part) -> None:
-        """Add a material, or replace its transport (of more lights, of another quotient), and draw `part.start`."""
+        """Add a material, or replace its transport (more lights, another quotient), and draw `part.start`."""
         made = zip(part.start.terms, part.transport, strict=True)
         terms = [_TermPicture(term, transport, part, self.canvas) for term, transport in made]
         for term, start in zip(terms, part.start.terms, strict=True):
@@ -107,10 +107,10 @@ class EditedPicture:
         self._parts[material], self._terms[material] = part, terms
 
     def show(self, material: str, edited: Editable) -> None:
-        """Let the picture go to a material as it is edited now; frames do so by `step`, or at once by `draw`.
+        """Set a material as now edited as the target; frames approach it by `step`, `draw` reaches it at once.
 
-        Of two curves in a term, the one that changes becomes active. Raises `TransportNeeded`, and leaves the picture
-        as it is, where the transport serves no such edit, and `UserError` where no pixel shows the material.
+        Of two curves in a term, the one that changes becomes active. Raises `TransportNeeded`, leaving the picture
+        unchanged, if the transport cannot show the edit, and `UserError` if no pixel shows the material.
         """
         known("material in view", material, self._parts)
         part, terms = self._parts[material], self._terms[material]
@@ -125,48 +125,48 @@ class EditedPicture:
             term.show(edited.curves, now)
 
     def activate(self, material: str, curve: str) -> None:
-        """Make a curve the active one of its terms, before it is dragged. Errors as of `show`."""
+        """Make a curve the active one of its terms, before it is dragged. Raises the errors of `show`."""
         known("material in view", material, self._parts)
         known("curve", curve, self._parts[material].start.curves)
         for term in self._terms[material]:
             term.activate(curve)
 
     def step(self, terms: int = TERMS) -> None:
-        """One frame: the `terms` largest changes of all active pictures together."""
+        """One frame: the `terms` largest changes over all active pictures."""
         active = [term for pictures in self._terms.values() for term in pictures if not term.is_settled]
         sizes = [term.sizes_of_changes() for term in active]
         whose = np.repeat(np.arange(len(active)), [len(size) for size in sizes])
         size = np.concatenate([*sizes, np.zeros(0)])
         largest = np.argpartition(-size, terms - 1)[:terms] if len(size) > terms else np.arange(len(size))
         shares = np.bincount(whose[largest[size[largest] > 0]], minlength=len(active))
-        if not shares.any():  # squares of tiny changes are 0
+        if not shares.any():  # squares of tiny changes underflow to 0
             shares[:] = terms
         for term, share in zip(active, shares, strict=True):
             term.step(int(share))
 
     def draw(self) -> None:
-        """The exact picture at once."""
+        """Draw the exact picture at once."""
         for terms in self._terms.values():
             for term in terms:
                 term.draw()
 
     @property
     def is_exact(self) -> bool:
-        """Whether the picture shows all that is wanted."""
+        """Whether the picture shows the target exactly."""
         return all(term.picture.is_exact for terms in self._terms.values() for term in terms)
 
     @property
     def is_settled(self) -> bool:
-        """Whether it does and every pixel was computed anew since: another frame would change no bit."""
+        """Whether it is exact and every pixel has been recomputed since: another frame would not change a bit."""
         return all(term.is_settled for terms in self._terms.values() for term in terms)
 
     def compose(self) -> None:
-        """Bring the canvas up to date: where it is shown from a GPU's memory, frames end with this."""
+        """Update the canvas; a frame shown from a GPU's memory ends with this."""
         self.canvas.compose(self.shown)
 
     @property
     def shown(self) -> list[tuple[Layer, NDArray[np.float32]]]:
-        """Layers with their scales, to be composed."""
+        """Layers with their scales, for composition."""
         return [(term.layer, term.scale) for terms in self._terms.values() for term in terms]
 
     def image(self) -> Image:
@@ -176,7 +176,7 @@ class EditedPicture:
 
 
 class _TermPicture:
-    """One term: its incremental picture over the active curve, and what multiplies it."""
+    """One term: its incremental picture over the active curve, and its factors."""
 
     def __init__(self, term: Term, transport: Rows | PairTransport, part: Part, canvas: Canvas) -> None:
         self.name, self._factors, self._start = term.name, term.factors, part.start.curves
@@ -186,7 +186,7 @@ class _TermPicture:
         self.layer = canvas.layer(part.pixel, part.theta_o, texture)
         self._viewer: Curve | None = None
         self._shown, self._colour = self._start, term.scale
-        self._to_renew = 0  # blocks of pixels that are older than the last edit
+        self._to_renew = 0  # blocks of pixels not recomputed since the last edit
         self._active = transport.over if isinstance(transport, Rows) else 0
         if isinstance(transport, Rows):
             self._use(self.layer.hold(transport.values), transport.unit)
@@ -198,14 +198,14 @@ class _TermPicture:
         return self.picture.is_exact and self._to_renew <= 0
 
     def serves(self, curves: Mapping[str, Curve]) -> bool:
-        """Whether curves can be shown with this transport."""
+        """Whether this transport can show the curves."""
         if len(self._factors) < 2 or not isinstance(self._transport, Rows):
             return True
         idle = self._factors[1 - self._active].curve
         return curves[idle] is self._start[idle] or np.array_equal(curves[idle].values, self._start[idle].values)
 
     def show(self, curves: Mapping[str, Curve], term: Term) -> None:
-        """Want the curves, and the scale of `term`."""
+        """Set curves, and the scale of `term`, as the target."""
         before, self._shown, self._colour = self._shown, curves, term.scale
         viewer = curves[term.viewer] if term.viewer else None
         if viewer is not self._viewer:
@@ -216,17 +216,17 @@ class _TermPicture:
         self._want()
 
     def activate(self, curve: str) -> None:
-        """Fold the other curve in where this term has two and `curve` is idle."""
+        """Fold in the other curve if this term has two and `curve` is idle."""
         if self._pairs is not None and self._factors[1 - self._active].curve == curve:
             self._refold(1 - self._active)
 
     @property
     def scale(self) -> NDArray[np.float32]:
-        """(3,): radiance of a value of 1 in the picture."""
+        """(3,) radiance of value 1 in the picture."""
         return np.asarray(np.multiply(self._colour, self._unit), np.float32)
 
     def sizes_of_changes(self) -> Floats:
-        """(J,) squared size of the changes that frames have to make, as they show."""
+        """(J,) squared visible size of the changes left for later frames."""
         change = (self.picture.wanted - self.picture.effective) * self.scale
         return np.asarray(np.sum(change * change, axis=1))
 
@@ -258,7 +258,7 @@ class _TermPicture:
         self.draw()
 
     def _folded(self) -> tuple[Products, float]:
-        """Products over the active curve, with the idle one as it is shown, and the radiance of a value of 1."""
+        """Products over the active curve, with the idle one as shown folded in, and the radiance of value 1."""
         assert self._pairs is not None
         idle = 1 - self._active
         factor = self._factors[idle]
@@ -275,7 +275,7 @@ class _TermPicture:
 
 
 def _counts(transport: Rows | PairTransport, factors: int) -> dict[int, int]:
-    """Number of wavelets by number of the factor."""
+    """Number of wavelets, by index of the factor."""
     if not isinstance(transport, Rows):
         assert factors == 2, "a matrix of transport is for a term with two curves"
         return dict(enumerate(transport.counts))

@@ -1,7 +1,7 @@
-"""Sums of transport rows: what every edited picture is made of, on all cores.
+"""Sums of transport rows, the kernel of every edited picture, on all cores.
 
-Transport is band-major, (J, C, P) half floats: J bands or wavelets, C colour channels, P pixels. A picture needs few
-rows of it, and those whole; the reads are in sequence, and half the bytes of float32.
+Transport is band-major, (J, C, P) half floats: J bands or wavelets, C colour channels, P pixels. A picture needs few of
+its rows, each whole; reads are sequential, and half the size of float32.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Pixels = NDArray[np.float32]
 
 @intrinsic
 def float_of_half(_typing, bits):  # type: ignore[no-untyped-def]
-    """numba has no half floats on the CPU; the processor does."""
+    """Convert a half float on the processor; numba has no half floats on the CPU."""
 
     def generate(_context, builder, _signature, args):  # type: ignore[no-untyped-def]
         return builder.fpext(builder.bitcast(args[0], ir.HalfType()), ir.FloatType())
@@ -56,7 +56,7 @@ def _float_of_bits(_typing, bits):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def unit_of(bits):  # type: ignore[no-untyped-def]
-    """What a mantissa of 1 stands for in a colour of `core.shared_exponent`."""
+    """Value of mantissa 1 in a colour of `core.shared_exponent`."""
     return _float_of_bits(np.uint32(((bits >> 27) + 103) << 23))  # type: ignore[call-arg]
 
 
@@ -68,7 +68,7 @@ def _add(picture, transport, rows, weights, begin, end):  # type: ignore[no-unty
         c, first = piece // blocks, begin + piece % blocks * BLOCK
         last = min(end, first + BLOCK)
         used = np.flatnonzero(weights[:, c])
-        for k in range(0, used.size - 3, 4):  # four rows at once: memory delivers them together
+        for k in range(0, used.size - 3, 4):  # four rows at once use memory bandwidth best
             i, j, m, n = rows[used[k]], rows[used[k + 1]], rows[used[k + 2]], rows[used[k + 3]]
             f, g = weights[used[k], c], weights[used[k + 1], c]
             u, v = weights[used[k + 2], c], weights[used[k + 3], c]
@@ -94,7 +94,7 @@ def add_rows(
 
 
 class Products(Protocol):
-    """A picture of sums of transport rows, in memory (`HostProducts`) or on a GPU (`lambent.realtime.edited`)."""
+    """A picture made of sums of transport rows, in memory (`HostProducts`) or on a GPU (`lambent.realtime.edited`)."""
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -102,30 +102,30 @@ class Products(Protocol):
 
     @property
     def picture(self) -> Pixels:
-        """(C, P) float32: the sums so far, 0 at first."""
+        """(C, P) float32: the sums so far, initially 0."""
 
     def add_rows(
         self, rows: NDArray[np.integer], weights: Floats, part: slice = slice(None), *, anew: bool = False
     ) -> None:
         """picture (C, P) += sum over k of weights[k] (C,) transport[rows[k]] (C, P) in `part` of the pixels.
 
-        With `anew` the sum takes the place of what was there.
+        With `anew` the sum replaces the previous values.
         """
 
 
 class Summable(Protocol):
-    """Rows that are kept in another way."""
+    """Rows with another storage format."""
 
     @property
     def shape(self) -> tuple[int, int, int]:
         """(J, C, P) of the transport."""
 
     def add_to(self, picture: Pixels, rows: NDArray[np.integer], weights: Floats, part: slice = slice(None)) -> None:
-        """As the function `add_rows`."""
+        """Like the function `add_rows`."""
 
 
 class HostProducts:
-    """`Products` of transport (J, C, P) float16 in memory, or of other rows, summed by all cores."""
+    """`Products` of transport (J, C, P) float16 in memory, or of `Summable` rows, summed on all cores."""
 
     def __init__(self, transport: Halves | Summable) -> None:
         self._transport = transport

@@ -1,4 +1,4 @@
-"""Relighting: the same incremental pictures the other way, with BRDFs fixed and the environment turned or changed.
+"""Relighting: incremental pictures with fixed BRDFs and an environment that rotates or changes.
 
 picture = sum over wavelets of light of  coefficient * row          (Ben-Artzi 2007, section 7.3; Overbeck 2006)
 """
@@ -17,14 +17,14 @@ from lambent.scenes.triangle_wavelets import TriangleTree
 
 
 class RelitPicture:
-    """A picture under an environment that changes.
+    """A picture under a changing environment.
 
     Parameters
     ----------
     tree
         The N triangles that light the scene.
     transport : (N, 3, P) float32, or SparseRows
-        Radiance of the P pixels that each triangle makes with a radiance of 1; or the wavelets of that.
+        Radiance of the P pixels due to each triangle at radiance 1; or its wavelets.
     """
 
     def __init__(self, tree: TriangleTree, transport: Pixels | SparseRows) -> None:
@@ -37,7 +37,7 @@ class RelitPicture:
 
     @property
     def is_exact(self) -> bool:
-        """Whether the picture shows all of the light."""
+        """Whether the picture shows the light exactly."""
         return self._picture.is_exact
 
     @property
@@ -46,13 +46,13 @@ class RelitPicture:
         return self._picture.picture * np.float32(self._unit)
 
     def light(self, radiance: Floats) -> None:
-        """Let the picture go to an environment of radiance (N, 3), by frames (`step`) or at once (`draw`)."""
+        """Set an environment of radiance (N, 3) as the target, approached by `step` and reached by `draw`."""
         self._picture.want(self._tree.of_radiance(np.asarray(radiance, float)))
 
     def step(self, terms: int = TERMS) -> None:
-        """One frame: of each level of wavelets the largest changes, or the level anew, whichever errs less."""
+        """One frame: per level of wavelets, add the largest changes or redraw, whichever has the smaller error."""
         self._picture.step(terms)
 
     def draw(self) -> None:
-        """The exact picture at once."""
+        """Draw the exact picture at once."""
         self._picture.draw()

@@ -1,4 +1,4 @@
-"""A baked view under an environment that turns or is replaced, materials as they are (store.contract, relighting)."""
+"""A baked view under an environment that rotates or is replaced, with fixed materials (store.contract, relighting)."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from lambent.scenes.triangle_wavelets import CHILDREN, FACES, TriangleTree, Turn
 from lambent.store.contract import ViewRecord, baked_views, view_artefact_name
 from lambent.store.store import Store
 
-TERMS_OF_LIGHT = 10 * TERMS  # a frame: rows are short, and a turn changes most of them
+TERMS_OF_LIGHT = 10 * TERMS  # per frame: rows are short, and a rotation changes most of them
 
 
 class RelitView:
-    """The picture of a view of a store under a changing environment; it begins with that of the bake.
+    """The picture of a stored view under a changing environment; it starts with that of the bake.
 
     Parameters
     ----------
     camera, width, height
-        Of a view that `bake(..., only={"relighting"}, views=[...])` was called for.
+        Of a view baked with `bake(..., only={"relighting"}, views=[...])`.
 
     Attributes
     ----------
     error : float
-        What the store has left out and rounded, as a share of the transport's norm (root mean square).
+        Omitted and rounded part of the stored transport, relative to its norm (root mean square).
 
     Raises
     ------
     UserError
-        The store has no relighting of the view.
+        If the store has no relighting of the view.
     """
 
     def __init__(self, store: Store, camera: Camera, width: int, height: int) -> None:
@@ -64,23 +64,23 @@ class RelitView:
 
     @property
     def is_exact(self) -> bool:
-        """Whether the picture shows all of the light."""
+        """Whether the picture shows the light exactly."""
         return self._picture.is_exact
 
     def turn(self, rotation_deg: float) -> None:
-        """Let the picture go to the environment turned about +y, from where it was baked or given."""
+        """Set as the target the environment rotated about +y, relative to the bake or to the last `light`."""
         angle = np.radians(rotation_deg % 360)
         c, s = np.cos(angle), np.sin(angle)
         self._turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) @ self._laid
         self._picture.light(self._light.radiance(None if self._is_upright else self._turn))
 
     def light(self, environment: Environment | None) -> None:
-        """Let the picture go to another environment, or back to that of the bake (None).
+        """Set another environment as the target, or that of the bake (None).
 
         Raises
         ------
         UserError
-            It is daylight, which a bake alone computes, or its file cannot be read.
+            If it is daylight, which only a bake can compute, or its file cannot be read.
         """
         self._around = None if environment is None else environment_picture(environment)
         self._light = self._baked if self._around is None else TurningLight.of_picture(self._tree, self._around)
@@ -88,11 +88,11 @@ class RelitView:
         self.turn(0.0)
 
     def step(self, terms: int = TERMS_OF_LIGHT) -> None:
-        """One frame: of each level of wavelets the largest changes, or the level anew, whichever errs less."""
+        """One frame: per level of wavelets, add the largest changes or redraw, whichever has the smaller error."""
         self._picture.step(terms)
 
     def draw(self) -> None:
-        """The exact picture at once."""
+        """Draw the exact picture at once."""
         self._picture.draw()
 
     def image(self) -> Image:
@@ -120,7 +120,7 @@ def _depth(triangles: int) -> int:
 
 
 def views_for_relighting(store: Store) -> dict[str, ViewRecord]:
-    """The views that a store can relight, by the camera's name; of several sizes the one with the most pixels."""
+    """The views that a store can relight, by camera name; of several sizes, the one with the most pixels."""
     found = [
         view for view in baked_views(store).values()
         if view_artefact_name(view.camera, view.width, view.height, "relighting", "spans") in store

@@ -1,7 +1,7 @@
-"""Transport of one term of one material as its edited picture reads it: rows of wavelets, in half floats.
+"""Transport of one term of one material for its edited picture: rows of wavelets, in half floats.
 
-A term with two curves is edited one curve at a time. Its transport is a matrix per pixel, and the curve that is idle is
-folded into it (Ben-Artzi 2007, eqs 4.14, 4.15).
+A term with two curves is edited one curve at a time. Its transport is a matrix per pixel, into which the idle curve is
+folded (Ben-Artzi 2007, eqs 4.14, 4.15).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from lambent.core.wavelets import transformed
 from lambent.editing.products import Halves, Pixels
 from lambent.materials.factored.curve import Curve
 
-NOTHING = 1e-12  # of the largest wavelet; squares of what the tail of a narrow curve has would be 0, and never be drawn
+NOTHING = 1e-12  # of the largest wavelet; squares of smaller ones, in a narrow curve's tail, underflow
 LARGEST = 2.0**14  # of stored rows: a quarter of the largest half float
 
 
@@ -28,11 +28,11 @@ class Rows:
     Attributes
     ----------
     values : (J, 3, P) float16
-        By wavelets of the curve, J a power of two; J = 1 where a term has no curve.
+        By wavelets of the curve, J a power of two; J = 1 for a term without a curve.
     unit : float
-        W/(sr m^2) of a value of 1. Half floats end at 65504; the sun's light does not.
+        W/(sr m^2) of value 1. Half floats end at 65504; the sun's light exceeds that.
     over : int
-        Number of the term's factor that has the curve.
+        Index of the curve among the term's factors.
     """
 
     values: Halves
@@ -41,7 +41,7 @@ class Rows:
 
     @classmethod
     def of_wavelets(cls, transport: Pixels, over: int = 0) -> Rows:
-        """Rows of transport (J, 3, P) in W/(sr m^2), scaled by a power of two so that half floats hold them."""
+        """Rows of transport (J, 3, P) in W/(sr m^2), scaled by a power of two to fit half floats."""
         largest = float(max(transport.max(initial=0.0), -transport.min(initial=0.0)))
         unit = 2.0 ** np.ceil(np.log2(max(largest, 1e-30) / LARGEST))
         return cls((transport / np.float32(unit)).astype(np.float16), float(unit), over)
@@ -60,12 +60,12 @@ class PairTransport(Protocol):
         """Nodes (J, K) of the first and of the second curve, powers of two."""
 
     def fold(self, curve_index: int, values: Floats) -> Rows:
-        """Rows over the other curve, with curve `curve_index`, 0 or 1, folded in by its values (K, 3) at nodes."""
+        """Rows over the other curve, with curve `curve_index`, 0 or 1, folded in by its values (K, 3) at the nodes."""
 
 
 @dataclass(frozen=True)
 class DensePairs:
-    """Transport `bands` (J, K, 3, P) float32, W/(sr m^2), over every pair of nodes of two curves."""
+    """Transport `bands` (J, K, 3, P) float32, W/(sr m^2), over all pairs of nodes of two curves."""
 
     bands: Pixels
 
@@ -80,12 +80,12 @@ class DensePairs:
 
 @lru_cache(maxsize=256)
 def coefficients_of(curve: Curve, count: int, polar: int) -> Floats:
-    """(count, 3) wavelets of a curve's values at nodes: what rows are multiplied by."""
+    """(count, 3) wavelets of a curve's node values, by which rows are multiplied."""
     return wavelets_of(curve.node_values(count, polar))
 
 
 def wavelets_of(values: Floats) -> Floats:
-    """(J, 3) wavelets of coefficients (J, 3), without what no frame would ever draw."""
+    """(J, 3) wavelets of coefficients (J, 3), with negligible ones, which no frame would draw, set to 0."""
     wavelets = transformed(values)
     wavelets[np.abs(wavelets) < NOTHING * np.abs(wavelets).max()] = 0.0
     wavelets.flags.writeable = False

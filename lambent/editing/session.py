@@ -1,4 +1,4 @@
-"""A session: the materials of one view while they are edited, with undo, and as a file.
+"""A session: the materials of one view during editing, with undo, and its file format.
 
 session = Session.new("room", camera, {"teapot": material})
 session.pull("teapot", "highlight", Region(a=0, b=0.1, c=0.2, d=0.4), y=2.0)
@@ -62,17 +62,17 @@ def _curves_of(file: Path) -> Editable:
 class Session:
     """Edits of the materials of one view.
 
-    Every method that edits is one step of undo, or a part of the stroke that is open. Names of materials, curves, terms
-    and parameters that do not exist raise `UserError`, and so do edits that no curve can follow.
+    Every editing method is one step of undo, or a part of the open stroke. Unknown names of materials, curves, terms
+    and parameters raise `UserError`, as do edits that no curve can follow.
 
     Parameters
     ----------
     document
-        The state to begin with.
+        The initial state.
     folder
-        Where its relative file names begin.
+        Base of its relative file names.
     factorise
-        Makes the terms and curves of a table's file; by default `editable_of`.
+        Converts a table's file to terms and curves; by default `editable_of`.
     """
 
     def __init__(self, document: SessionDocument, folder: Path = Path(), factorise: Factorise | None = None) -> None:
@@ -92,7 +92,7 @@ class Session:
         environment: Surroundings | None = None,
         factorise: Factorise | None = None,
     ) -> Session:
-        """A session without edits yet, of materials by their names in the scene."""
+        """A new session without edits, of materials by their names in the scene."""
         sources = {name: EditedMaterial(source=_source(start)) for name, start in materials.items()}
         made = _checked(
             SessionDocument, scene=scene, camera=camera, size=size, environment=environment, materials=sources
@@ -101,12 +101,12 @@ class Session:
 
     @classmethod
     def open(cls, path: Path, factorise: Factorise | None = None) -> Session:
-        """Read a session, and make the curves of all its materials, so that nothing fails later.
+        """Read a session, and create the curves of all its materials, so that nothing fails later.
 
         Raises
         ------
         UserError
-            The document cannot be used (`document.load_document`), names curves, terms or parameters that its materials
+            If the document is unusable (`document.load_document`), names curves, terms or parameters that its materials
             do not have, or a table that is missing or has changed.
         """
         session = cls(load_document(path), path.parent, factorise)
@@ -122,7 +122,7 @@ class Session:
         return session
 
     def save(self, path: Path) -> None:
-        """Write the session, atomically. File names that lead somewhere are written relative to its new folder."""
+        """Write the session, atomically. File names are made relative to its new folder, where possible."""
         document, target = self.document, path.parent
         changes: dict[str, Any] = {"scene": self._moved(document.scene, target)}
         if document.environment is not None:
@@ -134,11 +134,11 @@ class Session:
 
     @property
     def document(self) -> SessionDocument:
-        """The present state."""
+        """The current state."""
         return self.history.now
 
     def path(self, place: str) -> Path:
-        """The file that a place in the document names."""
+        """The file that a place in the document refers to."""
         return self.folder / place
 
     @property
@@ -179,45 +179,45 @@ class Session:
         y: float = 0.0,
         channels: tuple[Literal[0, 1, 2], ...] = ALL,
     ) -> None:
-        """Drag a region of a curve by x radians and y; its ramps widen where the curve would fold."""
+        """Drag a region of a curve by x radians and y; ramps widen where the curve would fold over."""
         self.apply(material, curve, *_made(translation, room_for(region, x), x, y, channels))
 
     def apply(self, material: str, curve: str, *operators: Operator) -> None:
-        """Add operators above the layers that a curve has."""
+        """Add operators on top of a curve's layers."""
         edit = self._curve(material, curve)
         self._change_curve(material, curve, layers=(*edit.layers, *operators))
 
     def remove(self, material: str, curve: str, layer: int) -> None:
-        """Take one layer (0 is the lowest) out."""
+        """Remove one layer (0 is the lowest)."""
         layers = self._curve(material, curve).layers
         if not 0 <= layer < len(layers):
             raise UserError("layer index out of range", field=curve, got=layer, expected=f"0 to {len(layers) - 1}")
         self._change_curve(material, curve, layers=layers[:layer] + layers[layer + 1 :])
 
     def draw(self, material: str, curve: str, drawn: Curve | Drawn) -> None:
-        """Replace a curve by one drawn freehand; its layers go."""
+        """Replace a curve by a freehand one; its layers are removed."""
         self._curve(material, curve)
         self._change_curve(
             material, curve, drawn=drawn if isinstance(drawn, Drawn) else _made(Drawn.of, drawn), layers=()
         )
 
     def collapse(self, material: str, curve: str) -> None:
-        """Make one drawn curve of a curve and its layers. Parameters no longer change it."""
+        """Flatten a curve and its layers to one freehand curve, which parameters no longer change."""
         if self._curve(material, curve).layers:
             self.draw(material, curve, self.editable(material).curves[curve])
 
     def set(self, material: str, **parameters: object) -> bool:
-        """Set parameters of a material that began as a model; returns what `become` does."""
+        """Set parameters of a material that started as a model; returns the result of `become`."""
         source = self._material(material).source
         if not isinstance(source, OfModel):
             raise UserError("has no parameters", field=material, got=f"a {source.kind}", expected="a model")
         return self.become(material, model_named(source.model)(**{**source.parameters, **parameters}))
 
     def become(self, material: str, start: Start) -> bool:
-        """Let a material begin as something else: a document with other numbers, a model, a table.
+        """Change the source of a material: a document with other numbers, a model, or a table.
 
-        Edits of the curves and terms that both have stay; the others go. Returns whether transport that was computed
-        for the material before still serves (`same_quotients`).
+        Edits of curves and terms that both sources have are kept; the others are dropped. Returns whether transport
+        computed for the previous material is still valid (`same_quotients`).
         """
         before, one = self.original(material), self._material(material)
         after = self._made(source := _source(start))
@@ -229,7 +229,7 @@ class Session:
         return same_quotients(before, after)
 
     def tint(self, material: str, term: str, colour: float | Triple) -> None:
-        """Multiply a term by a colour; (1, 1, 1) is as it was. A new tint replaces the one before."""
+        """Multiply a term by a colour, replacing its previous tint; (1, 1, 1) is the original."""
         one = self._material(material)
         known("term", term, [t.name for t in self.original(material).terms])
         given = _checked(EditedMaterial, source=one.source, tints={term: colour})
@@ -245,7 +245,7 @@ class Session:
             self._change_curve(material, curve, drawn=None, layers=())
 
     def merge(self, material: str, other: str) -> None:
-        """Make all objects of a material of another one; its own edits go. The view asks for new transport."""
+        """Give all objects of a material another one; its own edits are dropped. The view needs new transport."""
         self._material(material)
         materials = {name: one for name, one in self.document.materials.items() if name != material}
         known("material", other, materials, field="merged")
@@ -261,7 +261,7 @@ class Session:
 
     @contextmanager
     def stroke(self) -> Iterator[None]:
-        """Edits within are one step of undo, of several materials too; none of them where one fails."""
+        """Group edits, of several materials too, into one step of undo; if one fails, none of them is kept."""
         self.history.begin_stroke()
         try:
             yield
@@ -305,13 +305,13 @@ class Session:
         return self._factorise(file)
 
     def _moved(self, place: str, target: Path) -> str:
-        """A place as it is called from another folder; the name of a built-in scene stays."""
+        """A place relative to another folder; the name of a built-in scene is unchanged."""
         path = self.path(place)
         if Path(place).is_absolute() or not path.exists():
             return place
         try:
             return Path(os.path.relpath(path.resolve(), target.resolve())).as_posix()
-        except ValueError:  # another drive of Windows
+        except ValueError:  # another drive on Windows
             return str(path.resolve())
 
     def _moved_source(self, one: EditedMaterial, target: Path) -> EditedMaterial:
@@ -335,7 +335,7 @@ def _source(start: Start) -> OfDocument | OfModel | OfTable:
 
 
 def _edited(curve: Curve, edit: CurveEdit, field: str) -> Curve:
-    """The curve with its edit; steps stay in a cache, so that a drag computes its own layer alone."""
+    """The curve with its edit; intermediate steps are cached, so that a drag computes only its own layer."""
     if edit.drawn is not None:
         curve = _drawn(edit.drawn)
     try:
@@ -360,7 +360,7 @@ def _drawn(drawn: Drawn) -> Curve:
 
 
 def _made(make: Callable[..., Any], *arguments: Any) -> Any:
-    """`make(...)`; what pydantic refuses is a `UserError`."""
+    """`make(...)`; pydantic's errors become `UserError`."""
     try:
         return make(*arguments)
     except ValidationError as error:

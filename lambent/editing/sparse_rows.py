@@ -1,6 +1,6 @@
-"""Transport rows of which most entries are 0: wavelets of light, by blocks of pixels.
+"""Sparse transport rows: wavelets of light, by blocks of pixels.
 
-The entries of a block lie together, wavelet after wavelet, so that blocks are drawn on all cores, each by one.
+The entries of a block are contiguous, wavelet after wavelet, so that each block is drawn by one core.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ class SparseRows:
     spans : (B, J + 1) int64
         First entry of each row in each block, and one past the last.
     points : (E,) uint16
-        Pixel of each entry within its block, rising in each row.
+        Pixel of each entry within its block, ascending in each row.
     values : (E, 3) float16
     block : int
-        Pixels of a block; the last block may have fewer.
+        Pixels per block; the last block may have fewer.
     pixels : int
         P.
     """
@@ -43,7 +43,7 @@ class SparseRows:
         return self.spans.shape[1] - 1, 3, self.pixels
 
     def __getitem__(self, rows: slice) -> SparseRows:
-        """Some rows, next to each other."""
+        """A range of consecutive rows."""
         begin, end, step = rows.indices(self.shape[0])
         assert step == 1, "rows next to each other"
         return replace(self, spans=np.ascontiguousarray(self.spans[:, begin : end + 1]))

@@ -1,4 +1,4 @@
-"""Transport of a view in a store (store.contract) as the parts of its edited picture."""
+"""Load the transport of a view from a store (store.contract) as the parts of its edited picture."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from lambent.store.store import Store
 
 
 class NotBaked(UserError):
-    """A store has no transport that serves a session."""
+    """The store has no transport that fits the session."""
 
 
 @dataclass(frozen=True)
 class StoredPairs:
-    """Transport of two curves by the pairs of nodes that matter; arrays as in the contract of stores."""
+    """Transport over two curves by the stored pairs of nodes; arrays as in the contract of stores."""
 
     spans: NDArray[np.uint32]
     steps: NDArray[np.uint8]
@@ -48,24 +48,24 @@ class StoredPairs:
 def edited_picture(
     store: Store, session: Session, lights: int | None = None, canvas: Callable[[Image], Canvas] = HostCanvas
 ) -> EditedPicture:
-    """The picture of a session's view, drawn exactly as the session has edited it.
+    """The picture of a session's view, drawn exactly as edited.
 
-    Materials of the view that the session does not edit are drawn as the scene has them.
+    Materials of the view that the session does not edit are drawn as in the scene.
 
     Parameters
     ----------
     lights
-        Which of the stored transports to take; the one with the most lights where it is None.
+        Number of lights of the stored transport to use; by default the largest.
     canvas
         As for `EditedPicture`.
 
     Raises
     ------
     NotBaked
-        The store has no transport of the view, or one under another environment, or of other terms than the materials
-        have.
+        If the store has no transport of the view, or one under another environment, or for other terms than the
+        materials'.
     UserError
-        The session names materials that the scene does not have, or the store cannot be read.
+        If the session names materials that the scene does not have, or the store cannot be read.
     """
     view = session.document
     counts = transport_lights(store, view.camera, *view.size)
@@ -109,7 +109,7 @@ def _show(picture: EditedPicture, name: str, session: Session, store: Store) -> 
 
 
 def parts_of(store: Store, session: Session, materials: Mapping[str, Editable], lights: int) -> dict[str, Part]:
-    """The parts of a view, of those materials that it shows; `materials` are as they were when transport was made."""
+    """The parts of a view, for the materials it shows; `materials` are those that transport was computed for."""
     view = session.document
 
     def name(kind: str, part: str) -> str:

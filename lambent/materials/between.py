@@ -1,4 +1,4 @@
-"""Materials between two others, for what changes with time."""
+"""Interpolation between two materials, for animated changes."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from lambent.materials.document import Lobe, Material
 
 
 def between(first: Material, second: Material, share: float) -> Material:
-    """The material `share` of the way, 0 to 1, from the first to the second.
+    """Interpolate from the first material (`share` 0) to the second (`share` 1).
 
-    Diffuse coefficients change evenly, as linear reflectance and transmittance do where paints are mixed pixel by
-    pixel. So do the numbers of lobes where both have as many, of the same kinds and in the same order; else lobes are
-    those of the first until the second is reached, and so is everything that is no number.
+    Diffuse coefficients are linear, like the reflectance and transmittance of paints mixed pixel by pixel. Lobe
+    parameters are linear if both materials have the same number and kinds of lobes in the same order; otherwise the
+    first material's lobes stay until `share` is 1, as does everything that is not a number.
     """
     if share <= 0:
         return first

@@ -15,12 +15,12 @@ from lambent.materials import lobes
 from lambent.materials.document import BLACK, Material
 from lambent.materials.lobes import COS_MIN, NUMPY, Vector
 
-ENERGY_TOLERANCE = 0.01  # excess over 1 that rounding, quadrature and devices explain
-SELECTION_FLOOR = 0.02  # share of k: Fresnel can vanish at wo (r0 = 0, wo = n) and not at the half vector
+ENERGY_TOLERANCE = 0.01  # excess over 1 attributed to rounding, quadrature and devices
+SELECTION_FLOOR = 0.02  # share of k: Fresnel can vanish at wo (r0 = 0, wo = n) but not at the half vector
 
 
 def more_than_arrives(albedo: Floats) -> Flags:
-    """(...) whether albedos (...) exceed 1 by more than ENERGY_TOLERANCE; every energy warning goes by it."""
+    """(...) whether albedos (...) exceed 1 by more than ENERGY_TOLERANCE; all energy warnings use this test."""
     return np.asarray(np.asarray(albedo) > 1 + ENERGY_TOLERANCE)
 
 
@@ -63,7 +63,7 @@ def _mean(rgb: Triple) -> float:
 def selection(wo: Vector, material: Material, ops: Any = NUMPY) -> list[Any]:
     """Probability of each component at `wo`: diffuse reflection, diffuse transmission, then the lobes.
 
-    It depends on wo alone, so that the mixture's pdf is exact; it is roughly the energy each component returns.
+    It depends on wo alone, which keeps the mixture's pdf exact, and is roughly proportional to the returned energy.
     """
     cos_o = ops.abs(wo[2])
     seen = under_fresnel(cos_o, ops) if material.kd_coupled else 1 + 0 * cos_o
@@ -89,10 +89,10 @@ def pdf(wi: Vector, wo: Vector, material: Material, ops: Any = NUMPY) -> Any:
 
 
 def sample(wo: Vector, u_select: Any, u1: Any, u2: Any, material: Material, ops: Any = NUMPY) -> Vector:
-    """wi of the mixture; u_* uniform in [0, 1).
+    """Sample wi from the mixture; u_* uniform in [0, 1).
 
-    A lobe sample at or across the horizon comes back with wi.z = 0, where value and pdf are 0. Across the horizon the
-    other components' pdf would accept it, and the estimate would be too bright.
+    A lobe sample at or below the horizon is returned with wi.z = 0, where value and pdf are 0. Returned as it is, the
+    pdf of the other components would accept it, and the estimate would be too bright.
     """
     chosen = selection(wo, material, ops)
     side = ops.select(wo[2] > 0, 1.0, -1.0)
@@ -117,7 +117,7 @@ def components(w: Floats) -> Vector:
 
 
 class MaterialBSDF:
-    """A material on (..., 3) arrays; float64 inside."""
+    """A material as a BSDF on (..., 3) arrays; computes in float64."""
 
     def __init__(self, material: Material) -> None:
         self.material = material

@@ -1,9 +1,9 @@
-"""Check that a material suits a path tracer: reciprocity, energy, and a sampler that follows its density.
+"""Check that a material suits a path tracer: reciprocity, energy, and a sampler that matches its density.
 
-Energy: a directional albedo over 1 is a warning with its angle; alpha > 0 makes the albedo grow towards grazing, and
-published fits do so. It is a failure only where the mean albedo over all directions (cosine-weighted, the
-bihemispherical albedo) exceeds 1: by reciprocity, light between walls of such a material grows at every bounce, and a
-closed room has no finite radiance. Below that, the albedo only brightens grazing views.
+Energy: a directional albedo above 1 is a warning with its angle; with alpha > 0 the albedo grows towards grazing, as in
+published fits. It is a failure only if the mean albedo over all directions (cosine-weighted, the bihemispherical
+albedo) exceeds 1: by reciprocity, light between walls of such a material grows at every bounce, and a closed room has
+no finite radiance. Below that, a high albedo only brightens grazing views.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from lambent.materials.document import Material
 THETA_DEG = (*range(0, 85, 5), 82, 84, 85, 86, 87, 88, 89)
 PHI_DEG = (0.0, 45.0, 90.0, 135.0)
 SAMPLER_THETA_DEG = (0.0, 45.0, 85.0)
-PAIRS = 20_000  # random ones, and as many sampled ones
-RECIPROCITY_LIMIT = 1e-6  # float64 leaves 1e-12 for wide lobes and 1e-8 at the foot of the narrowest
+PAIRS = 20_000  # random pairs, and as many sampled ones
+RECIPROCITY_LIMIT = 1e-6  # float64 errors are 1e-12 for wide lobes and 1e-8 at the foot of the narrowest
 P_VALUE_LIMIT = 1e-3  # per check, shared by its chi-square tests (Sidak)
-INTEGRAL_LIMIT = 2e-3  # the quadrature errs by a few 1e-4, even for slopes of .003 beside 1.5
-ENERGY_LIMIT = 1 + 2e-3  # of the mean albedo, a failure beyond: the furnace's own error
+INTEGRAL_LIMIT = 2e-3  # the quadrature error is a few 1e-4, even for slopes of .003 beside 1.5
+ENERGY_LIMIT = 1 + 2e-3  # largest allowed mean albedo; the excess is the furnace's own error
 
 
 class Scatters(Protocol):
@@ -41,9 +41,9 @@ class Scatters(Protocol):
 
 @runtime_checkable
 class KnowsItsSteps(Protocol):
-    """A BSDF whose density has steps, and which tests its own sampler in cells along them.
+    """A BSDF with a discontinuous density, which tests its own sampler in matching cells.
 
-    `steps` are cells (N, 4) of the light's directions within which f is smooth, or None where f is smooth throughout.
+    `steps` returns cells (N, 4) of the light's directions within which f is smooth, or None if f is smooth everywhere.
     """
 
     def chi_square(self, wo: Floats, *, samples: int = 1_000_000, seed: int = 0) -> ChiSquare: ...
@@ -68,7 +68,7 @@ class Furnace:
 
 @dataclass(frozen=True)
 class SamplerCheck:
-    """The sampler against its density and value, for one wo. Albedos are means of RGB."""
+    """The sampler compared with its density and value, for one wo. Albedos are means over RGB."""
 
     theta_deg: float
     phi_deg: float
@@ -82,7 +82,7 @@ class SamplerCheck:
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """Results of every check; `failures` and `warnings` name what is wrong."""
+    """Results of all checks; `failures` and `warnings` describe the faults."""
 
     furnace: Furnace
     sampler: tuple[SamplerCheck, ...]
@@ -173,7 +173,7 @@ def sampler_failures(sampler: tuple[SamplerCheck, ...]) -> list[str]:
 def reciprocity_error(bsdf: Scatters, seed: int = 0) -> float:
     """Largest relative change of f when wi and wo are swapped, over random pairs and sampled pairs.
 
-    Values below 1e-9 of the largest count as that large, because at the foot of a narrow lobe rounding prevails.
+    Values below 1e-9 of the largest are raised to that, because rounding dominates at the foot of a narrow lobe.
     """
     rng = np.random.default_rng(seed)
     wo, wi = _sphere(rng, 2 * PAIRS), _sphere(rng, 2 * PAIRS)
@@ -202,7 +202,7 @@ def furnace(subject: Material | Scatters, *, samples: int = 1 << 14, seed: int =
 
 
 def mean_albedo(albedo: Floats) -> Triple:
-    """Cosine-weighted mean of a directional albedo (THETA_DEG, phi, 3); beyond 89 degrees it is that at 89."""
+    """Cosine-weighted mean of a directional albedo (THETA_DEG, phi, 3); beyond 89 degrees, the value at 89 is used."""
     sin2 = np.append(np.sin(np.radians(THETA_DEG)) ** 2, 1.0)
     rows = np.concatenate([albedo, albedo[-1:]]).mean(axis=1)
     red, green, blue = (float(np.trapezoid(rows[:, c], sin2)) for c in range(3))

@@ -1,8 +1,8 @@
 """Check that a measured table suits a path tracer, within the accuracy of a measurement.
 
-A table is reciprocal to the accuracy of its device, not to 1e-6: swapping wi and wo changes published RGL files by 3 to
-22 % of the light. Its albedo may exceed 1 near grazing, where a device's own errors prevail. The report therefore gives
-percentages, and only faults that no device explains are failures.
+A table is reciprocal only to the accuracy of its device, not to 1e-6: swapping wi and wo changes published RGL files by
+3 to 22 % of the light. Its albedo may exceed 1 near grazing, where device errors dominate. The report therefore gives
+percentages, and only faults beyond any device's errors are failures.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from lambent.materials.measured.protocol import MeasuredTable, negative_readings
 from lambent.materials.measured.sampling import TableBSDF
 
 PAIRS = 60_000
-RECIPROCITY_LIMIT = 0.5  # share of the light; the worst published file has .22, mixed up columns have 1 and more
-ENERGY_LIMIT = 1.02  # of the mean albedo, a failure beyond: albedo of a white tile as a good device measures it
-INTEGRAL_LIMIT = 0.05  # share of the albedo between reflectivity() and an independent quadrature
+RECIPROCITY_LIMIT = 0.5  # share of the light; the worst published file has .22, swapped columns have 1 and more
+ENERGY_LIMIT = 1.02  # largest allowed mean albedo: that of a white tile measured by a good device
+INTEGRAL_LIMIT = 0.05  # relative difference between reflectivity() and an independent quadrature
 INTEGRAL_THETA_DEG = (10.0, 40.0, 70.0)
-LAST_THETA_DEG = 84.0  # energy beyond is a warning at most
+LAST_THETA_DEG = 84.0  # energy beyond is only a warning
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class IntegralCheck:
 
     @property
     def deviation(self) -> float:
-        """Difference of the two as a share of the quadrature."""
+        """Relative difference of the two to the quadrature."""
         return abs(self.from_table - self.quadrature) / max(self.quadrature, 1e-12)
 
 
@@ -56,9 +56,9 @@ class TableReport(Report):
     resampling_share : float
         Deviation of the path tracer's look-up from the table itself, as a share of the light.
     tuples : dict of int
-        Numbers of raw tuples: used, those of them below zero, and left out by reason.
+        Numbers of raw tuples: used, below zero among these, and left out by reason.
     negative_readings : str
-        The readings below zero in words, which are no fault; empty where there are none.
+        A description of the readings below zero, which are not a fault; empty if there are none.
     """
 
     reciprocity_share: float
@@ -127,7 +127,7 @@ def albedos(table: MeasuredTable) -> Furnace:
 
 
 def check_integral(bsdf: TableBSDF, theta_deg: float, phi_deg: float, seed: int = 0) -> IntegralCheck:
-    """The table's own r + t at an incident direction against an adaptive quadrature of its f cos(theta_o)."""
+    """Compare the table's own r + t at an incident direction with an adaptive quadrature of f cos(theta_o)."""
     wi = direction(np.radians(theta_deg), np.radians(phi_deg))
 
     def f(wo: Floats) -> Floats:

@@ -19,8 +19,8 @@ Function = Callable[[Floats], Floats]  # (..., 3) directions -> (...) values
 
 CHUNK = 1 << 18
 LEAST_EXPECTED = 5.0  # cells with fewer expected samples are pooled: their statistic is not chi-square
-HIDDEN_PEAK = 4.0  # a pilot this many times above the mean of its cell shows that the nodes missed a peak
-FEW_PILOTS = 32  # cells with fewer are steered by the samples too, so that the edge of a narrow lobe is not missed
+HIDDEN_PEAK = 4.0  # a pilot this many times above its cell's mean reveals a peak missed by the nodes
+FEW_PILOTS = 32  # cells with fewer pilots also use the samples, so that the edge of a narrow lobe is not missed
 STRIPS = 32  # of z, and cells of each
 RTOL, LEVELS = 2e-4, 40  # of the quadrature: relative tolerance, and halvings at most
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -49,8 +49,8 @@ def chi_square(
 ) -> ChiSquare:
     """Test that `sample`, from u (n, 3) uniform in [0, 1), draws directions (n, 3) of `density` (n) in 1/sr.
 
-    A million samples find a pdf that is 2 % wrong; a hundred thousand do not. A density with steps needs `cells` along
-    its steps: (N, 4) as from `adapted_cells`, sorted by z0, then phi0.
+    A million samples detect a pdf that is 2 % wrong; a hundred thousand do not. A discontinuous density needs `cells`
+    along its steps: (N, 4) as from `adapted_cells`, sorted by z0, then phi0.
     """
     from scipy.stats import chi2
 
@@ -72,7 +72,7 @@ def chi_square(
 
     rare = expected < LEAST_EXPECTED
     o, e = np.append(observed[~rare], observed[rare].sum()), np.append(expected[~rare], expected[rare].sum())
-    if e[-1] < LEAST_EXPECTED:  # still too few: only samples where none belong count
+    if e[-1] < LEAST_EXPECTED:  # still too few expected: only samples where none are expected count
         e[-1] = max(e[-1], 1.0)
     statistic = float(((o - e) ** 2 / e).sum())
     degrees = len(o) - 1
@@ -81,7 +81,7 @@ def chi_square(
 
 
 def combined(tests: Sequence[ChiSquare]) -> ChiSquare:
-    """One test of the parts of a mixture, each by its share of the samples; empty parts count for nothing."""
+    """Combine tests of the parts of a mixture, weighted by their share of the samples; empty parts are ignored."""
     from scipy.stats import chi2
 
     tests = [test for test in tests if test.samples]
@@ -116,9 +116,9 @@ def adapted_cells(pilot: Floats) -> Floats:
 def integrate_cells(function: Function, cells: Floats, pilot: Floats) -> Floats:
     """Integral (N) over solid angle of `function` on each cell (N, 4).
 
-    Gauss-Legendre 4 x 4. A cell is halved across its longer side, up to LEVELS times, while its halves disagree with
-    it or it hides a peak: a value at a `pilot` direction (n, 3) far above the mean at the nodes. The pilots only steer;
-    they add nothing to the sum. A step away from the horizon costs about 1e-3.
+    Gauss-Legendre 4 x 4. A cell is halved across its longer side, up to LEVELS times, while its halves disagree with it
+    or it hides a peak: a value at a `pilot` direction (n, 3) far above the mean of the nodes. Pilots steer the
+    subdivision but add nothing to the sum. A discontinuity away from the horizon costs about 1e-3.
     """
     probe = _rule(function, cells)
     total, floor = np.zeros_like(probe), 0.02 * RTOL * np.abs(probe).sum() / len(cells)
@@ -158,7 +158,7 @@ def _cell_of(w: Floats, cells: Floats) -> Indices:
     z_low, first = np.unique(cells[:, 0], return_index=True)
     strip = np.clip(np.searchsorted(z_low, z, side="right") - 1, 0, len(z_low) - 1)
     strip_of_cell = np.searchsorted(first, np.arange(len(cells)), side="right") - 1
-    turn = 8.0  # more than 2 pi, so that one sorted key holds strip and phi
+    turn = 8.0  # above 2 pi, so that one sorted key combines strip and phi
     found = np.searchsorted(strip_of_cell * turn + cells[:, 2], strip * turn + phi, side="right") - 1
     return np.clip(found, 0, len(cells) - 1)
 
@@ -179,7 +179,7 @@ def _rule(function: Function, rects: Floats) -> Floats:
 
 
 def _halved(rects: Floats) -> tuple[Floats, Flags]:
-    """Halves (2N, 4) of each rectangle, lower first, cut across its longer side on the sphere; whether along phi."""
+    """Halve rectangles across their longer side on the sphere: (2N, 4), lower first; flags of cuts along phi."""
     z0, z1, p0, p1 = rects.T
     z, p = (z0 + z1) / 2, (p0 + p1) / 2
     sin_theta = np.sqrt((1 - z) * (1 + z))

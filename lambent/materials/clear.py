@@ -1,12 +1,12 @@
-"""Clear glass: surfaces that pass light straight on, and how much of it.
+"""Clear glass: surfaces that transmit light undeviated, and their transmittance.
 
-A lobe of transmission sends light on along its direction, spread by twice its slopes. The narrower it is, the closer is
-its albedo to that of its mirrored half vector n alone (3.5):
+A transmission lobe sends light on along its direction, spread by twice its slopes. As it narrows, its albedo approaches
+the value for half vector n alone, once mirrored (3.5):
 
     T(cos) = k (1 - r0) t(cos) cos^(1 - 2 alpha),    t of bsdf.under_fresnel,
 
-with the same cosine on both sides. Panes, solids and curved glass are alike here: no material refracts. clear.wgsl is
-the twin for shaders.
+with the same cosine on both sides. Panes, solids and curved glass are treated alike: no material refracts. clear.wgsl
+is the shader version.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Material
 from lambent.materials.lobes import COS_MIN, NUMPY, Vector
 
-STRAIGHT = 0.005  # slope: half of the light stays within .4 degrees, not much more than the sun's disc
+STRAIGHT = 0.005  # slope: half of the light stays within .4 degrees, little more than the sun's disc
 MOST_TERMS = 4
-MOST = 0.9999  # that passes: more is no surface
+MOST = 0.9999  # transmittance above which there is effectively no surface
 
 
 def clear_terms(material: Material) -> Floats | None:
-    """(n, 4) colour k (1 - r0) and exponent 1 - 2 alpha of each term of T; None where light is not passed straight on.
+    """(n, 4) colour k (1 - r0) and exponent 1 - 2 alpha of each term of T; None unless light is transmitted undeviated.
 
-    Neither where a part of what passes is spread: it would have to be told from the rest.
+    Also None if part of the transmitted light is scattered, because the two could not be separated.
     """
     lobes = [lobe for lobe in material.transmission_lobes if any(lobe.k)]
     spread = any(material.kt_d) or any(max(lobe.mx, lobe.my) > STRAIGHT for lobe in lobes)

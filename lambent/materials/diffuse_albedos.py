@@ -1,4 +1,4 @@
-"""Materials as light between surfaces sees them: diffuse albedos, and equivalent ones for lobes that were edited."""
+"""Diffuse albedos of materials for light between surfaces, with equivalent albedos for edited lobes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from lambent.materials.factored.of_lobes import of_material
 
 
 def albedos_of(materials: Sequence[Material]) -> Albedos:
-    """kd and kt_d of materials: light that their lobes send on is in the rays."""
+    """kd and kt_d of materials; light scattered by lobes is included in the rays instead."""
     shape = (len(materials), 3)
     return Albedos(
         np.array([m.kd for m in materials], float).reshape(shape),
@@ -24,11 +24,11 @@ def albedos_of(materials: Sequence[Material]) -> Albedos:
 
 
 def edited_albedos(baked: Sequence[Material], edited: Sequence[Material]) -> Albedos:
-    """Albedos of edited materials, where rays follow the lobes of the baked ones.
+    """Albedos of edited materials for rays that follow the lobes of the baked ones.
 
-    What an edit adds to the light of a lobe, or takes from it, counts as diffuse: the difference of the equivalent
-    albedos of the lobes (Ben-Artzi 2007, section 5.2.4), of either side, which can make an albedo negative. Colours
-    above MOST_ALBEDO are cut: more would not come to an end.
+    The change of a lobe's light counts as diffuse: the difference of the equivalent albedos of the lobes (Ben-Artzi
+    2007, section 5.2.4), per side, which can make an albedo negative. Albedos are clipped at MOST_ALBEDO, above which
+    the series of bounces diverges.
     """
     found = albedos_of(edited)
     reflected, transmitted = found.reflected.copy(), found.transmitted.copy()

@@ -1,10 +1,10 @@
-"""The material document: the JSON file that every part of Lambent and other tools exchange.
+"""The material document: the JSON file that all parts of Lambent and other tools exchange.
 
 Units: kd, kt_d and k are dimensionless RGB coefficients (linear Rec.709); mx, my are slopes (dimensionless roughness
 along t and b); r0 is the Fresnel reflectance at normal incidence; alpha is the exponent of the cosine product.
 
-A lobe with `retro` stands about the direction to the light itself, not about its mirror image; its alpha may be
-negative, because retro-reflectors lose light towards grazing.
+A lobe with `retro` is centred on the direction to the light instead of its mirror image. Its alpha may be negative,
+because retro-reflectors lose light towards grazing.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from lambent.core.inputs import parse_json, read_bytes
 
 FORMAT: Literal["lambent-material"] = "lambent-material"
 VERSION: Literal[1] = 1
-SCATTERING = {"kd", "kt_d", "lobes"}  # a document names at least one of them
+SCATTERING = {"kd", "kt_d", "lobes"}  # a document must have at least one
 Side = Literal["reflection", "transmission"]
 Distribution = Literal["beckmann", "ggx"]
 Kind = Literal["reflection", "transmission", "retro"]
@@ -34,7 +34,7 @@ def _spread(value: object) -> object:
     return (value, value, value) if isinstance(value, int | float) else value
 
 
-COEFFICIENT_MAX = 1e6  # of published lobes a few hundred; sums and squares of it are far from overflow
+COEFFICIENT_MAX = 1e6  # published lobes reach a few hundred; sums and squares of this limit do not overflow
 Coefficient = Annotated[float, Field(ge=0, le=COEFFICIENT_MAX, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 RGB = Annotated[tuple[Coefficient, Coefficient, Coefficient], BeforeValidator(_spread)]
@@ -48,7 +48,7 @@ class _Strict(BaseModel):
 
 
 class Lobe(_Strict):
-    """One directional lobe (Kurt et al. 2010; thesis eqs 3.3-3.5); `retro` mirrors wi about n before (Belcour 2014)."""
+    """One directional lobe (Kurt et al. 2010; thesis eqs 3.3-3.5); `retro` first mirrors wi about n (Belcour 2014)."""
 
     side: Side = "reflection"
     distribution: Distribution = "beckmann"
@@ -57,7 +57,7 @@ class Lobe(_Strict):
     my: Roughness
     r0: Annotated[tuple[Share, Share, Share], BeforeValidator(_spread)] = (0.04, 0.04, 0.04)
     alpha: Annotated[float, Field(ge=LEAST_ALPHA, le=1)] = 0.0
-    retro: bool = Field(default=False, exclude_if=lambda retro: not retro)  # so that other documents stay as they are
+    retro: bool = Field(default=False, exclude_if=lambda retro: not retro)  # keeps other documents unchanged
 
     @model_validator(mode="after")
     def _is_possible(self) -> Lobe:
@@ -73,19 +73,19 @@ class Lobe(_Strict):
         return "retro" if self.retro else self.side
 
     def of_kind(self, kind: Kind) -> Lobe:
-        """The lobe as one of another kind; an alpha that only retro lobes have becomes 0."""
+        """The lobe converted to another kind; an alpha valid only for retro lobes becomes 0."""
         side = "transmission" if kind == "transmission" else "reflection"
         alpha = self.alpha if kind == "retro" else max(self.alpha, 0.0)
         return self.model_copy(update={"side": side, "retro": kind == "retro", "alpha": alpha})
 
     @property
     def mirrors(self) -> bool:
-        """Whether it reflects about the mirror direction."""
+        """Whether the lobe reflects about the mirror direction."""
         return self.kind == "reflection"
 
 
 class Provenance(_Strict):
-    """Where a material's numbers come from: its measurement, and how it was fitted."""
+    """Origin of a material's numbers: its measurement and its fit."""
 
     source: str | None = None  # file name of the measurement, without folders
     source_sha256: str | None = None
@@ -136,13 +136,13 @@ def load_material(path: Path) -> Material:
     Raises
     ------
     UserError
-        The file is not JSON, not a material, of another version, or holds an unknown or impossible field.
+        If the file is not JSON, not a material, of another version, or has an unknown or invalid field.
     """
     return material_from(parse_json(read_bytes(path, MATERIAL_BYTES), path), path)
 
 
 def material_from(data: Any, file: Path | str) -> Material:
-    """The material of a parsed document; errors name `file`."""
+    """Parse the material of a loaded document; errors name `file`."""
     if not isinstance(data, dict):
         raise UserError("not a material document", file=file, got=type(data).__name__, expected="an object")
     if data.get("version", VERSION) != VERSION:

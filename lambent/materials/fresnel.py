@@ -1,7 +1,7 @@
 """Fresnel reflectance, exact and by Schlick's approximation.
 
-Cosines are between a direction and the facet's normal, in [0, 1]. The lobe has a Schlick term that the path tracer can
-trace, `lobes.fresnel`.
+Cosines are between a direction and the facet's normal, in [0, 1]. `lobes.fresnel` is the Schlick term for the path
+tracer.
 """
 
 from __future__ import annotations

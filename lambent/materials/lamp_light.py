@@ -1,14 +1,13 @@
-"""A lobe under one small lamp, in closed form: lamp_light.wgsl is its twin for shaders, tested for parity.
+"""A lobe lit by one small lamp, in closed form; lamp_light.wgsl is the shader version, tested for parity.
 
 A lamp is a mean direction w and two vectors a, b, the principal deviations of its directions. f cos_i is a smooth
 factor g times the density P = D h_z^4 of slopes s = (h_x, h_y)/h_z. With H = w + o not normalised,
     s = H_xy/H_z,  J a = (a_xy - s a_z)/H_z,  g = tint |H|^3/(2 H_z^4) cos_i^(1 - alpha)/cos_o^alpha.
 A Gaussian P of the matrix diag(mx^2, my^2), averaged over a Gaussian lamp, is a Gaussian of the matrix
     M = diag(mx^2, my^2) + 2 sum (J a)(J a)^T:
-the lobe is widened and keeps its integral. Of a GGX lobe, which has no variance, `GGX_WIDER` times that is closest.
-Where log g changes by q_a and q_b over a and b, the mean of g P is that at w, with s + q_a J a + q_b J b,
-times exp((q_a^2 +
-q_b^2)/2); this completes the square. Of a lamp that sets, the part above the horizon counts.
+the lobe is widened and keeps its integral. GGX has no variance; widening it `GGX_WIDER` times as much is closest. If
+log g changes by q_a and q_b along a and b, completing the square gives the mean of g P: its value at w with
+s + q_a J a + q_b J b, times exp((q_a^2 + q_b^2)/2). For a lamp that sets, the part above the horizon counts.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from lambent.materials.document import Lobe
 from lambent.materials.lobes import fresnel
 
 GGX_WIDER = 1.7
-HORIZON = 1.2  # of the sum of both vectors' heights: how far a lamp reaches above and below its middle
+HORIZON = 1.2  # multiple of the summed heights of both vectors: reach of a lamp above and below its centre
 COS_MIN, REACH_MIN = 1e-3, 1e-5
 
 
@@ -49,7 +48,7 @@ def lamp_response(lobe: Lobe, wo: Floats, w: Floats, axes: Floats) -> Floats:
     length2 = (total * total).sum(axis=-1)
     along = (axes[..., :2] * total[..., None, :2]).sum(axis=-1) + rise * total[..., 2:]
     tilt = 3 * along / length2[..., None] - rise * (4 * per_z - ((1 - lobe.alpha) / cos_i)[..., None])
-    tilt = tilt.clip(-1, 1)  # more is not log-linear
+    tilt = tilt.clip(-1, 1)  # beyond, g is not log-linear
     slope = slope + (tilt[..., None] * ja).sum(axis=-2)
     wider = 2 * (GGX_WIDER if lobe.distribution == "ggx" else 1.0)
     xx = lobe.mx**2 + wider * (ja[..., 0] ** 2).sum(axis=-1)

@@ -1,13 +1,13 @@
-"""The Kurt lobe: eval, sample, pdf. One implementation for numpy and the JIT path tracer; lobes.wgsl is its sibling.
+"""The Kurt lobe: eval, sample, pdf. One implementation for numpy and the JIT path tracer; lobes.wgsl is a copy.
 
-Every function takes directions as (x, y, z) component tuples and `ops`, their array library: `NUMPY`, or any module
-with the same names, such as drjit.
+Every function takes directions as (x, y, z) component tuples and the array library `ops`: `NUMPY`, or any module with
+the same names, such as drjit.
 
 Sources: Kurt, Szirmay-Kalos & Krivanek 2010, "An anisotropic BRDF model for fitting and Monte Carlo rendering";
 thesis M ("Real-time rendering of measured materials"), equations in parentheses. GGX: Walter et al. 2007, eq. 33.
-Retro lobes: the same about the back vector, normalize(wi' + wo) with wi' the mirror image of wi about n (Belcour,
-Pacanowski, Delahaie, Laville-Geay & Eupherte 2014, JOSA A 31, 2561). They are reciprocal as well: swapped directions
-have the back vector turned by 180 degrees about n, where D is the same.
+Retro lobes use the back vector instead of the half vector: normalize(wi' + wo), with wi' the mirror image of wi about n
+(Belcour, Pacanowski, Delahaie, Laville-Geay & Eupherte 2014, JOSA A 31, 2561). They are reciprocal too: swapping the
+directions turns the back vector by 180 degrees about n, which leaves D unchanged.
 
 Hazard: tan^2(theta_h) and 1 - cos^2(theta_h) cancel in float32 at low roughness; everything is built from hx^2, hy^2
 and hz of the half vector instead.
@@ -24,12 +24,12 @@ import numpy as np
 from lambent.materials.document import Lobe
 
 Vector = tuple[Any, Any, Any]  # components x, y, z: floats or arrays of one shape
-COS_MIN = 1e-4  # directions closer to the horizon than this carry no lobe (the cosine power diverges there)
+COS_MIN = 1e-4  # the lobe is 0 for directions closer to the horizon (the cosine power diverges there)
 
 
 @dataclass(frozen=True)
 class ArrayOps:
-    """Array functions under drjit's names; look-ups of tables need the last five as well."""
+    """Array functions under drjit's names; table look-ups need the last five as well."""
 
     exp: Callable[..., Any]
     log: Callable[..., Any]
@@ -71,7 +71,7 @@ def sample_cosine(u1: Any, u2: Any, ops: Any = NUMPY) -> Vector:
 
 
 def half_vector(wi: Vector, wo: Vector, ops: Any = NUMPY) -> Vector:
-    """normalize(wi + wo); finite but without meaning for opposite directions."""
+    """normalize(wi + wo); finite but meaningless for opposite directions."""
     x, y, z = wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]
     scale = 1 / ops.sqrt(ops.maximum(x * x + y * y + z * z, 1e-20))
     return x * scale, y * scale, z * scale
@@ -107,8 +107,8 @@ def sample_half_vector(u1: Any, u2: Any, lobe: Lobe, ops: Any = NUMPY) -> Vector
 def _same_side(wi: Vector, wo: Vector, lobe: Lobe, ops: Any) -> tuple[Vector, Vector, Any]:
     """wi and wo on the upper side (wi mirrored at the surface for transmission), and whether the lobe scatters them.
 
-    The sheet is two-sided: a pair seen from below is the same pair seen from above. wi of a retro lobe is mirrored
-    about n, so that all else is as for the mirror direction.
+    The sheet is two-sided: a pair seen from below equals the same pair seen from above. wi of a retro lobe is mirrored
+    about n; the rest is then the same as for a reflection lobe.
     """
     across = lobe.side == "transmission"
     same = wi[2] * wo[2] > 0
@@ -146,7 +146,7 @@ def evaluate(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> Vector:
 def sample(wo: Vector, u1: Any, u2: Any, lobe: Lobe, ops: Any = NUMPY) -> Vector:
     """wi = 2 (wo.h) h - wo (4.8), mirrored to the far side for transmission, and about n for a retro lobe.
 
-    A direction that ends on the wrong side of the surface is returned as it is; `pdf` and `evaluate` are 0 there.
+    A direction on the wrong side of the surface is returned unchanged; `pdf` and `evaluate` are 0 there.
     """
     x, y, z = reflect((wo[0], wo[1], ops.abs(wo[2])), sample_half_vector(u1, u2, lobe, ops))
     side = ops.select(wo[2] > 0, 1.0, -1.0) * (-1.0 if lobe.side == "transmission" else 1.0)
@@ -163,7 +163,7 @@ def pdf(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> Any:
 
 
 def weight(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> Vector:
-    """f |cos theta_i| / pdf of a direction made by `sample`, RGB; D, which under- and overflows, is cancelled."""
+    """f |cos theta_i| / pdf of a direction from `sample`, RGB; D, which can under- or overflow, cancels."""
     wi, wo, valid = _same_side(wi, wo, lobe, ops)
     h = half_vector(wi, wo, ops)
     value = ops.select(valid, wi[2] / (ops.maximum(h[2], 1e-6) * _cosine_power(wi, wo, lobe, ops)), 0.0)

@@ -1,4 +1,4 @@
-"""Normalise a material that returns more light than arrives, and report how much that changes it."""
+"""Normalise a material that returns more light than arrives, and report the size of the change."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from lambent.materials.document import Material
 from lambent.materials.export.pairs import CHECK_LOG2, pairs_of
 from lambent.materials.measured.metrics import errors_and_shares
 
-MARGIN = 0.999  # for the furnace's own error
-HALVINGS = 6  # of the interval that holds alpha's factor
+MARGIN = 0.999  # allowance for the furnace's own error
+HALVINGS = 6  # of the interval that contains alpha's factor
 ROUGHLY = 1 << 11  # samples of the furnace during the search; `with_less_k` is exact
 PAIRS = 20_000
 NOTE = "normalised so that no direction returns more than arrives; the errors are those of before"
@@ -61,12 +61,12 @@ class Normalisation:
 
 
 def normalisation(material: Material, seed: int = 0, progress: Progress = silent) -> Normalisation:
-    """`normalised` with a report of the changes; seconds to a minute, deterministic for a seed.
+    """`normalised` with a report of the changes; takes seconds to a minute, deterministic for a seed.
 
     Raises
     ------
     UserError
-        The diffuse terms alone exceed 1.
+        If the diffuse terms alone exceed 1.
     """
     after = normalised(material, seed, progress)
     before = furnace(material, seed=seed).highest
@@ -94,14 +94,14 @@ def _changed(before: Material, after: Material) -> dict[str, tuple[Any, Any]]:
 def normalised(material: Material, seed: int = 0, progress: Progress = silent) -> Material:
     """The material changed so that no furnace angle (theta up to 89 degrees) exceeds 1.
 
-    Of two remedies, the one that changes the appearance less (`change`) is taken: scale all k, per channel; or scale
-    all alpha first, which makes lobes exceed 1 towards grazing, and then k. Diffuse terms and slopes stay. A material
-    that does not exceed 1 comes back unchanged.
+    Two remedies are compared, and the one with the smaller change of appearance (`change`) is used: scale all k, per
+    channel; or first scale all alpha, which makes lobes exceed 1 towards grazing, then k. Diffuse terms and slopes
+    stay. A material that does not exceed 1 is returned unchanged.
 
     Raises
     ------
     UserError
-        The diffuse terms alone exceed 1.
+        If the diffuse terms alone exceed 1.
     """
     diffuse = np.add(material.kd, material.kt_d)
     if diffuse.max() > 1:
@@ -124,7 +124,7 @@ def with_less_k(material: Material, seed: int = 0) -> Material:
 
 
 def with_less_alpha(material: Material, seed: int = 0, progress: Progress = silent) -> Material:
-    """The material with all alpha scaled by the largest factor at which nothing exceeds 1; 0 where there is none."""
+    """The material with all alpha scaled by the largest factor for which nothing exceeds 1; 0 if there is none."""
     low, high = 0.0, 1.0
     for halving in range(HALVINGS):
         progress(1 + halving, HALVINGS + 2, "normalising")
@@ -145,7 +145,7 @@ def change(before: Material, after: Material, seed: int = 0) -> float:
 
 
 def _excess(material: Material, seed: int, samples: int = 1 << 14) -> Floats:
-    """Excess (3,) of the lobes' albedo over 1 minus the diffuse terms; 0 where there is none."""
+    """Excess (3,) of the lobes' albedo over 1 minus the diffuse terms; 0 without excess."""
     room = 1 - np.add(material.kd, material.kt_d)
     return np.asarray(np.maximum(_highest(material, seed, samples) - room, 0.0))
 
@@ -156,7 +156,7 @@ def _highest(material: Material, seed: int, samples: int = 1 << 14) -> Floats:
 
 
 def _flatter(material: Material, factor: float) -> Material:
-    """The material with all alpha scaled that make its lobes brighter towards grazing."""
+    """The material with each alpha scaled that makes its lobe brighter towards grazing."""
     alphas = (lobe.alpha * (factor if lobe.alpha > 0 else 1.0) for lobe in material.lobes)
     flatter = (lobe.model_copy(update={"alpha": alpha}) for lobe, alpha in zip(material.lobes, alphas, strict=True))
     return material.model_copy(update={"lobes": tuple(flatter)})

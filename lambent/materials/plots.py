@@ -18,7 +18,7 @@ from lambent.materials.fitting.incidence import Incidence, incidences
 from lambent.materials.measured.protocol import MeasuredTable
 
 Eval = Callable[[Floats, Floats], Floats]
-Placed = tuple[Incidence, bool, tuple[int, int]]  # whether of the far side, row and column
+Placed = tuple[Incidence, bool, tuple[int, int]]  # whether it is the far side's; row and column
 
 THETA_I_DEG = (0, 20, 40, 60, 75)
 STEPS = 721  # every quarter of a degree
@@ -26,7 +26,7 @@ FLOOR = 1e-5  # 1/sr, the lowest value shown
 DISK_PIXELS = 96
 WHITE_PERCENTILE = 99.8  # of the brightness over all disks, shown as white
 MOST_ROWS, MOST_COLUMNS = 8, 12  # of disks; more incident directions are thinned out
-UNKNOWN, SOURCE = (0.66, 0.78, 0.93), "#ffb300"  # shade of directions that were not measured; the light's dot
+UNKNOWN, SOURCE = (0.66, 0.78, 0.93), "#ffb300"  # shade of unmeasured directions; the light's dot
 IN_PLANE_INCHES, DISK_INCHES = 3.2, 1.3
 
 
@@ -77,7 +77,7 @@ def plot_measurement(path: Path, table: MeasuredTable, *, title: str) -> None:
 
 
 def disk_places(shown: Sequence[Incidence], transmits: bool) -> tuple[list[Placed], tuple[int, int]]:
-    """Row and column of the disk of every incident direction and side, and the number of both.
+    """Row and column of the disk of every incident direction and side, and the number of rows and columns.
 
     Rows are theta_i and columns phi_i, the far side below the near one; with a single phi_i, theta_i is the column.
     """
@@ -100,7 +100,7 @@ def new_figure(width: float, height: float) -> Any:
 
 
 def white_of(disks: Iterable[Floats]) -> float:
-    """The brightness shown as white, over all known pixels of disks."""
+    """The brightness shown as white, from all known pixels of the disks."""
     known = np.concatenate([disk[np.isfinite(disk)] for disk in disks])
     return max(float(np.percentile(known, WHITE_PERCENTILE)), 1e-12) if len(known) else 1.0
 
@@ -175,7 +175,7 @@ def _draw_disk(axis: Any, image: Floats, theta_deg: float) -> None:
 
 
 def _both_sides(entry: Incidence) -> Incidence:
-    """The entry of an isotropic table; tuples on one side of the plane of incidence alone are mirrored to the other."""
+    """The entry of an isotropic table; tuples on only one side of the plane of incidence are mirrored to the other."""
     aside = entry.wo[:, 1]
     left, right = aside > 1e-6, aside < -1e-6
     if left.any() == right.any():
@@ -187,7 +187,7 @@ def _both_sides(entry: Incidence) -> Incidence:
 
 
 def _thinned(gathered: Sequence[Incidence]) -> list[Incidence]:
-    """At most MOST_ROWS theta_i and MOST_COLUMNS phi_i, evenly chosen, with both ends."""
+    """At most MOST_ROWS theta_i and MOST_COLUMNS phi_i, evenly spaced, ends included."""
     phis = sorted({entry.phi_deg for entry in gathered})
     most = (MOST_COLUMNS, 1) if len(phis) <= 1 else (MOST_ROWS, MOST_COLUMNS)
     kept = []

@@ -1,4 +1,4 @@
-"""Other colours for materials: their diffuse reflection alone; lobes and transmission stay."""
+"""Change the colour of materials' diffuse reflection; lobes and transmission stay."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FIELD = "--recolour"
 
 
 def parse_recolours(texts: Sequence[str]) -> dict[str, Triple]:
-    """Linear RGB by material from texts MATERIAL=#rrggbb; `UserError` where one is not of this form."""
+    """Linear RGB by material from texts MATERIAL=#rrggbb; `UserError` for any other form."""
     found: dict[str, Triple] = {}
     for text in texts:
         name, _, written = text.rpartition("=")
@@ -34,21 +34,21 @@ def parse_recolours(texts: Sequence[str]) -> dict[str, Triple]:
 
 
 def hex_colour(text: str) -> Triple | None:
-    """Linear RGB of #rrggbb, which is sRGB; None of any other text."""
+    """Linear RGB of the sRGB colour #rrggbb; None for any other text."""
     if not re.fullmatch(r"#[0-9a-fA-F]{6}", text):
         return None
     return triple(srgb_decode(np.frombuffer(bytes.fromhex(text[1:]), np.uint8) / 255))
 
 
 def recoloured(materials: Mapping[str, Material], colours: Mapping[str, Triple]) -> dict[str, Material]:
-    """The materials that get other colours: diffuse reflection `colours` (linear RGB), which textures multiply.
+    """Materials with diffuse reflection replaced by `colours` (linear RGB), which textures multiply; only changed ones.
 
-    A key with * or ? stands for all materials that match it; of two keys for one material the last counts.
+    A key with * or ? stands for all materials that match it; if two keys match a material, the last one wins.
 
     Raises
     ------
     UserError
-        Where a name or pattern matches no material.
+        If a name or pattern matches no material.
     """
     found: dict[str, Material] = {}
     for name, colour in colours.items():

@@ -1,4 +1,4 @@
-"""Records that WGSL reads from buffers: numpy dtypes from the structs that declare them. Here those of lobes.wgsl."""
+"""Records that WGSL reads from buffers: numpy dtypes derived from WGSL structs, here those of lobes.wgsl."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _FIELD = re.compile(r"^ +(\w+): (.+?),(?: *//.*)?$", re.MULTILINE)
 
 
 def lobe_shader() -> str:
-    """Text of lobes.wgsl, to be put before a shader that uses it."""
+    """Text of lobes.wgsl, to prepend to a shader that uses it."""
     return files("lambent.materials").joinpath("lobes.wgsl").read_text(encoding="utf-8")
 
 
@@ -52,6 +52,6 @@ LOBE_DTYPE = wgsl_dtype("LambentLobe", lobe_shader())[0]
 
 
 def packed_lobes(lobes: Sequence[Lobe]) -> NDArray[Any]:
-    """Structured array (N,) of `LOBE_DTYPE`, ready to be written to a storage buffer."""
+    """Structured array (N,) of `LOBE_DTYPE`, ready for a storage buffer."""
     rows = [(o.k, o.mx, o.r0, o.my, o.alpha, SIDES[o.side], DISTRIBUTIONS[o.distribution], o.retro) for o in lobes]
     return np.array(rows, LOBE_DTYPE)

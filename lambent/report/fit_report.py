@@ -1,4 +1,4 @@
-"""The report of a fit as one HTML page: the measurement, the material, its errors, plots and previews."""
+"""A one-page HTML report of a fit: measurement, material, errors, plots and previews."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable, 
 from lambent.report import page
 from lambent.scenes.scene import Environment
 
-DPI, DENSITY = 150, 1.5  # plots are finer than their size on the page, for print and fine displays
+DPI, DENSITY = 150, 1.5  # plots are finer than their size on the page, for print and high-density displays
 STORED = {
     "f": "f, the BSDF without a cosine, 1/sr",
     "f_cos": "f |cos theta_o|, 1/sr",
@@ -56,22 +56,21 @@ def report(
     environment: Environment | None = None,
     progress: Progress = silent,
 ) -> str:
-    """One self-contained HTML page.
+    """Report a fit as one self-contained HTML page.
 
     Parameters
     ----------
     table, samples, result
-        A measurement, its tuples, and the result of `fit` on them.
+        A measurement, its samples, and the result of `fit` on them.
     source : Path, optional
         The measured file, for its hash.
     environment : Environment, optional
-        The surroundings of the previews; daylight by default.
+        Lighting of the previews; daylight by default.
 
     Raises
     ------
     UserError
-        Where the environment cannot be read. A machine without a working path tracer is no error: the report then says
-        that it has no previews, and why.
+        If the environment cannot be read. Without a working path tracer, the report omits the previews and states why.
     """
     material, metric = result.material, _metric(result.material)
     body = [
@@ -108,7 +107,7 @@ def _lead(result: FitResult, metric: Metric) -> str:
 
 
 def _share(result: FitResult, metric: str) -> float:
-    """The error over that of the best Lambertian surface."""
+    """Error relative to the best Lambertian fit's."""
     return result.errors[metric] / max(result.lambertian_errors[metric], 1e-300)
 
 
@@ -121,7 +120,7 @@ def _counted(lobes: tuple[Lobe, ...], side: str) -> str:
 def _previews(
     table: MeasuredTable, material: Material, environment: Environment | None, progress: Progress
 ) -> list[str]:
-    """The two balls and their difference, or why there are none."""
+    """The two preview balls and their difference, or the reason why they are missing."""
     try:
         from lambent.bake.engine import engine
 
@@ -159,7 +158,7 @@ def _previews(
 
 
 def _cut_out(picture: Floats, ball: Flags) -> bytes:
-    """PNG of an encoded image, transparent beside the ball."""
+    """PNG of an encoded image, transparent outside the ball."""
     from PIL import Image
 
     rgba = np.concatenate([to_bytes(picture), np.where(ball, 255, 0).astype(np.uint8)[..., None]], axis=-1)
@@ -247,7 +246,7 @@ def _errors(samples: MeasuredSamples, result: FitResult, metric: Metric) -> list
 
 
 def _albedos(result: FitResult) -> list[str]:
-    """Albedo of the fit beside the whole table's."""
+    """Albedo of the fit and of the whole table."""
     if not result.albedos:
         return []
     rows = []
@@ -263,7 +262,7 @@ def _albedos(result: FitResult) -> list[str]:
 
 
 def _judgement(samples: MeasuredSamples, result: FitResult, metric: Metric) -> list[str]:
-    """Known traits of fits of this kind, and their size in this one."""
+    """Known weaknesses of this kind of fit, and their size here."""
     peak = peak_share(samples, evaluate(result.material, samples))
     reached = f"model reaches {peak:.2f} of the measured peak (the brightest {PEAK_SHARE:.1%} of the tuples)."
     undershoots = "Fits under the cube root weigh errors as eyes do and undershoot peaks: here"

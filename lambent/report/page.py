@@ -1,6 +1,6 @@
-"""A self-contained HTML page: no scripts, fonts or images from elsewhere.
+"""A self-contained HTML page without external scripts, fonts or images.
 
-Callers pass plain text and PNG bytes; everything from a file or a user is escaped here.
+Callers pass plain text and PNG bytes; this module escapes all text.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ footer { margin-top: 3rem; padding-top: .8rem; border-top: 1px solid var(--line)
 
 
 def page(title: str, body: Iterable[str]) -> str:
-    """The whole document; `body` is HTML made by the functions below."""
+    """The whole document; `body` is HTML from the functions below."""
     head = (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -82,7 +82,7 @@ def bullets(lines: Iterable[str]) -> str:
 
 
 def note(title: str, lines: Iterable[str]) -> str:
-    """A box to read before anything else."""
+    """A box that stands out at the top of the page."""
     return f"<aside><p>{escape(title)}</p>{bullets(lines)}</aside>"
 
 
@@ -100,7 +100,7 @@ def table(
     numbers: Sequence[int] = (),
     chosen: int | None = None,
 ) -> str:
-    """A table whose first column names the rows; columns `numbers` are aligned right, row `chosen` stands out."""
+    """A table whose first column names the rows; columns `numbers` are right-aligned, row `chosen` is highlighted."""
 
     def cell(column: int, text: str, in_head: bool = False) -> str:
         kind = _class("number" if column in numbers else "")
@@ -121,7 +121,7 @@ def table(
 
 
 def picture(png: bytes, description: str, caption: str = "", *, density: float = 1.0, paper: bool = False) -> str:
-    """A figure of a PNG, shown at its size divided by `density`; `paper` keeps it on white in the dark."""
+    """A PNG figure, shown at its size divided by `density`; `paper` gives it a white background in dark mode."""
     width, height = struct.unpack(">II", png[16:24])
     uri = f"data:image/png;base64,{base64.b64encode(png).decode()}"
     size = f'width="{round(width / density)}" height="{round(height / density)}"'

@@ -1,4 +1,4 @@
-"""One array of a store as its manifest and its journal describe it: shape, chunks, key, and what is finished."""
+"""One array of a store as recorded in manifest and journal: shape, chunks, key, and finished chunks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
 
-LIMIT_BYTES = 1 << 34  # of one array or chunk: a manifest that promises more is not believed
+LIMIT_BYTES = 1 << 34  # limit for one array or chunk; a manifest that states more is rejected
 LIMIT_CHUNKS, LIMIT_AXES = 1 << 20, 8
 Array = NDArray[Any]
 Chunk = tuple[int, ...]
@@ -22,15 +22,15 @@ Region = tuple[slice, ...]
 
 
 class Version(NamedTuple):
-    """One writing of a chunk."""
+    """One written version of a chunk."""
 
-    crc: int  # crc32 of the chunk's file; 0 without a file, which means zeros
+    crc: int  # crc32 of the chunk's file; 0 for a chunk of zeros, which has no file
     generation: int = 0  # how often the chunk was rewritten
 
 
 @dataclass
 class Artefact:
-    """One array of a store. `key` changes whenever anything it was made from changes."""
+    """One array of a store. `key` changes whenever an input of the array changes."""
 
     name: str
     kind: str
@@ -49,21 +49,21 @@ class Artefact:
 
     @property
     def chunk_grid(self) -> list[Chunk]:
-        """Every chunk, written or not, in row-major order."""
+        """All chunks, written or not, in row-major order."""
         return list(product(*map(range, self.chunk_counts)))
 
     @property
     def written(self) -> NDArray[np.bool_]:
-        """Which chunks are written, with the shape `chunk_counts`."""
+        """Flags of written chunks, of shape `chunk_counts`."""
         return np.array([chunk_id(chunk) in self.done for chunk in self.chunk_grid], bool).reshape(self.chunk_counts)
 
     @property
     def state(self) -> str:
-        """In words: complete, or how far it is."""
+        """State in words: complete, or the share that is done."""
         return "complete" if self.complete else f"partial ({len(self.done)} of {math.prod(self.chunk_counts)} chunks)"
 
     def version(self, chunk: Chunk) -> Version | None:
-        """The writing of a chunk that counts; None where it is not written yet."""
+        """The current version of a chunk; None if not written yet."""
         return self.done.get(chunk_id(chunk))
 
     def has(self, chunk: str) -> bool:
@@ -73,22 +73,22 @@ class Artefact:
         return len(numbers) == len(self.shape) and all(inside) and chunk == chunk_id(tuple(map(int, numbers)))
 
     def region(self, chunk: Chunk) -> Region:
-        """Index of the array that a chunk covers, cut at the array's end."""
+        """Index of the region that a chunk covers, clipped to the array."""
         parts = zip(chunk, self.chunks, self.shape, strict=True)
         return tuple(slice(i * step, min((i + 1) * step, size)) for i, step, size in parts)
 
     def chunks_in(self, region: Sequence[slice]) -> list[Chunk]:
-        """The chunks that a region touches."""
+        """The chunks that overlap a region."""
         bounds = ((r.start // step, -(-r.stop // step)) for r, step in zip(region, self.chunks, strict=True))
         return list(product(*(range(*b) for b in bounds))) if all(r.start < r.stop for r in region) else []
 
     def is_same(self, other: Artefact, *, growing: bool) -> bool:
-        """Whether both have one key, type, chunking and shape; `growing` leaves the length of the first axis open."""
+        """Whether key, dtype, chunks and shape agree; `growing` ignores the length of the first axis."""
         mine, theirs = (a.shape[1:] if growing else a.shape for a in (self, other))
         return mine == theirs and (self.key, self.chunks, self.dtype) == (other.key, other.chunks, other.dtype)
 
     def check(self, store: Path) -> None:
-        """`UserError` where the shape is impossible, or larger than any array of a store."""
+        """Raise `UserError` if the shape is invalid or above LIMIT_BYTES."""
         itemsize = np.dtype(self.dtype).itemsize
         for what, sizes in (("shape", self.shape), ("chunks", self.chunks)):
             if min(sizes, default=1) < (what == "chunks") or math.prod(sizes) * itemsize > LIMIT_BYTES:
@@ -99,13 +99,13 @@ class Artefact:
             raise UserError("too many chunks", file=store, field=self.name, got=got, expected=limit)
 
     def entry(self) -> dict[str, Any]:
-        """What the manifest says: a chunk is its crc, or (crc, generation) where it was rewritten."""
+        """The manifest's entry: a chunk is its crc, or (crc, generation) if it was rewritten."""
         done = {chunk: version if version.generation else version.crc for chunk, version in self.done.items()}
         return {name: value for name, value in vars(self).items() if name != "name"} | {"done": done}
 
     @classmethod
     def of_entry(cls, name: str, e: Mapping[str, Any], store: Path) -> Artefact:
-        """The manifest's entry, or an error that `Store.open` turns into "manifest is damaged"."""
+        """Parse a manifest entry; errors become "manifest is damaged" in `Store.open`."""
         shape, chunks = (tuple(map(_count, e[axes])) for axes in ("shape", "chunks"))
         said = {chunk: v if isinstance(v, list) else [v] for chunk, v in e["done"].items()}
         done = {chunk: Version(*map(_count, v)) for chunk, v in said.items()}
@@ -124,7 +124,7 @@ class Artefact:
 
 
 def _count(value: object) -> int:
-    """A whole number that is not negative, or a `ValueError`."""
+    """A non-negative integer, or `ValueError`."""
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:
         raise ValueError(f"not a count: {str(value)[:40]}")
     return value

@@ -1,13 +1,13 @@
-"""The files of one array: one per chunk, and the journal of what was written since the manifest.
+"""The files of one array: one per chunk, and a journal of the writes since the last manifest.
 
-The array is zarr's, format 3, so that other programs read it: `zarr.json`, and the chunk (0, 1) in `c/0/1`,
-little-endian in one zstd frame, padded with zeros where it leaves the array. The manifest has its shape and checksums;
-`zarr.json` is never read here. Rewriting a chunk makes a new file, `c/0/1.1`, then `c/0/1.2`..., which other programs
-do not find: a process that dies leaves the old one whole.
+The array is in zarr format 3, so that other programs can read it: `zarr.json`, and the chunk (0, 1) in `c/0/1`, as one
+zstd frame of little-endian values, padded with zeros beyond the array. Shape and checksums come from the manifest;
+`zarr.json` is never read here. A rewritten chunk is a new file, `c/0/1.1`, then `c/0/1.2`..., which other programs do
+not find; if the process dies, the old file is still whole.
 
-The journal has one line per event: "0.1 GENERATION CRC;" for a written chunk, "length N 0;" for a first axis that has
-grown. A line begins with its newline and ends with its semicolon, so half a line, the trace of a process that died or
-of a full disk, neither counts nor spoils the next. Reading a line twice changes nothing.
+The journal has one line per event: "0.1 GENERATION CRC;" for a written chunk, "length N 0;" for a longer first axis.
+A line begins with its newline and ends with its semicolon, so a partial line, left by a dead process or a full disk, is
+ignored and does not corrupt the next. Replaying a line changes nothing.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _ZSTD = Zstd(level=0)
 
 
 class ChunkFiles:
-    """Reads and writes the chunks of one artefact in the folder of its store."""
+    """Reads and writes the chunks of one artefact in its store's folder."""
 
     def __init__(self, store_folder: Path, artefact: Artefact) -> None:
         self.artefact, self._store_folder = artefact, store_folder
@@ -48,7 +48,7 @@ class ChunkFiles:
         self.journal = inside(self._folder, "journal")
 
     def create(self) -> None:
-        """Make the array's folder anew, without chunks."""
+        """Create the array's folder afresh, without chunks."""
         self.remove()
         self.describe()
 
@@ -59,7 +59,7 @@ class ChunkFiles:
 
     def describe(self) -> None:
         """Write `zarr.json`."""
-        from zarr import create_array  # here, because what only reads does without
+        from zarr import create_array  # imported here: readers do without zarr
         from zarr.codecs import ZstdCodec
         from zarr.storage import MemoryStore
 
@@ -70,7 +70,7 @@ class ChunkFiles:
             beside.write_bytes(files["zarr.json"].to_bytes())
 
     def write(self, chunk: Chunk, data: Array) -> None:
-        """Put a chunk on disk, then name it in the journal, then remove the file that it replaces."""
+        """Write a chunk to disk, then record it in the journal, then delete the replaced file."""
         old = self.artefact.version(chunk)
         encoded = self._encoded(chunk, data)
         version = Version(zlib.crc32(encoded), 0 if old is None else old.generation + 1)
@@ -79,16 +79,16 @@ class ChunkFiles:
             with atomic_path(path) as beside:
                 beside.write_bytes(encoded)
         else:
-            path.unlink(missing_ok=True)  # of a process that died before it could name the file
+            path.unlink(missing_ok=True)  # left by a process that died before recording it
         self._note(chunk_id(chunk), version.generation, version.crc)
         self.artefact.done[chunk_id(chunk)] = version
         if old is not None:
             _remove(self._path(chunk, old))
 
     def read(self, chunk: Chunk, version: Version) -> Array | None:
-        """One writing of a chunk, cut at the array's end; None where its file is gone or fails its checksum."""
+        """One version of a chunk, clipped to the array; None if its file is missing or fails its checksum."""
         size = math.prod(self.artefact.chunks) * self._dtype.itemsize
-        encoded = _content(self._path(chunk, version), size + size // 128 + 1024)  # what cannot be made smaller
+        encoded = _content(self._path(chunk, version), size + size // 128 + 1024)  # zstd's upper bound
         if zlib.crc32(encoded) != version.crc:
             return None
         if not encoded:
@@ -103,7 +103,7 @@ class ChunkFiles:
         return whole[self._inner(chunk)]
 
     def lengthen(self, length: int) -> None:
-        """Make the first axis `length` long; the array is no longer complete."""
+        """Make the first axis `length` long; the array is then incomplete."""
         longer = replace(self.artefact, shape=(length, *self.artefact.shape[1:]))
         longer.check(self._store_folder)
         ChunkFiles(self._store_folder, longer).describe()
@@ -111,7 +111,7 @@ class ChunkFiles:
         self.artefact.shape, self.artefact.complete = longer.shape, False
 
     def read_journal(self) -> None:
-        """Bring the artefact up to what the journal says."""
+        """Apply the journal to the artefact."""
         a = self.artefact
         for name, number, crc in ((w.decode(), int(n), int(c)) for w, n, c in self._lines()):
             if name == LENGTH:
@@ -124,17 +124,17 @@ class ChunkFiles:
                 raise ValueError(f"{a.name}: the journal names an unknown chunk {name}")
 
     def _lines(self) -> list[tuple[bytes, bytes, bytes]]:
-        """Name, number and checksum of every whole line of the journal."""
+        """Name, number and checksum of every complete line of the journal."""
         return _LINE.findall(_content(self.journal, LIMIT_JOURNAL_BYTES))
 
     def size_bytes(self, chunk: Chunk) -> int:
-        """Size of a chunk's file; 0 where there is none."""
+        """Size of a chunk's file; 0 without one."""
         version = self.artefact.version(chunk)
         path = None if version is None else self._path(chunk, version)
         return path.stat().st_size if path is not None and path.exists() else 0
 
     def settle(self) -> None:
-        """When the manifest has all that the journal has: remove the journal and the files that nothing names."""
+        """Once the manifest includes the journal: delete the journal and all unreferenced files."""
         a = self.artefact
         named = {self._path(chunk, version) for chunk in a.chunk_grid if (version := a.version(chunk)) is not None}
         for path in (self._folder / "c").rglob("*"):
@@ -143,7 +143,7 @@ class ChunkFiles:
         self.journal.unlink(missing_ok=True)
 
     def _note(self, name: str, number: int, crc: int) -> None:
-        """Append a line to the journal and see it onto the disk."""
+        """Append a line to the journal and flush it to disk."""
         with self.journal.open("ab") as file:
             file.write(f"\n{name} {number} {crc};".encode("ascii"))
             file.flush()
@@ -154,18 +154,18 @@ class ChunkFiles:
         return inside(self._folder, f"{name}.{version.generation}" if version.generation else name)
 
     def _encoded(self, chunk: Chunk, data: Array) -> bytes:
-        """Bytes of a chunk's file; none for a chunk of zeros, which has no file."""
+        """Bytes of a chunk's file; empty for a chunk of zeros, which has no file."""
         whole = np.zeros(self.artefact.chunks, self._dtype)
         whole[self._inner(chunk)] = data
         return bytes(_ZSTD.encode(whole)) if whole.reshape(-1).view(np.uint8).any() else b""
 
     def _inner(self, chunk: Chunk) -> Region:
-        """Index of the values of a chunk that lie within the array."""
+        """Index of a chunk's values that lie within the array."""
         return tuple(slice(0, part.stop - part.start) for part in self.artefact.region(chunk))
 
 
 def _content(path: Path, limit_bytes: int) -> bytes:
-    """Content of a file; nothing where there is none."""
+    """Content of a file; empty if it is missing."""
     try:
         return read_bytes(path, limit_bytes)
     except UserError:
@@ -175,7 +175,7 @@ def _content(path: Path, limit_bytes: int) -> bytes:
 
 
 def content_size(frame: bytes) -> int:
-    """Bytes that a zstd frame says it holds (RFC 8878, 3.1.1.1); -1 where it is no frame, or does not say."""
+    """Decompressed size stated by a zstd frame (RFC 8878, 3.1.1.1); -1 if it is not a frame or states none."""
     if frame[:4] != b"\x28\xb5\x2f\xfd" or len(frame) < 5:
         return -1
     kind, is_single, dictionary = frame[4] >> 6, frame[4] >> 5 & 1, frame[4] & 3
@@ -184,5 +184,5 @@ def content_size(frame: bytes) -> int:
 
 
 def _remove(path: Path) -> None:
-    with suppress(PermissionError):  # on Windows, while another process reads it; `settle` removes it later
+    with suppress(PermissionError):  # on Windows, while another process reads it; `settle` deletes it later
         path.unlink(missing_ok=True)

@@ -1,7 +1,7 @@
-"""Whether a store is what `store.contract` says: its arrays by name, and the names and numbers of its scene record.
+"""Checks that a store obeys `store.contract`: its arrays, and the names and numbers of its scene record.
 
-A bake writes no other; a damaged or foreign manifest may say anything. What is read is checked here, once, so that
-nothing that draws or traces has to ask.
+Bakes write consistent stores; a damaged or foreign manifest may contain anything. Everything is checked here once, so
+that renderers and tracers need no checks.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from lambent.store.store import MANIFEST, Store
 SceneRecord = Any  # of `store.contract`, which imports this module
 ANY = None
 CUBE = (6, ANY, ANY)
-_ARRAYS: tuple[tuple[str, tuple[int | None, ...], str], ...] = (  # name, shape, kinds of numbers
+_ARRAYS: tuple[tuple[str, tuple[int | None, ...], str], ...] = (  # name, shape, kinds of dtype
     ("geometry/positions", (ANY, 3), "f"), ("geometry/normals", (ANY, 3), "f"), ("geometry/tangents", (ANY, 3), "f"),
     ("geometry/uv", (ANY, 2), "f"), ("geometry/uv2", (ANY, 2), "f"), ("geometry/faces", (ANY, 3), "iu"),
     ("light_map/irradiance", (ANY, ANY, 3), "f"), ("light_map/irradiance_back", (ANY, ANY, 3), "f"),
@@ -42,7 +42,7 @@ _PER_VERTEX = ("positions", "normals", "tangents", "uv", "uv2")
 
 
 def check_record(store: Store, record: SceneRecord) -> None:
-    """`UserError` where arrays have another shape than their names say, or the record contradicts itself."""
+    """Raise `UserError` if an array's shape does not fit its name, or the record contradicts itself."""
     for artefact in store.artefacts():
         for pattern, wanted, kinds in _ARRAYS:
             if fnmatchcase(artefact.name, pattern):
@@ -66,7 +66,7 @@ def check_record(store: Store, record: SceneRecord) -> None:
 
 
 def _check_names(store: Store, record: SceneRecord) -> None:
-    """Whether what names something names what is there, and each range of faces lies within them."""
+    """Check that all references resolve and all face ranges lie within the faces."""
     objects = {o.name: o for o in record.objects}
     if len(objects) != len(record.objects):
         raise _broken(store, "objects", "two objects have the same name")
@@ -96,7 +96,7 @@ def _check_names(store: Store, record: SceneRecord) -> None:
 
 
 def read_geometry(store: Store) -> dict[str, Array]:
-    """The arrays geometry/* by their last name; `UserError` where they do not fit together."""
+    """The arrays geometry/* by the last part of their name; `UserError` if they do not fit together."""
     arrays = {name: store.read(f"geometry/{name}") for name in (*_PER_VERTEX, "faces")}
     count = len(arrays["positions"])
     if any(len(arrays[name]) != count for name in _PER_VERTEX):
@@ -110,7 +110,7 @@ def read_geometry(store: Store) -> dict[str, Array]:
 
 
 def numbers_of(store: Store, artefact: str, name: str, count: int) -> tuple[float, ...]:
-    """So many finite numbers from the notes of an array."""
+    """`count` finite numbers from an array's meta; raise `UserError` otherwise."""
     found = store.artefact(artefact).meta.get(name)
     listed = found if isinstance(found, list) else []
     numbers = tuple(float(x) for x in listed if isinstance(x, int | float) and math.isfinite(x))
@@ -120,7 +120,7 @@ def numbers_of(store: Store, artefact: str, name: str, count: int) -> tuple[floa
 
 
 def is_usable(camera: Camera) -> bool:
-    """Whether a camera is within FARTHEST_M and sees something."""
+    """Whether a camera is within FARTHEST_M of the origin and has a valid view."""
     numbers = (*camera.position, *camera.target, *camera.up)
     return all(abs(number) <= FARTHEST_M for number in numbers) and 0 < camera.fov_y_deg < 180
 

@@ -1,4 +1,4 @@
-"""Light fields of a store: arrays light_field/OBJECT/* to `core.light_field.LightField`."""
+"""Read light fields: arrays light_field/OBJECT/* to `core.light_field.LightField`."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from lambent.store.contract import light_field_name
 from lambent.store.store import Store
 
 PARTS = ("points", "normals", "radiance", "inverse_distance", "sample_map")
-BLOCKS = "blocks"  # in place of radiance
-DISTANCES = "distances"  # in blocks, in place of inverse_distance and cover
-EXITS = "exits"  # of glass
-COVER = "cover"  # of texels' quarters; stores of earlier versions have none
+BLOCKS = "blocks"  # replaces radiance
+DISTANCES = "distances"  # blocks that replace inverse_distance and cover
+EXITS = "exits"  # glass only
+COVER = "cover"  # of texels' quarters; absent from earlier versions' stores
 
 
 def has_light_field(store: Store, object_name: str) -> bool:
-    """Whether the whole light field of an object is in the store: its last array is complete."""
+    """Whether the store has the complete light field of an object, that is, its last array."""
     name = light_field_name(object_name, PARTS[-1])
     return name in store and store.artefact(name).complete
 
 
 def read_light_field(store: Store, object_name: str) -> LightField:
-    """The light field of an object; `UserError` where its arrays do not fit together."""
+    """The light field of an object; `UserError` if its arrays do not fit together."""
     points, normals, sample_map = (
         store.read(light_field_name(object_name, part))
         for part in PARTS
@@ -68,12 +68,12 @@ def read_light_field(store: Store, object_name: str) -> LightField:
 def _distances(
     store: Store, object_name: str
 ) -> tuple[NDArray[np.float16], NDArray[np.uint8] | None, NDArray[np.uint32] | None]:
-    """Inverse distances and cover, and their blocks where the store has those."""
+    """Inverse distances and cover, and their blocks if stored."""
     name = light_field_name(object_name, DISTANCES)
     if name not in store:
         inverse = store.read(light_field_name(object_name, "inverse_distance"))
         return inverse, _cover(store, object_name, inverse.shape), None
-    from lambent.core.light_field_blocks import distances_of  # which imports numba
+    from lambent.core.light_field_blocks import distances_of  # imports numba
 
     blocks, (side,) = store.read(name), numbers_of(store, name, "texels", 1)
     volume = store.artefact(light_field_name(object_name, PARTS[-1])).meta.get("volume") is True
@@ -85,7 +85,7 @@ def _distances(
 
 
 def _cover(store: Store, object_name: str, shape: tuple[int, ...]) -> NDArray[np.uint8] | None:
-    """Which quarters of texels show surfaces, where the store knows."""
+    """Flags of the texels' quarters that show surfaces; None if not stored."""
     name = light_field_name(object_name, COVER)
     if name not in store:
         return None
@@ -96,7 +96,7 @@ def _cover(store: Store, object_name: str, shape: tuple[int, ...]) -> NDArray[np
 
 
 def _glass(store: Store, object_name: str, shape: tuple[int, ...]) -> Glass | None:
-    """What refracts; None where the store has none."""
+    """The refraction of glass; None if the object has none."""
     name = light_field_name(object_name, EXITS)
     if name not in store:
         return None
@@ -108,18 +108,18 @@ def _glass(store: Store, object_name: str, shape: tuple[int, ...]) -> Glass | No
 
 
 def light_name(store: Store, object_name: str) -> str:
-    """Name of the array that holds a light field's radiance, in blocks or not."""
+    """Name of the array of a light field's radiance, blocks or maps."""
     blocks = light_field_name(object_name, BLOCKS)
     return blocks if blocks in store else light_field_name(object_name, "radiance")
 
 
 def _radiance(store: Store, object_name: str, side: int) -> tuple[NDArray[np.float16], NDArray[np.uint32] | None]:
-    """Maps, and their blocks where the store has those."""
+    """Maps, and their blocks if stored."""
     name = light_name(store, object_name)
     array = store.read(name)
     if not name.endswith(BLOCKS):
         return array, None
-    from lambent.core.light_field_blocks import maps_of  # which imports numba
+    from lambent.core.light_field_blocks import maps_of  # imports numba
 
     if array.ndim != 4 or array.shape[1] != array.shape[2] or array.shape[3] != 4 or array.dtype != np.uint32:
         raise UserError("broken store", file=store.folder, field=name, got=str(array.shape), expected="n x b x b x 4")

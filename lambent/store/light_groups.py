@@ -1,4 +1,4 @@
-"""The light groups of a store, and the names of its light maps by group (see `store.contract`)."""
+"""The light groups of a store, and the names of its light maps per group (see `store.contract`)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from lambent.store.store import MANIFEST, Store
 class LightGroupRecord(BaseModel):
     """Emitters that are dimmed together: see scenes.light_groups.
 
-    `share` is that of their luminous irradiance, the sun's direct light included, on the surfaces of the scene.
+    `share` is the group's fraction of luminous irradiance, the sun's direct light included, on the scene's surfaces.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -23,12 +23,12 @@ class LightGroupRecord(BaseModel):
 
 
 def group_name(side: str, *, direct: bool = False) -> str:
-    """Name of the array of a side of the light map by light group, of all light or of what is direct."""
+    """Name of a light map side's array by light group; `direct` selects direct light alone."""
     return f"light_map/{side.replace('irradiance', 'direct' if direct else 'groups')}"
 
 
 def light_groups(store: Store) -> tuple[LightGroupRecord, ...]:
-    """The light groups of a store, in the order of its arrays by group; none where it was baked without."""
+    """The light groups of a store, in the order of its arrays by group; empty if baked without groups."""
     name = group_name(SIDES[0])
     if name not in store:
         return ()

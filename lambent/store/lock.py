@@ -1,4 +1,4 @@
-"""One writer at a time: a lock on a file, which ends with the process that holds it, so that none can be stale."""
+"""A writer lock: a file lock that ends with its process, so that it cannot go stale."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from weakref import WeakValueDictionary
 
 from lambent.core.errors import UserError
 
-FILE = ".writer.lock"  # stays in the folder; that it exists means nothing
+FILE = ".writer.lock"  # the file stays in the folder; its existence means nothing
 
 
 def lock(handle: int, *, wait: bool) -> bool:
-    """Lock an open file until it is closed; False where another open file has the lock and `wait` is False.
+    """Lock an open file until it is closed; returns False if it is locked elsewhere and `wait` is False.
 
-    A drive that knows no locks, as some network drives, goes without.
+    On a drive without locks, such as some network drives, this does nothing and returns True.
     """
     try:
         if sys.platform == "win32":
             import msvcrt
 
-            os.lseek(handle, 1 << 30, os.SEEK_SET)  # past the end: others cannot read a locked byte
+            os.lseek(handle, 1 << 30, os.SEEK_SET)  # beyond the end: Windows blocks reads of locked bytes
             msvcrt.locking(handle, msvcrt.LK_LOCK if wait else msvcrt.LK_NBLCK, 1)
         else:
             import fcntl
@@ -35,15 +35,15 @@ def lock(handle: int, *, wait: bool) -> bool:
 
 
 class WriterLock:
-    """The right of this process to write into `folder`, until `release` or the end of the object.
+    """This process's exclusive right to write into `folder`, until `release` or deletion of the object.
 
-    A second lock in the same thread takes the right from the first, whose `held` turns False: a thread that asks is not
-    in the middle of a write. Another thread is refused like another process.
+    A second lock in the same thread takes over from the first, whose `held` turns False: the thread cannot be in the
+    middle of a write. Another thread is refused like another process.
 
     Raises
     ------
     UserError
-        Where another process or thread writes, or the folder cannot be written.
+        If another process or thread is writing, or the folder is not writable.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -73,11 +73,11 @@ class WriterLock:
 
     @property
     def held(self) -> bool:
-        """Whether this process may write; a forked child may not."""
+        """Whether this process may write; False in a forked child."""
         return self._handle is not None and self._process == os.getpid()
 
     def release(self) -> None:
-        """Let others write."""
+        """Allow others to write."""
         handle, self._handle = self._handle, None
         if handle is not None:
             os.close(handle)

@@ -1,11 +1,11 @@
-"""How much of a probe's light arrives where it is shown.
+"""The share of a probe's light that reaches the surfaces showing it.
 
-`light_map/probe_share` says it by direction: at a texel, a + b.w of the light that the probe has along unit w, held
-within 0 and MOST_SHARE. It counts for the objects in its notes.
+`light_map/probe_share` gives it by direction: at a texel, the share of the probe's light along unit w is a + b.w,
+clamped to [0, MOST_SHARE]. It applies to the objects in its meta.
 
-All others follow the notes of the probe's radiance. r is the light map's share of `seen_irradiance` (`store.contract`),
-times `occlusion_gain`, at most 1. The probe's light is scaled by r; with `even_niches` by r^2, and (1 - r) E/pi of the
-light map's irradiance E is added from all directions.
+All other objects use the meta of the probe's radiance. r is the light map's share of `seen_irradiance`
+(`store.contract`), times `occlusion_gain`, at most 1. The probe's light is scaled by r. With `even_niches`, it is
+scaled by r^2, and (1 - r) E/pi of the light map's irradiance E is added from all directions.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ MOST_GAIN = 8.0
 
 
 def occlusion_gain(store: Store, object_name: str) -> float:
-    """Factor on the light map's share of `probe_irradiance` of `store.contract`."""
+    """Factor on the light map's share of `store.contract.probe_irradiance`."""
     name = probe_name(object_name, "radiance")
     gain = store.artefact(name).meta.get("occlusion_gain", 1.0)
     if not (isinstance(gain, int | float) and 1 <= gain <= MOST_GAIN):
@@ -31,7 +31,7 @@ def occlusion_gain(store: Store, object_name: str) -> float:
 
 
 def probe_shares(store: Store) -> tuple[Floats | None, frozenset[str]]:
-    """Numbers (H, W, 4) of the texels, and the objects that they count for; None and nothing where they are absent."""
+    """Coefficients (H, W, 4) of the texels, and the objects that use them; None and empty if absent."""
     if PROBE_SHARE not in store:
         return None, frozenset()
     names = store.artefact(PROBE_SHARE).meta.get("objects")
@@ -45,7 +45,7 @@ def probe_shares(store: Store) -> tuple[Floats | None, frozenset[str]]:
 
 
 def has_even_niches(store: Store, object_name: str) -> bool:
-    """Whether niches show the light map's light from all directions where they hide the probe's."""
+    """Whether niches show the light map's light from all directions where they occlude the probe's."""
     name = probe_name(object_name, "radiance")
     said = store.artefact(name).meta.get("even_niches", False)
     if not isinstance(said, bool):

@@ -1,4 +1,4 @@
-"""Floor plans of reflectors as a store keeps them: signed bytes, packed into the text of the scene record."""
+"""Floor plans of reflectors in a store: signed bytes, compressed into the text of the scene record."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ def plan_record(plan: FloorPlan) -> PlanRecord:
 
 
 def plan_of(record: PlanRecord) -> FloorPlan:
-    """The plan of a record; `UserError` where its bytes are not as many as it says."""
+    """The plan of a record; `UserError` if its bytes do not match its size."""
     size = record.rows * record.columns
     try:
         unpacker = zlib.decompressobj()
-        cells = unpacker.decompress(base64.b64decode(record.packed, validate=True), size + 1)  # no more than asked for
+        cells = unpacker.decompress(base64.b64decode(record.packed, validate=True), size + 1)  # bounded output
     except (binascii.Error, zlib.error) as error:
         raise UserError("broken store", field="reflectors: plan", got=str(error), expected="packed bytes") from error
     if len(cells) != size:

@@ -1,7 +1,7 @@
-"""The session of a store: what people have changed while they look at it, `session.json` in its folder.
+"""The session of a store: the user's changes while viewing it, `session.json` in its folder.
 
-No bake touches the file. `session-unsaved.json` beside it has the same form: the window keeps there what nobody has
-saved yet, so that it survives the end of the process. Saved cameras and paths are not in it: see `store.views`.
+Bakes never touch the file. `session-unsaved.json` beside it has the same form: the window keeps unsaved changes there,
+so that they survive the end of the process. Saved cameras and paths are elsewhere: see `store.views`.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from lambent.core.light_mix import LightMix
 from lambent.materials.document import Material
 from lambent.store.lock import lock
 
-LOCK_FILE = ".session.lock"  # stays in the folder; that it exists means nothing
+LOCK_FILE = ".session.lock"  # the file stays in the folder; its existence means nothing
 FILE, UNSAVED_FILE = "session.json", "session-unsaved.json"
 FORMAT: Literal["lambent-walk-session"] = "lambent-walk-session"
 VERSION: Literal[1] = 1
 
 
 class SessionLock:
-    """The right to keep the session of a store, until `release` or the end of the process.
+    """The right to write the session of a store, until `release` or the end of the process.
 
     Raises
     ------
     UserError
-        Where the folder cannot be written.
+        If the folder is not writable.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -48,7 +48,7 @@ class SessionLock:
             self.release()
 
     def release(self) -> None:
-        """Let another window have it."""
+        """Allow another window to take it."""
         handle, self._handle, self.held = self._handle, None, False
         if handle is not None:
             os.close(handle)
@@ -59,9 +59,9 @@ class _Strict(BaseModel):
 
 
 class RoomState(_Strict):
-    """What a room looks like: materials that stand in for the scene's, by name, and the mix of its light groups.
+    """The look of a room: replacement materials by name, and the mix of its light groups.
 
-    `textures` are those that a material wears in the place of its own: the name of their material, "" for none.
+    `textures` maps a material to the material whose textures it uses instead of its own; "" for none.
     """
 
     materials: dict[str, Material] = {}
@@ -69,19 +69,19 @@ class RoomState(_Strict):
     light: LightMix = LightMix()
 
     def unknown(self, materials: Collection[str], groups: Collection[str]) -> list[str]:
-        """Names of materials and light groups that a store does not have."""
+        """Names of materials and light groups that are missing from a store."""
         worn = [*self.materials, *self.textures, *(of for of in self.textures.values() if of)]
         return [n for n in worn if n not in materials] + [n for n in self.light.groups if n not in groups]
 
     def only(self, materials: Collection[str]) -> RoomState:
-        """The same with those of its materials that a store has."""
+        """A copy limited to the materials that a store has."""
         known = {name: one for name, one in self.materials.items() if name in materials}
         worn = {name: of for name, of in self.textures.items() if name in materials and of in (*materials, "")}
         return RoomState(materials=known, textures=worn, light=self.light)
 
 
 class WalkSession(_Strict):
-    """What a session file holds: the present state, the one that is compared with it, and stored states by name."""
+    """Content of a session file: the current state, the state compared with it, and stored states by name."""
 
     format: Literal["lambent-walk-session"] = FORMAT
     version: Literal[1] = VERSION
@@ -90,18 +90,18 @@ class WalkSession(_Strict):
     states: dict[str, RoomState] = {}
 
     def unknown(self, materials: Collection[str], groups: Collection[str]) -> list[str]:
-        """Names of materials and light groups that a store does not have, sorted."""
+        """Names of materials and light groups that are missing from a store, sorted."""
         parts = [self.now, *([] if self.beside is None else [self.beside]), *self.states.values()]
         return sorted({name for part in parts for name in part.unknown(materials, groups)})
 
 
 def read_session(file: Path) -> WalkSession | None:
-    """The session in a file; None where there is none.
+    """The session in a file; None if there is no file.
 
     Raises
     ------
     UserError
-        Where the file is damaged or of another version.
+        If the file is damaged or of another version.
     """
     if not file.exists():
         return None
@@ -121,10 +121,10 @@ def session_from(said: Any, file: Path) -> WalkSession:
         return WalkSession.model_validate(said)
     except ValidationError as error:
         raise invalid(error, file) from error
-    except UserError as error:  # a mix that no light can have
+    except UserError as error:  # an invalid mix
         raise UserError(error.message, file=file, field=error.field, got=error.got, expected=error.expected) from error
 
 
 def write_session(file: Path, session: WalkSession) -> None:
-    """Write a session, atomically; `UserError` where that cannot be."""
+    """Write a session, atomically; raises `UserError` on failure."""
     write_text(file, json.dumps(session.model_dump(mode="json"), indent=1) + "\n")

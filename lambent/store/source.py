@@ -1,4 +1,4 @@
-"""Where the scene of a store is, and the scene as it was baked."""
+"""The scene of a store: its location, and the scene as baked."""
 
 from __future__ import annotations
 
@@ -19,32 +19,32 @@ from lambent.store.store import Store
 from lambent.store.textures import read_textures
 
 SOURCE = "source"  # document: "builtin:NAME", or a path relative to the store's folder
-CREASE_ANGLE = "crease_angle"  # document: degrees, or null where the scene's normals are as its files have them
+CREASE_ANGLE = "crease_angle"  # document: degrees, or null to use the normals of the scene's files
 SURROUNDINGS = "surroundings"  # document: the image that lights views instead of the scene's environment, if any
-SAME_M = 1e-4  # metres, and share of the largest coordinate: bounds that differ less are the same
+SAME_M = 1e-4  # tolerance for equal bounds: metres, and share of the largest coordinate
 log = logging.getLogger(__name__)
 
 
 def inputs_of(scene: Scene) -> dict[str, str]:
-    """SHA-256 of the files a scene was read from, by file name."""
+    """SHA-256 of each file of a scene, by file name."""
     return {path.name: sha256_of(path) for path in (*scene.sources, *scene.measured.values())}
 
 
 def environment_note(image: ImageEnvironment | None) -> dict[str, Any] | None:
-    """What arrays note of an image that lights them instead of their scene's environment; None without one."""
+    """Meta of an array lit by an image instead of its scene's environment; None without an image."""
     if image is None:
         return None
     return {**asdict(image), "file": sha256_of(image.file)}
 
 
 def changed_inputs(store: Store, scene: Scene) -> list[str]:
-    """Names of the scene's files that have changed since the store was baked."""
+    """Names of the scene's files that changed since the bake."""
     now = inputs_of(scene)
     return sorted(name for name in now.keys() | store.inputs.keys() if now.get(name) != store.inputs.get(name))
 
 
 def write_source(store: Store, scene: Scene) -> None:
-    """Note where the scene is; nothing where it was made in memory."""
+    """Record the location of the scene; nothing for a scene made in memory."""
     place = scene.origin
     if place is not None and not place.startswith("builtin:"):
         place = Path(os.path.relpath(place, store.folder)).as_posix()
@@ -53,15 +53,15 @@ def write_source(store: Store, scene: Scene) -> None:
 
 
 def scene_of(store: Store, given: str | None = None) -> Scene:
-    """The scene that a store was baked from, with the materials and textures that it was baked with.
+    """The scene of a store, with the materials and textures of the bake.
 
-    It is loaded from `given`, else from where it was when it was baked. A warning is logged where its geometry no
-    longer fits the store.
+    It is loaded from `given`, else from its location at the bake. Logs a warning if its geometry no longer fits the
+    store.
 
     Raises
     ------
     UserError
-        Where the store does not know its scene and none is given, or the scene cannot be loaded.
+        If the location is unknown and `given` is None, or the scene cannot be loaded.
     """
     place = given or store.documents.get(SOURCE)
     if not isinstance(place, str):
@@ -91,20 +91,20 @@ def scene_of(store: Store, given: str | None = None) -> Scene:
 
 
 def worn_in_views(store: Store) -> dict[str, str]:
-    """Materials of objects, by name, as edited views were baked with them: some may have been merged."""
+    """Material name by object, as used by baked edited views; materials may have been merged since."""
     found = (a for a in store.artefacts("view_points") if "objects" in a.meta)
     return {str(name): str(material) for artefact in found for name, material in artefact.meta["objects"]}
 
 
 def _parts_of(name: str, record: SceneRecord) -> list[ObjectRecord]:
-    """What the store has of an object: itself, or the parts that it was cut into for its probes."""
+    """The store's records of an object: the object itself, or the parts it was cut into for probes."""
     return [o for o in record.objects if o.name == name or o.name.startswith(f"{name}.part")]
 
 
 def _fits(parts: list[ObjectRecord], bounds: tuple[object, object], faces: int, cuts: set[str]) -> bool:
-    """Whether the parts have so many faces, or more where the bake has cut them, and these bounds.
+    """Whether the parts have `faces` faces, or more if the bake cut them, and these bounds.
 
-    Faces are cut where the object was divided, or where the light's edges run (`cuts`).
+    The bake cuts faces when it divides an object and along the edges of light (`cuts`).
     """
     baked, was_cut = sum(part.face_count for part in parts), len(parts) > 1 or any(part.name in cuts for part in parts)
     if not parts or baked < faces or (baked > faces and not was_cut):

@@ -1,4 +1,4 @@
-"""The variants of a store: those of its scene, and states of the room that were stored in the window."""
+"""The variants of a store: those of its scene, and states of the room stored in the window."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from lambent.store.contract import SceneRecord, scene_record
 from lambent.store.session import FILE, RoomState, read_session
 from lambent.store.store import Store
 
-SAVED = "saved"  # the room as it was last saved
+SAVED = "saved"  # name of the room as last saved
 
 
 def variants_of(store: Store, *, saved: bool = True) -> tuple[Variant, ...]:
-    """The variants of the scene, and after them the states of the store's session; of one name, the state.
+    """The variants of the scene, then the states of the store's session; a state hides a variant of the same name.
 
-    `saved` adds the room as the session left it, where that is another than the baked one. What the store does not have
-    any more is left out of a state.
+    `saved` adds the room as the session left it, if it differs from the bake. Materials that the store no longer has
+    are left out of a state.
 
     Raises
     ------
     UserError
-        Where the session is damaged.
+        If the session is damaged.
     """
     record, session = scene_record(store), read_session(store.folder / FILE)
     found = {variant.name: variant for variant in record.variants}
@@ -30,7 +30,7 @@ def variants_of(store: Store, *, saved: bool = True) -> tuple[Variant, ...]:
 
 
 def says_light(store: Store, name: str) -> bool:
-    """Whether a variant of this name says what the light is: a mix, or, of a state, that it is as baked."""
+    """Whether a variant of this name defines the light: a mix, or, in a state, the light as baked."""
     session, found = read_session(store.folder / FILE), {one.name: one for one in variants_of(store)}
     of_session = session is not None and (name in session.states or name == SAVED)
     return name in found and (of_session or bool(found[name].light.groups))

@@ -1,11 +1,11 @@
-"""What a bake is on disk: one folder, `manifest.json` and chunked compressed arrays, each with a journal.
+"""A bake on disk: one folder with `manifest.json` and chunked, compressed arrays, each with a journal.
 
-Rules: a chunk is on disk before the array's journal names it; the manifest is replaced whole, never edited, and takes
-over a journal when its array is finished or the next writer comes; a rewritten chunk is a new file; readers verify the
-checksum of every chunk they read. So a store survives kill -9 at any moment and never reads as complete when it is not.
+Rules: a chunk is on disk before the array's journal records it. The manifest is replaced whole, never edited; it
+absorbs a journal when the array is finished or the next writer starts. A rewritten chunk is a new file. Readers verify
+the checksum of every chunk. So a store survives kill -9 at any moment and never reads as complete when it is not.
 
-Only one process writes a store at a time; readers wait for nobody. The first writing call of a `Store` takes the lock
-(`lambent.store.lock`), and `Store.close` or the end of the object gives it back.
+Only one process writes a store at a time; readers never wait. The first writing call of a `Store` takes the lock
+(`lambent.store.lock`); `Store.close` or deletion of the object releases it.
 """
 
 from __future__ import annotations
@@ -28,35 +28,35 @@ from lambent.store.artefact import Array, Artefact, Chunk, Region, chunk_id
 from lambent.store.chunk_files import ChunkFiles
 from lambent.store.lock import WriterLock
 
-FORMAT, VERSIONS = "lambent-store", (1, 2)  # 2 where a chunk was rewritten: readers of 1 do not find its file
+FORMAT, VERSIONS = "lambent-store", (1, 2)  # version 2 has rewritten chunks, whose files readers of 1 do not find
 MANIFEST = "manifest.json"
 __all__ = ["Array", "Artefact", "Chunk", "Store", "Writer"]
 LIMIT_BYTES = 1 << 28  # of a manifest
-SPARSE_BYTES, DENSEST = 1 << 30, 1 << 16  # an array of more bytes has files, which zstd packs no denser
+SPARSE_BYTES, DENSEST = 1 << 30, 1 << 16  # larger arrays need files: zstd's highest ratio
 _DAMAGE = (OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError, SyntaxError)
 
 
 class Store:
-    """A folder of named arrays. Make one with `create` or `open`; never construct it by hand."""
+    """A folder of named arrays. Obtain one from `create` or `open`, never from the constructor."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = Path(folder)
         self.inputs: dict[str, str] = {}
         self.documents: dict[str, Any] = {}
         self._artefacts: dict[str, Artefact] = {}
-        self._entries: dict[str, _Entry] = {}  # as last written to the manifest; without those that writers changed
+        self._entries: dict[str, _Entry] = {}  # as in the last manifest, less those changed since
         self._lock: WriterLock | None = None
 
     @classmethod
     def create(cls, folder: Path, inputs: Mapping[str, str]) -> Store:
-        """The store in `folder`, made where there is none, open for writing. `inputs` maps each input to its hash.
+        """Open the store in `folder` for writing, and create it if needed. `inputs` maps each input to its hash.
 
-        An existing store keeps its arrays; the bake finds out by their `key` which of them are stale.
+        An existing store keeps its arrays; the bake detects stale ones by their `key`.
 
         Raises
         ------
         UserError
-            Where the folder holds something else, or another process writes the store.
+            If the folder holds something else, or another process is writing the store.
         """
         store = cls(folder)
         if not (store.folder / MANIFEST).exists() and store.folder.exists():
@@ -70,13 +70,13 @@ class Store:
 
     @classmethod
     def open(cls, folder: Path) -> Store:
-        """The store in `folder`; `UserError` where it is none, of another version, or damaged."""
+        """Open the store in `folder`; `UserError` if it is not one, of another version, or damaged."""
         store = cls(folder)
         store._load()
         return store
 
     def close(self) -> None:
-        """Let other processes write; reading goes on, and the next writing call takes the lock again."""
+        """Release the lock; reading goes on, and the next writing call takes the lock again."""
         if self._lock is not None:
             self._lock.release()
 
@@ -87,7 +87,7 @@ class Store:
         self.close()
 
     def refresh(self) -> None:
-        """See what another process has written since. `Artefact` objects obtained before stay as they were."""
+        """Load the changes of other processes. `Artefact` objects obtained earlier stay unchanged."""
         if not self._writes:
             self._load()
 
@@ -100,32 +100,32 @@ class Store:
         return name in self._artefacts and self._artefacts[name].complete
 
     def availability(self, name: str) -> tuple[Literal["absent", "partial", "complete"], float]:
-        """Whether an artefact is there, and which share of its chunks is written (0 to 1)."""
+        """State of an artefact, and the fraction of its chunks that is written (0 to 1)."""
         if name not in self._artefacts:
             return "absent", 0.0
         a = self._artefacts[name]
         return ("complete", 1.0) if a.complete else ("partial", len(a.done) / max(1, math.prod(a.chunk_counts)))
 
     def artefact(self, name: str) -> Artefact:
-        """The record of an array; `UserError` where the store holds none of this name."""
+        """The record of an array; `UserError` if the store has none of this name."""
         if name not in self._artefacts:
             raise self._error("array is not in the store", name, "bake it first")
         return self._artefacts[name]
 
     def set_document(self, name: str, document: Any) -> None:
-        """Keep a small JSON value (the scene record, timings) in the manifest."""
+        """Keep a small JSON value (scene record, timings) in the manifest."""
         self._own()
         self.documents[name] = document
         self._save()
 
     def forget_all(self) -> None:
-        """Drop every array, so that a bake starts anew; their files go when they are written again."""
+        """Drop all arrays, so that a bake starts afresh; their files are deleted when they are rewritten."""
         self._own()
         self._artefacts.clear()
         self._save()
 
     def forget(self, names: Iterable[str]) -> None:
-        """Drop arrays, those of these names that are there, and their files."""
+        """Drop the arrays of these names, if present, and their files."""
         self._own()
         dropped = [self._artefacts.pop(name) for name in list(names) if name in self._artefacts]
         self._save()
@@ -144,11 +144,11 @@ class Store:
         meta: Mapping[str, Any] | None = None,
         growing: bool = False,
     ) -> Writer:
-        """Start, or go on with, an array.
+        """Start or resume an array.
 
-        Where the store holds chunks of the same `key`, shape and chunking, they are kept and `Writer.missing` lists
-        the rest; otherwise the array starts empty. Of a `growing` array, whose first axis `Writer.extend` lengthens,
-        the longer of what the store holds and `shape` counts.
+        Chunks of the same `key`, shape and chunking are kept, and `Writer.missing` lists the rest; otherwise the array
+        starts empty. The first axis of a `growing` array is lengthened by `Writer.extend`; it starts at the longer of
+        the stored length and `shape`.
         """
         self._own()
         wanted = Artefact(name, kind, tuple(shape), tuple(chunks), np.dtype(dtype).name, key, dict(meta or {}))
@@ -167,7 +167,7 @@ class Store:
         return writer
 
     def put(self, name: str, kind: str, array: Array, *, key: str, meta: Mapping[str, Any] | None = None) -> None:
-        """Write a whole array at once, as one chunk."""
+        """Write a whole array as one chunk."""
         shape = tuple(max(1, size) for size in array.shape)
         writer = self.begin(name, kind, array.shape, shape, array.dtype.name, key=key, meta=meta)
         for chunk in writer.missing:
@@ -175,24 +175,24 @@ class Store:
         writer.finish()
 
     def read(self, name: str) -> Array:
-        """The whole array; `UserError` where it is absent, incomplete or damaged."""
+        """The whole array; `UserError` if it is absent, incomplete or damaged."""
         artefact = self.artefact(name)
         if not artefact.complete:
             raise self._error(f"is {artefact.state}", name, "run `lambent bake` again to finish it")
         return self.read_region(name, ())
 
     def read_partial(self, name: str) -> tuple[Array, NDArray[np.bool_]]:
-        """The array as far as it is written, zero elsewhere, and which chunks are written (`Artefact.written`)."""
+        """The array as far as written, zero elsewhere, and flags of written chunks (`Artefact.written`)."""
         artefact = self.artefact(name)
         written = artefact.written
         chunks = [chunk for chunk in artefact.chunk_grid if written[chunk]]
         return self._gathered(artefact, tuple(slice(0, size) for size in artefact.shape), chunks), written
 
     def read_region(self, name: str, region: Sequence[slice]) -> Array:
-        """Part of an array, complete or not; `UserError` where a chunk of it is not written or damaged.
+        """Part of an array, complete or not; `UserError` if one of its chunks is unwritten or damaged.
 
-        `region` has slices without a step, for the first axes or for all; only the chunks that it touches are read.
-        Of one chunk: `artefact.region(chunk)`.
+        `region` has slices without a step, for the first axes or for all. Only chunks that overlap it are read. For one
+        chunk, use `artefact.region(chunk)`.
         """
         artefact = self.artefact(name)
         parts = [*region, *[slice(None)] * (len(artefact.shape) - len(region))]
@@ -200,7 +200,7 @@ class Store:
         return self._gathered(artefact, plain, artefact.chunks_in(plain))
 
     def _gathered(self, artefact: Artefact, region: Region, chunks: Iterable[Chunk]) -> Array:
-        """Values of a region from these chunks."""
+        """Values of a region, from the given chunks."""
         files, chunks = ChunkFiles(self.folder, artefact), list(chunks)
         size = math.prod(max(0, part.stop - part.start) for part in region) * np.dtype(artefact.dtype).itemsize
         if size > memory_bytes() // 2:
@@ -216,7 +216,7 @@ class Store:
         return gathered
 
     def _piece(self, files: ChunkFiles, chunk: Chunk) -> Array:
-        """A chunk that passes its checksum; the new one where another process has rewritten it since."""
+        """A chunk that passes its checksum; the newer version if another process has rewritten it."""
         artefact, name = files.artefact, files.artefact.name
         field = f"{name} {chunk_id(chunk)}"
         while (version := artefact.version(chunk)) is not None:
@@ -239,7 +239,7 @@ class Store:
         return self._lock is not None and self._lock.held
 
     def _own(self) -> None:
-        """Take the right to write, and take over what others have written until then."""
+        """Take the lock, and load what others have written before."""
         if self._writes:
             return
         self._lock = WriterLock(self.folder)
@@ -258,7 +258,7 @@ class Store:
             raise
 
     def _load(self) -> None:
-        """Read manifest and journals; again where a writer has replaced the manifest meanwhile."""
+        """Read manifest and journals; retry if a writer replaces the manifest meanwhile."""
         path = self.folder / MANIFEST
         if not path.exists():
             hint = "make one with `lambent bake`"
@@ -267,10 +267,10 @@ class Store:
             text = None
             while text != (
                 text := read_bytes(path, LIMIT_BYTES).decode("utf-8")
-            ):  # ends when none has replaced it meanwhile
+            ):  # ends once nobody replaces it meanwhile
                 manifest = json.loads(text)
                 if "\\ud" in text.lower():
-                    json.dumps(manifest, ensure_ascii=False).encode("utf-8")  # fails where a text has half a character
+                    json.dumps(manifest, ensure_ascii=False).encode("utf-8")  # fails on lone surrogates
                 if manifest["format"] != FORMAT or manifest["version"] not in VERSIONS:
                     found, expected = f"{manifest['format']} {manifest['version']}", f"{FORMAT} 1 or 2"
                     raise UserError("unknown store version", file=path, got=found, expected=expected)
@@ -299,7 +299,7 @@ class Store:
         write_text(self.folder / MANIFEST, _object(parts))
 
     def _entry(self, artefact: Artefact) -> _Entry:
-        """Of the manifest: a bake of thousands of arrays saves as often, and would spend its time on making texts."""
+        """Cached manifest entry: a bake saves thousands of times, and encoding all entries would dominate."""
         known = self._entries.get(artefact.name)
         if known is not None and known.artefact is artefact:
             return known
@@ -310,11 +310,11 @@ class Store:
 class _Entry(NamedTuple):
     artefact: Artefact
     text: str
-    rewritten: bool  # whether a chunk was
+    rewritten: bool  # whether a chunk was rewritten
 
 
 class Writer:
-    """Writes the chunks of one array; see `Store.begin`. It is of use as long as its store holds the lock."""
+    """Writes the chunks of one array; see `Store.begin`. Valid while its store holds the lock."""
 
     def __init__(self, store: Store, artefact: Artefact) -> None:
         self.artefact = artefact
@@ -323,24 +323,24 @@ class Writer:
 
     @property
     def missing(self) -> list[Chunk]:
-        """Chunks that are not written yet."""
+        """Chunks not written yet."""
         return [chunk for chunk in self.artefact.chunk_grid if self.artefact.version(chunk) is None]
 
     def write(self, chunk: Chunk, data: Array) -> None:
-        """Write a chunk, or replace one: whoever reads, and whatever dies, finds the old one or the new one whole.
+        """Write or replace a chunk; a reader or a crash finds either the old or the new chunk, whole.
 
-        `Artefact.version` tells how often a chunk was replaced: a pass that adds samples to finished chunks goes on,
-        after an interruption, with those that are behind.
+        `Artefact.version` counts replacements: after an interruption, a pass that adds samples to finished chunks
+        resumes with those that are behind.
         """
         self._check()
         self._files.write(chunk, data)
 
     def read_chunk(self, chunk: Chunk) -> Array:
-        """A chunk written before, to build on."""
+        """A chunk written before."""
         return self._store.read_region(self.artefact.name, self.artefact.region(chunk))
 
     def extend(self, count: int) -> None:
-        """Lengthen the first axis by `count`, whole chunks each; the array is partial until it is finished again."""
+        """Lengthen the first axis by `count`, in whole chunks; the array is partial until finished again."""
         self._check()
         a = self.artefact
         assert count > 0 and not (count % a.chunks[0] or a.shape[0] % a.chunks[0]), "batches are whole chunks"
@@ -356,7 +356,7 @@ class Writer:
         self._files.settle()
 
     def _check(self) -> None:
-        """`UserError` where the lock went to another `Store`, or the array was begun anew; it is about to change."""
+        """Raise `UserError` if the lock went to another `Store`, or the array was begun again."""
         self._store._entries.pop(self.artefact.name, None)
         ours = self._lock is self._store._lock and self._store._writes
         if not ours or self._store._artefacts.get(self.artefact.name) is not self.artefact:
@@ -364,10 +364,10 @@ class Writer:
 
 
 def _object(parts: Mapping[str, str]) -> str:
-    """JSON of an object, from that of its values: one line each. json.dumps takes 20 times as long with `indent`."""
+    """JSON object from the JSON of its values, one line each; json.dumps with `indent` takes 20 times as long."""
     return "{" + ",\n".join(f"{json.dumps(key)}: {value}" for key, value in parts.items()) + "}"
 
 
 def _within(part: Sequence[slice], whole: Sequence[slice]) -> Region:
-    """Index of a region relative to one that encloses it."""
+    """Index of a region relative to an enclosing one."""
     return tuple(slice(p.start - w.start, p.stop - w.start) for p, w in zip(part, whole, strict=True))

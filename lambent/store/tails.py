@@ -1,10 +1,10 @@
-"""What light has met before it reaches the surface that a pixel shows: the tails of paths, by number.
+"""Tails of light paths: the surfaces that light hit before the surface a pixel shows, numbered.
 
     B(x) = sum over bands j and tails z of  T_jz(x) c_j d_z        (Ben-Artzi 2007, eq. 6.6)
 
-A tail lists the surfaces beyond the first. Each is a slot, a side of a material, and counts by its equivalent albedo;
-the order does not matter, so a tail is a multiset of slots. In a slowly decaying series the surface next to that of the
-pixel counts by bands of its curves: such a tail is a band of a term and the multiset of what follows (6.9).
+A tail lists the surfaces beyond the first. Each is a slot, that is, a side of a material, and contributes its
+equivalent albedo. The order does not matter, so a tail is a multiset of slots. In a slowly decaying series, the surface
+next to the pixel's contributes bands of its curves: such a tail is a band of a term and the multiset of the rest (6.9).
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Floats
 from lambent.core.multisets import Multisets
 
-FIXED = "fixed"  # side of the slot of all materials that are not edited: its albedo is 1, their light is in T
+FIXED = "fixed"  # side of the slot of all uneditable materials: albedo 1, their light is in T
 Slot = tuple[str, str]  # material, and side: reflection, transmission or FIXED
 
 
 @dataclass(frozen=True)
 class SecondBands:
-    """Bands of a term's curves at the second surface: `counts` of each of its factors, numbered first factor first."""
+    """Bands of a term's curves at the second surface: `counts` per factor, first factor numbered first."""
 
     material: str
     term: int
@@ -39,16 +39,16 @@ class SecondBands:
 
 @dataclass(frozen=True)
 class Tails:
-    """The tails of paths that meet 2 to `most_hits` surfaces, the shortest first.
+    """The tails of paths with 2 to `most_hits` surfaces, shortest first.
 
     Attributes
     ----------
     slots : tuple of (material, side)
     most_hits : int
-        Surfaces on the longest path, that of the pixel included.
+        Surfaces on the longest path, the pixel's included.
     second : tuple of SecondBands
-        Empty where the second surface counts by its albedo as well. A term of no curves has one band; one of the
-        material "" stands for all that are not edited.
+        Empty if the second surface contributes its albedo too. A term without curves has one band; material ""
+        stands for all uneditable materials.
     """
 
     slots: tuple[Slot, ...]
@@ -59,11 +59,11 @@ class Tails:
         return self.begin(self.most_hits + 1)
 
     def multisets(self, hits: int) -> Multisets:
-        """The multisets of a tail of a path that meets `hits` surfaces."""
+        """The multisets of the tails of paths with `hits` surfaces."""
         return Multisets(len(self.slots), hits - 2 if self.second else hits - 1)
 
     def begin(self, hits: int) -> int:
-        """Number of the first tail of paths that meet `hits` surfaces."""
+        """Number of the first tail of paths with `hits` surfaces."""
         return sum(self.bands_of_second * len(self.multisets(n)) for n in range(2, hits))
 
     @property
@@ -72,19 +72,19 @@ class Tails:
 
     @cached_property
     def hits(self) -> NDArray[np.int64]:
-        """(Z,) surfaces on the path of each tail, that of the pixel included."""
+        """(Z,) number of surfaces on each tail's path, the pixel's included."""
         numbers = range(2, self.most_hits + 1)
         return np.repeat(numbers, [self.begin(n + 1) - self.begin(n) for n in numbers])
 
     @cached_property
     def band_of_second(self) -> NDArray[np.int64]:
-        """(Z,) number of the band of the second surface, of all terms' bands in their order; 0 where it has none."""
+        """(Z,) band of the second surface, numbered over all terms in order; 0 without one."""
         parts = [np.repeat(range(self.bands_of_second), len(self.multisets(n))) for n in range(2, self.most_hits + 1)]
         return np.concatenate(parts)
 
     @cached_property
     def exponents(self) -> NDArray[np.int64]:
-        """(Z, slots): how often each slot counts by its albedo."""
+        """(Z, slots): power of each slot's albedo."""
         numbers = range(2, self.most_hits + 1)
         parts = [np.tile(self.multisets(n).exponents, (self.bands_of_second, 1)) for n in numbers]
         return np.concatenate(parts)

@@ -1,4 +1,4 @@
-"""Textures in a store: one array per image and material; its transform of uv is in the scene record."""
+"""Textures in a store: one array per image and material; uv transforms are in the scene record."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from lambent.store.store import Store
 
 
 def texture_records(textures: Mapping[str, MaterialTextures]) -> dict[str, TexturesRecord]:
-    """What the scene record says of textures, by material."""
+    """The scene record's entries for textures, by material."""
     return {
         material: TexturesRecord(parts={n: t.uv_transform for n, t in parts(of).items()}, cutoff=of.cutoff)
         for material, of in textures.items()
@@ -19,7 +19,7 @@ def texture_records(textures: Mapping[str, MaterialTextures]) -> dict[str, Textu
 
 
 def write_textures(store: Store, textures: Mapping[str, MaterialTextures]) -> None:
-    """Write the images that the store does not hold yet."""
+    """Write the images that the store lacks."""
     for material, of_material in textures.items():
         for part, texture in parts(of_material).items():
             name, key = texture_name(material, part), digest(texture)
@@ -28,7 +28,7 @@ def write_textures(store: Store, textures: Mapping[str, MaterialTextures]) -> No
 
 
 def read_textures(store: Store, record: SceneRecord) -> dict[str, MaterialTextures]:
-    """The textures of a scene record, by material; an image that several materials show is one array in memory."""
+    """The textures of a scene record, by material; an image shared by several materials is one array in memory."""
     read: dict[str, Texture] = {}
     found = {}
     for material, said in record.textures.items():

@@ -1,6 +1,6 @@
-"""Cameras and recorded camera paths that people save while they look at a store: `views.json` in its folder.
+"""Cameras and recorded camera paths that users save while viewing a store: `views.json` in its folder.
 
-No bake touches the file or waits for its lock. Every change reads the file again and replaces it whole, so that two
+Bakes never touch the file, and it needs no bake's lock. Each change reads the file again and replaces it whole, so two
 windows on one store do not lose each other's views.
 """
 
@@ -32,7 +32,7 @@ LONGEST_NAME = 80
 
 
 class Views(BaseModel):
-    """What a `views.json` holds."""
+    """Content of a `views.json`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -45,12 +45,12 @@ class Views(BaseModel):
 
 
 def read_views(folder: Path) -> Views:
-    """The saved views of the store in `folder`; none where there is no file yet.
+    """The saved views of the store in `folder`; empty if there is no file yet.
 
     Raises
     ------
     UserError
-        Where the file is damaged, of another version, or holds cameras that nobody can look through.
+        If the file is damaged, of another version, or holds unusable cameras.
     """
     path = Path(folder) / FILE
     if not path.exists():
@@ -62,19 +62,19 @@ def read_views(folder: Path) -> Views:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise UserError(f"saved views cannot be used ({first['msg']})", file=path, field=where or None) from error
-    except UserError as error:  # a mix that no light can have
+    except UserError as error:  # an invalid mix
         raise UserError(f"saved views cannot be used ({error.message})", file=path, field=error.field) from error
     _check(views, path)
     return views
 
 
 def change_views(folder: Path, change: Callable[[Views], Views]) -> Views:
-    """Read, change, replace; returns what the file holds then.
+    """Read the views, apply `change`, and replace the file; returns the new views.
 
     Raises
     ------
     UserError
-        Where the file cannot be read or written; it is as it was then.
+        If the file cannot be read or written; it is then unchanged.
     """
     with _alone(Path(folder)):
         views = change(read_views(folder))
@@ -84,9 +84,9 @@ def change_views(folder: Path, change: Callable[[Views], Views]) -> Views:
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Keep others who change this folder's views waiting, so that what one of them adds is not replaced unread.
+    """Exclude others who change this folder's views, so that no addition is overwritten unread.
 
-    The folder itself is locked, because a lock file would stay behind; Windows cannot, and goes without.
+    Locks the folder itself, because a lock file would stay behind; does nothing on Windows, which cannot.
     """
     if sys.platform == "win32":
         yield
@@ -99,11 +99,11 @@ def _alone(folder: Path) -> Iterator[None]:
         lock(handle, wait=True)
         yield
     finally:
-        os.close(handle)  # which ends the lock
+        os.close(handle)  # releases the lock
 
 
 def with_views(record: SceneRecord, views: Views) -> SceneRecord:
-    """The scene record with the saved views after its own; a name of the scene's hides a saved one."""
+    """The scene record with saved views after its own; a scene's name hides a saved view of the same name."""
     cameras = {c.name for c in record.cameras}
     paths = {p.name for p in record.paths}
     return record.model_copy(
@@ -115,7 +115,7 @@ def with_views(record: SceneRecord, views: Views) -> SceneRecord:
 
 
 def checked_name(text: str, taken: set[str]) -> str:
-    """The name that was typed, without blanks around it; `UserError` where a view cannot have it."""
+    """The typed name without surrounding blanks; `UserError` if it is invalid or taken."""
     name = text.strip()
     if not name:
         raise UserError("name is empty", expected="a name, as in entrance")
@@ -129,7 +129,7 @@ def checked_name(text: str, taken: set[str]) -> str:
 
 
 def free_name(stem: str, taken: set[str]) -> str:
-    """`stem` with the first number that is not taken."""
+    """`stem` with the first free number."""
     return next(name for number in count(1) if (name := f"{stem} {number}") not in taken)
 
 

@@ -1,1 +1,1 @@
-"""Interreflections of an edited view: freezing of all objects but one, and the polynomial in what is left."""
+"""Interreflections of an edited view: all objects but one are frozen, which leaves a polynomial in its albedos."""

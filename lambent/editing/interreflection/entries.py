@@ -1,6 +1,6 @@
-"""The light of one term of a view, sparse: numbers of bands and tails as steps from entry to entry.
+"""Sparse light of one term of a view: band and tail numbers are stored as differences between entries.
 
-A step has one byte or two. Where the next number is further away, entries without light come between.
+A difference has one byte or two. A larger gap is bridged by entries without light.
 """
 
 from __future__ import annotations
@@ -18,32 +18,32 @@ from lambent.core.arrays import Indices
 from lambent.editing.products import unit_of
 
 Entries = tuple[NDArray[np.integer], NDArray[np.unsignedinteger[Any]], NDArray[np.uint32]]
-"""Of each of a tile's points, how many; their numbers, rising within a point; their values."""
-WIDTHS: tuple[type[np.unsignedinteger[Any]], ...] = np.uint8, np.uint16  # of a step
+"""Entries of each of a tile's points: counts; their numbers, ascending within a point; their values."""
+WIDTHS: tuple[type[np.unsignedinteger[Any]], ...] = np.uint8, np.uint16  # of a difference
 BYTES = 4  # of a value
 
 
 @dataclass(frozen=True)
 class TermLight:
-    """Light of one term of a material by bands and tails; of a material that is not edited, all its light.
+    """Light of one term of a material by bands and tails; for an uneditable material, all its light.
 
     Attributes
     ----------
     ends : (P + 1,) int64
         Entries of point p are ends[p] to ends[p + 1].
     steps : (N,) uint8 or uint16
-        From each entry's number to the next entry's; each point begins at 0. Numbers are the tail times the number of
-        bands, plus the band.
+        Difference of each entry's number to the previous one's; each point begins at 0. A number is the tail times the
+        number of bands, plus the band.
     values : (N,) uint32
         RGB9E5 (`core.shared_exponent`), times `units` of the point.
     units : (P,) float32
         W/(sr m^2).
     counts : tuple of int
-        Bands of each of the term's curves, powers of two; empty where it has none.
+        Bands of each of the term's curves, powers of two; empty without curves.
     met : (T,) int64
-        Numbers of the tails that have an entry, rising.
+        Numbers of the tails that have an entry, ascending.
     largest : float
-        Sum of all entries of a point in one channel, the largest of all points.
+        Largest sum, over all points and channels, of a point's entries.
     """
 
     ends: NDArray[np.int64]
@@ -60,7 +60,7 @@ class TermLight:
 
     @property
     def bits_of_bands(self) -> int:
-        """Bits of an entry's number that are its band."""
+        """Bits of an entry's number that hold its band."""
         assert self.bands & (self.bands - 1) == 0, "numbers of bands are powers of two"
         return self.bands.bit_length() - 1
 
@@ -73,12 +73,12 @@ class TermLight:
 
     @classmethod
     def of_tiles(cls, tiles: Iterable[Entries], units: NDArray[np.float32], counts: tuple[int, ...]) -> TermLight:
-        """Of tiles of points, one after another."""
+        """Concatenate tiles of points."""
         bands, dtype = int(np.prod(counts, dtype=int)), None
         made, met = [], [np.zeros(0, int)]
         for tile in tiles:
             dtype = dtype or (_narrowest(tile) if len(tile[1]) else None)
-            made.append(_stepped(tile, dtype or np.uint8))  # which joins with any
+            made.append(_stepped(tile, dtype or np.uint8))  # uint8 joins with either type
             met.append(_tails(tile[1], bands))
         room, steps, values = (np.concatenate(parts) for parts in zip(*made, strict=True))
         ends = _ends(room)
@@ -87,7 +87,7 @@ class TermLight:
 
 
 def _narrowest(tile: Entries) -> type[np.unsignedinteger[Any]]:
-    """What its steps take the fewest bytes in."""
+    """The type in which the tile's steps take the fewest bytes."""
     room = {of: _room(_ends(tile[0]), tile[1], np.iinfo(of).max).sum() for of in WIDTHS}
     return min(WIDTHS, key=lambda of: room[of] * (of().nbytes + BYTES))
 
@@ -99,7 +99,7 @@ def _tails(codes: NDArray[np.unsignedinteger[Any]], bands: int) -> Indices:
 
 
 def _stepped(tile: Entries, dtype: type[np.unsignedinteger[Any]]) -> Entries:
-    """Entries of each point, steps and values, with the entries that come between."""
+    """Entries of each point, steps and values, including entries that bridge gaps."""
     each, codes, values = tile
     ends, most = _ends(each), np.iinfo(dtype).max
     room = _room(ends, codes, most)
@@ -115,7 +115,7 @@ def _ends(each: NDArray[np.integer]) -> NDArray[np.int64]:
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def _room(ends, codes, most):  # type: ignore[no-untyped-def]
-    """(P,) entries of each point, with those between."""
+    """(P,) entries of each point, including those that bridge gaps."""
     room = np.empty(len(ends) - 1, np.int64)
     for p in numba.prange(len(room)):
         count, before = ends[p + 1] - ends[p], np.int64(0)

@@ -1,4 +1,4 @@
-"""Sums over the stored entries: whole pixels, or rows over the curve that is edited (Ben-Artzi 2007, eqs 6.6, 6.7)."""
+"""Sums over stored entries: whole pixels, or rows over the edited curve (Ben-Artzi 2007, eqs 6.6, 6.7)."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from lambent.editing.packed_light import add_weighted_light
 from lambent.editing.products import Halves, Pixels, half_of_float
 from lambent.editing.rows import LARGEST
 
-AT_ONCE = 32 * TOGETHER  # points that a thread takes with the same sums
+AT_ONCE = 32 * TOGETHER  # points that a thread processes with the same sums
 
-APART = 4  # sums that entries take turns at: one need not wait for the one before
+APART = 4  # accumulators used in turn, so that no addition waits for the previous one
 
 
 @dataclass(frozen=True)
 class Cells:
-    """The sums that some pixels need: a cell for each monomial and row (`Powers`) that their tails have.
+    """The sums that some pixels need: one cell for each monomial and row (`Powers`) among their tails.
 
     Attributes
     ----------
     number : (Z,)
-        Cell of each tail; 0 too for tails that are not among them.
+        Cell of each tail; 0 also for tails without one.
     power, row : (C,)
-        Of each cell; monomials rise, and so do rows within one.
+        Of each cell; sorted by monomial, then by row.
     """
 
     number: Indices
@@ -40,7 +40,7 @@ class Cells:
 
     @classmethod
     def of(cls, power: Powers, met: Indices) -> Cells:
-        """Of tails by their numbers."""
+        """Cells for the given tails."""
         met = power.weighing(met)
         pairs, found = np.unique(np.column_stack([power.power[met], power.row[met]]), axis=0, return_inverse=True)
         number = np.zeros(len(power.tails), np.int64)
@@ -67,15 +67,15 @@ def add_pixels(
 
 
 def rows(light: TermLight, band: Floats, tail: Floats, cells: Cells, row: Indices, count: int) -> tuple[Halves, float]:
-    """Rows (C, count, 3, P) of wavelets for each cell, and their unit in W/(sr m^2); as `add_pixels`.
+    """Rows (C, count, 3, P) of wavelets for each cell, and their unit in W/(sr m^2); parameters as in `add_pixels`.
 
     Parameters
     ----------
     row : (J,)
-        Row of each band: its band of the curve that is edited. `band` has the coefficients of the other curve.
+        Row of each band: its band of the edited curve. `band` has the coefficients of the other curve.
     """
     out = np.zeros((len(cells), count, 3, len(light.units)), np.uint16)
-    # No sum is larger than that of all entries of a point.
+    # No sum exceeds that of all entries of a point.
     unit = unit_for(light.largest * float(np.abs(band).max() * np.abs(tail).max()))
     units = (light.units / np.float32(unit)).astype(np.float32)
     _rows(out, *_entries(light), units, *_tables(band, tail, cells), np.asarray(row, np.int64), TAPS.astype(np.float32))
@@ -91,7 +91,7 @@ def halves(sums: Pixels) -> tuple[Halves, float]:
 
 
 def unit_for(largest: float) -> float:
-    """The power of two that rows are multiples of, so that half floats hold them."""
+    """Power of two to divide rows by, so that half floats can hold them."""
     return float(2.0 ** np.ceil(np.log2(max(largest, 1e-30) / LARGEST)))
 
 
@@ -132,7 +132,7 @@ def _rows(out, ends, steps, values, bits_of_bands, units, band, tail, cell, row,
             many = min(TOGETHER, points - first)
             _add(sums, met, first, many, ends, steps, values, bits_of_bands, units, band, tail, cell, row)
             for c in range(cells):
-                if met[c]:  # what is not written costs no memory either
+                if met[c]:  # unwritten pages take no memory
                     write_wavelets(out[c], first, sums[c], before, taps)
                     sums[c] = 0
                     met[c] = False
@@ -140,7 +140,7 @@ def _rows(out, ends, steps, values, bits_of_bands, units, band, tail, cell, row,
 
 @numba.njit(fastmath=True, cache=True, nogil=True)
 def _add(sums, met, first, many, ends, steps, values, bits_of_bands, units, band, tail, cell, row):  # type: ignore[no-untyped-def]
-    """sums (C, J, TOGETHER, 4) += light of `many` points from `first` on; `met` are the cells that have any."""
+    """sums (C, J, TOGETHER, 4) += light of `many` points from `first` on; sets `met` for cells that receive any."""
     mask, count = (1 << bits_of_bands) - 1, sums.shape[1]
     for i in range(many):
         code, unit = np.int64(0), units[first + i]

@@ -1,9 +1,9 @@
-"""Pixels whose light is a polynomial in the albedos of the edited material: an incremental picture for each monomial.
+"""Pixels whose light is a polynomial in the albedos of the edited material: one incremental picture per monomial.
 
     sum over monomials q of  m_q  sum over rows r and bands j of  s_r c_j F_qrj
 
-Rows are the bands of the edited material at the second surface, bands those of its curve at the first one. Both change
-with the same edit; of their products, frames take the largest changes.
+Rows are the bands of the edited material at the second surface, bands those of its curve at the first. The same edit
+changes both; frames apply the largest changes of their products.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ class MonomialPicture:
     Parameters
     ----------
     transport : (R, J, 3, P) float16
-        By row, and wavelets of the curve at the first surface.
+        By row, and by wavelet of the curve at the first surface.
     power : int
         Number of the monomial.
     rows : (R,)
-        Number of each row's coefficient (`Powers.second`).
+        Index of each row's coefficient (`Powers.second`).
     """
 
     def __init__(self, transport: Halves, power: int, rows: Indices, part: PartLight, canvas: Canvas) -> None:
@@ -56,7 +56,7 @@ class MonomialPicture:
 
     @property
     def changes(self) -> int:
-        """How many terms it has to change."""
+        """Number of terms left to change."""
         return int(np.count_nonzero((self._picture.wanted != self._picture.effective).any(axis=1)))
 
     @property
@@ -69,14 +69,14 @@ class MonomialPicture:
 
 
 def monomials(transport: Halves, cells: Cells, part: PartLight, canvas: Canvas) -> list[MonomialPicture]:
-    """Of transport (C, J, 3, P) by cells."""
+    """Monomial pictures for transport (C, J, 3, P) by cells."""
     ends = np.flatnonzero(np.diff(cells.power, append=-1)) + 1
     parts = zip([0, *ends[:-1]], ends, strict=False)
     return [MonomialPicture(transport[a:b], int(cells.power[a]), cells.row[a:b], part, canvas) for a, b in parts]
 
 
 def step(pictures: Sequence[MonomialPicture], work: int) -> None:
-    """One frame of so many terms times pixels: each picture a like share, and what the others leave."""
+    """One frame of `work` terms times pixels: equal shares for all pictures, plus the unused shares of others."""
     going = sorted((one for one in pictures if not one.is_settled), key=lambda one: one.changes * one.pixels)
     for left, one in zip(range(len(going), 0, -1), going, strict=True):
         terms = min(one.changes, max(1, work // (left * max(1, one.pixels))))

@@ -1,6 +1,6 @@
-"""Noise of interreflections, from two pictures of which the second has the samples of the first and more.
+"""Noise of interreflections, from two pictures of which the second extends the samples of the first.
 
-A bake whose progress goes through `PassNoise` leaves the figure in its store, for whoever opens it later.
+A bake whose progress goes through `PassNoise` stores the noise, for whoever opens the store later.
 """
 
 from __future__ import annotations
@@ -24,22 +24,23 @@ from lambent.store.contract import view_artefact_name
 from lambent.store.store import Store
 
 NOISE = "interreflection_noise"  # document: by the name of a view's tails, their key, samples and noise
-PASS = re.compile(r"interreflections, (\d+) samples")  # what the bake says of a pass
+PASS = re.compile(r"interreflections, (\d+) samples")  # the bake's progress text for a pass
 Shot = tuple[Camera, tuple[int, int]]
 
 
 def light_of(light: Interreflections, materials: Mapping[str, Editable]) -> Pixels:
     """(3, P) interreflections of all points with these materials, part after part, in W/(sr m^2)."""
-    frozen = powers(light.tails, materials, "")  # no material is edited: the one monomial is 1
+    frozen = powers(light.tails, materials, "")  # no material is edited: the only monomial is 1
     all_tails = Cells.of(frozen, np.arange(len(light.tails)))
     parts = [frozen_light(part, materials[name], frozen, all_tails)[0] for name, part in light.parts.items()]
     return np.concatenate(parts, axis=1)
 
 
 def noise(before: Pixels, after: Pixels, samples: tuple[int, int]) -> float:
-    """Standard error of the luminance of a point in `after`, as a share of its mean over all points.
+    """Standard error of a point's luminance in `after`, relative to the mean over all points.
 
-    With variance s of a sample, n samples before and m after, the difference has s (1/n - 1/m), and `after` s/m.
+    With variance s of a sample, n samples before and m after, the difference has variance s (1/n - 1/m), and `after`
+    s/m.
     """
     fewer, more = samples
     difference, mean = luminance((after - before).T), float(luminance(after.T).mean())
@@ -48,7 +49,7 @@ def noise(before: Pixels, after: Pixels, samples: tuple[int, int]) -> float:
 
 
 class PassNoise:
-    """Takes the progress of a bake, looks at its last two passes, and notes their noise in the store.
+    """Observes the progress of a bake, compares its last two passes, and writes their noise to the store.
 
     Parameters
     ----------
@@ -57,11 +58,11 @@ class PassNoise:
     shots
         Camera, width and height of each view.
     materials
-        All of the scene, as they are baked.
+        All materials of the scene, as baked.
     samples
-        That the bake ends with.
+        Final number of samples of the bake.
     progress
-        Where all progress goes on to.
+        Receives all progress.
     """
 
     def __init__(
@@ -78,7 +79,7 @@ class PassNoise:
         self._found: dict[str, dict[str, object]] = {}
 
     def progress(self, done: float, total: float, what: str) -> None:
-        """As `Progress`."""
+        """Callback of type `Progress`."""
         self._passed_on(done, total, what)
         said = PASS.fullmatch(what)
         if said and done == total and 2 * int(said[1]) >= self._samples:
@@ -87,13 +88,13 @@ class PassNoise:
                 self._look(store, k, *shot)
 
     def note(self, store: Store) -> None:
-        """Write what was found, once the bake has ended."""
+        """Write the noise, once the bake has ended."""
         if self._found:
             store.set_document(NOISE, {**store.documents.get(NOISE, {}), **self._found})
 
     def _look(self, store: Store, k: int, camera: Camera, size: tuple[int, int]) -> None:
         pixels, samples = [], []
-        for name, one in self._materials.items():  # one at a time, for all their bands may not fit into memory
+        for name, one in self._materials.items():  # one at a time: bands of all may not fit into memory
             light = interreflections(store, camera, size, {name: one})
             if light.parts:
                 pixels.append(light_of(light, self._materials))
@@ -106,7 +107,7 @@ class PassNoise:
 
 
 def noted_noise(store: Store, camera: Camera, size: tuple[int, int], samples: int) -> float | None:
-    """Noise of a view with so many samples, as its bake noted it; None where it did not."""
+    """Noise of a view with `samples` samples, as written by its bake; None if it was not."""
     name = _tails(camera, size)
     said = store.documents.get(NOISE, {}).get(name, {})
     is_of_it = name in store and said.get("key") == store.artefact(name).key and said.get("samples") == samples

@@ -1,10 +1,10 @@
-"""The interreflections of an edited view, as layers of the canvas that its direct light is drawn on.
+"""The interreflections of an edited view, as layers on the canvas of its direct light.
 
     B = sum over monomials q of  m_q(d_i)  sum over bands of  c_j F_jq        (Ben-Artzi 2007, eq. 6.8)
 
-Some curves of one material i are edited, active; all others are frozen. Its own terms with an active curve are
-incremental pictures over the bands of that, and so are all pixels over the bands that it has at second surfaces. Of
-whatever else there is, the inner sums do not change.
+Some curves of one material i are edited and called active; all others are frozen. Incremental pictures cover the
+material's own terms with an active curve, over its bands, and all pixels, over its bands at second surfaces. All other
+inner sums stay constant.
 """
 
 from __future__ import annotations
@@ -39,20 +39,20 @@ class FrozenPicture:
     Parameters
     ----------
     materials
-        All materials of the view, as they are now.
+        All current materials of the view.
     edited : str
-        The one that is edited.
+        The edited material.
     canvas : Canvas
-        Makes the layers.
+        Creates the layers.
     active : names of curves, optional
-        Those that are edited; in terms that have two, the first one.
+        The edited curves; in terms with two of them, the first is used.
     hits : (int, int)
-        Least and most surfaces on the paths that are shown.
+        Least and most surfaces on the shown paths.
 
     Attributes
     ----------
     edited, active, hits, materials
-        As they were given.
+        As given.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class FrozenPicture:
         self.draw()
 
     def serves(self, material: Editable, active: str | None = None) -> bool:
-        """Whether the edited material can be shown so, and curve `active`, if it has that, be edited."""
+        """Whether this picture can show the edited material, and edit curve `active` if it has it."""
         begun = self.materials[self.edited]
         if not same_quotients(begun, material) or changed(begun, material) & self._idle:
             return False
@@ -91,7 +91,7 @@ class FrozenPicture:
         return all(at is None or at == mine for at, mine in zip(wanted, self._powers.active, strict=True))
 
     def show(self, material: Editable) -> None:
-        """Let the picture go to the material as it is edited now."""
+        """Set the material as now edited as the target of the picture."""
         self._values = self._powers.values(material).astype(np.float32)
         second = self._powers.second(material)
         for pictures, _ in self._others:
@@ -101,11 +101,11 @@ class FrozenPicture:
             term.show(material, now, second)
 
     def step(self, terms: int = TERMS) -> None:
-        """One frame: as much as adding up `terms` terms in all pixels."""
+        """One frame, with the work of adding `terms` terms in all pixels."""
         step(self._all, terms * self._pixels)
 
     def draw(self) -> None:
-        """The exact picture at once."""
+        """Draw the exact picture at once."""
         for one in self._all:
             one.draw()
 
@@ -115,12 +115,12 @@ class FrozenPicture:
 
     @property
     def is_settled(self) -> bool:
-        """Whether another frame would change no bit."""
+        """Whether another frame would not change a bit."""
         return all(one.is_settled for one in self._all)
 
     @property
     def shown(self) -> Shown:
-        """Layers with their scales, to be composed."""
+        """Layers with their scales, for composition."""
         scaled = [*self._others, *((term.pictures, term.scale) for term in self._terms)]
         return [(one.layer, self._values[one.power] * scale) for pictures, scale in scaled for one in pictures]
 
@@ -164,7 +164,7 @@ class _TermPicture:
 
 
 def changed(before: Editable, after: Editable) -> frozenset[str]:
-    """Names of the curves that are not the same in two states of a material."""
+    """Names of the curves that differ between two states of a material."""
     return frozenset(
         name
         for name, curve in after.curves.items()
@@ -174,7 +174,7 @@ def changed(before: Editable, after: Editable) -> frozenset[str]:
 
 
 def frozen_light(part: PartLight, material: Editable, power: Powers, cells: Cells) -> Pixels:
-    """(C, 3, P) light of a material that is frozen, by cells."""
+    """(C, 3, P) light of a frozen material, by cells."""
     total = np.zeros((len(cells), 3, len(part.pixel)), np.float32)
     if not part.edited:
         add_pixels(total, part.terms[0], ONE, power.weight, cells, np.ones((3, 1)))
@@ -188,6 +188,6 @@ def frozen_light(part: PartLight, material: Editable, power: Powers, cells: Cell
 
 
 def _idle(material: Editable, active: Active) -> frozenset[str]:
-    """Curves whose values are in the sums."""
+    """Curves whose values are already in the sums."""
     pairs = zip(material.terms, active, strict=True)
     return frozenset(factor.curve for term, at in pairs for k, factor in enumerate(term.factors) if k != at)

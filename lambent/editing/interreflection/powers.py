@@ -12,7 +12,7 @@ from lambent.materials.factored.albedo import albedo
 from lambent.materials.factored.terms import Editable, Factor, Term
 from lambent.store.tails import FIXED, SecondBands, Tails
 
-Active = tuple[int | None, ...]  # of each term of a material, the factor whose curve is edited
+Active = tuple[int | None, ...]  # for each term of a material, the factor whose curve is edited
 
 
 @dataclass(frozen=True)
@@ -23,13 +23,13 @@ class Powers:
     ----------
     material : str
     weight : (Z, 3)
-        Factor of each tail by all that is frozen.
+        Factor of each tail from all frozen materials.
     power : (Z,)
         Number of each tail's monomial.
     exponents : (Q, slots)
         Of the edited material's slots, by monomial; 0 for all others.
     row : (Z,)
-        Number, in `second`, of the coefficient that each tail has of the edited material at the second surface.
+        Index, in `second`, of each tail's coefficient of the edited material at the second surface.
     """
 
     tails: Tails
@@ -41,14 +41,14 @@ class Powers:
     row: Indices
 
     def values(self, material: Editable) -> Floats:
-        """(Q, 3) monomials of the material as it is edited."""
+        """(Q, 3) monomials of the material as edited."""
         albedos = _albedos(self.tails, {self.material: material})
         return np.asarray(np.prod(albedos[None] ** self.exponents[:, :, None], axis=1))
 
     def second(self, material: Editable) -> Floats:
-        """(R, 3) coefficients of the material as it is edited: 1, then its terms at the second surface.
+        """(R, 3) coefficients of the material as edited: 1, then its terms at the second surface.
 
-        A term has one for each band of its active curve; one alone where none is active.
+        A term has one coefficient per band of its active curve, or a single one without an active curve.
         """
         found = [np.ones((1, 3))]
         for one in self.tails.second:
@@ -58,7 +58,7 @@ class Powers:
         return np.concatenate(found)
 
     def weighing(self, met: Indices) -> Indices:
-        """Of tails by their numbers, those that count."""
+        """The given tails that contribute."""
         return met[self.weight[met].any(axis=1)]
 
 
@@ -69,12 +69,12 @@ def powers(
     hits: tuple[int, int] = (2, 99),
     active: Active | None = None,
 ) -> Powers:
-    """Freeze all materials but one, and of that one all curves but the active ones.
+    """Freeze all materials but one, and all curves of that one but the active ones.
 
     Parameters
     ----------
     edited
-        "" freezes all.
+        Name of the edited material; "" freezes all.
     hits
         Least and most surfaces on the paths that count.
     active
@@ -104,7 +104,7 @@ def powers(
 
 
 def _albedos(tails: Tails, materials: Mapping[str, Editable]) -> Floats:
-    """(slots, 3); 1 for slots of materials that are not named."""
+    """(slots, 3); 1 for slots of materials that are not in `materials`."""
     found = np.ones((len(tails.slots), 3))
     for k, (material, side) in enumerate(tails.slots):
         if side != FIXED and material in materials:
@@ -113,7 +113,7 @@ def _albedos(tails: Tails, materials: Mapping[str, Editable]) -> Floats:
 
 
 def second_coefficients(tails: Tails, materials: Mapping[str, Editable]) -> Floats:
-    """(W, 3) coefficients of the bands of second surfaces; 1 for materials that are not named."""
+    """(W, 3) coefficients of the bands of second surfaces; 1 for materials that are not in `materials`."""
     return np.concatenate([_coefficients(one, materials) for one in tails.second] or [np.ones((1, 3))])
 
 
@@ -126,12 +126,12 @@ def _coefficients(one: SecondBands, materials: Mapping[str, Editable]) -> Floats
 
 
 def active_of(material: Editable, curves: Collection[str]) -> Active:
-    """The first factor of each term that has one of these curves."""
+    """The first factor of each term with one of these curves."""
     return tuple(next((k for k, f in enumerate(t.factors) if f.curve in curves), None) for t in material.terms)
 
 
 def active_bands(term: Term, counts: tuple[int, ...], material: Editable, at: int | None) -> Floats:
-    """(J, 3) coefficients of a term's factor `at`, or a single 1."""
+    """(J, 3) coefficients of a term's factor `at`, or a single 1 for None."""
     if at is None:
         return np.ones((1, 3))
     factor = term.factors[at]
@@ -139,14 +139,14 @@ def active_bands(term: Term, counts: tuple[int, ...], material: Editable, at: in
 
 
 def band_of(counts: tuple[int, ...], at: int | None) -> Indices:
-    """Of each product of bands, the band of the factor `at`; 0 for none."""
+    """For each product of bands, the band of the factor `at`; 0 for None."""
     return np.asarray(np.indices(counts)[at].reshape(-1) if at is not None else np.zeros(int(np.prod(counts)), int))
 
 
 def bands_of(
     factors: tuple[Factor, ...], counts: tuple[int, ...], material: Editable, but: int | None = None
 ) -> Floats:
-    """(J, 3) coefficients of products of bands, first curve first; that of the factor `but` counts as 1."""
+    """(J, 3) coefficients of products of bands, first curve first; the factor `but` counts as 1."""
     found = np.ones((1, 3))
     for k, (factor, count) in enumerate(zip(factors, counts, strict=True)):
         means = np.ones((count, 3)) if k == but else material.curves[factor.curve].band_means(count, factor.polar)

@@ -1,4 +1,4 @@
-"""Interreflections of a view in a store (store.contract), in memory: by material and term, tiles in one."""
+"""Load the interreflections of a view from a store (store.contract): by material and term, tiles concatenated."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from lambent.store.tails import Tails
 
 @dataclass(frozen=True)
 class PartLight:
-    """The pixels that show one material, and the light of its terms; `edited` is False for one that is not edited."""
+    """The pixels that show one material, and the light of its terms; `edited` is False for an uneditable one."""
 
     start: Editable
     pixel: Indices
@@ -34,7 +34,7 @@ class PartLight:
 
 @dataclass(frozen=True)
 class Interreflections:
-    """All of a view: its tails, and the parts by material. `samples` is the least that a tile has."""
+    """The interreflections of a view: its tails, and its parts by material. `samples` is the fewest of any tile."""
 
     size: tuple[int, int]
     tails: Tails
@@ -43,7 +43,7 @@ class Interreflections:
 
 
 def samples_of(store: Store, session: Session) -> int:
-    """Paths per pixel that the store has of a session's view, under its light; 0 where there are none."""
+    """Paths per pixel that the store has for a session's view under its light; 0 if it has none."""
     view = session.document
     names = [view_artefact_name(view.camera, *view.size, "interreflection", part) for part in ("tails", "")]
     if names[0] not in store or store.artefact(names[0]).meta["environment"] != environment_note(session.environment):
@@ -53,7 +53,7 @@ def samples_of(store: Store, session: Session) -> int:
 
 
 def series_of(store: Store, session: Session) -> tuple[int, ...]:
-    """Of the interreflections that a store has of a session's view."""
+    """Series of the interreflections that the store has for a session's view."""
     view = session.document
     return tuple(store.artefact(view_artefact_name(view.camera, *view.size, "interreflection", "tails")).meta["series"])
 
@@ -61,17 +61,17 @@ def series_of(store: Store, session: Session) -> tuple[int, ...]:
 def interreflections(
     store: Store, camera: Camera, size: tuple[int, int], materials: Mapping[str, Editable]
 ) -> Interreflections:
-    """Read them, as far as they are there: tiles that are missing are black.
+    """Read the interreflections as far as they are stored; missing tiles are black.
 
     Parameters
     ----------
     materials
-        Of the scene, as they were when the store was baked.
+        Of the scene, as at the bake.
 
     Raises
     ------
     UserError
-        The store has none of this view, or those of other terms than the materials have.
+        If the store has none of this view, or its terms are not those of the materials.
     """
 
     def name(kind: str, part: str) -> str:
@@ -113,7 +113,7 @@ def interreflections(
 
 
 def _term(store: Store, name: str, points: int, factors: int) -> tuple[TermLight, int]:
-    """The tiles of a term of so many curves one after another, and the samples of the one that has the fewest."""
+    """The tiles of a term with `factors` curves, concatenated, and the fewest samples of any tile."""
     names = list(takewhile(lambda tile: tile in store, (f"{name}/{k}" for k in count())))
     said = [store.artefact(tile).meta for tile in names]
     many = [int(one["points"]) for one in said]

@@ -1,4 +1,4 @@
-"""The picture of an edited view with its interreflections: direct light, and one material's polynomial on top.
+"""The picture of an edited view with its interreflections: direct light plus one material's polynomial.
 
 whole = whole_picture(store, session)
 whole.show("floor", edited); whole.step(); whole.image()
@@ -33,7 +33,7 @@ def whole_picture(
     canvas: Callable[[Image], Canvas] = HostCanvas,
     hits: tuple[int, int] = ALL_HITS,
 ) -> WholePicture:
-    """The picture of a session's view with the interreflections that the store has, drawn exactly.
+    """The picture of a session's view with the stored interreflections, drawn exactly.
 
     Parameters and errors are those of `editing.stored.edited_picture`; `hits` as in `WholePicture`.
     """
@@ -49,20 +49,20 @@ def whole_picture(
 
 
 class WholePicture:
-    """An `EditedPicture` with interreflections, where there are some.
+    """An `EditedPicture` with interreflections, if there are any.
 
-    Another material is edited as soon as its polynomial is there: it is made in the background, while frames show the
-    one before. `draw` waits for it.
+    To edit another material, its polynomial is computed in the background, while frames show the previous one; `draw`
+    waits for it.
 
     Parameters
     ----------
     direct
-        The direct light; drawn as it was given.
+        The direct light; drawn as given.
 
     Attributes
     ----------
     hits : (int, int)
-        Least and most surfaces on the paths that are shown: (1, 1) is direct light alone.
+        Least and most surfaces on the shown paths: (1, 1) is direct light alone.
     """
 
     def __init__(self, direct: EditedPicture) -> None:
@@ -71,40 +71,40 @@ class WholePicture:
         self._light: Interreflections | None = None
         self._now: dict[str, Editable] = {}
         self._frozen: FrozenPicture | None = None
-        self._wanted: tuple[str, frozenset[str]] | None = None  # material and curves to be edited next
+        self._wanted: tuple[str, frozenset[str]] | None = None  # next material and curves to edit
         self._work: Future[FrozenPicture] | None = None
         self._pool = ThreadPoolExecutor(1)
 
     @property
     def samples(self) -> int:
-        """Paths per pixel of the interreflections; 0 without them."""
+        """Paths per pixel of the interreflections; 0 without any."""
         return self._light.samples if self._light is not None else 0
 
     def give(self, light: Interreflections, materials: Mapping[str, Editable]) -> None:
-        """Add interreflections, or replace them by better ones; `materials` are all of the view as they are shown."""
+        """Add or replace interreflections; `materials` are all materials of the view as shown."""
         self._light, self._now = light, dict(materials)
         edited = self._frozen.edited if self._frozen is not None else next(iter(light.parts))
         self._wanted = self._wanted or (edited, self._active)
 
     def see(self, hits: tuple[int, int]) -> None:
-        """Show paths that meet so many surfaces, least and most."""
+        """Show paths with numbers of surfaces from hits[0] to hits[1]."""
         if hits != self.hits:
             self.hits = hits
             if self._frozen is not None:
                 self._wanted = self._wanted or (self._frozen.edited, self._active)
 
     def show(self, material: str, edited: Editable) -> None:
-        """As `EditedPicture.show`, which may refuse."""
+        """Like `EditedPicture.show`, including its errors."""
         self.direct.show(material, edited)
         before, frozen = self._now.get(material, edited), self._frozen
         self._now[material] = edited
         if frozen is not None and frozen.edited == material and frozen.serves(edited):
             frozen.show(edited)
-        elif self._light is not None and self._work is None:  # else it is wanted as soon as that is taken
+        elif self._light is not None and self._work is None:  # otherwise it is requested when that work is done
             self._wanted = material, changed(before, edited)
 
     def activate(self, material: str, curve: str) -> None:
-        """As `EditedPicture.activate`."""
+        """Like `EditedPicture.activate`."""
         self.direct.activate(material, curve)
         frozen = self._frozen
         if self._light is None or material not in self._now:
@@ -113,7 +113,7 @@ class WholePicture:
             self._wanted = material, frozenset({curve})
 
     def step(self, terms: int = TERMS) -> bool:
-        """One frame; whether interreflections were replaced in it."""
+        """Draw one frame; returns whether it replaced the interreflections."""
         self.direct.step(terms)
         taken = self._work is not None and self._work.done()
         if self._work is not None and taken:
@@ -127,7 +127,7 @@ class WholePicture:
         return taken
 
     def draw(self) -> None:
-        """The exact picture at once."""
+        """Draw the exact picture at once."""
         self.direct.draw()
         if self._work is not None:
             self._take(self._work.result())
@@ -140,22 +140,22 @@ class WholePicture:
 
     @property
     def is_exact(self) -> bool:
-        """Whether the picture shows all that is wanted."""
+        """Whether the picture shows the target exactly."""
         return self.direct.is_exact and self._is_current and (self._frozen is None or self._frozen.is_exact)
 
     @property
     def is_settled(self) -> bool:
-        """Whether another frame would change no bit."""
+        """Whether another frame would not change a bit."""
         return self.direct.is_settled and self._is_current and (self._frozen is None or self._frozen.is_settled)
 
     @property
     def shown(self) -> Shown:
-        """Layers with their scales, to be composed."""
+        """Layers with their scales, for composition."""
         direct = self.direct.shown if self.hits[0] <= 1 else []
         return direct + (self._frozen.shown if self._frozen is not None and self.hits[1] > 1 else [])
 
     def compose(self) -> None:
-        """As `EditedPicture.compose`."""
+        """Like `EditedPicture.compose`."""
         self.direct.canvas.compose(self.shown)
 
     def image(self) -> Image:
@@ -164,17 +164,17 @@ class WholePicture:
         return self.direct.canvas.image()
 
     def direct_image(self) -> Image:
-        """(H, W, 3) float32, direct light alone, whatever is shown."""
+        """(H, W, 3) float32, direct light alone, regardless of `hits`."""
         self.direct.canvas.compose(self.direct.shown)
         return self.direct.canvas.image()
 
     def close(self) -> None:
-        """End the work in the background."""
+        """End background work."""
         self._pool.shutdown(cancel_futures=True)
 
     @property
     def _active(self) -> frozenset[str]:
-        """Curves that are edited now."""
+        """Currently edited curves."""
         return self._frozen.active if self._frozen is not None else frozenset()
 
     @property
@@ -182,7 +182,7 @@ class WholePicture:
         return self._work is None and self._wanted is None
 
     def _freezing(self) -> _Freezing | None:
-        """The work that is wanted; None where the interreflections are of other terms than a material has now."""
+        """The work to do; None if the stored interreflections belong to other terms than a material has now."""
         assert self._wanted is not None
         (material, active), light = self._wanted, self._light
         self._wanted = None
@@ -192,7 +192,7 @@ class WholePicture:
         return _Freezing(light, dict(self._now), material, active, self.hits, self.direct)
 
     def _take(self, frozen: FrozenPicture) -> None:
-        """Go over to a polynomial; what was edited since is shown, or made anew."""
+        """Switch to a polynomial; apply later edits to it, or compute it again."""
         self._frozen = frozen
         for name, made in frozen.materials.items():
             now = self._now[name]
@@ -207,7 +207,7 @@ class WholePicture:
 
 
 class _Freezing:
-    """Makes a `FrozenPicture` of what is wanted at this moment."""
+    """Computes a `FrozenPicture` of the current target."""
 
     def __init__(
         self,

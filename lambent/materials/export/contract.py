@@ -8,7 +8,7 @@ A writer is a module of this package with
     write(subject, path, progress) -> Cost
 
 `lambent convert --as` takes the module's name. A writer of tables samples a material; a writer of materials refuses a
-table, which has to be fitted first.
+table, which must be fitted first.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ class Cost:
     Attributes
     ----------
     lost : tuple of str
-        Sentences: what the format cannot hold, and what replaces it.
+        Sentences on what the format cannot represent and its replacement.
     errors : dict of float
         Metric name -> E between the subject and the written file, in the metric's unit.
     share : dict of float
-        The errors as shares of the subject's own size under that metric (E against black).
+        The errors relative to the subject's own size under that metric (E against black).
     light : dict of float
-        Side -> light that the written file scatters there over the subject's.
+        Side -> light scattered to that side, written file over subject.
     towards_light : float
-        f of the written file back towards the light over the subject's, where retro lobes were left out.
+        f back towards the light, written file over subject, if retro lobes were left out.
     """
 
     lost: tuple[str, ...] = ()
@@ -52,12 +52,12 @@ class Cost:
 
     @property
     def verdict(self) -> Verdict:
-        """Whether the file stands for the subject, in a word with its reason."""
+        """Whether the file represents the subject: one word with its reason."""
         return verdict_of(self.share, self.light, self.towards_light)
 
 
 class Writer(Protocol):
-    """A writer's module."""
+    """Interface of a writer module."""
 
     NAME: str
     ENDINGS: tuple[str, ...]

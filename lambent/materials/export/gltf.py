@@ -36,7 +36,7 @@ TAKES: tuple[Kind, ...] = ("material",)
 
 IOR_MAX = 2.333  # diamond's; engines clamp beyond it
 F0_MAX = r0_of(IOR_MAX)
-SIMPLER = 0.98  # a blend of metal and dielectric is taken only below this share of either's remainder
+SIMPLER = 0.98  # a blend of metal and dielectric must lower the error of either below this share
 NEGLIGIBLE = 1e-4
 RADIUS_M = 0.1
 AROUND, ROWS = 96, 48
@@ -135,7 +135,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
 
 
 def likeness(material: Material, progress: Progress = silent) -> tuple[GltfMaterial, Cost]:
-    """The glTF material that looks most like `material`, rounded as in the file, and its cost."""
+    """The glTF material closest to `material`, rounded as in the file, and its cost."""
     check, lost = pairs_of(material, CHECK_LOG2, seed=1), match.shape_losses(material)
     towards_light = match.kept_towards_light(material)
     material = match.without_retro(material)
@@ -188,7 +188,7 @@ class _Space:
         return low, high
 
     def starts(self, metallic: float) -> list[Floats]:
-        """A start per lobe, with the material's own numbers where they have a counterpart."""
+        """One start per lobe, using the material's own parameters where they have a counterpart."""
         c = self.channels
         starts = []
         for lobe in self.material.lobes or (None,):
@@ -221,7 +221,7 @@ class _Space:
 
 
 def _near_ends(value: float) -> float:
-    """The value, or 0 or 1 within NEGLIGIBLE of those."""
+    """Snap a value within NEGLIGIBLE of 0 or 1."""
     return next((end for end in (0.0, 1.0) if abs(value - end) < NEGLIGIBLE), value)
 
 
@@ -284,7 +284,7 @@ def _sphere(fitted: GltfMaterial, material: Material) -> tuple[dict[str, Any], b
 def _unit_sphere() -> tuple[Floats, Floats, NDArray[np.integer]]:
     """Normals and tangents (V, 3) of a sphere, y up, and its triangles (T, 3), all with an area."""
     theta, phi = np.linspace(0, np.pi, ROWS + 1), np.linspace(0, 2 * np.pi, AROUND + 1)
-    # Every triangle at a pole has its own pole vertex, so that the tangent there is that of its sector.
+    # Each triangle at a pole has its own pole vertex, so that the vertex has the tangent of its sector.
     turn = np.tile(phi, (ROWS + 1, 1))
     turn[[0, -1]] += np.pi / AROUND
     sin_theta = np.sin(theta)[:, None]

@@ -1,6 +1,6 @@
 """Gonio text, Lambent's own plain columns (measured/gonio_text.py): the tuples of a gonio table, unchanged.
 
-Other subjects (MERL, RGL, LBNL, a material) are measured by the gonio-photometer in software, without noise, with finer
+Other subjects (MERL, RGL, LBNL, a material) are measured by the simulated gonio-photometer, without noise, with finer
 steps about the mirror direction.
 """
 
@@ -62,9 +62,9 @@ def _setup(scatterer: Scatterer) -> Setup:
 
 
 def _lobe_widths_deg(scatterer: Scatterer, phi: float) -> list[float]:
-    """Angles at which f falls to half near theta_i = 30 degrees, along the plane of incidence and across it.
+    """Angles at which f falls to half near theta_i = 30 degrees, in the plane of incidence and across it.
 
-    From the mirror direction where phi is pi, from the light where it is 0; 30 where f does not fall so far.
+    Measured from the mirror direction for phi = pi, from the light for phi = 0; 30 if f does not fall to half.
     """
     offset = np.geomspace(0.05, 30, 200)
     wi = np.broadcast_to(direction(np.radians(30), 0.0), (len(offset), 3))

@@ -53,7 +53,7 @@ def block_head(wavelength: str, detector: str, direction: str, bases: dict[str, 
 
 
 def losses(directions: Iterable[str], grey: bool) -> tuple[str, ...]:
-    """Sentences on what a file of blocks of these directions does not tell."""
+    """Sentences on what a file with blocks of these directions omits."""
     lost = []
     if not grey:
         lost.append("colour in tools other than Radiance: they read only the block Visible, the luminance")

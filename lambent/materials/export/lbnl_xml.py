@@ -1,7 +1,7 @@
 """LBNL BSDF XML on the Klems full basis: 145 x 145 patches, both sides, reflection and transmission.
 
-Every pair of patches holds the mean of f over both, so that each patch receives the light the subject sends there.
-Colour follows Radiance's tools: Visible is the luminance, beside CIE-X and CIE-Z.
+Every pair of patches holds the mean of f over both, so that each patch receives the same light as from the subject.
+Colour follows Radiance's tools: Visible is the luminance; CIE-X and CIE-Z are added.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ TAKES: tuple[Kind, ...] = ("table", "material")
 
 BASIS = KLEMS_FULL
 _DIRECT_SHARE = 0.5
-_EXACT = 1e-4  # share of the subject's size, below which it is a matrix of these patches itself
+_EXACT = 1e-4  # share of the subject's size below which the subject is a matrix of these patches itself
 _WAVELENGTHS = (("CIE-X", "X"), ("Visible", "Y"), ("CIE-Z", "Z"))
 _BASES = {"ColumnAngleBasis": BASIS.name, "RowAngleBasis": BASIS.name}
 
@@ -42,7 +42,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     Raises
     ------
     UserError
-        The subject scatters nothing; a file of zeros would be invalid.
+        If the subject scatters nothing; a file of zeros would be invalid.
     """
     scatterer = scatterer_of(subject)
     grey = scatterer.channels == 1 or (isinstance(subject, Material) and is_grey(subject))
@@ -60,7 +60,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
 
 
 def _means(subject: Subject, scatterer: Scatterer, progress: Progress) -> tuple[Floats, Floats]:
-    """Means of light from +z and from -z. A material is equal from both and reciprocal; so are its means, exactly."""
+    """Mean f for light from +z and from -z; for a material, which is the same from both sides, exactly reciprocal."""
     if isinstance(subject, Material):
         means = patch_means(scatterer.eval, BASIS, proposal_of(subject), 1, progress)
         means = np.stack([_reciprocal(f) for f in means])
@@ -75,7 +75,7 @@ def _means(subject: Subject, scatterer: Scatterer, progress: Progress) -> tuple[
 def _reciprocal(f: Floats) -> Floats:
     """The mean of f (outgoing, incident, C) and of f for reversed light.
 
-    Reversed light enters by the patch opposite to the one the light left by.
+    Reversed light enters by the patch opposite to the one by which the light left.
     """
     back = BASIS.opposite
     return np.asarray((f + np.swapaxes(f, 0, 1)[back][:, back]) / 2)

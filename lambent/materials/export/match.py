@@ -1,4 +1,4 @@
-"""Find the parameters of another tool's model that look most like a material, and name their differences."""
+"""Fit another tool's material model to a material, and describe the differences."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from lambent.materials.export.contract import Cost, Subject
 from lambent.materials.export.pairs import Pairs
 from lambent.materials.measured.metrics import CUBEROOT, errors_and_shares, light_ratios
 
-MOST_EVALUATIONS = 60  # of the Jacobian, per start
+MOST_EVALUATIONS = 60  # of the Jacobian, for each start
 ALBEDO_BINS = 8
-ALBEDO_WEIGHT = 0.3  # of relative differences of albedo, beside those of f
+ALBEDO_WEIGHT = 0.3  # weight of relative albedo differences against differences of f
 ALBEDO_TOLERANCE = 0.02  # relative; larger differences are reported
-LOST_AT_DEG = 30  # where the light of retro lobes is stated
+LOST_AT_DEG = 30  # angle of incidence at which the lost retro light is reported
 ALPHA_MIN, ALPHA_MAX = 0.001, 1.0  # range of the other tools' roughness
 
 Model = Callable[[Floats], Floats]
@@ -41,7 +41,7 @@ def without_retro(material: Material) -> Material:
 
 
 def _retro_losses(material: Material) -> list[str]:
-    """What leaving out the retro lobes costs."""
+    """Descriptions of the loss from leaving out the retro lobes."""
     returned = tuple(lobe for lobe in material.lobes if lobe.retro)
     if not returned:
         return []
@@ -62,7 +62,7 @@ def _towards_light(material: Material) -> float:
 
 
 def kept_towards_light(material: Material) -> float:
-    """What is left of f back towards the light without retro lobes, as a share; 1 where there are none."""
+    """f back towards the light without retro lobes, relative to the material's; 1 without retro lobes."""
     if not any(lobe.retro for lobe in material.lobes):
         return 1.0
     return _towards_light(without_retro(material)) / max(_towards_light(material), 1e-30)
@@ -74,14 +74,14 @@ def match(
     """Bounded least squares from every start: cube-root, cosine-weighted differences of f, and those of the albedos.
 
     Without the albedos, the cube root's weight on the tails would trade light for shorter tails: a metal would come out
-    a third too dark. Parameters whose bounds are equal stay.
+    a third too dark. Parameters with equal bounds are fixed.
 
     Returns
     -------
     best : (P,)
-        Parameters of the best end point.
+        The best parameters.
     total : float
-        Its sum of squares; 0 is perfect, a black surface has 1 + ALBEDO_WEIGHT.
+        Their sum of squares; 0 is perfect, a black surface has 1 + ALBEDO_WEIGHT.
     """
     from scipy.optimize import least_squares
 
@@ -133,9 +133,10 @@ def _differences(pairs: Pairs) -> Callable[[Floats], Floats]:
 
 
 def cost_of(pairs: Pairs, f_written: Floats, lost: Sequence[str], towards_light: float = 1.0) -> Cost:
-    """The cost of a written model with f (N, C) at `pairs`, including light that is not the material's.
+    """The cost of a written model with f (N, C) at `pairs`, including light that the material does not scatter.
 
-    `towards_light` is of `kept_towards_light`. C is 1 of a grey model whose retro lobes alone had colour.
+    `towards_light` comes from `kept_towards_light`. C is 1 for a grey model of a material whose retro lobes alone have
+    colour.
     """
     f_written = np.broadcast_to(f_written, pairs.samples.f.shape)
     light = light_ratios(pairs.samples, f_written)
@@ -162,14 +163,14 @@ def shape_losses(material: Material, *, beckmann_kept: bool = False) -> list[str
 
 
 def slope_start(lobe: Lobe, distribution: str) -> tuple[float, float]:
-    """Start roughness along t and b: a GGX peak is as wide as a Beckmann one of 1.2 times its roughness."""
+    """Start roughness along t and b: a GGX peak is as wide as a Beckmann peak of 1.2 times its roughness."""
     scale = 0.8 if lobe.distribution == "beckmann" and distribution == "ggx" else 1.0
     mx, my = (float(np.clip(scale * m, ALPHA_MIN, ALPHA_MAX)) for m in (lobe.mx, lobe.my))
     return mx, my
 
 
 def brightness(lobe: Lobe) -> float:
-    """Approximate light returned by the lobe, to rank lobes by."""
+    """Approximate light returned by the lobe, for ranking lobes."""
     k, r0 = np.array(lobe.k), np.array(lobe.r0)
     return float(np.mean(k * (r0 if lobe.side == "reflection" else 1 - r0))) + 0.02 * float(np.mean(k))
 

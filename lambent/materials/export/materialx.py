@@ -1,4 +1,4 @@
-"""A material as MaterialX: a graph of nodes of the physically based library, one for each of our terms.
+"""A material as MaterialX: a graph of nodes from the physically based library, one per term.
 
 The sum of a `generalized_schlick_bsdf` per lobe of reflection, a `dielectric_bsdf` in mode T per lobe of transmission,
 a rough diffuse of roughness 0 and a translucent node for the far side, on a thin-walled surface. Roughness is GGX's
@@ -41,7 +41,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
 
 
 def likeness(material: Material, progress: Progress = silent) -> tuple[Likeness, Cost]:
-    """The nodes' numbers that look most like `material`, rounded as in the file, and their cost."""
+    """Parameters of the nodes closest to `material`, rounded as in the file, and their cost."""
     lost = shape_losses(material)
     if material.lobes:
         lost.append(
@@ -67,7 +67,7 @@ def _eval(pairs: Pairs, part: Part) -> Floats:
 
 
 def _others(lobe: Lobe, channels: int) -> tuple[Floats, Floats, Floats]:
-    """Roots of color90."""
+    """Start values of the roots of color90, with bounds."""
     return np.sqrt(np.clip(np.array(lobe.k)[:channels], 1e-4, 1)), np.zeros(channels), np.ones(channels)
 
 
@@ -79,7 +79,7 @@ def _colour_start(lobe: Lobe) -> Floats:
 
 
 def _f0(lobe: Lobe) -> float:
-    """Reflectance of the wall of a lobe of transmission, by its rounded ior."""
+    """Reflectance of a transmission lobe's wall, from its rounded ior."""
     return r0_of(_ior(lobe))
 
 

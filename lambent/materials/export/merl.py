@@ -1,7 +1,7 @@
 """MERL binary: an isotropic RGB BRDF on 90 x 90 x 180 half and difference angles, see measured/merl.py.
 
-Every bin gets the value at its centre. The format distinguishes neither the specimen's azimuths nor the order of wi and
-wo: the mean over both is written.
+Every bin gets the value at its centre. The format drops the specimen's azimuth and the order of wi and wo; means over
+both are written.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
 
 
 def _planes(scatterer: Scatterer, progress: Progress) -> tuple[Floats, float]:
-    """(3, theta_h, theta_d, phi_d) as stored, -1 where a direction is below the surface, and the orders' difference."""
+    """(3, theta_h, theta_d, phi_d) as stored, -1 below the surface, and the difference between the two orders."""
     planes = np.full((3, *SHAPE), -1.0)
     theta_h, theta_d, phi_d = bin_centres(SHAPE)
     difference = total = 0.0
@@ -60,7 +60,7 @@ def _planes(scatterer: Scatterer, progress: Progress) -> tuple[Floats, float]:
 
 
 def _turned(scatterer: Scatterer, wi: Floats, wo: Floats) -> Floats:
-    """f (N, 3), the mean over azimuths of the specimen unless it is isotropic."""
+    """f (N, 3), averaged over azimuths of the specimen unless it is isotropic."""
     if scatterer.symmetry == "isotropic":
         return scatterer.rgb(wi, wo)
     total = np.zeros((len(wi), 3))

@@ -1,9 +1,9 @@
-"""A material as a Mitsuba 3 scene that plain Mitsuba loads: a sphere with the nearest sum of Mitsuba's own BSDFs.
+"""A material as a scene that plain Mitsuba 3 loads: a sphere with the closest sum of Mitsuba's own BSDFs.
 
-Reflection is `diffuse` and one `roughconductor` per lobe, with our distribution (Beckmann stays Beckmann); transmission
-is `principledthin`, which is diffuse, or rough without refraction. Mitsuba has no sum of BSDFs, only `blendbsdf`: each
-part's weight is its share of the blend, and its colour is divided by that. Such colours may exceed 1 although the sum
-does not, which Mitsuba accepts in an `srgb` texture that is `unbounded`.
+Reflection is `diffuse` and one `roughconductor` per lobe, with the lobe's distribution (Beckmann stays Beckmann);
+transmission is `principledthin`, which is diffuse, or rough without refraction. Mitsuba cannot add BSDFs, only blend
+them (`blendbsdf`), so each part's colour is divided by its weight in the blend. Such a colour may exceed 1 although the
+sum does not; Mitsuba accepts it in an `srgb` texture that is `unbounded`.
 
 A comment holds the exact material, for use where Lambent is installed, after `register_material_plugin()`.
 
@@ -36,8 +36,8 @@ NAME = "Mitsuba 3 scene"
 ENDINGS = (".xml",)
 TAKES: tuple[Kind, ...] = ("material",)
 ETA_RANGE, KAPPA_RANGE = (1.0, 12.0), (0.0, 12.0)
-COLOUR_MAX = 4.0  # of a part before it is divided by its share
-THIN_ETA = 1.0001  # near 1, so that the sheet itself reflects nothing: reflection has its own lobes
+COLOUR_MAX = 4.0  # largest colour of a part before division by its weight
+THIN_ETA = 1.0001  # near 1, so that the sheet itself does not reflect: reflection has its own lobes
 LEAST_SHARE = 0.05  # of the blend, so that no part is sampled too rarely
 
 
@@ -50,7 +50,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
 
 
 def likeness(material: Material, progress: Progress = silent) -> tuple[Likeness, Cost]:
-    """The parts that look most like `material`, rounded as in the file, and their cost."""
+    """The parts closest to `material`, rounded as in the file, and their cost."""
     masking, with_fresnel = "Smith's masking", "Smith's masking and a conductor's Fresnel term"
     lost = [line.replace(masking, with_fresnel) for line in shape_losses(material, beckmann_kept=True)]
     if any(lobe.distribution == "beckmann" for lobe in material.transmission_lobes):
@@ -74,7 +74,7 @@ def _eval(pairs: Pairs, part: Part) -> Floats:
 
 
 def _others(lobe: Lobe, channels: int) -> tuple[Floats, Floats, Floats]:
-    """eta and kappa."""
+    """Start values of eta and kappa, with bounds."""
     low, high = zip(ETA_RANGE, KAPPA_RANGE, strict=True)
     return np.array([ior_of(np.clip(np.mean(lobe.r0), 0.001, 0.7)), 0.5]), np.array(low), np.array(high)
 
@@ -115,7 +115,7 @@ _SCENE = """<scene version="3.0.0">
 
 
 def document(material: Material, found: Likeness) -> str:
-    """The scene as XML; the light is behind the ball of a material that transmits."""
+    """The scene as XML; for a material that transmits, the light is behind the ball."""
     scene = ET.fromstring(_SCENE.format(behind=-4 if material.transmits else 4))
     bsdf = _bsdf(found)
     bsdf.set("id", "material")
@@ -126,7 +126,7 @@ def document(material: Material, found: Likeness) -> str:
 
 
 def _exact(material: Material) -> Any:
-    """A comment with the exact BSDF, and how to use it."""
+    """A comment with the exact BSDF and instructions."""
     bsdf = ET.Element("bsdf", type="lambent_material", id="material")
     exact = material.model_dump_json(exclude={"name", "provenance"})
     ET.SubElement(bsdf, "string", name="material", value=exact)
@@ -139,7 +139,7 @@ def _exact(material: Material) -> Any:
 
 
 def _bsdf(found: Likeness) -> ET.Element:
-    """All parts: reflection in one two-sided blend, each part of transmission beside it."""
+    """All parts: reflection in one two-sided blend, combined with each part of transmission."""
     near: list[Part | None] = [part for part in found.parts if part.lobe.side == "reflection"]
     far: list[Part | None] = [part for part in found.parts if part.lobe.side == "transmission"]
     if any(found.kd) or not (near or far or any(found.kt_d)):
@@ -157,14 +157,14 @@ def _bsdf(found: Likeness) -> ET.Element:
 
 
 def _shares(sizes: Sequence[float]) -> list[float]:
-    """Shares of the blend, rounded as in the file; they sum to 1."""
+    """Weights of the blend, rounded as in the file; they sum to 1."""
     raised = np.maximum(np.array(sizes) / max(sum(sizes), 1e-9), LEAST_SHARE)
     shares = [round(float(share), 4) for share in raised / raised.sum()]
     return [*shares[:-1], round(1 - sum(shares[:-1]), 4)]
 
 
 def _blend(leaves: list[tuple[ET.Element, float]]) -> ET.Element:
-    """The leaves, each at its share of the sum of shares."""
+    """Blend the leaves, each weighted by its share."""
     (first, share), *rest = leaves
     total = sum(share for _, share in leaves)
     return _made("blendbsdf", ("float", "weight", 1 - share / total), first, _blend(rest)) if rest else first

@@ -1,7 +1,7 @@
-"""Direction pairs at which a material is compared with another tool's model, and that model's facets.
+"""Direction pairs for comparing a material with another tool's model, and the model's microfacet terms.
 
-All these tools have the same microfacets, D G / (4 (wi.n)(wo.n)) over a GGX (or Beckmann) distribution with Smith's
-masking; they differ in the form of the masking and in the factors.
+All these tools use the same microfacets, D G / (4 (wi.n)(wo.n)) over a GGX (or Beckmann) distribution with Smith's
+masking; they differ in the form of masking and in the factors.
 
 Sources: Walter et al. 2007, Microfacet models for refraction, eqs 25-28, 33, 34; Heitz 2014, Understanding the
 masking-shadowing function, eqs 72, 86, 99 (anisotropic, height-correlated).
@@ -24,7 +24,7 @@ from lambent.materials.fresnel import schlick_weight
 from lambent.materials.lobes import Vector
 from lambent.materials.measured.protocol import GRAZING_DEG, LeftOut, MeasuredSamples, TableInfo
 
-FIT_LOG2, CHECK_LOG2 = 12, 14  # of the number of pairs to fit, and to measure the errors
+FIT_LOG2, CHECK_LOG2 = 12, 14  # number of pairs for the fit, and for measuring the errors
 Masking = Literal["correlated", "separable"]
 
 
@@ -64,7 +64,7 @@ class Pairs:
     def facets(
         self, mx: float, my: float, masking: Masking = "correlated", distribution: Distribution = "ggx"
     ) -> Floats:
-        """(N,) D G / (4 cos_i cos_o) in 1/sr, without Fresnel; of the mirrored pair where wo is on the far side."""
+        """(N,) D G / (4 cos_i cos_o) in 1/sr, without Fresnel; uses the mirrored pair if wo is on the far side."""
         hz2 = self.h[2] ** 2
         slope2 = ((self.h[0] / mx) ** 2 + (self.h[1] / my) ** 2) / hz2
         tails = np.exp(-slope2) if distribution == "beckmann" else (1 + slope2) ** -2.0
@@ -99,7 +99,7 @@ def is_isotropic(material: Material) -> bool:
 
 
 def pairs_of(material: Material, log2_count: int, seed: int) -> Pairs:
-    """Pairs spread as in a measurement: theta_i even up to the grazing limit, wo over both sides.
+    """Draw pairs distributed as in a measurement: theta_i uniform up to the grazing limit, wo over both sides.
 
     Half of the wo are uniform in solid angle, half follow the material's own lobes, so that no peak is missed. A pair's
     weight is the solid angle of wo, as in a measured table.
@@ -107,7 +107,7 @@ def pairs_of(material: Material, log2_count: int, seed: int) -> Pairs:
     Parameters
     ----------
     log2_count : int
-        2^log2_count pairs are drawn; those beyond the grazing limit are left out.
+        2^log2_count pairs are drawn; those beyond the grazing limit are dropped.
     """
     from scipy.stats import qmc
 

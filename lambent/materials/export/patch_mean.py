@@ -1,9 +1,9 @@
-"""Means of f over pairs of patches of an angle basis, with which a matrix of patches keeps the energy.
+"""Means of f over pairs of patches of an angle basis, which preserve energy in a matrix of patches.
 
-The mean is over the projected solid angle of the incident and the outgoing patch. A lobe can be far narrower than a
-patch, and a dim patch is rarely met by any lobe; directions are therefore drawn both evenly within every patch and from
-a BSDF's own lobes, and weighted by the sum of both densities (Veach & Guibas 1995, the balance heuristic). Per pair the
-smallest value found is subtracted first, so that a constant comes out exactly.
+The mean is over the projected solid angle of both patches. A lobe can be far narrower than a patch, and lobes rarely
+reach a dim patch; directions are therefore drawn both uniformly within every patch and from a BSDF's lobes, and
+weighted by the sum of both densities (Veach & Guibas 1995, the balance heuristic). The smallest value of each pair is
+subtracted first, so that a constant comes out exactly.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.lobes import COS_MIN
 from lambent.materials.measured.klems import OUTSIDE, AngleBasis
 
-EVEN_LOG2, LOBES_LOG2 = 3, 13  # of the directions per pair of patches, and per incident patch from lobes
+EVEN_LOG2, LOBES_LOG2 = 3, 13  # log2 of directions per pair of patches, and per incident patch from lobes
 
 Evaluate = Callable[[Floats, Floats], Floats]
 
@@ -68,5 +68,5 @@ def _directions(basis: AngleBasis, proposal: MaterialBSDF, i: int) -> tuple[Floa
     lobes = proposal.sample(wi[len(u) :], v[:, 2:])
     wo = np.concatenate([even, lobes])
     patch = np.concatenate([patch, basis.index(raised(lobes))])
-    scattered = (np.abs(wo[:, 2]) > COS_MIN) & (patch != OUTSIDE)  # samples of lobes can end at the horizon
+    scattered = (np.abs(wo[:, 2]) > COS_MIN) & (patch != OUTSIDE)  # lobe samples can end at the horizon
     return wi[scattered], wo[scattered], patch[scattered]

@@ -1,4 +1,4 @@
-"""Where a subject's light is expected: a BSDF to draw directions from, and whether a table knows light from behind."""
+"""Where a subject scatters light: a BSDF to draw directions from, and a test for light from behind."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from lambent.materials.export.contract import Subject
 from lambent.materials.measured.retro import retro
 
 _WIDTHS = (0.004, 0.02, 0.08, 0.3)  # of the lobes of the proposal for a table
-_MOST_TUPLES = 100_000  # of a table, that tell whether it is retro-reflective
-_ASKED_DEG, _TURN_DEG = (1.0, 20.0, 45.0, 70.0), 45.0  # theta at which light from behind is looked for, steps of phi
+_MOST_TUPLES = 100_000  # tuples of a table used to detect retro-reflection
+_ASKED_DEG, _TURN_DEG = (1.0, 20.0, 45.0, 70.0), 45.0  # theta, and steps of phi, at which light from behind is tested
 
 
 def proposal_of(subject: Subject) -> MaterialBSDF:
-    """A material itself; for a table, a material with lobes of every width a measured one can have.
+    """A material itself; for a table, a material with lobes of every width that measured lobes can have.
 
-    A table that is retro-reflective gets them about the light, too.
+    For a retro-reflective table, lobes about the light are added.
     """
     if isinstance(subject, Material):
         return MaterialBSDF(subject)
@@ -33,9 +33,9 @@ def proposal_of(subject: Subject) -> MaterialBSDF:
 
 
 def knows_the_back(subject: Subject) -> bool:
-    """Whether light from -z is scattered: as the table states by `has_a_back`, or at any of many directions.
+    """Whether light from -z is scattered: as the table's `has_a_back` states, or as found at any of many directions.
 
-    A material is the same from both sides.
+    A material is equal from both sides.
     """
     if isinstance(subject, Material):
         return True

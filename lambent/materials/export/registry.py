@@ -1,4 +1,4 @@
-"""Find the writer of a format by its name, or by a file's ending."""
+"""Find the writer of a format by name or by file suffix."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from lambent.materials.export.contract import Writer
 
 @cache
 def writers() -> dict[str, Writer]:
-    """Every writer by the name of its module, in alphabetical order."""
+    """All writers by module name, in alphabetical order."""
     return {name: cast(Writer, module) for name, module in modules_in(package, having="write").items()}
 
 
 def writer_for(path: Path, name: str | None = None) -> Writer:
-    """The writer called `name`, or the only one that writes files with this ending.
+    """The writer called `name`, or the only one for this file suffix.
 
     Raises
     ------
     UserError
-        The name is unknown, or the ending belongs to no format or to several.
+        If the name is unknown, or no format or several use the suffix.
     """
     found = writers()
     if name is not None:

@@ -1,4 +1,4 @@
-"""Tables and materials as functions of two directions, for writers that evaluate them at directions of their own."""
+"""Tables and materials as functions of two directions, for writers that choose their own directions."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from lambent.materials.measured.protocol import MeasuredSamples, negative_readin
 from lambent.materials.measured.registry import load
 from lambent.materials.measured.retro import towards_light
 
-MOST_TUPLES = 200_000  # of a table, at which the written file is compared
-PEAK_RATIO, PEAK_DEG, PEAK_TOLERANCE = 1.25, 10.0, 0.1  # of a peak about the light, and what it may lose unsaid
+MOST_TUPLES = 200_000  # tuples of a table at which the written file is compared
+PEAK_RATIO, PEAK_DEG, PEAK_TOLERANCE = 1.25, 10.0, 0.1  # of a retro-reflective peak; its tolerated loss
 LOST_TRANSMISSION = "transmission: the format holds reflection alone"
 
 
@@ -58,19 +58,19 @@ def scatterer_of(subject: Subject) -> Scatterer:
 
 
 def tuples_of(subject: Subject, most: int = MOST_TUPLES) -> MeasuredSamples:
-    """At most so many of a table's measured tuples; for a material, pairs spread as in a measurement."""
+    """At most `most` of a table's measured tuples; for a material, pairs distributed as in a measurement."""
     if isinstance(subject, Material):
         return pairs_of(subject, CHECK_LOG2, seed=1).samples
     return subject.samples(most)
 
 
 def read_back(subject: Subject, path: Path, lost: tuple[str, ...]) -> Cost:
-    """Differences of the file at `path`, read again, from the subject at the subject's own tuples.
+    """Compare the file at `path`, read back, with the subject at the subject's own tuples.
 
     Raises
     ------
     UserError
-        The file is of no readable format.
+        If no reader recognises the file.
     """
     samples, written = tuples_of(subject), load(path)
     negative = negative_readings(samples)
@@ -85,7 +85,7 @@ def read_back(subject: Subject, path: Path, lost: tuple[str, ...]) -> Cost:
 
 
 def _of_the_peak_about_the_light(samples: MeasuredSamples, f: Floats) -> list[str]:
-    """How a file with f (N, C) at the tuples holds a retro-reflective peak, where there is one and it does not."""
+    """A sentence if the subject has a retro-reflective peak that f (N, C) of the file, at the tuples, lacks."""
     if towards_light(samples) < PEAK_RATIO:
         return []
     apart = np.linalg.norm(samples.wi - samples.wo, axis=1)

@@ -1,9 +1,10 @@
 """RGL tensor file (Dupuy & Jakob 2018), as Mitsuba's `measured` plugin and measured/rgl.py read it.
 
-Per incident direction the half vectors get a density that follows the light, p times d_wo/d_u_m, to a power that keeps
-the tails, plus a floor. The square it warps to is sampled evenly, so that the file's rows and columns are dense where
-the lobe is, whatever its width; between incident directions the warp moves, and the lobe with it. f cos theta_o is
-stored as it is (`jacobian` = 0), not divided by a microfacet term: nothing is assumed about the material.
+For each incident direction, half vectors get a density that follows the light, p times d_wo/d_u_m, raised to a power
+that keeps the tails, plus a floor. The square that it warps to is sampled uniformly, so that rows and columns of the
+file are dense in the lobe, whatever its width; between incident directions the warp moves, and the lobe with it.
+f cos theta_o is stored directly (`jacobian` = 0) instead of being divided by a microfacet term, so that nothing is
+assumed about the material.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ PHI_I_END = {"quadrant": -np.pi / 2, "half": 0.0, "none": np.pi}  # they begin a
 ROWS, COLUMNS = 64, 128  # of the density: azimuth and elevation of the half vector
 NODES = {"isotropic": 64, "other": 32}  # rows and columns of the warped square
 _POWER = 0.35
-_FLOOR, _FLOOR_BELOW = 0.02, 0.002  # even share of the density, which keeps every direction in reach
-_LOWEST = 1e-4  # cosine of the directions that replace those below the horizon
+_FLOOR, _FLOOR_BELOW = 0.02, 0.002  # uniform share of the density, which keeps every direction reachable
+_LOWEST = 1e-4  # cosine that replaces directions below the horizon
 
 
 def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
@@ -76,7 +77,7 @@ def _slice(scatterer: Scatterer, theta_i: float, phi_i: float, n: int) -> tuple[
     y, x = np.meshgrid(np.linspace(0, 1, ROWS), np.linspace(0, 1, COLUMNS), indexing="ij")
     values, share = _asked(scatterer, wi, np.stack([x.ravel(), y.ravel()], axis=-1), turned)
     density = ((luminance(values) * share) ** _POWER).reshape(ROWS, COLUMNS)
-    density[[0, -1]] = (density[0] + density[-1]) / 2  # one azimuth, at both ends of the turn
+    density[[0, -1]] = (density[0] + density[-1]) / 2  # both ends of the turn are one azimuth
     floor = np.where(share > 0, _FLOOR, _FLOOR_BELOW).reshape(ROWS, COLUMNS)
     density = density / max(float(density.mean()), 1e-12) + floor
     density = density.astype(np.float32).astype(np.float64)
@@ -90,16 +91,16 @@ def _slice(scatterer: Scatterer, theta_i: float, phi_i: float, n: int) -> tuple[
 
 
 def _asked(scatterer: Scatterer, wi: Floats, u_m: Floats, turned_rad: float) -> tuple[Floats, Floats]:
-    """f cos theta_o (N, 3) at wi mirrored about the half vectors at u_m (N, 2), and d_wo / d_u_m (N,).
+    """f cos theta_o (N, 3) with wi mirrored about the half vectors at u_m (N, 2), and d_wo / d_u_m (N,).
 
-    Below the horizon, f cos is that of the direction just above it, so that nodes there do not affect neighbours, and
-    d_wo / d_u_m is 0.
+    Below the horizon, f cos is taken just above it, so that nodes there do not affect their neighbours, and d_wo /
+    d_u_m is 0.
     """
     m = half_vectors_at(u_m, turned_rad)
     all_wi = np.broadcast_to(wi, m.shape)
     wo = reflect(all_wi, m)
     above = wo[:, 2] > _LOWEST
-    # Mirrored about a half vector at the horizon, wi at the normal points straight down; m then gives the azimuth.
+    # wi along the normal, mirrored about a half vector at the horizon, points straight down; m then gives the azimuth.
     level = normalize((wo + 0.1 * m) * (1, 1, 0)) + np.array([0.0, 0.0, _LOWEST])
     lifted = normalize(np.where(above[:, None], wo, level))
     values = np.maximum(scatterer.rgb(all_wi, lifted), 0) * lifted[:, 2:]

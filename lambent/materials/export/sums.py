@@ -1,4 +1,4 @@
-"""Matching for tools whose materials are sums, like ours: diffuse terms stay, each lobe gets a counterpart."""
+"""Matching for tools whose materials are sums like ours: diffuse terms are kept, each lobe gets a counterpart."""
 
 from __future__ import annotations
 
@@ -101,9 +101,9 @@ class Likeness:
 
 
 def likeness(material: Material, tool: Tool, lost: Sequence[str], progress: Progress) -> tuple[Likeness, Cost]:
-    """The closest material of the tool, rounded as in the file, and its cost; exact if there are no lobes.
+    """The closest material of the tool, rounded as in the file, and its cost; exact without lobes.
 
-    Retro lobes have no counterpart: the others are matched without them, and the cost counts them.
+    Retro lobes have no counterpart: they are left out of the match, but counted in the cost.
     """
     check, towards_light = pairs_of(material, CHECK_LOG2, seed=1), kept_towards_light(material)
     material = without_retro(material)

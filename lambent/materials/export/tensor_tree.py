@@ -1,7 +1,7 @@
-"""LBNL BSDF XML as tensor trees, which Radiance reads: cells fine where the subject varies, see tree_growth.py.
+"""LBNL BSDF XML as tensor trees for Radiance: cells are fine where the subject varies, see tree_growth.py.
 
-Rank 3 for a subject that looks the same when the sheet is turned, else rank 4. A tree that was read is written with its
-own cells and values. Colour is the luminance beside u' and v' of CIE 1976, as Radiance's tools write it.
+Rank 3 if turning the sheet does not change the subject, else rank 4. A tree that was read is written with its own cells
+and values. Colour is luminance with u' and v' of CIE 1976, as in Radiance's tools.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ ENDINGS = (".xml",)
 TAKES: tuple[Kind, ...] = ("table", "material")
 
 SCOUTS_LOG2 = 19  # directions drawn from lobes, for light from one side
-MOST_TUPLES = 100_000  # of a table, which are scouts too
+MOST_TUPLES = 100_000  # tuples of a table, which serve as scouts too
 CHROMA_TOLERANCE = 0.004  # range of u' and v' in a cell
 _WAVELENGTHS = ("Visible", "CIE-u", "CIE-v")
-_DIGITS, _ALL_DIGITS = 6, 9  # of means, and of a tree that was read
+_DIGITS, _ALL_DIGITS = 6, 9  # of means, and of values from a tree that was read
 _LOST_PATCHES = "the patch borders, which do not match the cells; --as lbnl_xml keeps a matrix on Klems full"
-_MENTIONED = 0.01  # share of the light in uneven cells from which it is reported
+_MENTIONED = 0.01  # share of the light in uneven cells above which it is reported
 
 Trees = dict[str, tuple[TensorTree, ...]]
-"""(Y,) or (Y, u', v') by the direction the file names, such as Reflection Back."""
+"""(Y,) or (Y, u', v') by the file's name of the direction, such as Reflection Back."""
 
 
 def write(subject: Subject, path: Path, progress: Progress = silent, rank: Rank | None = None) -> Cost:
@@ -56,7 +56,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent, rank: Rank 
     Raises
     ------
     UserError
-        The subject scatters nothing, or has an azimuth and rank 3 is asked for.
+        If the subject scatters nothing, or depends on azimuth with rank 3 requested.
     """
     scatterer = scatterer_of(subject)
     own = _own_trees(subject, rank)
@@ -81,7 +81,7 @@ def _document(name: str, trees: Trees, digits: int) -> Iterator[str]:
 
 
 def _own_trees(subject: Subject, rank: Rank | None) -> Trees | None:
-    """The trees of a table that was read from trees, unless another rank is asked for."""
+    """The trees of a table that was read from trees, unless another rank is requested."""
     if not isinstance(subject, LbnlTable):
         return None
     found: Trees = {}
@@ -98,7 +98,7 @@ def _direction(through: bool, side: int) -> str:
 
 
 def _grown(subject: Subject, scatterer: Scatterer, asked: Rank | None, progress: Progress) -> tuple[Trees, list[str]]:
-    """Trees of every way and side that scatters light, and what they lose."""
+    """Trees for every way and side that scatter light, and their losses."""
     turning = _change_by_turning(subject, scatterer)
     if asked == 3 and turning > ISOTROPIC_WITHIN and scatterer.symmetry != "isotropic":
         got = f"turning the sheet changes f by {100 * turning:.2g} % of its mean"
@@ -126,7 +126,7 @@ def _grown(subject: Subject, scatterer: Scatterer, asked: Rank | None, progress:
 def _change_by_turning(subject: Subject, scatterer: Scatterer) -> float:
     """Change of f when the sheet is turned, over the mean of f, at the subject's tuples; 0 if it is isotropic.
 
-    A matrix's claim of isotropy is not enough: its patches are equal at some azimuths and others lie between them.
+    A matrix that claims isotropy is tested too: its patches agree at some azimuths, but others lie between them.
     """
     if scatterer.symmetry == "isotropic" and not _is_matrix(subject):
         return 0.0
@@ -170,7 +170,7 @@ def _pairs_at(rank: Rank, place: Floats) -> tuple[Floats, Floats]:
 
 
 def _scouts(subject: Subject, content: Callable[[Floats], Floats], rank: Rank, side: int, through: bool) -> Scouts:
-    """Places drawn from the lobes that the subject may have, and those of a table's own tuples."""
+    """Places drawn from the lobes that the subject may have, and from a table's own tuples."""
     from scipy.stats import qmc
 
     proposal = proposal_of(subject)
@@ -178,7 +178,7 @@ def _scouts(subject: Subject, content: Callable[[Floats], Floats], rank: Rank, s
 
     def density_at(place: Floats) -> Floats:
         wi, wo = _pairs_at(rank, place)
-        used = 1.0 if rank == 4 else 2.0  # rank 3 has wi in half of its cube alone
+        used = 1.0 if rank == 4 else 2.0  # rank 3 has wi in one half of its cube only
         return np.asarray((used * np.pi * 2**SCOUTS_LOG2) * proposal.pdf(wo * (1, 1, through_sign), wi) / wo[:, 2])
 
     u = qmc.Sobol(rank + 1, scramble=True, rng=0).random_base2(SCOUTS_LOG2)

@@ -1,11 +1,11 @@
-"""Tensor trees grown where a function of directions varies.
+"""Grow tensor trees that are fine where a function of directions varies.
 
-A cell is split while its content varies by more than a tolerance, the cells with most at stake first (largest range
-times volume), until all are even or the tree is full. Content is known at 32 even places of every cell and at scouts,
-places where light is expected: drawn from a BSDF's own lobes, or measured. A peak far narrower than the first cells is
-thus found. Cells halve the square that carries projected solid angle, so a mean over a cell keeps its energy. In cells
-that stay uneven, the even places and the drawn scouts are weighted by the sum of their densities (Veach & Guibas 1995,
-the balance heuristic), so that an unresolved peak keeps its energy too.
+A cell is split while its content varies by more than a tolerance, in descending order of range times volume, until all
+cells are even or the tree is full. Content is known at 32 uniform places per cell and at scouts: places where light is
+expected, drawn from a BSDF's lobes or measured. This finds peaks far narrower than the first cells. Cells halve a
+square in which area is projected solid angle, so the mean over a cell preserves energy. In cells that stay uneven,
+uniform places and drawn scouts are weighted by the sum of their densities (Veach & Guibas 1995, the balance heuristic),
+so that an unresolved peak keeps its energy too.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from lambent.materials.measured.tensor_tree import Rank, TensorTree
 TOLERANCE = 0.1  # range of f in a cell, over its mean plus the mean of all f
 MOST_CELLS: dict[Rank, int] = {3: 1 << 18, 4: 1 << 20}
 DEEPEST = 12  # levels: a cell then spans 0.03 degrees
-_FIRST: dict[Rank, int] = {3: 4, 4: 3}  # levels that are always split
-_EVEN_LOG2 = 5  # even places per cell
+_FIRST: dict[Rank, int] = {3: 4, 4: 3}  # levels that are split unconditionally
+_EVEN_LOG2 = 5  # log2 of uniform places per cell
 _AT_ONCE = 1 << 12  # cells
 _LEAST_BATCH = 256
 _SIN_GRAZING = float(np.sin(np.radians(GRAZING_DEG)))
@@ -54,7 +54,7 @@ class Scouts:
 
 
 class Growth:
-    """A tree of cells; the children of a cell stand together, and cell 0 is the cube.
+    """A tree of cells; the children of a cell are consecutive, and cell 0 is the cube.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class Growth:
 
     @property
     def _used(self) -> Flags:
-        """(N,) whether cells hold directions: rank 3 uses half of its first coordinate."""
+        """(N,) whether cells contain directions: rank 3 uses half of its first coordinate."""
         if self.rank == 4:
             return np.ones(len(self.level), dtype=bool)
         return np.asarray(2 * self.corner[:, 0] < 1 << self.level)
@@ -124,7 +124,7 @@ class Growth:
 
     @property
     def kept_peak(self) -> float:
-        """The mean of the cell that holds the brightest value found, over that value."""
+        """Mean of the cell that contains the brightest value, over that value."""
         leaves = np.flatnonzero(self.is_leaf)
         peak = leaves[self.highest[leaves].sum(axis=1).argmax()]
         brightest = float(self.highest[peak].sum())
@@ -132,7 +132,7 @@ class Growth:
 
     @property
     def smallest_deg(self) -> float:
-        """Angle across the smallest cell, seen at the normal."""
+        """Angular width of the smallest cell, at the normal."""
         return float(np.degrees(np.sqrt(np.pi) * 0.5 ** int(self.level.max())))
 
     def _split(self, cells: Indices) -> None:
@@ -162,9 +162,9 @@ class Growth:
         return np.asarray((self.corner[cells][:, None] + self._even) * np.exp2(-self.level[cells])[:, None, None])
 
     def _asked(self, cells: Indices) -> tuple[Floats, Floats, Floats]:
-        """Lowest, highest and mean (len(cells), C) at the even places; 0 in the half of rank 3 that is not used.
+        """Lowest, highest and mean (len(cells), C) at the uniform places; 0 in the unused half of rank 3.
 
-        Glancing directions count in the mean alone, so that a cell that has no others is even.
+        Grazing directions count in the mean alone; a cell with no others is even.
         """
         found = np.zeros((3, len(cells), self._scouts.value.shape[1]))
         here = np.flatnonzero(self._used[cells])
@@ -183,7 +183,7 @@ class Growth:
         return value.reshape(*places.shape[:2], -1)
 
     def _weigh(self, cells: Indices) -> None:
-        """The means of cells by the even places and the scouts together."""
+        """Means of cells from uniform places and scouts together."""
         scouts = self._scouts
         for start in range(0, len(cells), _AT_ONCE):
             part = cells[start : start + _AT_ONCE]
@@ -197,13 +197,13 @@ class Growth:
         np.add.at(self.mean, home, (scouts.value[inside] - self.lowest[home]) * share[:, None])
 
     def tree(self, value: Callable[[Floats], Floats], tolerance: float | None = None) -> TensorTree:
-        """The tree of `value` (N,) of means (N, C), with cells joined again that are even together.
+        """The tree of `value` (N,) of means (N, C), with cells merged where they are jointly even.
 
         Parameters
         ----------
         tolerance : float, optional
-            Largest range of `value` in a cell; by default `TOLERANCE` holds for the content. Cells without light are
-            even with any others.
+            Largest range of `value` in a cell; by default, `TOLERANCE` applies to the content. Cells without light
+            merge with any others.
         """
         first, mean = self.first.copy(), self.mean.copy()
         low, high = self.lowest.copy(), self.highest.copy()
@@ -225,7 +225,7 @@ class Growth:
 def _is_glancing(place: Floats) -> Flags:
     """(...) whether light enters or leaves beyond `GRAZING_DEG`, where f can grow without limit.
 
-    The distance of a place (..., rank) from the middle of a square, along its axes, is the sine of theta.
+    The distance of a place (..., rank) from the centre of a square, along its axes, is the sine of theta.
     """
     rank = place.shape[-1]
     sine = np.abs(2 * place - 1)
@@ -233,7 +233,7 @@ def _is_glancing(place: Floats) -> Flags:
 
 
 def _even_places(rank: Rank) -> Floats:
-    """(K, rank) places of the unit cube, equally many in each of its halves."""
+    """(K, rank) places of the unit cube, equal numbers in each half."""
     from scipy.stats import qmc
 
     points = qmc.Sobol(rank, scramble=False).random_base2(_EVEN_LOG2)
@@ -257,7 +257,7 @@ def _tree(rank: Rank, first: Indices, value: Floats) -> TensorTree:
     code = np.zeros(len(first), dtype=np.int64)
     code[branches] = np.arange(len(branches))
     code[np.concatenate([grids, alone])] = -1 - np.arange(len(grids) + len(alone))
-    # The last coordinate of a grid is fastest, the first is a child's lowest bit: the bits are reversed.
+    # A grid's last coordinate is fastest, but the first is a child's lowest bit: the bits are reversed.
     order = sum((children >> d & 1) << (rank - 1 - d) for d in range(rank))
     values = np.concatenate([value[first[grids][:, None] + order].ravel(), value[alone]])
     logs = np.repeat(np.array([1, 0], dtype=np.int8), [len(grids), len(alone)])

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from lambent.materials.measured.tensor_tree import TensorTree
 
-_PER_LINE, _AT_ONCE = 8, 1 << 14  # values, at most, of a line and of a piece of text
+_PER_LINE, _AT_ONCE = 8, 1 << 14  # values per line and per piece of text, at most
 
 
 def pieces_of(tree: TensorTree, digits: int) -> Iterator[str]:
-    """The text in pieces that need little memory, with so many significant digits."""
+    """The text in small pieces, with `digits` significant digits."""
     stack: list[int | None] = [tree.root]  # None closes a brace
     while stack:
         code = stack.pop()

@@ -1,4 +1,4 @@
-"""The verdict on an export in one word, by limits that stand here alone."""
+"""The verdict on an export in one word; all limits are in this file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Literal
 
 from lambent.materials.document import Side
 
-# E as a share of the subject's own size: (faithful up to, approximate up to). L1 is light in wrong directions; the
+# E relative to the subject's own size: (faithful up to, approximate up to). L1 is light in wrong directions; the cube
 # cube root is close to what is seen; Ngan's L2 sees peaks above all: beyond 1 they are worse than a black surface.
 LIMITS: dict[str, tuple[float, float]] = {
     "l1": (0.1, 0.5),
@@ -17,18 +17,18 @@ LIMITS: dict[str, tuple[float, float]] = {
     "log": (0.2, 0.75),
 }
 LIGHT_LIMITS = (0.05, 0.25)  # relative difference of the light to either side
-RETRO_LIMITS = (0.3, 0.75)  # of f back towards the light: what a tape is made for, however little light it is
+RETRO_LIMITS = (0.3, 0.75)  # of f back towards the light, the purpose of retro-reflective tape
 _LIGHT: dict[Side, str] = {"reflection": "reflected light", "transmission": "transmitted light"}
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether an export stands for its subject.
+    """Whether an export represents its subject.
 
     Attributes
     ----------
     word : str
-        faithful, approximate or unusable; "not compared" where there are no errors to judge by.
+        faithful, approximate or unusable; "not compared" without errors to judge by.
     reason : str
         The figures that decided it.
     """
@@ -41,10 +41,10 @@ class Verdict:
 
 
 def verdict_of(share: Mapping[str, float], light: Mapping[Side, float], towards_light: float = 1.0) -> Verdict:
-    """The verdict by errors as shares of the subject's size, and by what is written over the subject's: of the light,
-    and of f back towards the light.
+    """The verdict from errors relative to the subject's size, and from ratios written over subject.
 
-    The worst figure decides; all figures beyond the same limit are named.
+    `light` is the ratio of scattered light per side, `towards_light` that of f back towards the light. The worst figure
+    decides; all figures beyond the same limit are named.
     """
     if not share:
         return Verdict("not compared", "the file was not compared with its source")

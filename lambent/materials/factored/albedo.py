@@ -1,4 +1,4 @@
-"""Equivalent albedos: the diffuse surface that reflects as much of uniform light (Ben-Artzi 2007, section 5.2.4).
+"""Equivalent albedos: the diffuse surface that reflects the same share of uniform light (Ben-Artzi 2007, 5.2.4).
 
     d = 1/pi  integral of f cos cos over both hemispheres = sum over bands of  c_j e_j        (5.21, 5.22)
 
@@ -21,13 +21,13 @@ from lambent.materials.factored.terms import Editable, Factor, Term
 from lambent.materials.lobes import NUMPY, Vector
 
 BANDS, BANDS_OF_TWO, BANDS_OF_VIEWER = 1024, 256, 64
-VIEWERS, ELEVATIONS, AZIMUTHS, TURNS = 32, 1024, 32, 8  # nodes; turns of both directions for what is anisotropic
+VIEWERS, ELEVATIONS, AZIMUTHS, TURNS = 32, 1024, 32, 8  # nodes; turns of both directions for anisotropic terms
 _made: dict[tuple[str, bool], Floats] = {}
 
 
 @dataclass(frozen=True)
 class _Axis:
-    """A curve of a term, cut into bands that are narrow at small angles: their ends are END_RAD (k / bands)^2."""
+    """An axis of a term: bands that narrow towards small angles, with ends END_RAD (k / bands)^2."""
 
     factor: Factor
     bands: int
@@ -43,9 +43,9 @@ class _Axis:
 
 
 def albedo(material: Editable, side: str) -> Floats:
-    """(3,) equivalent albedo of a material's terms of one side, "reflection" (with what it returns) or "transmission".
+    """(3,) equivalent albedo of a material's terms on one side, "reflection" (with retro lobes) or "transmission".
 
-    Textures have a mean of 1 and do not change it.
+    Textures have mean 1 and do not change it.
     """
     mine = [term for term in material.terms if (term.side == "transmission") == (side == "transmission")]
     return np.asarray(sum((term_albedo(term, material.curves) for term in mine), np.zeros(3)))
@@ -75,7 +75,7 @@ def _shares(term: Term, axes: list[_Axis]) -> Floats:
     turns = 1 if _is_isotropic(term, axes) else TURNS
     shape = [axis.bands for axis in axes]
     total = np.zeros((3, int(np.prod(shape, dtype=int))))
-    for turn_rad in (np.arange(turns) + 0.5) / turns * 2 * np.pi:  # one after another: each is a million nodes
+    for turn_rad in (np.arange(turns) + 0.5) / turns * 2 * np.pi:  # one at a time: each is a million nodes
         total += _sums(term, axes, _turned(wi, turn_rad), _turned(wo, turn_rad), weight / turns)
     return np.ascontiguousarray(total.T).reshape(*shape, 3)
 
@@ -119,7 +119,7 @@ def _nodes(about_half_vector: bool) -> tuple[Vector, Vector, Floats]:
     square_o = (np.arange(VIEWERS) + 0.5) / VIEWERS  # sin^2 theta_o: cosine distributed, each pi / VIEWERS of cos dw
     phi = (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS * 2 * np.pi
     ends = (np.arange(ELEVATIONS + 1) / ELEVATIONS) ** 2 * END_RAD
-    # Solid angles, and cosines over them, are exact: the albedo of a constant is 1 to the last digit.
+    # Solid angles, and cosines over them, are exact: the albedo of a constant is exactly 1.
     theta, solid = (ends[1:] + ends[:-1]) / 2, -np.diff(np.cos(ends))
     projected = np.diff(np.sin(ends) ** 2) / 2
     o, e, a = np.broadcast_arrays(square_o[:, None, None], theta[:, None], phi)

@@ -50,10 +50,10 @@ class Curve:
         return np.where(inside[..., None], np.stack(columns, axis=-1), 0.0)
 
     def band_means(self, bands: int, polar: int = 0) -> Floats:
-        """Coefficients (bands, 3): the mean over each of `bands` equal bands, which divide KNOTS, exactly.
+        """Coefficients (bands, 3): the exact mean over each of `bands` equal bands; `bands` must divide KNOTS.
 
-        Point samples instead would pop while a narrow peak is dragged (Ben-Artzi 2007, eq. 4.17). Where the angle times
-        `polar` is one from an axis, bands are rings of a sphere: a peak keeps its light in any band.
+        Point samples would pop while a narrow peak is dragged (Ben-Artzi 2007, eq. 4.17). If `polar` times the angle is
+        an angle from an axis, bands are rings of a sphere, and a peak keeps its light in any band.
         """
         per_band, rest = divmod(KNOTS, bands)
         if rest:
@@ -65,16 +65,16 @@ class Curve:
         return np.asarray((means * rings).sum(axis=1) / rings.sum(axis=1))
 
     def node_values(self, bands: int, polar: int = 0) -> Floats:
-        """Values (bands, 3) at the centres of equal bands, between which straight lines follow the curve.
+        """Values (bands, 3) at the centres of equal bands, whose linear interpolation follows the curve.
 
-        Values of the curve there would make a narrow peak pop while it is dragged. Means over the bands flatten it, by
-        1/8 of their second difference; that much goes back up the slopes, but no further than half way to the curve's
-        least and largest value in these bands and those beside them, so that nothing overshoots or becomes negative.
-        With `polar`, see `band_means`, the first value is such that the first two bands keep their light: a mean would
-        make a peak about the axis as bright as its band is wide.
+        Curve values at the centres would make a narrow peak pop while it is dragged. Means over the bands flatten it by
+        1/8 of their second difference. That amount is added back, limited to half way to the curve's least and largest
+        value in the band and its neighbours, so that nothing overshoots or becomes negative. With `polar`, see
+        `band_means`, the first value preserves the light of the first two bands: a mean would make a peak about the
+        axis brighter with wider bands.
         """
         means, per_band = self.band_means(bands), KNOTS // bands
-        within = np.ascontiguousarray(self.values[:-1].T).reshape(3, bands, per_band)  # as numpy is fast along the end
+        within = np.ascontiguousarray(self.values[:-1].T).reshape(3, bands, per_band)  # fast along the last axis
         least, most = (f(f.reduce(within, axis=2).T, self.values[per_band::per_band]) for f in (np.minimum, np.maximum))
         least, most = (np.pad(of, ((1, 1), (0, 0)), mode="edge") for of in (least, most))
         below = means - np.minimum(np.minimum(least[:-2], least[1:-1]), least[2:])
@@ -107,8 +107,8 @@ def _rings(polar: int) -> Floats:
 
 @lru_cache(maxsize=32)
 def _first_lines(bands: int, polar: int) -> tuple[Floats, Floats]:
-    """Solid angles (2 KNOTS / bands,) of intervals in the first two bands, and the light (3,) there of a value of 1 at
-    the first, second and third node, with straight lines between."""
+    """Solid angles (2 KNOTS / bands,) of intervals in the first two bands, and the light (3,) in them of value 1 at
+    the first, second and third node, with linear interpolation."""
     count = 2 * KNOTS // bands
     nodes = np.arange(3) * (KNOTS // bands) + KNOTS / bands / 2
     rings, middles = _rings(polar)[:count], np.arange(count) + 0.5

@@ -18,7 +18,7 @@ from lambent.materials.fresnel import schlick
 
 @dataclass(frozen=True)
 class Highlight:
-    """A distribution of normals as factors and curves; 1 / cos_h^`cos_h` of it is left to the quotient."""
+    """A distribution of normals as factors and curves; its part 1 / cos_h^`cos_h` is left to the quotient."""
 
     factors: tuple[Factor, ...]
     curves: dict[str, Curve]
@@ -26,7 +26,7 @@ class Highlight:
 
 
 def beckmann(mx: float, my: float, name: str = "highlight") -> Highlight:
-    """Beckmann's distribution: one curve over theta_h, or two over the slopes where it is anisotropic."""
+    """Beckmann's distribution: one curve over theta_h, or, if anisotropic, two over the slopes."""
     if mx == my:
         curve = Curve.of(lambda x: np.exp(-((np.tan(x) / mx) ** 2)) / (np.pi * mx * mx * _cos4(x)))
         return Highlight((Factor(name, "theta_h"),), {name: curve}, 0.0)
@@ -38,7 +38,7 @@ def beckmann(mx: float, my: float, name: str = "highlight") -> Highlight:
 
 
 def ggx(mx: float, my: float, name: str = "highlight") -> Highlight:
-    """GGX: one curve over theta_h, stretched to circles where it is anisotropic."""
+    """GGX: one curve over theta_h, stretched to circles if anisotropic."""
     m2, stretched = mx * my, mx != my
     curve = Curve.of(lambda x: 1 / (np.pi * m2 * (1 if stretched else _cos4(x)) * (1 + np.tan(x) ** 2 / m2) ** 2))
     factor = Factor(name, "theta_h", stretch=float(np.sqrt(my / mx)))
@@ -48,7 +48,8 @@ def ggx(mx: float, my: float, name: str = "highlight") -> Highlight:
 def lobe_terms(lobe: Lobe, prefix: str = "") -> tuple[tuple[Term, ...], dict[str, Curve]]:
     """Terms and curves of a Kurt lobe; names begin with `prefix`.
 
-    Two curves of the highlight leave none for Fresnel: two terms share them, and have Schlick's factor between them.
+    If the highlight takes both curves, none is left for Fresnel: two terms then share them and blend by Schlick's
+    factor.
     """
     highlight = (ggx if lobe.distribution == "ggx" else beckmann)(lobe.mx, lobe.my, f"{prefix}highlight")
     k, r0 = np.array(lobe.k), np.array(lobe.r0)
@@ -88,7 +89,7 @@ def of_material(material: Material) -> Editable:
 
 
 def prefixed(lobes: Sequence[Lobe]) -> list[tuple[str, Lobe]]:
-    """The lobes of a document with the beginnings of their terms' and curves' names; none where there is one lobe."""
+    """The lobes of a document with the prefixes of their terms and curves; empty for a single lobe."""
     return [(f"lobe {number} " if len(lobes) > 1 else "", lobe) for number, lobe in enumerate(lobes, start=1)]
 
 

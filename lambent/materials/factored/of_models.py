@@ -1,6 +1,6 @@
-"""Models as terms and curves (Ben-Artzi 2007, chapter 3): a parameter that changes makes new curves.
+"""Models as terms and curves (Ben-Artzi 2007, chapter 3): changing a parameter makes new curves.
 
-A model of one's own registers its function: `@editable.register`.
+To add a model, register its function: `@editable.register`.
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ DIFFUSE = Factor("diffuse", "theta_i")
 
 @singledispatch
 def editable(model: Model) -> Editable:
-    """The terms and curves of a model with its present parameters.
+    """The terms and curves of a model with its current parameters.
 
     Raises
     ------
     UserError
-        No decomposition of the model is known.
+        If no decomposition of the model is known.
     """
     raise UserError("model has no curves to edit", field=model.name, hint="fit it with lobes first")
 
 
 def same_quotients(one: Editable, other: Editable) -> bool:
-    """Whether `other` differs from `one` in curves and scales alone, so that transport made for one serves both."""
+    """Whether `other` differs from `one` in curves and scales only, so that one transport serves both."""
     return [(t.quotient, t.factors, t.side) for t in one.terms] == [
         (t.quotient, t.factors, t.side) for t in other.terms
     ]
@@ -86,7 +86,7 @@ def _(model: CookTorrance) -> Editable:
 
 @editable.register
 def _(model: AshikhminShirley) -> Editable:
-    """Two terms that share their curves have Schlick's Fresnel factor between them (3.12)."""
+    """Two terms that share their curves and blend by Schlick's Fresnel factor (3.12)."""
     rd, rs, ex, ey = model.rgb("rd"), model.rgb("rs"), model.number("ex"), model.number("ey")
     scale, factors = (
         np.sqrt((ex + 1) * (ey + 1)) / (2 * np.pi),
@@ -128,7 +128,7 @@ def _(model: Schlick) -> Editable:
 
 @editable.register
 def _(model: OrenNayar) -> Editable:
-    """Its parameters are scales of four fixed functions; the curves are for drawing freehand."""
+    """Its parameters scale four fixed functions; the curves are for freehand editing."""
     sigma2, rho = np.radians(model.number("sigma")) ** 2, model.rgb("rho")
     parts: list[tuple[str, q.One | q.OrenNayarPart, Floats]] = [
         ("diffuse", q.One(), rho * (1 - 0.5 * sigma2 / (sigma2 + 0.33)) / np.pi),

@@ -1,6 +1,6 @@
 """Homomorphic factors as curves (Ben-Artzi 2007, eq. 3.16): P(theta_i) Q(theta_h) P(theta_o).
 
-The curves are the textures' means over the azimuth; what a texture has beyond them stays in the quotient.
+The curves are the textures' means over azimuth; the rest of each texture stays in the quotient.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from lambent.materials.measured.homomorphic import HomomorphicTable, ParabolicMa
 class Azimuths:
     """p(wi) q(h) p(wo), RGB: the textures over their means at the same angle, each clamped to [0, MOST].
 
-    The ratios are formed where they are looked up, not texel by texel: means bend more than bilinear ratios follow.
+    Ratios are formed at look-up, not per texel: means bend more than bilinear ratios can follow.
     """
 
     p: ParabolicMap = field(repr=False, compare=False)

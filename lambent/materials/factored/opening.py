@@ -1,4 +1,4 @@
-"""Whatever describes a material, as terms and curves, with the error of that."""
+"""Load any description of a material as terms and curves, with the error of the factorisation."""
 
 from __future__ import annotations
 
@@ -35,18 +35,18 @@ def editable_of(subject: Path | str | Material | Model | MeasuredTable, progress
     Parameters
     ----------
     subject
-        The object, or the path of a measured file in any known format or of a material document; the content tells.
+        The object, or the path of a measured file or a material document; the content decides which.
 
     Returns
     -------
     Factored
-        The editable, and its errors as shares of those of a black surface, by metric: at the tuples of a table; for a
-        document or a model, which have curves of their own, at half and difference angles.
+        The editable, and its errors by metric relative to a black surface: at the tuples of a table; for a document or
+        a model, which have exact curves, at half and difference angles.
 
     Raises
     ------
     UserError
-        The file is missing, of no known kind or broken, or the model has no decomposition.
+        If the file is missing, of no known kind or broken, or the model has no decomposition.
     """
     if isinstance(subject, Path | str):
         path = Path(subject)
@@ -67,7 +67,7 @@ def _begins_as_json(path: Path) -> bool:
 
 
 def _judged_everywhere(found: Editable, evaluate: Callable[[Floats, Floats], Floats]) -> Factored:
-    """Judged against a formula, at half and difference angles."""
+    """Errors against a formula, at half and difference angles."""
     wi, wo = (w.reshape(-1, 3) for w in _JUDGED.directions())
     above = np.minimum(wi[:, 2], wo[:, 2]) > np.cos(np.radians(GRAZING_DEG))
     wi, wo, weight = wi[above], wo[above], _JUDGED.solid_angles()[above]

@@ -1,4 +1,4 @@
-"""The angles that curves run over, from 0 to 90 degrees (Ben-Artzi 2007, chapter 3).
+"""The angles over which curves are defined, from 0 to 90 degrees (Ben-Artzi 2007, chapter 3).
 
 Functions take directions as component tuples in the local frame and `ops`, as `materials.lobes` does, so that the same
 code runs in numpy and in the path tracer; wi and wo are on the upper side. `stretch` is the ratio by which the half
@@ -20,7 +20,7 @@ from lambent.materials.lobes import NUMPY, Vector, half_vector
 class Parametrisation:
     """An angle of a pair of directions: `angle(wi, wo, stretch, ops)` in radians.
 
-    `polar` times it is an angle from an axis about which directions turn, see `Curve.band_means`; 0 where none is.
+    `polar` times it is an angle from an axis of rotation, see `Curve.band_means`; 0 if there is no axis.
     """
 
     title: str
@@ -74,7 +74,7 @@ def _gamma_b(wi: Vector, wo: Vector, stretch: float, ops: Any) -> Any:
 
 
 def _elevation(w: Vector, ops: Any) -> Any:
-    """Angle to the normal; 90 degrees below the horizon, where corners of lights may be."""
+    """Angle from the normal; 90 degrees below the horizon, which corners of lights can reach."""
     return ops.atan2(ops.sqrt(w[0] * w[0] + w[1] * w[1]), ops.maximum(w[2], 0.0))
 
 

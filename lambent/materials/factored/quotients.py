@@ -1,4 +1,4 @@
-"""Quotients: the parts of a BRDF that edits of its curves leave as they are.
+"""Quotients: the parts of a BRDF that edits of its curves do not change.
 
 `evaluate(wi, wo, ops)` takes component tuples of directions on the upper side; see `factored.terms.Quotient`.
 """
@@ -18,7 +18,7 @@ LEAST = 1e-9  # keeps 1/cos finite
 
 @dataclass(frozen=True)
 class One:
-    """1: the curves are all."""
+    """1: the curves are the whole term."""
 
     def evaluate(self, wi: Vector, wo: Vector, ops: Any) -> Any:
         return 1 + 0 * wi[2]
@@ -153,4 +153,4 @@ def _fifth_power(cosine: Any, ops: Any) -> Any:
     return m2 * m2 * m
 
 
-DIFFUSE = (One, CoupledDiffuse, AshikhminDiffuse, OrenNayarPart)  # those of light from below the surface
+DIFFUSE = (One, CoupledDiffuse, AshikhminDiffuse, OrenNayarPart)  # quotients of light from below the surface

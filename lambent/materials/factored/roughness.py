@@ -1,7 +1,7 @@
-"""Roughness that varies over a surface: one curve of a highlight serves every point, stretched as its slopes are.
+"""Roughness that varies over a surface: one highlight curve serves every point, stretched with the local slopes.
 
-A distribution of slopes that is r times as wide has, at an angle, the value of the first at the angle whose tangent is
-r times smaller, over r^2 (Heitz 2014, section 5.3: Beckmann's and GGX are shape-invariant). For those it is exact.
+If slopes are r times as wide, the distribution at an angle is the original at the angle whose tangent is r times
+smaller, divided by r^2 (Heitz 2014, section 5.3). Beckmann's and GGX are shape-invariant, so this is exact for both.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ def varies(term: Term) -> bool:
 
 
 def narrowed(over: str, angle_rad: Any, roughness: Any, ops: Any) -> Any:
-    """The angle at which a curve over `over` is looked up where slopes are `roughness` times those of the curve."""
+    """The angle at which to look up a curve over `over` for slopes `roughness` times those of the curve."""
     if over not in SLOPES:
         return angle_rad
     return ops.atan2(ops.sin(angle_rad), ops.cos(angle_rad) * roughness)
 
 
 def thinned(term: Term, wi: Vector, wo: Vector, roughness: Any, ops: Any) -> Any:
-    """What the quotient of a varying term is multiplied by: (cos_h' / cos_h)^(4 - h) / roughness^2.
+    """Factor on the quotient of a varying term: (cos_h' / cos_h)^(4 - h) / roughness^2.
 
-    Curves are distributions of normals, slopes over cos_h^4, but for the 1 / cos_h^h that the quotient has of them.
+    Curves are distributions of normals, that is, of slopes over cos_h^4, except for the 1 / cos_h^h in the quotient.
     """
     x, y, z = half_vector(wi, wo, ops)
     square = roughness * roughness

@@ -1,4 +1,4 @@
-"""A quotient on a grid of half and difference angles: what the curves of a measured table leave over."""
+"""A quotient on a grid of half and difference angles: the remainder of a measured table after its curves."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from lambent.materials.factored.quotients import One
 from lambent.materials.factored.terms import Quotient
 from lambent.materials.lobes import NUMPY, Vector, half_vector
 
-MOST = 10.0  # largest ratio: 100 changes no error of a measured table by a per mille, and magnifies edits
-LOWEST_COSINE = 0.02  # nodes whose wi or wo is lower hold what is there at this height: no edge at the horizon
+MOST = 10.0  # largest ratio: 100 changes errors of measured tables by less than a per mille, and magnifies edits
+LOWEST_COSINE = 0.02  # nodes with wi or wo below take the value at this height, which avoids an edge at the horizon
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Number of nodes along theta_h (square-root steps, as MERL's), theta_d, phi_d and phi_h, at centres of cells.
+    """Number of nodes along theta_h (square-root steps, as MERL's), theta_d, phi_d and phi_h, at cell centres.
 
-    `turns_d` is the period of phi_d in half turns: 1 for a reciprocal table, whose phi_d + pi swaps light and viewer.
-    One node of phi_h stands for an isotropic table.
+    `turns_d` is the period of phi_d in half turns: 1 for a reciprocal table, because phi_d + pi swaps light and viewer.
+    An isotropic table has one node of phi_h.
     """
 
     theta_h: int
@@ -65,7 +65,7 @@ class Grid:
         return pair[0], pair[1]
 
     def raised_directions(self) -> tuple[Floats, Floats]:
-        """(N, 3) `directions` in storage order, lifted to LOWEST_COSINE where they are lower."""
+        """(N, 3) `directions` in storage order, raised to LOWEST_COSINE."""
         pair = [w.reshape(-1, 3) for w in self.directions()]
         for w in pair:
             np.maximum(w[:, 2], LOWEST_COSINE, out=w[:, 2])
@@ -79,7 +79,7 @@ class Grid:
         ).ravel()
 
     def around(self, wi: Vector, wo: Vector, ops: Any) -> Iterator[tuple[Any, Any]]:
-        """Numbers of the nodes around a pair of directions on the upper side, with their shares of its value."""
+        """Indices of the nodes around a pair of directions on the upper side, with their weights."""
         h = half_vector(wi, wo, ops)
         sin_h = ops.sqrt(h[0] * h[0] + h[1] * h[1])
         off = sin_h > 1e-7
@@ -142,7 +142,7 @@ class Tabulated:
 
 
 def digest_of(*arrays: Floats) -> str:
-    """Stands for the arrays in a `repr`."""
+    """A string for `repr` that identifies the arrays."""
     return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()[:16]
 
 

@@ -2,7 +2,7 @@
 
     f(wi, wo) = sum over terms of  f_q rho_q(wi, wo) f_o(theta_o) f_A(gamma_A(wi, wo)) f_B(gamma_B(wi, wo))
 
-f_q is a colour, rho_q the quotient, which edits leave as it is, and the f are curves. Terms may share curves.
+f_q is a colour, rho_q the quotient, which edits do not change, and each f is a curve. Terms may share curves.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from lambent.materials.factored.parametrisations import PARAMETRISATIONS, angle_
 from lambent.materials.factored.quotients import DIFFUSE
 from lambent.materials.lobes import NUMPY, Vector
 
-MOST_CURVES = 2  # besides f_o that one term may have
+MOST_CURVES = 2  # per term, besides f_o
 
 
 class Quotient(Protocol):
-    """rho_q: a frozen value whose `repr` says all about it, for keys of stores."""
+    """rho_q: a frozen value whose `repr` identifies it, for keys of stores."""
 
     def evaluate(self, wi: Vector, wo: Vector, ops: Any) -> Any:
         """rho_q (...) in 1/sr, or RGB as a tuple of three; wi and wo are on the upper side."""
@@ -42,7 +42,7 @@ class Factor:
 
     @property
     def polar(self) -> int:
-        """As `Curve.band_means` takes it."""
+        """`polar` of `Curve.band_means`."""
         return PARAMETRISATIONS[self.over].polar
 
 
@@ -50,14 +50,14 @@ class Factor:
 class Term:
     """One product. `scale` is f_q; `factors` are f_A and f_B; `viewer` is f_o, over theta_o.
 
-    Before anything is evaluated, wi of a transmission term is mirrored at the surface, that of a retro term about n.
+    Before evaluation, wi of a transmission term is mirrored at the surface, and wi of a retro term about n.
     """
 
     name: str
     quotient: Quotient
     scale: Triple = (1.0, 1.0, 1.0)
     factors: tuple[Factor, ...] = ()
-    viewer: str | None = None  # name of its curve
+    viewer: str | None = None  # name of the curve f_o
     side: Kind = "reflection"
 
     def __post_init__(self) -> None:
@@ -65,17 +65,17 @@ class Term:
 
     @property
     def curves(self) -> tuple[str, ...]:
-        """Names of its curves, each once."""
+        """Names of its curves, without repeats."""
         names = [factor.curve for factor in self.factors] + ([self.viewer] if self.viewer else [])
         return tuple(dict.fromkeys(names))
 
     @property
     def is_diffuse(self) -> bool:
-        """Whether the texture of the diffuse colour multiplies it, not that of highlights.
+        """Whether the texture of the diffuse colour multiplies the term, rather than that of highlights.
 
-        Curves over angles other than theta_i and theta_o know a highlight or Fresnel's factor. A term without `factors`
-        has the shape of its quotient: light from below the surface for one of `quotients.DIFFUSE`, so that a constant
-        is Lambertian; any other quotient is a highlight that cannot be edited.
+        A curve over any angle but theta_i and theta_o describes a highlight or a Fresnel factor. A term without
+        `factors` has the shape of its quotient: diffuse for one of `quotients.DIFFUSE`, so that a constant is
+        Lambertian; any other quotient is an uneditable highlight.
         """
         if not self.factors:
             return isinstance(self.quotient, DIFFUSE)
@@ -83,7 +83,7 @@ class Term:
 
     @property
     def fixed(self) -> str:
-        """All of it that transport depends on, in words: edits of curves and colours leave it as it is."""
+        """The inputs of transport in words; edits of curves and colours leave them unchanged."""
         return repr((self.quotient, self.factors, self.side))
 
 
@@ -91,7 +91,8 @@ class Term:
 class Editable:
     """A material as terms and their curves.
 
-    `fixed` names what the curves cannot change, and stays as it was when the terms were made: a masking term, say.
+    `fixed` names the parts that the curves cannot change, such as a masking term; they stay as when the terms were
+    made.
     """
 
     name: str
@@ -105,7 +106,7 @@ class Editable:
 
     @property
     def sides(self) -> list[str]:
-        """Those that it scatters to: reflection, transmission or both."""
+        """The sides it scatters to: reflection, transmission or both."""
         return sorted({"transmission" if term.side == "transmission" else "reflection" for term in self.terms})
 
     def with_curve(self, name: str, curve: Curve) -> Editable:
@@ -127,7 +128,7 @@ class Editable:
 
 
 def upper_pair(wi: Vector, wo: Vector, side: Kind, ops: Any) -> tuple[tuple[Vector, Vector], Any]:
-    """wi, as a term of this side sees it, and wo on the upper side; and whether it scatters between them."""
+    """wi as a term of this side uses it, wo on the upper side, and whether the term scatters between them."""
     seen = wi[2] * wo[2] < 0 if side == "transmission" else wi[2] * wo[2] > 0
     x, y = (-wi[0], -wi[1]) if side == "retro" else wi[:2]
     return ((x, y, ops.abs(wi[2])), (wo[0], wo[1], ops.abs(wo[2]))), seen

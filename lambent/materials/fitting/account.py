@@ -20,7 +20,7 @@ from lambent.materials.measured.protocol import MeasuredSamples, negative_readin
 AT_BOUND = 0.005  # of the interval
 UNDERSHOOT = 0.7  # of the measured peak
 TOTAL_TOLERANCE = 0.1  # of the light scattered to one side, over all tuples
-PEAK_SHARE = 0.001  # share of the tuples, the brightest, that form the peak
+PEAK_SHARE = 0.001  # share of the tuples, brightest first, that form the peak
 LAMBERTIAN_STEPS = 30
 CHUNK = 1 << 14  # tuples evaluated at once
 SCHLICK_SPAN = 0.1  # (1 - cos_d)^5 that the bright tuples must reach to determine both r0 and ks
@@ -37,7 +37,7 @@ def lambertian_errors(samples: MeasuredSamples) -> dict[str, float]:
 
 
 def _lambertian_rest(problem: Problem) -> float:
-    """The remainder of the best diffuse term alone: a weighted median, exact for L1; least squares otherwise."""
+    """The residual of the best diffuse term alone: a weighted median, exact for L1; least squares otherwise."""
     if problem.metric.power == 1:
         best = np.pi * weighted_median(problem.measured, np.broadcast_to(problem.w * problem.c, problem.measured.shape))
         return problem.remaining(Mixture(best))
@@ -58,7 +58,7 @@ def evaluate(material: Material, samples: MeasuredSamples) -> Floats:
 def warnings_of(
     samples: MeasuredSamples, material: Material, model: Floats, found: Mapping[Side, Found], metric: str
 ) -> tuple[str, ...]:
-    """A line for every doubt about a fit; `model` is its f (N, C) at the tuples, `found` has the sides with a model."""
+    """One line per doubt about a fit; `model` is its f (N, C) at the tuples, `found` has the sides with a model."""
     lines = [line for side, one in found.items() for line in _bounds(side, one.models[-1].lobes, one.boxes)]
     share = peak_share(samples, model)
     if share < UNDERSHOOT:
@@ -74,7 +74,7 @@ def warnings_of(
 
 
 def below_zero(samples: MeasuredSamples, metric: Metric) -> list[str]:
-    """A line on the readings below zero and on how the metric takes them, where there are any."""
+    """A line on readings below zero and their treatment by the metric, if there are any."""
     if not (negative := negative_readings(samples)):
         return []
     taken = "as 0" if metric.clamps else "as measured"
@@ -108,7 +108,7 @@ def _bounds(side: Side, lobes: Sequence[Candidate], boxes: Sequence[Box]) -> lis
 
 
 def peak_share(samples: MeasuredSamples, model: Floats) -> float:
-    """Sum of p of the model, f (N, C), over that of the measurement, over the brightest PEAK_SHARE of the tuples."""
+    """Sum of p over the brightest PEAK_SHARE of the tuples: model f (N, C) over measurement."""
     measured = samples.p.mean(axis=1)
     fitted = (model * np.abs(samples.wo[:, 2:])).mean(axis=1)
     brightest = np.argsort(measured)[-max(int(PEAK_SHARE * len(measured)), 10) :]

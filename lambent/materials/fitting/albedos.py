@@ -1,7 +1,7 @@
 """Albedo over the angle of incidence: of a whole table, and of a material fitted to it.
 
-The errors of a fit are sums over the tuples that were measured. Where these are few, near grazing above all, a material
-with small errors can scatter several times the light that the table scatters.
+The errors of a fit are sums over measured tuples. Where these are sparse, above all near grazing, a material with small
+errors can scatter several times as much light as the table.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from lambent.materials.measured.protocol import LeftOut, MeasuredSamples, Measur
 
 THETA_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 75.0, 80.0)
 PHI_DEG = (0.0, 90.0)  # of an anisotropic table
-MARGIN_DEG = 4.0  # of theta_o beyond theta_i that was measured: else much of the lobe at theta_i was not
+MARGIN_DEG = 4.0  # measured theta_o must exceed theta_i by this; otherwise much of the lobe is missing
 POINTS = 2048  # of the quadrature, per incident direction
-DARK = 0.005  # albedo that counts as black: 2 in place of 1 permille is no factor of two
-KEEP = 3.0  # weight of the mean squares of ln of the ratios, in units of the error of a black surface
-TOLERANCE = 1.25  # factor between both albedos beyond which a fit is in doubt
+DARK = 0.005  # albedo that counts as black: .002 instead of .001 is no doubt about a fit
+KEEP = 3.0  # weight of the mean squares of the log ratios, in units of the error of a black surface
+TOLERANCE = 1.25  # ratio of the two albedos beyond which a fit is in doubt
 CHANNELS = {1: ("",), 3: ("red", "green", "blue")}
 
 
@@ -36,15 +36,15 @@ class Curve:
     Attributes
     ----------
     theta_deg : (A,)
-        Of the incident directions; with two phi_i in turn where the table is anisotropic.
+        Of the incident directions; for an anisotropic table, each with two phi_i in turn.
     pairs : MeasuredSamples
-        N pairs over which a model's albedo is integrated, without an f; the weight has the cosine.
+        N pairs for integrating a model's albedo, without f; the weight includes the cosine.
     which : (N,)
         Index of the incident direction of each pair.
     albedo : (A, C)
         Of the table.
     guessed : (A,) bool
-        Whether much of the lobe was not measured: directions MARGIN_DEG beyond the mirror's are beyond the tuples'.
+        Whether much of the lobe is missing: tuples do not reach MARGIN_DEG beyond the mirror direction.
     """
 
     side: Side
@@ -77,7 +77,7 @@ class Comparison:
 
     @property
     def worst(self) -> tuple[int, int]:
-        """Index of the incident direction, of those not guessed, and of the channel whose ratio is furthest from 1."""
+        """Index of the incident direction (not a guessed one) and of the channel whose ratio is furthest from 1."""
         return self._worst(~self.guessed)
 
     def _worst(self, among: Flags) -> tuple[int, int]:
@@ -104,7 +104,7 @@ class Comparison:
         return f"{self.fit[at]:.3f} for the table's {self.table[at]:.3f} at {where}"
 
     def warning(self, kept: bool) -> str:
-        """The same with what to do about it; `kept`: the fit was to follow the albedos already."""
+        """The doubt with a remedy; `kept`: the fit was constrained to the albedos already."""
         return f"{self}; " + ("more lobes follow it better" if kept else "--keep-albedo constrains the fit to it")
 
     def to_json(self) -> dict[str, Any]:
@@ -145,7 +145,7 @@ def _curve(table: MeasuredTable, samples: MeasuredSamples, side: Side, incident:
 
 
 def keep(curve: Curve, problem: Problem, coupled: bool) -> Problem:
-    """The problem with the table's albedos to follow as well."""
+    """The problem with the table's albedos as additional targets."""
     pairs = problem_of(curve.pairs, curve.side, problem.metric, problem.distribution, coupled)
     first = np.searchsorted(curve.which, np.arange(len(curve.theta_deg)))
     black = problem.remaining(Mixture(np.zeros(len(problem.measured))))
@@ -154,7 +154,7 @@ def keep(curve: Curve, problem: Problem, coupled: bool) -> Problem:
 
 
 def compare(curves: Mapping[Side, Curve], material: Material) -> tuple[Comparison, ...]:
-    """The albedos of a material beside the table's, per side."""
+    """The albedos of a material and of the table, per side."""
     return tuple(
         Comparison(side, curve.theta_deg, curve.albedo, curve.of(evaluate(material, curve.pairs)), curve.guessed)
         for side, curve in curves.items()

@@ -1,4 +1,4 @@
-"""Choices of a fit that the command line and the editor offer, with one default for both."""
+"""Options of a fit in the command line and the editor, with a common default."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ from typing import Literal, get_args
 
 DistributionChoice = Literal["beckmann", "ggx", "best"]
 DISTRIBUTION_CHOICES: tuple[DistributionChoice, ...] = get_args(DistributionChoice)
-DISTRIBUTION: DistributionChoice = DISTRIBUTION_CHOICES[0]  # that of a fit nobody chose another one for
+DISTRIBUTION: DistributionChoice = DISTRIBUTION_CHOICES[0]  # default of a fit

@@ -9,20 +9,19 @@ from lambent.core.arrays import Floats
 BIN = 0.02  # bin width in ln f: finer than the 2 % noise of a good gonio-photometer
 SMOOTH_BINS = 3.0  # standard deviation of the smoothing, in bins, so that noise does not split the peak
 FLOOR = 1e-4 / np.pi  # f of a diffuse coefficient of 1e-4; smaller values count as 0
-FLOOR_SHARE = 0.2  # of the mode's density: the most allowed below it (table noise, a gonio-photometer's dark rim)
+FLOOR_SHARE = 0.2  # of the mode's density: the most allowed below the mode (table noise, a gonio-photometer's dark rim)
 LOWEST_SHARE = 0.25  # the mode is sought among the lowest quarter of the values, see `diffuse_mode`
 
 
 def diffuse_mode(f: Floats, weight: Floats) -> float:
-    """kd (dimensionless) of one channel: pi times the most frequent value of the measured directions.
+    """kd (dimensionless) of one channel: pi times the most frequent value over the measured directions.
 
-    The histogram is over ln f, because values span five decades and noise is relative to them; tuples count by
-    `weight`, so that a table sampled densely around its peak gives the same mode as an even one. Lobes only add to the
-    diffuse term, so at most `LOWEST_SHARE` of the weight may lie below the mode; a wide lobe's plateau is thus not
-    mistaken for it. If more than that share scatters nothing, kd is 0; fewer zeros (a channel clipped at the edge of
-    the gamut, sensor noise) do not affect the mode. The density must fall off below the mode (`_is_floor`), otherwise
-    kd is 0: values of a lobe without a diffuse term spread evenly over ln f.
-
+    The histogram is over ln f, because values span five decades with relative noise; tuples are weighted, so that a
+    table sampled densely around its peak gives the same mode as a uniform one. Lobes only add to the diffuse term, so
+    at most `LOWEST_SHARE` of the weight may lie below the mode; this excludes the plateau of a wide lobe. If more than
+    that share scatters nothing, kd is 0; fewer zeros (a channel clipped at the edge of the gamut, sensor noise) do not
+    affect the mode. The density must fall off below the mode (`_is_floor`), otherwise kd is 0: values of a lobe without
+    a diffuse term are spread evenly over ln f.
     Parameters
     ----------
     f : (N,)
@@ -43,7 +42,7 @@ def diffuse_mode(f: Floats, weight: Floats) -> float:
     reach = int(4 * SMOOTH_BINS)
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / SMOOTH_BINS) ** 2)
     density = np.convolve(share, kernel / kernel.sum())[reach : reach + len(share)]
-    below = dark_share + np.concatenate([np.zeros(reach + 1), np.cumsum(share)])[: len(share)]  # not counting the peak
+    below = dark_share + np.concatenate([np.zeros(reach + 1), np.cumsum(share)])[: len(share)]  # excludes the peak
     mode = int(np.argmax(np.where(below <= LOWEST_SHARE, density, 0.0)))
     if not _is_floor(share, mode, float(density[mode])):
         return 0.0

@@ -34,7 +34,7 @@ def disk_directions(pixels: int, phi_deg: float, far: bool) -> tuple[Floats, Fla
 
 
 def measured_disk(entry: Incidence, far: bool, pixels: int) -> Floats:
-    """Brightness (pixels, pixels, C) of the nearest tuple, NaN where none is near or the pixel is off the disk."""
+    """Brightness (pixels, pixels, C) of the nearest tuple; NaN if none is near or the pixel is off the disk."""
     from scipy.spatial import cKDTree
 
     wo, inside = disk_directions(pixels, entry.phi_deg, far)
@@ -42,9 +42,9 @@ def measured_disk(entry: Incidence, far: bool, pixels: int) -> Floats:
     here = (entry.wo[:, 2] < 0) == far
     if here.sum() < LEAST_TUPLES:
         return empty
-    points, first = np.unique(np.round(entry.wo[here], 6), axis=0, return_index=True)  # at theta_i = 0 phi_i repeats
+    points, first = np.unique(np.round(entry.wo[here], 6), axis=0, return_index=True)  # at theta_i = 0, phi_i repeats
     tree = cKDTree(points)
-    even = np.sqrt(2 * np.pi / len(points))  # distance to a neighbour if the tuples lay evenly
+    even = np.sqrt(2 * np.pi / len(points))  # distance to a neighbour for evenly spaced tuples
     spacing = np.maximum(tree.query(points, k=5)[0][:, -1], even)
     distance, nearest = tree.query(wo.reshape(-1, 3))
     known = (distance <= NEAR_TUPLE * spacing[nearest]).reshape(inside.shape) & inside
@@ -63,7 +63,7 @@ def in_plane_directions(theta_i_deg: float, phi_deg: float, signed_deg: Floats, 
 def in_plane_tuples(entry: Incidence, far: bool) -> tuple[Floats, Floats]:
     """Signed theta_o (K,) in degrees from the side's normal, and p (K, C), of the tuples nearest the plane.
 
-    One tuple per `THETA_STEP_DEG`, the nearest, and none further than `PLANE_DEG` from the plane.
+    One tuple, the nearest, per `THETA_STEP_DEG`; none further than `PLANE_DEG` from the plane.
     """
     theta, phi = angles(entry.wo)
     off = np.degrees(phi) - entry.phi_deg

@@ -4,7 +4,7 @@
 
 One curve of each product is solved with the other fixed, for both products at once, so that light moves freely between
 them (Lawrence et al. 2006, SACLS). Curves are linear between knots. Weights are those of the cube root metric at the
-model itself, not at the reading: noise about zero would count most.
+model, not at the reading, where noise about zero would dominate.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from lambent.core.arrays import Floats, Indices
 from lambent.materials.measured.metrics import CUBEROOT
 
 ROUNDS = 40
-ENOUGH = 2e-3  # relative gain of a round at which the rounds end
-SMOOTHING = 1e-6  # weight of the bend of the second product's logarithms, over that of all values
-FLATNESS = 3e-4  # the same for the slope of the first product's: what is diffuse varies little
-SHRINKING = 0.05  # of the second product while it and the first compete: what both explain is the first's
-FINAL, A_LITTLE = 5, 0.005  # rounds at the end, and what remains of it in these
-DARK = 1e-3  # share of the mean value below which values weigh alike
-LEAST = 1e-7  # of a curve's largest knot: a knot that reached zero may still rise
+ENOUGH = 2e-3  # relative gain of a round below which the rounds end
+SMOOTHING = 1e-6  # weight of the curvature of the second product's logarithms, relative to all values
+FLATNESS = 3e-4  # likewise for the slope of the first product's: diffuse curves vary little
+SHRINKING = 0.05  # of the second product while the two compete: light that both can explain goes to the first
+FINAL, A_LITTLE = 5, 0.005  # final rounds, and the shrinking left in them
+DARK = 1e-3  # share of the mean value below which all values get equal weight
+LEAST = 1e-7  # relative to a curve's largest knot: a knot at zero may still rise
 
 
 @dataclass(frozen=True)
 class Axis:
-    """Knots of a curve around each of N values: the lower one, and the share of the next."""
+    """Interpolation of N values between knots: the lower knot, and the weight of the next."""
 
     knots: int
     low: Indices
@@ -49,7 +49,7 @@ class Axis:
 
 @dataclass
 class Products:
-    """Two products of curves at N values; a product whose curves are zero is absent, and stays so."""
+    """Two products of curves at N values; a product whose curves are zero is absent and stays so."""
 
     axes: tuple[Axis, Axis, Axis, Axis]  # alpha, beta, gamma, delta
     base: Floats
@@ -61,7 +61,7 @@ class Products:
 
 
 def fit(products: Products, f: Floats, weight: Floats, cosine: Floats, rounds: int = ROUNDS) -> float:
-    """Improve the curves in place; returns the weighted relative error left.
+    """Improve the curves in place; returns the remaining weighted relative error.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def fit(products: Products, f: Floats, weight: Floats, cosine: Floats, rounds: i
 
 
 def _solve(products: Products, pair: tuple[int, int], f: Floats, w: Floats, shrinking: float) -> None:
-    """The curves of this pair, one of each product, given the others."""
+    """Solve this pair of curves, one of each product, with the others fixed."""
     from scipy.optimize import nnls
 
     values = [axis.at(curve) for axis, curve in zip(products.axes, products.curves, strict=True)]
@@ -134,14 +134,14 @@ def _solve(products: Products, pair: tuple[int, int], f: Floats, w: Floats, shri
 
 
 def _add_smoothness(matrix: Floats, right: Floats, part: slice, log: Floats, order: int, strength: float) -> None:
-    """Add the squared differences, of this order, of log(curve s), linear in s about s = 1."""
+    """Add squared differences, of this order, of log(curve s), linearized in s about 1."""
     differences = np.diff(np.eye(len(log)), order, axis=0)
     matrix[part, part] += strength * differences.T @ differences
     right[part] += strength * differences.T @ (differences @ (1 - log))
 
 
 def _balance(products: Products) -> None:
-    """Both curves of a product equally large, so that neither under- nor overflows."""
+    """Scale both curves of a product to equal size, so that neither under- nor overflows."""
     for k in (0, 2):
         a, b = products.curves[k], products.curves[k + 1]
         if a.max() > 0 and b.max() > 0:

@@ -2,10 +2,10 @@
 
     f = rho_q (G_d(theta_i) H_d(theta_o) + base G_s(theta_d) H_s(theta_h))
 
-per channel and side. `base` is 1, or the masking and foreshortening of a microfacet lobe, G / (4 cos_i cos_o), with
-which G_s and H_s are like Fresnel's factor and a distribution of normals; whichever leaves less unexplained. The
-remainder rho_q is the table over the sum of products, on a grid, clamped to [0, MOST]: it makes the unedited curves the
-table, and nowhere more than the table.
+per channel and side. `base` is 1, or the masking and foreshortening of a microfacet lobe, G / (4 cos_i cos_o), which
+makes G_s and H_s resemble Fresnel's factor and a distribution of normals; the fit takes the base with the smaller
+residual. The remainder rho_q is the table over the sum of products, on a grid, clamped to [0, MOST]: with it, the
+unedited curves reproduce the table, and never exceed it.
 """
 
 from __future__ import annotations
@@ -33,22 +33,22 @@ from lambent.materials.measured.protocol import GRAZING_DEG, MeasuredSamples, Me
 FITTED, FITTED_ANISOTROPIC = Grid(90, 45, 24, turns_d=2), Grid(64, 24, 12, 12, turns_d=2)
 RATIOS, RATIOS_ANISOTROPIC = Grid(90, 45, 36), Grid(64, 24, 24, 24)
 KNOTS = {"theta_h": 90, "theta_d": 30, "theta_i": 24, "theta_o": 24}
-NEGLIGIBLE = 1e-3  # share of the light below which a product is left out
-TRIED = 8  # rounds of each base
-JUDGED = 20_000  # tuples that the stated errors are of
+NEGLIGIBLE = 1e-3  # share of the light below which a product is dropped
+TRIED = 8  # rounds for trying each base
+JUDGED = 20_000  # tuples at which errors are evaluated
 AT_ONCE = 1 << 16
 
 
 @dataclass(frozen=True)
 class Factored:
-    """Terms and curves of a material, and how near they are to it.
+    """Terms and curves of a material, and their errors.
 
     Attributes
     ----------
     editable : Editable
     errors, without_quotient : dict
-        By metric, error as a share of that of a black surface: of the editable, and of its products of curves alone
-        (empty for a material whose quotients are formulas).
+        Metric -> error relative to a black surface: of the editable, and of its products of curves alone (empty for a
+        material whose quotients are formulas).
     """
 
     editable: Editable
@@ -67,7 +67,7 @@ def judged(editable: Editable, samples: MeasuredSamples, products: Editable | No
 
 
 def factorise(table: MeasuredTable, progress: Progress = silent) -> Factored:
-    """The terms and curves of a measured table; always the same for the same table."""
+    """The terms and curves of a measured table; deterministic."""
     sides: list[Side] = ["reflection", "transmission"] if table.info.transmits else ["reflection"]
     terms: list[Term] = []
     bare: list[Term] = []
@@ -112,8 +112,8 @@ def _channel(
 ) -> tuple[float, list[Floats]]:
     """Error and curves of one channel.
 
-    The diffuse product begins at the mode of the values, the highlight at what is above it. A product that is absent
-    at the start, or that turns out to carry next to no light, is zero.
+    The diffuse product starts at the mode of the values, the highlight at the excess. A product that is absent at the
+    start, or that ends up with almost no light, is zero.
     """
     light = weight * cos_i * cos_o
     level = diffuse_mode(np.maximum(f, 0), weight * cos_o) / np.pi
@@ -136,7 +136,7 @@ def _channel(
 
 
 def _means(values: Floats, weight: Floats, axis: Axis) -> Floats:
-    """(knots,) weighted means of values about each knot; those of the neighbours where there are none."""
+    """(knots,) weighted means of values about each knot; taken from neighbours if a knot has none."""
     near = axis.low + (axis.share > 0.5)
     total = np.bincount(near, weights=weight, minlength=axis.knots)
     mean = np.bincount(near, weights=weight * values, minlength=axis.knots) / np.maximum(total, 1e-300)
@@ -179,7 +179,7 @@ def _curve(angle: str, channels: list[Floats]) -> Curve:
 
 
 def _unit(angle: str, value_rad: Floats) -> Floats:
-    """Place in [0, 1] of an angle: square-root steps along theta_h, where highlights are narrow."""
+    """Position in [0, 1] of an angle; square-root steps along theta_h, where highlights are narrow."""
     unit = np.asarray(value_rad) / END_RAD
     return np.sqrt(unit) if angle == "theta_h" else unit
 
@@ -187,14 +187,14 @@ def _unit(angle: str, value_rad: Floats) -> Floats:
 def _with_ratios(
     table: MeasuredTable, side: Side, terms: list[Term], curves: dict[str, Curve], progress: Progress
 ) -> list[Term]:
-    """The terms with the remainder, which they share, in their quotients."""
+    """The terms with the shared remainder in their quotients."""
     if not terms:
         return []
     sizes = table.info.sizes
     grid = RATIOS if table.info.isotropic else RATIOS_ANISOTROPIC
     own = [sizes.get(name, 0) for name in ("theta_h", "theta_d", "phi_d")]
     if table.info.isotropic and min(own) > 1:
-        grid = Grid(*own)  # MERL's own bins, so that nothing is resampled
+        grid = Grid(*own)  # MERL's own bins: no resampling
     grid = _reciprocal(grid, table, side)
     wi, wo = grid.raised_directions()
     used = {name: curve for name, curve in curves.items() if any(name in term.curves for term in terms)}
@@ -210,7 +210,7 @@ def _with_ratios(
 
 
 def _reciprocal(grid: Grid, table: MeasuredTable, side: Side) -> Grid:
-    """The grid over the whole circle of phi_d, where light and viewer cannot be swapped."""
+    """The grid over the full circle of phi_d, for a table that is not reciprocal."""
     rng = np.random.default_rng(2)
     wi, wo = direction(np.arccos(rng.uniform(0.1, 1, (2, 128))), rng.uniform(0, 2 * np.pi, (2, 128)))
     one, other = _values(table, side, wi, wo), _values(table, side, wo, wi)
@@ -222,7 +222,7 @@ def _reciprocal(grid: Grid, table: MeasuredTable, side: Side) -> Grid:
 def _values(
     table: MeasuredTable, side: Side, wi: Floats, wo: Floats, progress: Progress = silent, doing: str = ""
 ) -> Floats:
-    """f (N, C) of upper pairs (N, 3), those of a transmission with the viewer mirrored; 0 where it is not finite."""
+    """f (N, C) of upper pairs (N, 3), the viewer mirrored for transmission; 0 where not finite."""
     towards = wo * FLIP_Z if side == "transmission" else wo
     parts = []
     for k in range(0, len(wi), AT_ONCE):

@@ -37,8 +37,8 @@ DISTRIBUTIONS: dict[str, tuple[Distribution, ...]] = {
     "best": ("beckmann", "ggx"),
 }
 MAX_LOBES = 4
-GAIN = 0.05  # share of E that another lobe must remove, where the number of lobes is "auto"
-RETRO_RATIO = 2.0  # medians of f near the light over those beside it, from which a retro lobe is tried
+GAIN = 0.05  # share of E that another lobe must remove if the number of lobes is "auto"
+RETRO_RATIO = 2.0  # median of f near the light over that beside it, above which a retro lobe is tried
 RETRO_GAIN = 0.1  # share of E that a retro lobe must remove to be taken
 DARK = 1e-5  # a smaller diffuse coefficient counts as 0
 
@@ -62,7 +62,7 @@ class FitResult:
     notes : tuple of str
         Choices that the fit made.
     albedos : tuple of Comparison
-        Albedo of the material beside the whole table's, per side; empty where the fit was given tuples alone.
+        Albedo of the material and of the whole table, per side; empty if the fit was given tuples alone.
     """
 
     material: Material
@@ -80,7 +80,7 @@ class Task:
     """The checked arguments of `fit`."""
 
     lobes: int
-    gain: float  # share of E that another lobe must remove; 0 where the number of lobes is given
+    gain: float  # share of E that another lobe must remove; 0 for a fixed number of lobes
     method: Method
     metric: Metric
     distributions: tuple[Distribution, ...]
@@ -89,7 +89,7 @@ class Task:
     ranges: Ranges
     schedule: Schedule
     seed: int
-    kept: dict[Side, Curve]  # albedos that the model has to follow
+    kept: dict[Side, Curve]  # albedos that the model must match
     retro: bool | None = None
 
 
@@ -112,10 +112,9 @@ def fit(
     source: Path | None = None,
     progress: Progress = silent,
 ) -> FitResult:
-    """Fit a diffuse term and `lobes` lobes per side (3.6), and a retro-reflective lobe where the table shows one.
+    """Fit a diffuse term and `lobes` lobes per side (3.6), and a retro-reflective lobe if the table shows one.
 
-    mx, my, r0 and alpha are shared by the channels; every coefficient is solved per channel.
-
+    Channels share mx, my, r0 and alpha; every coefficient is solved per channel.
     Parameters
     ----------
     table : MeasuredSamples or MeasuredTable
@@ -133,19 +132,19 @@ def fit(
     fix, ranges : mapping, optional
         Parameter name -> value, or -> (lo, hi); names as in `parameters.known_parameters`.
     retro : bool, optional
-        Whether to fit a retro-reflective lobe besides. By default it is tried where tuples near the light are
-        RETRO_RATIO times as bright as beside it, or a parameter of it is in `fix` or `ranges`, and taken where it
-        removes at least the share RETRO_GAIN of the error.
+        Whether to fit a retro-reflective lobe as well. By default it is tried if tuples near the light are RETRO_RATIO
+        times as bright as beside it, or if `fix` or `ranges` names one of its parameters; it is kept if it removes at
+        least the share RETRO_GAIN of the error.
     gain : float
         Share of E in (0, 1), for "auto".
     whole : MeasuredTable, optional
-        The table of the tuples, for its albedos; `table` itself where that is one.
+        The table of the tuples, for its albedos; by default `table`, if that is a MeasuredTable.
     keep_albedo : bool
-        Whether the albedo over theta_i has to follow the table's, per channel (`albedos.KEEP`).
+        Whether the albedo over theta_i must match the table's, per channel (`albedos.KEEP`).
     schedule : Schedule, optional
         Values per parameter and number of levels of the grid.
     seed : int
-        Of the choice of tuples; the same seed gives the same material.
+        Seed for choosing tuples; the same seed gives the same material.
     source : Path, optional
         The measured file, whose hash goes into the provenance.
     progress : Progress
@@ -154,8 +153,8 @@ def fit(
     Raises
     ------
     UserError
-        Unknown method, metric, distribution or parameter; impossible value; number of lobes out of range; a parameter
-        of transmission for a table without transmission; albedos to keep without their table, or by the grid.
+        Unknown method, metric, distribution or parameter; invalid value; number of lobes out of range; a transmission
+        parameter for a table without transmission; `keep_albedo` without a table, or with the grid method.
     """
     began = time.perf_counter()
     count, fix, ranges = MAX_LOBES if lobes == "auto" else lobes, fix or {}, ranges or {}
@@ -240,7 +239,7 @@ def _check(lobes: int, gain: float, method: str, distribution: str) -> None:
 
 
 def _may_return(samples: MeasuredSamples, task: Task) -> bool:
-    """Whether a retro-reflective lobe is tried."""
+    """Whether to try a retro-reflective lobe."""
     if task.retro is not None:
         return task.retro
     asked = any(parameters.is_of_retro(name) for name in [*task.fix, *task.ranges])
@@ -248,7 +247,7 @@ def _may_return(samples: MeasuredSamples, task: Task) -> bool:
 
 
 def _choose(found: dict[Side, Found], other: dict[Side, Found], task: Task) -> str:
-    """Put the model with a retro lobe into `found` where it is clearly better, or asked for; the choice in words."""
+    """Put the model with a retro lobe into `found` if clearly better or requested; the choice in words."""
     without, with_it = found["reflection"].error, other["reflection"].error
     share = 1 - with_it / without if without > 0 else 0.0
     taken = task.retro is True or share >= RETRO_GAIN
@@ -271,7 +270,7 @@ def _fit_side(
     found: dict[Side, Found],
     retro: bool = False,
 ) -> None:
-    """Put the side's models into `found`, including those finished when `progress` raises; `retro`: one lobe more."""
+    """Put the side's models into `found`, even if `progress` raises later; `retro` adds a retro lobe."""
     channels = samples.f.shape[1]
     kinds: list[tuple[Kind, int]] = [("retro", 0)] if retro else []
     kinds += [(side, i) for i in range(task.lobes)]
@@ -307,7 +306,7 @@ def _fit_side(
 
 
 def _narrow_first(model: Mixture, boxes: Sequence[Box]) -> Mixture:
-    """The model with its lobes sorted by roughness, if the user's restrictions are the same for all; retro first."""
+    """The model with its lobes sorted by roughness, retro first, if the user's restrictions are the same for all."""
     boxes = [box for box in boxes if not box.retro]
     alike = all(np.array_equal((box.lo, box.hi), (boxes[0].lo, boxes[0].hi)) for box in boxes)
     alike = alike and all(box.k_limits == boxes[0].k_limits for box in boxes)
@@ -316,7 +315,7 @@ def _narrow_first(model: Mixture, boxes: Sequence[Box]) -> Mixture:
 
 
 def _diffuse(samples: MeasuredSamples, side: Side, fix: Fixed) -> Floats:
-    """kd or kt_d (C,) from the mode of the side's values, or as the user fixed it."""
+    """kd or kt_d (C,) from the mode of the side's values, or fixed by the user."""
     name = "kd" if side == "reflection" else "kt_d"
     channels = samples.f.shape[1]
     if name in fix:
@@ -327,7 +326,7 @@ def _diffuse(samples: MeasuredSamples, side: Side, fix: Fixed) -> Floats:
 
 
 def _diffuse_rgb(side: Side, samples: MeasuredSamples, task: Task, found: dict[Side, Found]) -> Triple:
-    """kd or kt_d of the model found, or of the histogram if the fit found none."""
+    """kd or kt_d of the fitted model, or of the histogram if the fit has none."""
     if side in found and found[side].models:
         diffuse = found[side].models[-1].diffuse
         return _rgb(np.where(diffuse < DARK, 0.0, diffuse) if task.method == "gradient" else diffuse)
@@ -335,14 +334,14 @@ def _diffuse_rgb(side: Side, samples: MeasuredSamples, task: Task, found: dict[S
 
 
 def _lobes(side: Side, candidates: Sequence[Candidate], distribution: Distribution, fix: Fixed) -> Iterator[Lobe]:
-    """The lobes of a side as a document holds them, the retro-reflective one last."""
+    """The lobes of a side in the form of a document, the retro-reflective one last."""
     mirroring = (one for one in candidates if not one.retro)
     yield from (_lobe(side, i, one, distribution, fix) for i, one in enumerate(mirroring))
     yield from (_lobe("retro", 0, one, distribution, fix) for one in candidates if one.retro)
 
 
 def _lobe(kind: Kind, index: int, candidate: Candidate, distribution: Distribution, fix: Fixed) -> Lobe:
-    """The lobe as a document holds it."""
+    """The lobe in the form of a document."""
     names = [parameter(kind, base, index) for base in SHAPE]
     mx, my, r0, alpha = (
         parameters.scalar(fix[name], base) if name in fix else float(value)
@@ -363,7 +362,7 @@ def _rgb(values: Floats) -> Triple:
 
 
 def _by_lobes(found: dict[Side, Found]) -> list[str]:
-    """A line per side with several models: its own E with one lobe, two, ..."""
+    """One line per side with several models: the side's E with one lobe, two, ..."""
     lines = []
     for side, one in found.items():
         metric = one.problem.metric

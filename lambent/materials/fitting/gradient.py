@@ -1,9 +1,9 @@
-"""The gradient search: least squares from several starts, on few tuples first, then on all that count.
+"""The gradient search: least squares from several starts, first on few tuples, then on all that count.
 
-Lobes are added one by one to the best model so far. A new lobe starts at several widths, at either end of (r0, alpha),
-which are bimodal, and by splitting each existing lobe into a narrow and a wide one. Its coefficients are solved on the
-remainder of the others (subtracted and clamped); then every shape and coefficient moves at once. The best starts
-continue with more tuples. `fit` keeps the model with one more lobe only if it fits all tuples better.
+Lobes are added one by one to the best model so far. A new lobe starts at several widths and at both ends of (r0,
+alpha), whose optima are bimodal, and by splitting each existing lobe into a narrow and a wide one. Its coefficients are
+solved on the residual of the others (subtracted and clamped); then all shapes and coefficients move together. The best
+starts continue with more tuples. `fit` keeps the extra lobe only if it fits all tuples better.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ LEAST_START = 1e-6  # a coefficient of 0 has no logarithm
 
 
 def fit_lobes(problem: Problem, bounds: Bounds, diffuse: Floats, progress: Progress, seed: int) -> Iterator[Mixture]:
-    """The best model with one lobe, with two lobes, ... up to the number of boxes.
+    """Yield the best model with one lobe, with two lobes, ... up to the number of boxes.
 
-    If `progress` raises before the first, the best so far comes first, then the exception.
+    If `progress` raises before the first, the best model so far is yielded before the exception.
 
     Parameters
     ----------
     diffuse : (C,)
-        Start values of the diffuse coefficients, or their values where they are given.
+        Start values of the diffuse coefficients, or their fixed values.
     """
     channels = len(problem.measured)
     stages = problem.thinned([v // channels for v in VALUES], seed, (np.float32,) * 3)
@@ -62,7 +62,7 @@ def fit_lobes(problem: Problem, bounds: Bounds, diffuse: Floats, progress: Progr
 def _descend(
     stages: Sequence[Problem], bounds: Bounds, starts: list[Mixture], progress: Progress, lobe: int, best: list[Mixture]
 ) -> None:
-    """Put the ends of the starts, best first, into `best`, which is up to date at any time."""
+    """Put the results of all starts, best first, into `best`, which is valid at any time."""
     rounds, lobes, done = len(starts) + sum(KEPT), len(bounds.boxes), 0
     alive = starts
     for stage, kept, steps, stop in zip(stages, (len(starts), *KEPT), STEPS, STOP_SHARE, strict=True):
@@ -124,7 +124,7 @@ def _within(k: Floats, box: Box) -> Floats:
 
 
 def _positive(bounds: Bounds, model: Mixture, lobe: Candidate) -> Mixture:
-    """The model with the lobe; coefficients of 0 may move again."""
+    """The model with the added lobe; coefficients of 0 become free again."""
     lobes = [replace(one, k=_within(one.k, box)) for box, one in zip(bounds.boxes, model.lobes, strict=False)]
     diffuse = np.maximum(model.diffuse, LEAST_START) if bounds.diffuse_free else model.diffuse
     return Mixture(diffuse, (*lobes, lobe))

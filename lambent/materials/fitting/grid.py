@@ -1,11 +1,11 @@
 """The hierarchical search (thesis 3.4.1), in the logarithms of mx, my and r0 and in alpha.
 
-Several lobes: fit one, subtract, clamp at 0, fit the next, and refit in turn. One lobe: of n equidistant values per
-free parameter the best combination is kept, and every interval shrinks around it to 1/(n - 1) of its extent; this
-repeats a given number of times. Each candidate's coefficient is solved, not searched. A table with more than `VALUES`
-measured values is thinned by importance sampling.
+Several lobes: fit one, subtract, clamp at 0, fit the next, and refit in turn. One lobe: evaluate all combinations of n
+equidistant values per free parameter, keep the best, and shrink every interval around it to 1/(n - 1) of its extent;
+repeat for a given number of levels. Each candidate's coefficient is solved, not searched. A table with more than
+`VALUES` measured values is thinned by importance sampling.
 
-The box can lose the global optimum (the thesis says so): `gradient` is never worse and far quicker.
+The box can lose the global optimum, as the thesis states: `gradient` is never worse and far faster.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from lambent.materials.fitting.parameters import Box
 from lambent.materials.fitting.problem import ALPHA, MU, NU, R0, Candidate, Mixture, Problem
 from lambent.materials.fitting.scale import Channel, solve_coefficients, solve_scale
 
-NEGLIGIBLE = 1e-9  # f in 1/sr: tuples where no candidate reaches it have the background alone
+NEGLIGIBLE = 1e-9  # f in 1/sr: tuples that no candidate reaches have the background alone
 VALUES = 40_000  # measured values (tuples times channels)
 FULL_STEPS = 40  # Gauss-Newton steps for the coefficients on all tuples
 ROUNDS = 3  # of refitting every lobe in turn
@@ -58,7 +58,7 @@ def fit_lobes(
         finished: list[Candidate] = []
         try:
             model = refit(model, count - 1, finished)
-        except BaseException:  # cancelled: without a finished lobe, that of the last finished level counts
+        except BaseException:  # cancelled: use the last finished level if no lobe is finished
             if count == 1 and finished:
                 yield Mixture(diffuse, (_with_exact_scale(problem, model, finished[-1], boxes[0]),))
             raise
@@ -106,7 +106,7 @@ def search(
 def _evaluate(
     problem: Problem, channels: tuple[Channel, ...], box: Box, axes: list[Floats], report: Callable[[float], None]
 ) -> Iterator[tuple[Candidate, float]]:
-    """Every combination of the values (ln mx, ln my, ln r0, alpha), with its coefficient solved, and its remainder."""
+    """All combinations of the values (ln mx, ln my, ln r0, alpha), with solved coefficients and residuals."""
     pairs = list(zip(axes[MU], axes[MU], strict=True) if box.tied else product(axes[MU], axes[NU]))
     combined = np.array(list(product(axes[R0], axes[ALPHA])))
     fresnel = problem.fresnel(np.exp(combined[:, 0]), box.retro).astype(problem.base.dtype)
@@ -131,7 +131,7 @@ def _evaluate(
 
 
 def _losses(problem: Problem, channel: Channel) -> Floats:
-    """Contribution of each tuple to the metric where the lobe is 0."""
+    """Contribution of each tuple to the metric for a lobe of 0."""
     transform = problem.metric.transform
     difference = np.abs(transform(channel.c * channel.measured) - transform(channel.c * channel.background))
     return np.asarray(channel.w * difference**problem.metric.power)

@@ -1,8 +1,8 @@
 """Damped Gauss-Newton on the shapes and coefficients of one side's model, with exact derivatives.
 
-Coefficients enter by their logarithms: they stay positive, and ln k trades linearly against ln r0, which is nearly
-free. L1 is minimised by reweighting: least squares with weights 1/|residual| has the same minimum. Steps respect the
-bounds: an unknown that would leave its interval stops at its end, and the rest of the step is solved again.
+Coefficients enter as logarithms: they stay positive, and ln k trades linearly against ln r0, which is poorly
+determined. L1 is minimised by reweighting: least squares with weights 1/|residual| has the same minimum. Steps respect
+the bounds: an unknown that would leave its interval stops at its end, and the rest of the step is solved again.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from lambent.materials.fitting.parameters import Box
 from lambent.materials.fitting.problem import ALPHA, MU, NU, KeptAlbedo, Mixture, Problem
 from lambent.materials.fitting.scale import TINY
 
-DAMPING = (1e-3, 1e7)  # at the start, and at most; shares of the normal matrix's diagonal
+DAMPING = (1e-3, 1e7)  # initial and largest; shares of the normal matrix's diagonal
 LEAST_RESIDUAL = 1e-3  # share of the transformed measurement (and of its mean) below which L1 is quadratic
-LONGEST_STEP = 2.0  # of any logarithm, because far from the optimum the model is not linear in it
+LONGEST_STEP = 2.0  # of any logarithm: far from the optimum the model is not linear in it
 K_SPAN = 14.0  # range of ln k in one minimisation, to either side
 NOTHING = 1e-9  # a coefficient below this is 0
 SHAPE_AXES = range(MU, ALPHA + 1)
-COEFFICIENT = 4  # "axis" of an unknown that is ln k of a channel
-DIFFUSE = -1  # "lobe" of a diffuse coefficient: the terms of a model are this one, then the lobes
+COEFFICIENT = 4  # "axis" of unknowns that are ln k of a channel
+DIFFUSE = -1  # "lobe" number of the diffuse coefficients: a model's terms are this one, then the lobes
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,9 @@ class Bounds:
 
 
 def minimise(problem: Problem, bounds: Bounds, start: Mixture, steps: int, stop_share: float) -> tuple[Mixture, float]:
-    """The model after at most `steps` steps downwards, and its remainder (`Problem.remaining`).
+    """The model after at most `steps` descent steps, and its residual (`Problem.remaining`).
 
-    A step that lowers the error by less than the share `stop_share` is the last.
+    Stops after a step that lowers the error by less than the share `stop_share`.
     """
     unknowns = _unknowns(bounds, start)
     error = problem.remaining(start)
@@ -76,7 +76,7 @@ def minimise(problem: Problem, bounds: Bounds, start: Mixture, steps: int, stop_
 
 
 def _step(matrix: Floats, gradient: Floats, damping: float, x: Floats, lo: Floats, hi: Floats) -> Floats:
-    """The end of a damped step: the minimum of the damped quadratic within the bounds (by an active set)."""
+    """End point of a damped step: the minimum of the damped quadratic within the bounds (active set)."""
     diagonal = np.diag(matrix)
     damped = matrix + damping * np.diag(np.maximum(diagonal, 1e-12 * diagonal.max() + 1e-300))
     least, most = np.maximum(lo - x, -LONGEST_STEP), np.minimum(hi - x, LONGEST_STEP)
@@ -123,7 +123,7 @@ def _normal_equations(
 def _add_albedos(
     kept: KeptAlbedo, bounds: Bounds, mixture: Mixture, unknowns: Sequence[Unknown], matrix: Floats, gradient: Floats
 ) -> None:
-    """The same of the albedos that the model has to follow."""
+    """Likewise for the albedos that the model must match."""
     pairs = kept.pairs
     terms, slopes = _terms(pairs, mixture, 1.0), _slopes(pairs, bounds, mixture)
     weight = kept.weight / kept.albedo.shape[1] * 2 / pairs.metric.power  # L1's gradient lacks the 2 of squares
@@ -154,7 +154,7 @@ def _slopes(problem: Problem, bounds: Bounds, mixture: Mixture) -> list[tuple[Fl
 def _rows(
     unknowns: Sequence[Unknown], channel: int, parts: Floats, slopes: Sequence[Sequence[Floats]], dtype: np.dtype[Any]
 ) -> tuple[list[int], Floats]:
-    """Indices of the unknowns that move a channel, and the derivatives (U, N) of its model by them."""
+    """Indices of the unknowns that affect a channel, and the derivatives (U, N) of its model by them."""
     here = [i for i, u in enumerate(unknowns) if u.axis != COEFFICIENT or u.channel == channel]
     rows = np.empty((len(here), parts.shape[1]), dtype=dtype)
     for row, i in zip(rows, here, strict=True):
@@ -167,7 +167,7 @@ def _rows(
 
 
 def _unknowns(bounds: Bounds, start: Mixture) -> list[Unknown]:
-    """The free coordinates; a coefficient that is 0 or fixed is none."""
+    """The free coordinates; coefficients that are 0 or fixed are left out."""
     unknowns = []
     for index, (box, lobe) in enumerate(zip(bounds.boxes, start.lobes, strict=False)):
         for axis in SHAPE_AXES:

@@ -50,12 +50,12 @@ def parameter(kind: Kind, base: str, index: int = 0) -> str:
 
 
 def is_of_retro(name: str) -> bool:
-    """Whether a parameter is one of the retro-reflective lobe."""
+    """Whether a parameter belongs to the retro-reflective lobe."""
     return name.startswith(("kr", "r_"))
 
 
 def known_parameters(lobes: int) -> list[str]:
-    """Every name that `fix` and `ranges` may hold for this many lobes per side."""
+    """All names that `fix` and `ranges` may have for this many lobes per side."""
     names = [parameter(side, base, i) for side in SIDES for i in range(lobes) for base in ("k", *SHAPE)]
     return ["kd", "kt_d", *names, *(parameter("retro", base) for base in ("k", *SHAPE))]
 
@@ -86,10 +86,10 @@ class Box:
 def box_of(side: Kind, index: int, isotropic: bool, channels: int, fix: Fixed, ranges: Ranges) -> Box:
     """The search box of a lobe under the user's restrictions.
 
-    An isotropic table ties my to mx, unless the user restricts my. r0 of a transmission lobe is fixed at 0 unless the
-    user restricts it: with Schlick's F the lobe (3.5) has kt (1 - F(u)) = kt (1 - r0) (1 - (1 - u)^5), so that only the
-    product kt (1 - r0) can be measured, and kt then is that product. r0 of a retro lobe is fixed at 1 likewise: prisms
-    reflect totally, and alpha alone says how the lobe falls towards grazing.
+    For an isotropic table my equals mx unless the user restricts my. r0 of a transmission lobe is fixed at 0 unless the
+    user restricts it: with Schlick's F, the lobe (3.5) has kt (1 - F(u)) = kt (1 - r0) (1 - (1 - u)^5), so only the
+    product kt (1 - r0) can be measured, and kt stands for that product. r0 of a retro lobe is likewise fixed at 1:
+    prisms reflect totally, and alpha alone determines the fall-off towards grazing.
     """
     restrictions, bounds = dict(fix), RETRO_BOUNDS if side == "retro" else BOUNDS
     if side != "reflection" and parameter(side, "r0", index) not in {**fix, **ranges}:

@@ -1,4 +1,4 @@
-"""Plots of a fit beside its measurement (thesis figures 3.11, 3.12, 3.14): polar plots, in-plane curves, albedo."""
+"""Plots of a fit and its measurement (thesis figures 3.11, 3.12, 3.14): polar plots, in-plane curves, albedo."""
 
 from __future__ import annotations
 
@@ -146,9 +146,9 @@ def _show_disk(ax: Any, image: Floats, theta_deg: float, phi_deg: float, brushin
 
 
 def _inside_pixels() -> tuple[NDArray[np.integer], NDArray[np.integer]]:
-    """For each pixel of a disk's square the one to show: itself, or its inner neighbour across the rim.
+    """For each pixel of a disk's square, the pixel to show: itself, or its inner neighbour if it is outside the rim.
 
-    The circle then clips the image instead of whole pixels.
+    The circle then clips the image smoothly instead of whole pixels.
     """
     steps = (np.arange(DISK_PIXELS) + 0.5) / DISK_PIXELS * 2 - 1
     x, y = np.meshgrid(steps, steps)

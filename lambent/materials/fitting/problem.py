@@ -1,4 +1,4 @@
-"""One side of a table, prepared so that a lobe of any shape takes a few multiplications per tuple.
+"""One side of a table, prepared so that evaluating any lobe takes a few multiplications per tuple.
 
 ln f_lobe / k = ln F + base + ln D' - alpha ln(cos_i cos_o)   (3.3-3.5), with base = -ln(4 pi hz^4 cos_d) and
 D' = exp(-q) / (mx my) of Beckmann, 1 / (mx my (1 + q)^2) of GGX, q = hx^2/hz^2/mx^2 + hy^2/hz^2/my^2. For retro lobes h
@@ -51,13 +51,13 @@ class Mixture:
 
 @dataclass(frozen=True)
 class Problem:
-    """The data that one side's model has to fit.
+    """The data that one side's model is fitted to.
 
     Attributes
     ----------
     slope_x2, slope_y2, base, schlick : (1 or 2, N)
         (hx/hz)^2, (hy/hz)^2, -ln(4 pi hz^4 cos_d) and (1 - cos_d)^5 of every tuple's half vector, then of its back
-        vector where there may be a retro lobe.
+        vector if retro lobes are allowed.
     log_cosines : (N,)
         ln(cos_i cos_o).
     diffuse : (N,)
@@ -67,7 +67,7 @@ class Problem:
     w, c : (N,)
         The metric's weight and cosine.
     kept : KeptAlbedo, optional
-        Albedos that the model has to follow as well.
+        Albedos that the model must match as well.
     """
 
     side: Side
@@ -93,7 +93,7 @@ class Problem:
         return np.asarray(f if self.side == "reflection" else 1 - f)
 
     def density(self, mx: float, my: float, retro: bool = False) -> Floats:
-        """(N,) the factor of a lobe that mx and my determine."""
+        """(N,) factor of a lobe that depends on mx and my."""
         x2, y2, base = (array[int(retro)] for array in (self.slope_x2, self.slope_y2, self.base))
         q = x2 / (mx * mx) + y2 / (my * my)  # squared slope in units of the roughness
         logarithm = -2 * np.log1p(q) if self.distribution == "ggx" else -q
@@ -106,7 +106,7 @@ class Problem:
         return np.asarray(self.density(mx, my, retro) * fresnel * np.exp(-alpha * self.log_cosines))
 
     def log_derivatives(self, shape: Floats, tied: bool, retro: bool = False) -> tuple[Floats, Floats, Floats, Floats]:
-        """(N,) each: derivatives of ln basis by ln mx (and ln my at once if `tied`), ln my, ln r0 and alpha."""
+        """Derivatives (N,) of ln basis by ln mx (with ln my if `tied`), ln my, ln r0 and alpha."""
         mx, my, r0, _ = (float(v) for v in shape)
         x, y = self.slope_x2[int(retro)] * (2 / (mx * mx)), self.slope_y2[int(retro)] * (2 / (my * my))
         if self.distribution == "ggx":
@@ -124,7 +124,7 @@ class Problem:
 
     @cached_property
     def blocks(self) -> tuple[Problem, ...]:
-        """The tuples in pieces whose intermediate results stay in the processor's cache."""
+        """The tuples in blocks whose intermediate results fit into the processor's cache."""
         return tuple(
             replace(self, kept=None, **{name: getattr(self, name)[..., i : i + BLOCK] for name in (*PER_TUPLE, "w")})
             for i in range(0, len(self), BLOCK)
@@ -136,7 +136,7 @@ class Problem:
         return np.asarray(self.metric.transform(self.c * self.measured))
 
     def remaining(self, mixture: Mixture) -> float:
-        """The metric's sum over all tuples, averaged over channels: E to the metric's power, and what `kept` adds."""
+        """The metric's sum over all tuples, averaged over channels: E to the metric's power, plus that of `kept`."""
         error = sum(block._remaining(mixture) for block in self.blocks)
         return error if self.kept is None else error + self.kept.remaining(mixture)
 
@@ -145,22 +145,22 @@ class Problem:
         return float(np.mean((np.abs(difference) if self.metric.power == 1 else difference * difference) @ self.w))
 
     def channels(self, others: Mixture) -> tuple[Channel, ...]:
-        """Data for one more lobe, per channel: the rest, clamped so that the lobe is never negative."""
+        """Data for one more lobe, per channel: the residual, clamped so that the lobe is never negative."""
         diffuse = others.diffuse[:, None].astype(self.diffuse.dtype) * self.diffuse
         rest = np.maximum(self.measured - (self.evaluate(others) - diffuse), diffuse) if others.lobes else self.measured
         return tuple(Channel(m, b, self.w, self.c) for m, b in zip(rest, diffuse, strict=True))
 
     def take(self, index: NDArray[np.integer], w: Floats, dtype: type = np.float32) -> Problem:
-        """The tuples `index`, with weights of their own."""
+        """The tuples `index`, with new weights."""
         taken = {name: getattr(self, name)[..., index].astype(dtype) for name in PER_TUPLE}
         return replace(self, **taken, w=w.astype(dtype))
 
     def thinned(self, counts: Sequence[int], seed: int, dtypes: Sequence[type]) -> list[Problem]:
         """For each count, about that many tuples that estimate the metric without bias.
 
-        Systematic sampling along the storage order: half of the density follows the metric's weight, half follows
-        weight times the transformed measurement, so that narrow peaks are sampled; each tuple's weight is divided by
-        its density. The same seed gives the same tuples.
+        Systematic sampling in storage order: half of the density is proportional to the metric's weight, half to weight
+        times the transformed measurement, so that narrow peaks are sampled; each tuple's weight is divided by its
+        density. The same seed gives the same tuples.
         """
         if len(self) > min(counts):
             height = np.abs(self.metric.transform(self.c * self.measured.mean(axis=0))) ** self.metric.power
@@ -181,12 +181,12 @@ class Problem:
 
 @dataclass(frozen=True)
 class KeptAlbedo:
-    """Albedos that one side's model has to follow: mean squares of ln(model / table), as a part of the error.
+    """Albedos that one side's model must match: the mean square of ln(model / table) is added to the error.
 
     Attributes
     ----------
     pairs : Problem
-        The pairs of directions over which a model's albedo is integrated.
+        The pairs of directions for integrating a model's albedo.
     solid_angle : (N,)
         Weight of each pair in that integral, cosine included.
     first : (A,)
@@ -194,9 +194,9 @@ class KeptAlbedo:
     albedo : (C, A)
         Of the table.
     weight : float
-        Of the mean squares, in units of E to the metric's power.
+        Of the mean square, in units of E to the metric's power.
     dark : float
-        Added to both albedos: their logarithm needs it where nothing is scattered.
+        Added to both albedos, to keep their logarithm finite when nothing is scattered.
     """
 
     pairs: Problem
@@ -211,7 +211,7 @@ class KeptAlbedo:
         return np.asarray(np.add.reduceat(f * self.solid_angle, self.first, axis=-1))
 
     def off(self, mixture: Mixture) -> tuple[Floats, Floats]:
-        """ln of the table's albedos over the model's (C, A), and the derivatives (C, A) of the model's logarithm."""
+        """ln of table over model albedo (C, A), and the derivatives (C, A) of the model's logarithm."""
         model = self.integral(self.pairs.evaluate(mixture)) + self.dark
         return np.log((self.albedo + self.dark) / model), 1 / model
 
@@ -229,7 +229,7 @@ class Found:
 
     @property
     def mirroring(self) -> int:
-        """Number of lobes of the last model that are not retro-reflective."""
+        """Number of lobes of the last model, without retro-reflective ones."""
         return sum(not lobe.retro for lobe in self.models[-1].lobes) if self.models else 0
 
     @property
@@ -265,7 +265,7 @@ def problem_of(
 
 
 def _half_vector_terms(wi: Floats, wo: Floats, cos_i: Floats, cos_o: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """slope_x2, slope_y2, base and schlick (N,) of `Problem`, of tangential components (2, N) and cosines (N,)."""
+    """slope_x2, slope_y2, base and schlick (N,) of `Problem`, from tangential components (2, N) and cosines (N,)."""
     hx, hy, hz = wi[0] + wo[0], wi[1] + wo[1], cos_i + cos_o
     length2 = hx * hx + hy * hy + hz * hz
     cos_d = np.clip((hx * wo[0] + hy * wo[1] + hz * cos_o) / np.sqrt(length2), 1e-6, 1)

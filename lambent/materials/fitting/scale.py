@@ -15,7 +15,7 @@ from lambent.core.arrays import Flags, Floats
 from lambent.materials.measured.metrics import Metric
 
 TINY = 1e-30
-STEP_LIMIT = 1.5  # of ln k per Gauss-Newton step, because far from the optimum the model is not linear in ln k
+STEP_LIMIT = 1.5  # of ln k per Gauss-Newton step: far from the optimum the model is not linear in ln k
 
 
 @dataclass(frozen=True)
@@ -32,12 +32,12 @@ class Channel:
 
 
 def weighted_median(values: Floats, weights: Floats) -> Floats:
-    """Exact minimiser m (...) of sum_t weights_t |values_t - m| over the last axis; 0 where no weight is above 0.
+    """Exact minimiser m (...) of sum_t weights_t |values_t - m| over the last axis; 0 if no weight is positive.
 
     Parameters
     ----------
     values, weights : (..., N)
-        Weights are >= 0. Of an interval of minimisers the lower end is returned.
+        Weights are >= 0. Of an interval of minimisers, the lower end is returned.
     """
     if values.shape[-1] == 0:
         return np.zeros(values.shape[:-1], dtype=values.dtype)
@@ -52,7 +52,7 @@ def weighted_median(values: Floats, weights: Floats) -> Floats:
 def solve_scale(
     metric: Metric, channel: Channel, basis: Floats, limits: tuple[float, float] = (0.0, np.inf), steps: int = 5
 ) -> tuple[Floats, Floats]:
-    """The best coefficient of each candidate basis, and its remainder.
+    """The best coefficient of each candidate basis, and its residual.
 
     Parameters
     ----------

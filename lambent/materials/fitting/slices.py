@@ -1,7 +1,7 @@
 """E around the optimum of a fit (thesis figure 3.9): over two parameters of a lobe, with all others fixed.
 
-Only the lobe's own coefficient is solved again at each point. A narrow round pit means that the table determines both
-parameters; a valley, that it determines a combination of them.
+Only the lobe's own coefficient is solved again at each point. A narrow round pit shows that the table determines both
+parameters; a valley, that it determines only a combination of them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from lambent.materials.measured.protocol import MeasuredSamples
 
 STEPS = 33  # along each axis
 TUPLES = 6000
-REACH = 4.0  # mx and my range from the optimum divided by it to the optimum times it
+REACH = 4.0  # mx and my range from the optimum / REACH to the optimum x REACH
 SOLVER_STEPS = 6
 
 
@@ -60,8 +60,8 @@ def slices(
 ) -> list[Slice]:
     """The slices of lobe `index` of `material`: over (mx, my) and (r0, alpha).
 
-    An isotropic table holds one azimuth of wi, which cannot distinguish mx from my: both move as one, and (m, alpha)
-    replaces (mx, my). For other lobes than mirroring ones r0 cannot be separated from k, so a roughness replaces r0.
+    An isotropic table has one azimuth of wi and cannot distinguish mx from my: both vary together, and (m, alpha)
+    replaces (mx, my). For retro and transmission lobes r0 cannot be separated from k, so a roughness replaces r0.
     """
     lobe = material.lobes[index]
     problem, rest = _prepared(samples, material, index, metric)
@@ -87,7 +87,7 @@ def _axis(name: str, best: float, steps: int, retro: bool) -> Floats:
 
 
 def _prepared(samples: MeasuredSamples, material: Material, index: int, metric: Metric) -> tuple[Problem, Floats]:
-    """Some tuples of the lobe's side, and f (C, N) of everything but the lobe at those."""
+    """Some tuples of the lobe's side, and f (C, N) of all but the lobe at them."""
     lobe = material.lobes[index]
     retro = any(other.retro for other in material.lobes) and lobe.side == "reflection"
     problem = problem_of(samples, lobe.side, metric, lobe.distribution, material.kd_coupled, retro)

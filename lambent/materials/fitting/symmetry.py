@@ -1,7 +1,7 @@
-"""Directions that were not measured, from those that mirror them.
+"""Fill in unmeasured directions from mirror-symmetric ones.
 
-A surface whose grain runs along x or y looks the same in a mirror across either, and turned by 180 degrees. One that is
-isotropic, whose tuples are turned to phi_i = 0, looks the same in a mirror across the plane of incidence.
+A surface whose grain runs along x or y is symmetric in both axes, and under a turn of 180 degrees. An isotropic one,
+whose tuples are turned to phi_i = 0, is symmetric in the plane of incidence.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import numpy as np
 from lambent.materials.fitting.incidence import Incidence
 
 ALIKE_DEG = 1.0
-# Signs of x and y, and the azimuth that phi becomes: sign * phi + offset, in degrees.
+# Signs of x and y, and the azimuth that phi maps to: sign * phi + offset, in degrees.
 MIRRORS = (((1, -1), -1, 0.0), ((-1, 1), -1, 180.0), ((-1, -1), 1, 180.0))
 
 
 def mirrored(entry: Incidence, entries: Sequence[Incidence]) -> Incidence | None:
-    """Tuples of `entries` in the mirrors that turn their incident direction into that of `entry`; None without any."""
+    """Tuples of `entries`, mirrored so that their incident direction becomes that of `entry`; None without any."""
     found = []
     for other in entries:
         if abs(other.theta_deg - entry.theta_deg) > ALIKE_DEG:

@@ -7,8 +7,9 @@
 
 DIM counts the columns of the directions and of the values; PARAM_IN names the parametrisation, PARAM_OUT the quantity.
 VS gives, per value, how many columns of confidence follow (0, 1: a radius, 2: both bounds); they are not used. Angles
-are in radians. Lines above the header are ignored; `#` and then no letter is a comment. The parametrisations are those
-of ALTA's params.h, in alta_directions.py. Rows below the horizon, which its grids hold, are left out.
+are in radians. Lines above the header are ignored; `#` followed by anything but a letter starts a comment. The
+parametrisations are those of ALTA's params.h, in alta_directions.py. Rows below the horizon, which ALTA's grids
+include, are dropped.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ def read(path: Path) -> MeasuredTable:
         raise UserError("is a function fitted by ALTA, not data", file=path, hint="load the data that it was fitted to")
     first = _FIRST.search(text)
     header = _HEADER.match(text, first.start() if first else 0)
-    assert header is not None  # it matches nothing at least
+    assert header is not None  # the pattern also matches an empty header
     keys = {key.decode(): shown(value) for key, value in reversed(_KEY.findall(header[0]))}
     inputs, outputs = int(dim[1]), int(dim[2])
     parametrisation = _parametrisation(keys.get("PARAM_IN"), inputs, path)
@@ -97,7 +98,7 @@ def read(path: Path) -> MeasuredTable:
 
 
 def _parametrisation(name: str | None, inputs: int, path: Path) -> Parametrisation:
-    """The parametrisation of this name, or a `UserError` for slices, unknown ones, and another count of columns."""
+    """The parametrisation of this name; `UserError` for slices, unknown names, or a wrong number of columns."""
     full = "directions of light and view, in one of: " + ", ".join(PARAMETRISATIONS)
     if name in SLICES:
         got = f"{name}: {SLICES[name]}"
@@ -116,7 +117,7 @@ def _parametrisation(name: str | None, inputs: int, path: Path) -> Parametrisati
 
 
 def _quantity(name: str | None, outputs: int, path: Path) -> tuple[Quantity, str]:
-    """What the values are, and their kind if there are three."""
+    """The quantity of the values, and, for three values, their kind."""
     if name not in _QUANTITIES:
         expected = f"one of: {', '.join(_QUANTITIES)}"
         hint = "state the quantity in the header, if you know it"
@@ -131,7 +132,7 @@ def _quantity(name: str | None, outputs: int, path: Path) -> tuple[Quantity, str
 
 
 def _rows(body: bytes, stated: int, confidence: str, path: Path) -> Floats:
-    """(N, stated or more) numbers: rows end with the columns of confidence that #VS counts, or without them."""
+    """(N, stated or more) numbers: rows may or may not end with the columns of confidence that #VS counts."""
     first = body.strip().split(b"\n", 1)[0].replace(b",", b" ").replace(b";", b" ")
     found = len(first.split())
     further = sum(int(count) for count in confidence.split() if count in ("1", "2"))

@@ -1,7 +1,7 @@
-"""The parametrisations of ALTA (params.h): from their columns to the directions of light (wi) and view (wo).
+"""ALTA's parametrisations (params.h): conversion of their columns to directions of light (wi) and view (wo).
 
-Written from the definitions: H is the half vector of view V and light L, K that of V and the mirrored light. Where a
-parametrisation drops an azimuth, the other columns are enough for an isotropic BRDF, up to mirroring and reciprocity.
+Written from the definitions: H is the half vector of view V and light L, K that of V and the mirrored light. If a
+parametrisation drops an azimuth, the other columns suffice for an isotropic BRDF, up to mirroring and reciprocity.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Pair = tuple[Floats, Floats]
 
 @dataclass(frozen=True)
 class Parametrisation:
-    """One of ALTA's.
+    """One of ALTA's parametrisations.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ def _halved(h_xy: Floats, b_xy: Floats) -> Pair:
 
 
 def _stark(h: Floats, b: Floats, phi: Floats) -> Pair:
-    """Light and view from |H_p| and |B| of their half sum and half difference, which is at right angles to it."""
+    """Light and view from |H_p| and |B| of their half sum and half difference, which are perpendicular."""
     with np.errstate(invalid="ignore"):
         z = np.sqrt(1 - h**2 - b**2)
     half = np.stack([h, np.zeros_like(h), z], axis=-1)
@@ -97,7 +97,7 @@ def _stereographic(xy: Floats) -> Floats:
 
 
 def _unit(w: Floats) -> Floats:
-    """Vectors (N, 3) at unit length; NaN where a file's vector is none."""
+    """Vectors (N, 3) at unit length; NaN for a zero vector in the file."""
     length = np.linalg.norm(w, axis=1, keepdims=True)
     return np.where(np.abs(length - 1) < 0.01, w / np.where(length > 0, length, 1), np.nan)
 
@@ -123,7 +123,7 @@ def _neumann(p: Floats) -> Pair:
     return _halved(_xy(p[:, 0], np.zeros(len(p))), _xy(p[:, 1], p[:, 2]))
 
 
-AZIMUTHS = np.radians((0.0, 30.0, 60.0, 90.0))  # of the values of tables without an azimuth; the rest mirrors them
+AZIMUTHS = np.radians((0.0, 30.0, 60.0, 90.0))  # copies of tables without an azimuth; the rest mirrors them
 _LIGHT_UP = ("the light is along the normal alone",)
 
 PARAMETRISATIONS: dict[str, Parametrisation] = {

@@ -1,8 +1,8 @@
-"""Incident azimuths of a table of the whole circle, half of it or a quarter: the rest follows by symmetry.
+"""Incident azimuths of a table that covers the whole circle, a half or a quarter; the rest follows by symmetry.
 
-A table of half a circle stays as it is when both directions turn by 180 degrees, that of a quarter when both are
-mirrored in x or in y. Where the nodes end before their part of the circle does, because the closing node is left out,
-f lies between those of the last node and of the image of the next.
+A half-circle table is unchanged when both directions turn by 180 degrees, a quarter-circle table when both are mirrored
+in x or in y. If the nodes end before their part of the circle does, because the closing node is left out, f is
+interpolated between the last node and the image of the next.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 
-CLOSED_RAD = 1e-3  # a part whose last node is as near to its end is closed
-SAME = 1e-6  # of a part: the closing node belongs to it
+CLOSED_RAD = 1e-3  # distance of the last node from the end at which a part counts as closed
+SAME = 1e-6  # relative to a part: the closing node belongs to it
 
 
 @dataclass(frozen=True)
 class Azimuths:
-    """Nodes (N,) in radians, N > 1, increasing, of one of `parts` equal parts of the circle: 1, 2 or 4."""
+    """Increasing nodes (N,) in radians, N > 1, of one of `parts` equal parts of the circle: 1, 2 or 4."""
 
     nodes: Floats
     parts: int
 
     @classmethod
     def of(cls, nodes: Floats) -> Azimuths:
-        """Nodes and the parts that they stand for, with or without a closing node."""
+        """Detect the part of the circle that nodes cover, with or without a closing node."""
         span, step = float(nodes[-1] - nodes[0]), float(np.median(np.diff(nodes)))
         whole = [parts for parts in (1, 2, 4) if abs(span - 2 * np.pi / parts) < CLOSED_RAD]
         wide = [parts for parts in (1, 2, 4) if span <= 2 * np.pi / parts + CLOSED_RAD]
@@ -34,7 +34,7 @@ class Azimuths:
         return cls(nodes, whole[0] if whole else nearest)
 
     def brought(self, wi: Floats, wo: Floats) -> tuple[Floats, Floats, Floats]:
-        """Pairs (N, 3) in the nodes' part of the circle, and the azimuths (N,) of wi there."""
+        """Pairs (N, 3) moved into the nodes' part of the circle, and the azimuths (N,) of wi there."""
         phi, period = np.arctan2(wi[:, 1], wi[:, 0]), 2 * np.pi / self.parts
         if self.parts < 4:
             parts = (phi - self.nodes[0]) / period
@@ -49,7 +49,7 @@ class Azimuths:
         return wi, wo, middle + off - 2 * np.pi * np.round(off / (2 * np.pi))
 
     def beyond(self, phi: Floats) -> tuple[Floats, Floats, Floats]:
-        """Of `brought` azimuths (N,): flip (N, 3) and azimuth (N,) of the image that counts too, and its share (N,)."""
+        """For `brought` azimuths (N,): flip (N, 3), azimuth (N,) and weight (N,) of the other image to blend with."""
         first, last = self.nodes[0], self.nodes[-1]
         over, under = np.maximum(phi - last, 0), np.maximum(first - phi, 0)
         if self.parts < 4:
@@ -58,7 +58,7 @@ class Azimuths:
             return flip, phi - period, np.minimum(over / max(first + period - last, SAME), 1)
         low, high = self._bounds
         across = np.where(over > 0, high, low)
-        along_x = np.abs(np.sin(across)) < 0.5  # mirrored in y there, elsewhere in x
+        along_x = np.abs(np.sin(across)) < 0.5  # the mirror there is in y, elsewhere in x
         flip = np.stack([np.where(along_x, 1.0, -1.0), np.where(along_x, -1.0, 1.0), np.ones(len(phi))], axis=-1)
         share = over / max(2 * (high - last), SAME) + under / max(2 * (first - low), SAME)
         return flip, 2 * across - phi, np.minimum(share, 1)  # a quarter's nodes may lie across its ends

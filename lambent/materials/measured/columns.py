@@ -1,11 +1,11 @@
-"""Plain columns of other programs: angles and values, under a line that names them in one of many conventions.
+"""Plain columns from other programs: angles and values, below a line of names in one of many conventions.
 
     # measured 2025-03-04
     theta_in, phi_in, theta_out, phi_out, BRDF
     30, 0, 10, 180, 0.041
 
 The line of names may be a comment. Angles are in degrees unless a name says (rad). A file that does not name its
-quantity is refused, because f and f cos theta_o look alike. Lambent's gonio text is the strict case, see gonio_text.py.
+quantity is refused, because f and f cos theta_o look alike. Lambent's own stricter format is in gonio_text.py.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _IN = ("i", "in", "inc", "l", "light", "incident")
 _WAVELENGTH = re.compile(r"(\d+(?:\.\d+)?)_?nm$", re.IGNORECASE)
 _SEPARATORS = re.compile(r"[\s,;]+")
 _LEAST_NUMBERS = 5
-_SCATTERED = 4  # fewer outgoing directions than this per incident one: no grid of incident directions
+_SCATTERED = 4  # fewer outgoing directions per incident one do not form a grid
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Layout:
 
 
 def recognise(head: bytes, size: int) -> bool:
-    """Whether the first line names angles and values, or the first two hold equally many numbers, at least five."""
+    """Whether the first line names angles and values, or the first two have equally many numbers, at least five."""
     text = head_text(head)
     if text is None or gonio_text.recognise(head, size):
         return False
@@ -109,7 +109,7 @@ def read(path: Path) -> MeasuredTable:
 
 
 def _split(text: bytes) -> tuple[list[str] | None, bytes]:
-    """The names of the columns, where a line gives them, and the rows below."""
+    """The column names, if a line gives them, and the rows below."""
     named: list[str] | None = None
     at = 0
     while at < len(text):
@@ -135,7 +135,7 @@ def layout_of(names: list[str], path: Path) -> Layout:
     Raises
     ------
     UserError
-        An angle is missing or named twice, or the unknown value columns.
+        If an angle is missing or named twice, or a value column is unknown.
     """
     angles: dict[str, int] = {}
     for column, name in enumerate(names):
@@ -164,7 +164,7 @@ def layout_of(names: list[str], path: Path) -> Layout:
 
 
 def _angle(name: str) -> str | None:
-    """theta_i, phi_i, theta_o, phi_o or dphi, if the name is a usual one for it."""
+    """theta_i, phi_i, theta_o, phi_o or dphi, if `name` is a common name for it."""
     if len(name) > LONGEST_NAME:
         return None
     word = re.sub(r"\(.*?\)|\[.*?\]|_?(?:deg|rad)$", "", name.lower()).replace("-", "_").strip("_")
@@ -243,7 +243,7 @@ def _degrees(rows: Floats, layout: Layout, phi_i_deg: float) -> Floats:
 
 
 def _values(values: Floats, layout: Layout) -> tuple[Floats, tuple[str, ...]]:
-    """(N, 1 or 3) grey or linear RGB; NaN where it is not finite, or marked as not measured."""
+    """(N, 1 or 3) grey or linear RGB; NaN if not finite or marked as not measured."""
     values = unmarked(np.where(np.isfinite(values), values, np.nan))
     if layout.kind == "xyz":
         return rgb_of_xyz(values)

@@ -1,4 +1,4 @@
-"""Faults of a measured table: each as a number, and as a list with a sentence where it matters, else none."""
+"""Faults of a measured table: each as a number, with a list of one sentence if it matters, else empty."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from lambent.materials.measured.protocol import (
 from lambent.materials.measured.scattered import ScatteredTable
 
 _PAIRS = 4096
-_REACH_DEG = 60  # of the swapped pairs, so that both directions are inside the usual incident grids
+_REACH_DEG = 60  # of the swapped pairs, so that both directions lie within common incident grids
 _CHANNELS = {1: ("",), 3: (" (red)", " (green)", " (blue)")}
 
 NON_RECIPROCAL = 0.05  # shares of the mean from which a difference is reported
 ASYMMETRIC = 0.05
-EXTRAPOLATED = 0.005  # share of the pairs of directions from which it is reported
+EXTRAPOLATED = 0.005  # share of the pairs of directions above which it is reported
 UNDER_SAMPLED = 0.5  # share of the peak that its neighbours must reach
 _MOST_INCIDENT = 400  # a table with more incident directions than this has no grid of them
 _LEAST_TUPLES = 12
@@ -32,7 +32,7 @@ _REASONS = {"shadowed": "not measured, or below the horizon", "not_finite": "not
 
 
 def left_out(samples: MeasuredSamples) -> tuple[dict[str, float], list[str]]:
-    """Percentage of the tuples that are left out, by the reasons of `LeftOut`."""
+    """Percentage of the tuples that are left out, by reason (`LeftOut`)."""
     counts, total = samples.left_out, len(samples) + samples.left_out.total
     percent = {name: 100 * getattr(counts, name) / total for name in _REASONS}
     said = [f"{percentage(percent[name])} of the tuples are {what}, and left out" for name, what in _REASONS.items()]
@@ -40,13 +40,13 @@ def left_out(samples: MeasuredSamples) -> tuple[dict[str, float], list[str]]:
 
 
 def negative(samples: MeasuredSamples) -> list[str]:
-    """Readings below zero, as noise leaves them: fits keep them, `eval` does not."""
+    """Readings below zero due to noise; fits keep them, `eval` does not."""
     found = negative_readings(samples)
     return [f"{found}; a fit keeps them, drawing and conversion use 0"] if found else []
 
 
 def non_reciprocity(table: MeasuredTable) -> tuple[float, list[str]]:
-    """Mean of |f(wi, wo) - f(wo, wi)| over the mean of f, for even pairs and pairs near the mirror direction."""
+    """Mean of |f(wi, wo) - f(wo, wi)| over the mean of f, for uniform pairs and pairs near the mirror direction."""
     u = np.concatenate([r2(_PAIRS), r2(_PAIRS, (0.25, 0.75))], axis=1)
     wi, wo = (_within_reach(u[:, k : k + 2]) for k in (0, 2))
     near = direction(*_mirrored(wi, u[:, 2:]))
@@ -76,7 +76,7 @@ def asymmetry(table: MeasuredTable, symmetry: Symmetry) -> tuple[float, list[str
 
 
 def extrapolation(table: MeasuredTable) -> tuple[float, list[str]]:
-    """Share of the pairs of directions, even in solid angle up to GRAZING_DEG, where a scattered table extrapolates."""
+    """Share of the pairs of directions, uniform in solid angle up to GRAZING_DEG, at which a table extrapolates."""
     if not isinstance(table, ScatteredTable):
         return 0.0, []
     u = np.stack([radical_inverse(np.arange(_PAIRS), base) for base in (2, 3, 5)])
@@ -130,7 +130,7 @@ def under_sampled(samples: MeasuredSamples) -> tuple[int, list[str]]:
 
 
 def too_bright(theta_i_deg: Floats, albedo: Floats) -> list[str]:
-    """A line where more light returns than arrives, as `more_than_arrives` tells."""
+    """A line if more light returns than arrives, by `more_than_arrives`."""
     over = more_than_arrives(albedo)
     if not over.any():
         return []

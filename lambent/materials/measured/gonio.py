@@ -1,7 +1,7 @@
 """Gonio-photometer tables: a grid of incident directions, and for each a sheet of outgoing ones on either side.
 
-Look-ups between the incident directions (thesis M, 3.2) blend p = f |cos theta_o|, where reconstruction.py says.
-Transmission is looked up as the reflection of the pair mirrored at the surface.
+Look-ups between the incident directions (thesis M, 3.2) blend p = f |cos theta_o| at the directions that
+reconstruction.py gives. Transmission is looked up as the reflection of the pair mirrored at the surface.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ FORMAT = "gonio text"
 Symmetry = Literal["isotropic", "quadrant", "half", "none"]
 PHI_I_RANGE_DEG: dict[Symmetry, float] = {"isotropic": 0.0, "quadrant": 90.0, "half": 180.0, "none": 360.0}
 _COS_MIN = 1e-4
-_MOST_FOLDS, _MOST_LEFT_OUT = 16, 400_000  # incident directions and tuples that choose the reconstruction
-_STEEPEST = 4.0  # times f of a neighbour: limit where wo is at the horizon and the direction looked up is above it
+_MOST_FOLDS, _MOST_LEFT_OUT = 16, 400_000  # incident directions and tuples used to choose the reconstruction
+_STEEPEST = 4.0  # limit relative to f of a neighbour, for wo at the horizon and a look-up direction above it
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class GonioTable(MeasuredTable):
         return choice_of(self._folds()) if self.reconstruction == AUTO else Choice(self.reconstruction)
 
     def _folds(self) -> Iterator[Fold]:
-        """Inner theta_i, evenly at most _MOST_FOLDS, or both of two, with predictions from their neighbours."""
+        """Inner theta_i, at most _MOST_FOLDS spread evenly (or both of two), with predictions from their neighbours."""
         count = len(self.theta_i_deg)
         left_out = np.arange(1, count - 1) if count > 2 else np.arange(count if count == 2 else 0)
         if len(left_out) == 0:
@@ -124,10 +124,10 @@ class GonioTable(MeasuredTable):
         return TableInfo(file, self.format, isotropic, transmits, channels, self.stored, sizes, self.notes)
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
-        """f (..., C) in 1/sr; a pair seen from below is the same pair seen from above (a two-sided sheet).
+        """f (..., C) in 1/sr; a pair seen from below equals the same pair seen from above (a two-sided sheet).
 
-        Readings below zero are interpolated as they are, so that they cancel the noise above it; what is left of them
-        becomes 0.
+        Readings below zero are interpolated unchanged, so that they cancel noise above zero; the result is clamped at
+        0.
         """
         return on_flat_pairs(self._eval, wi, wo)
 
@@ -140,7 +140,7 @@ class GonioTable(MeasuredTable):
         return np.maximum(f, 0)
 
     def _reduced(self, wi: Floats, wo: Floats) -> tuple[Floats, Floats]:
-        """The pair, turned or mirrored to the table's range of incident directions."""
+        """The pair, rotated or mirrored into the table's range of incident directions."""
         if self.symmetry == "isotropic":
             sin_theta = np.hypot(wi[:, 0], wi[:, 1])
             c, s = (np.divide(wi[:, a], sin_theta, out=np.full(len(wi), 1.0 - a), where=sin_theta > 0) for a in (0, 1))
@@ -164,8 +164,9 @@ class GonioTable(MeasuredTable):
             neighbour = direction(np.radians(self.theta_i_deg[a]), np.radians(self.phi_i_deg[b])) * half_turn
             for unturned, share, about_light in asked_of(neighbour):
                 asked = unturned * half_turn
-                # Interpolate p, not f: f of a lobe bends steeply over theta_i, and p falls to 0 at the horizon. At the
-                # horizon itself f = p / cos would diverge and make single pixels too bright.
+                # Interpolate p, not f: f of a lobe is strongly curved over theta_i, while p falls to 0 at the horizon,
+                # where
+                # f = p / cos would diverge and make single pixels too bright.
                 p_over_f = np.minimum(np.maximum(asked[:, 2], 0) / np.maximum(wo[:, 2], _COS_MIN), _STEEPEST)
                 part = weight * p_over_f * share
                 for k, rows in groups(a * len(self.phi_i_deg) + b, np.flatnonzero(part > 0)):
@@ -174,9 +175,9 @@ class GonioTable(MeasuredTable):
         return f
 
     def _phi_bracket(self, phi_deg: Floats) -> tuple[Indices, Indices, Floats, Flags, Flags]:
-        """Indices of the phi_i on either side, the share of the second, and where each stands half a turn further.
+        """Indices of the phi_i on either side, weight of the second, and flags of those used half a turn further.
 
-        A whole or half turn wraps round.
+        A full or half turn wraps around.
         """
         nodes = self.phi_i_deg
         period = {"half": 180.0, "none": 360.0}.get(self.symmetry)
@@ -195,7 +196,7 @@ class GonioTable(MeasuredTable):
         columns: list[tuple[Floats, ...]] = []
         seen: set[int] = set()
         for theta_i, phi_i, sheet, far in self.entries():
-            if id(sheet) not in seen:  # at theta_i = 0 one sheet may serve every phi_i
+            if id(sheet) not in seen:  # at theta_i = 0, one sheet may serve every phi_i
                 wo = sheet.directions[sheet.measured]
                 wi = np.broadcast_to(direction(np.radians(theta_i), np.radians(phi_i)), wo.shape)
                 f, weight = sheet.values[sheet.measured], sheet.weights()[sheet.measured]
@@ -205,7 +206,7 @@ class GonioTable(MeasuredTable):
         return collect(wi, wo, f, weight, self.info, np.asarray(np.isnan(f).any(axis=1)), max_count)
 
     def entries(self) -> Iterator[tuple[float, float, AnySheet, bool]]:
-        """theta_i and phi_i in degrees, the sheet, and whether it is of the far side, of every incident direction."""
+        """Yield theta_i and phi_i in degrees, the sheet, and whether it is of the far side, per incident direction."""
         for sheets, far in ((self.reflected, False), (self.transmitted, True)):
             for theta_i, row in zip(self.theta_i_deg, sheets, strict=False):
                 for phi_i, sheet in zip(self.phi_i_deg, row, strict=True):
@@ -220,7 +221,7 @@ def symmetry_of(table: MeasuredTable) -> Symmetry:
 
 
 def groups(key: Indices, rows: Indices) -> list[tuple[int, Indices]]:
-    """(key, rows) of every key among the chosen rows."""
+    """Group the chosen rows by key: (key, rows)."""
     rows = rows[np.argsort(key[rows], kind="stable")]
     found, starts = np.unique(key[rows], return_index=True)
     return list(zip(found.tolist(), np.split(rows, starts[1:]), strict=bool(len(rows))))

@@ -1,6 +1,6 @@
-"""Shared by the text formats of gonio data: from rows (theta_i, phi_i, theta_o, phi_o, f) to a table.
+"""Convert rows (theta_i, phi_i, theta_o, phi_o, f) to a table; shared by the text formats of gonio data.
 
-Incident directions form a grid. The outgoing directions of each may form another, with holes, or none.
+Incident directions form a grid. Outgoing directions may form another, with holes, or none.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ _WORDS: dict[str, Quantity] = {
     **dict.fromkeys(("p", "transfer", "transferprobability"), "p"),
 }
 LONGEST_NAME = 64  # of a column
-DECIMALS = 5  # of the angles in degrees: closer directions are the same
-_LEAST_FILLED = 0.3  # share of its nodes that a grid of outgoing directions must have, or it is a scattered set
-_PLANE_DEG = 0.1  # a scan this close to the plane of incidence is in it
+DECIMALS = 5  # of the angles in degrees: directions equal to this precision are merged
+_LEAST_FILLED = 0.3  # share of nodes that a grid of outgoing directions must fill; otherwise it is a scattered set
+_PLANE_DEG = 0.1  # a scan this close to the plane of incidence counts as in it
 
 
 def check_angles(angles_deg: Floats, path: Path) -> None:
-    """`UserError` where an angle (N, 4) is not finite or outside its range."""
+    """Raise `UserError` if an angle (N, 4) is not finite or out of range."""
     expected = "degrees: theta_i in [0, 90), theta_o in [0, 180], phi up to 3600"
     theta_i, theta_o, phi = angles_deg[:, 0], angles_deg[:, 2], np.abs(angles_deg[:, [1, 3]])
     finite = np.isfinite(angles_deg).all(axis=1)
@@ -46,7 +46,7 @@ def check_angles(angles_deg: Floats, path: Path) -> None:
 
 
 def quantity_of(word: str) -> Quantity | None:
-    """The quantity in a column of this name; None for other names."""
+    """The quantity of a column of this name; None for other names."""
     if len(word) > LONGEST_NAME:
         return None
     return _WORDS.get(re.sub(r"\(.*?\)|\[.*?\]|[^a-z]", "", word.lower()))
@@ -103,7 +103,7 @@ def table_of(
     angles[far, 2] = np.round(180 - angles[far, 2], DECIMALS)
     angles[:, 3] = np.round(angles[:, 3] % 360, DECIMALS) % 360
     at_pole = angles[:, 2] == 0
-    if len(np.unique(angles[at_pole, 3])) == 1:  # else the file gives theta_o = 0 as ordinary nodes of the grid
+    if len(np.unique(angles[at_pole, 3])) == 1:  # otherwise the file has theta_o = 0 as regular grid nodes
         angles[at_pole, 3] = 0
     angles, f, far, images, repeated = _averaged(angles, f, far, images)
     if repeated:
@@ -114,13 +114,13 @@ def table_of(
 
 
 def spanned_symmetry(phi_i_deg: Floats) -> Symmetry:
-    """The symmetry whose range the increasing phi_i span."""
+    """The symmetry with the range that the increasing phi_i span."""
     span = phi_i_deg[-1] - phi_i_deg[0]
     return next((name for name, whole in PHI_I_RANGE_DEG.items() if span <= whole), "none")
 
 
 def _checked_symmetry(named: str, phi_i_deg: Floats, path: Path) -> Symmetry:
-    """The symmetry the file names, or a `UserError` where the phi_i span more."""
+    """The symmetry the file names; `UserError` if the phi_i span more."""
     symmetry = cast(Symmetry, known("symmetry", named, PHI_I_RANGE_DEG, file=path, field="symmetry"))
     if phi_i_deg[-1] - phi_i_deg[0] > PHI_I_RANGE_DEG[symmetry]:
         got = f"phi_i from {phi_i_deg[0]:g} to {phi_i_deg[-1]:g}"
@@ -130,9 +130,9 @@ def _checked_symmetry(named: str, phi_i_deg: Floats, path: Path) -> Symmetry:
 
 
 def _mirrored(angles_deg: Floats, f: Floats) -> tuple[Floats, Floats, Flags]:
-    """Rows of an isotropic specimen, their f, and which of them are images.
+    """Rows of an isotropic specimen, their f, and flags of mirror images.
 
-    Mirror images are added where the rows cover only one side of the plane of incidence.
+    Mirror images are added if the rows cover only one side of the plane of incidence.
     """
     phi = np.round(angles_deg[:, 3] % 360, DECIMALS) % 360
     left, right = (phi > 0) & (phi < 180), phi > 180
@@ -142,7 +142,7 @@ def _mirrored(angles_deg: Floats, f: Floats) -> tuple[Floats, Floats, Flags]:
 
 
 def _averaged(angles: Floats, f: Floats, far: Flags, images: Flags) -> tuple[Floats, Floats, Flags, Flags, int]:
-    """The rows sorted by direction, with f of repeats averaged, and how many repeat."""
+    """The rows sorted by direction, with f of repeated directions averaged, and the number of repeats."""
     order = np.lexsort((angles[:, 3], angles[:, 2], angles[:, 1], angles[:, 0], far))
     angles, f, far, images = angles[order], f[order], far[order], images[order]
     same = (angles[1:] == angles[:-1]).all(axis=1) & (far[1:] == far[:-1])
@@ -156,7 +156,7 @@ def _averaged(angles: Floats, f: Floats, far: Flags, images: Flags) -> tuple[Flo
 
 
 def _side(angles_deg: Floats, f: Floats, images: Flags, incident_deg: tuple[Floats, Floats], path: Path) -> Sheets:
-    """The sheets of one side, by theta_i then phi_i; one measured at theta_i = 0 serves every phi_i."""
+    """The sheets of one side, by theta_i then phi_i; a single sheet at theta_i = 0 serves every phi_i."""
     theta_i, phi_i = incident_deg
     if len(angles_deg) == 0:
         return ()

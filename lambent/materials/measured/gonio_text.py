@@ -5,8 +5,8 @@
     theta_i phi_i theta_o phi_o p_r p_g p_b
     5 0 0 0 0.0213 0.0175 0.0141
 
-Angles are in degrees; theta_o > 90 is transmission; the value columns' names give the quantity; nan, or exactly -1,
--99, -999 or -9999, was not measured.
+Angles are in degrees; theta_o > 90 is transmission. The names of the value columns give the quantity. nan, or exactly
+-1, -99, -999 or -9999, marks a value that was not measured.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _HEADER_BYTES = 1 << 16
 
 
 def recognise(head: bytes, size: int) -> bool:
-    """Whether the first line that is no comment names the four angles, and no quantity by another name (BRDF, f_x)."""
+    """Whether the first uncommented line names the four angles, and no quantity by another name (BRDF, f_x)."""
     names = _names(head)
     if names is None or tuple(names[:4]) != ANGLES:
         return False

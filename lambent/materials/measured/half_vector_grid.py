@@ -1,18 +1,18 @@
-"""A dense grid, viewer x half vector, that a renderer looks up and samples in place of any measured table.
+"""A dense grid, viewer x half vector, from which a renderer looks up and samples any measured table.
 
-Axes: the viewer's elevation (and azimuth, of an anisotropic table), then the half vector's elevation with MERL's
-square-root map and its azimuth. A lobe about the mirror direction, however narrow, lies in the same cells for every
-viewer; blending neighbouring viewers therefore aligns lobes as thesis M, 3.2 does, and the cells are smallest where
-lobes are. Transmission is reflection mirrored at the surface. half_vector_resampling.py makes grids of tables.
+Axes: the viewer's elevation (and azimuth, for an anisotropic table), then the half vector's elevation with MERL's
+square-root map, and its azimuth. A lobe about the mirror direction, however narrow, lies in the same cells for every
+viewer. Blending neighbouring viewers therefore aligns lobes as in thesis M, 3.2, and cells are smallest where lobes
+are. Transmission is reflection mirrored at the surface. half_vector_resampling.py converts tables to grids.
 
-Densities: per viewer node a tabulated distribution of half vectors, constant over each cell's solid angle, with
+Densities: each viewer node has a tabulated distribution of half vectors, constant over each cell's solid angle, with
 p(wi) = p(h) / (4 wo.h) (Walter et al. 2007, eq. 14). Viewer nodes are mixed with their blending weights; a share
-DIFFUSE of the samples is cosine distributed, for light that the cells miss near the horizon.
+DIFFUSE of the samples is cosine distributed, for light near the horizon that the cells miss.
 
 Conventions: wi to the light, wo to the viewer, as components; f in 1/sr without the cosine. As in lobes.py, one
 implementation serves numpy and the JIT path tracer: `ops` is the array library.
 
-Hazard: 1 - cos(theta_h) cancels in float32; elevations go by atan2 and by sin^2(theta/2).
+Hazard: 1 - cos(theta_h) cancels in float32; elevations use atan2 and sin^2(theta/2) instead.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from lambent.core.arrays import Floats
 from lambent.materials.lobes import COS_MIN, NUMPY, ArrayOps, Vector, dot, half_vector, reflect, sample_cosine
 
 DIFFUSE = 0.1  # share of cosine-distributed samples
-MARGIN = 1.2  # the peak is tabulated at nodes and cell centres; between them f cos may be higher
-LAST_VIEWER_DEG = 89.0  # beyond it, f of the last viewer
+MARGIN = 1.2  # factor on the peak, tabulated at nodes and cell centres: f cos can be higher between them
+LAST_VIEWER_DEG = 89.0  # beyond it, f of the last viewer is used
 
 
 @dataclass(frozen=True)
 class GridShape:
-    """Number of viewers (theta, phi; one phi = isotropic) and of half vectors; the latter are powers of two."""
+    """Number of viewers (theta, phi; one phi = isotropic) and of half vectors; the latter must be powers of two."""
 
     viewer_theta: int
     viewer_phi: int
@@ -60,16 +60,16 @@ class _Viewers:
 
     nodes: list[tuple[Any, Any]]  # numbers and blending weights
     up: Vector  # wo on the upper side, turned to phi = 0 of an isotropic grid
-    turn: tuple[Any, Any]  # cosine and sine of that turn, a further half turn where the peaks are about the light
+    turn: tuple[Any, Any]  # cosine and sine of that turn, plus half a turn if the peaks are about the light
     face: Any  # number of the face, 0 or 1
 
     def blend(self, table: Any, first: Any, ops: ArrayOps) -> Any:
-        """Entries of a table by viewer node, from `first` on, blended."""
+        """Blend a table's entries of the viewer nodes, from `first` on."""
         parts = [weight * ops.gather(table, first + node) for node, weight in self.nodes]
         return sum(parts[1:], parts[0])
 
     def half(self, wi: Vector, ops: ArrayOps) -> tuple[Any, Any, Any]:
-        """Row and column of the half vector, as shares of the grid's extent, and wo.h."""
+        """Row and column of the half vector, as fractions of the grid's extent, and wo.h."""
         c, s = self.turn
         turned = c * wi[0] + s * wi[1], c * wi[1] - s * wi[0], ops.abs(wi[2])
         h = half_vector(turned, self.up, ops)
@@ -79,7 +79,7 @@ class _Viewers:
 
 @dataclass(frozen=True)
 class HalfVectorGrid:
-    """A table on the grid; flat arrays of numpy or of the path tracer.
+    """A table on the grid, as flat arrays of numpy or of the path tracer.
 
     Attributes
     ----------
@@ -173,7 +173,7 @@ class HalfVectorGrid:
         return ops.select(self._seen(wi, wo, ops), value, 0.0)
 
     def sample(self, wo: Vector, u_select: Any, u1: Any, u2: Any, ops: ArrayOps = NUMPY) -> Vector:
-        """wi; u_* uniform in [0, 1). A sample at or across the horizon comes back with wi.z = 0."""
+        """wi; u_* uniform in [0, 1). A sample at or beyond the horizon is returned with wi.z = 0."""
         shape, viewers = self.shape, self._viewers(wo, ops)
         across, u_select = chosen_side(u_select, self.share_across(wo, ops, viewers), ops)
         diffuse = u_select < DIFFUSE
@@ -197,11 +197,11 @@ class HalfVectorGrid:
         return x, y, ops.select((wo[2] > 0) == across, -z, z)
 
     def share_across(self, wo: Vector, ops: ArrayOps = NUMPY, viewers: _Viewers | None = None) -> Any:
-        """Probability of a transmitted sample; `viewers` are those around wo, where they are known."""
+        """Probability of a transmitted sample; `viewers` are the nodes around wo, if known."""
         return self.of_viewer(self.across, wo, ops, viewers)
 
     def of_viewer(self, table: Any, wo: Vector, ops: ArrayOps = NUMPY, viewers: _Viewers | None = None) -> Any:
-        """Entries of a table (faces, viewers), between the viewer nodes."""
+        """Interpolate a table (faces, viewers) between the viewer nodes."""
         viewers = viewers or self._viewers(wo, ops)
         return viewers.blend(table, viewers.face * self.shape.viewers, ops)
 
@@ -219,7 +219,7 @@ class HalfVectorGrid:
         return ops.select(across & (self.kinds == 1), 0.0, MARGIN * functools.reduce(ops.maximum, peaks))
 
     def cell_borders(self) -> Floats:
-        """(N, 4) ranges of z and phi of the half vectors' cells, sorted; transmission's are mirrored to z < 0."""
+        """(N, 4) ranges of z and phi of the half vectors' cells, sorted; mirrored to z < 0 for transmission."""
         shape = self.shape
         z = np.cos(((np.arange(shape.theta_h, -1, -1)) / shape.theta_h) ** 2 * np.pi / 2)
         z[0], phi = 0.0, np.linspace(0, 2 * np.pi, shape.phi_h + 1)
@@ -271,14 +271,14 @@ def turns(y: Any, x: Any, ops: ArrayOps) -> Any:
 
 
 def chosen_side(u_select: Any, share: Any, ops: ArrayOps) -> tuple[Any, Any]:
-    """Whether u_select, uniform in [0, 1), chooses transmission of probability `share`; and it again, uniform."""
+    """Whether u_select, uniform in [0, 1), chooses transmission of probability `share`; u_select rescaled."""
     across = u_select < share
     near = (u_select - share) / ops.maximum(1 - share, 1e-9)
     return across, ops.select(across, u_select / ops.maximum(share, 1e-9), near)
 
 
 def first_above(u: Any, table: Any, first: Any, count: int, ops: ArrayOps) -> Any:
-    """Number of the first entry above `u` in the rising `table[first:first + count]`, whose last one is above."""
+    """Index of the first entry above `u` in the ascending `table[first:first + count]`; the last one is above."""
     found, step = 0 * first, 1 << (count - 1).bit_length() >> 1
     while step:
         probe = ops.minimum(found + (step - 1), count - 1)
@@ -288,7 +288,7 @@ def first_above(u: Any, table: Any, first: Any, count: int, ops: ArrayOps) -> An
 
 
 def _drawn(u: Any, table: Any, first: Any, count: int, ops: ArrayOps) -> tuple[Any, Any]:
-    """The cell of a CDF that `u` falls in, and its place in that cell, in [0, 1)."""
+    """The cell of a CDF that contains `u`, and the position in the cell, in [0, 1)."""
     found = first_above(u, table, first, count, ops)
     high = ops.gather(table, first + found)
     low = ops.select(found > 0, ops.gather(table, first + ops.select(found > 0, found - 1, found)), 0.0)
@@ -296,7 +296,7 @@ def _drawn(u: Any, table: Any, first: Any, count: int, ops: ArrayOps) -> tuple[A
 
 
 def _within(row: Any, along: Any, column: Any, beside: Any, shape: GridShape, ops: ArrayOps) -> Vector:
-    """Half vector at these shares of a cell's solid angle."""
+    """Half vector at these fractions of a cell's solid angle."""
     low, high = (ops.sin(((row + step) / shape.theta_h) ** 2 * (np.pi / 4)) ** 2 for step in (0.0, 1.0))
     half = low + along * (high - low)  # sin^2(theta/2)
     phi = (column + beside) * (2 * np.pi / shape.phi_h)

@@ -22,7 +22,7 @@ from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.two_sided import TwoSided
 
 _FLAT = (*HalfVectorGrid.ARRAYS, "albedo", "peak")
-_LOWEST_COSINE = 0.02  # cells whose wi is lower take f at this height, so that blending meets no edge at the horizon
+_LOWEST_COSINE = 0.02  # cells with wi below use f at this height, so that blending meets no edge at the horizon
 
 
 def grid_of(
@@ -31,9 +31,9 @@ def grid_of(
     progress: Progress = silent,
     part: Literal["whole", "mirror", "light"] = "whole",
 ) -> HalfVectorGrid:
-    """A table on the grid; `shape` is by default ISOTROPIC or ANISOTROPIC, as the table declares itself.
+    """Resample a table to the grid; `shape` defaults to ISOTROPIC or ANISOTROPIC, by the table's declaration.
 
-    Parts are for `TwinGrid`: what `back_share` counts to the mirror direction, and what it counts to the light.
+    `part` serves `TwinGrid`: "mirror" and "light" are the shares that `back_share` assigns to each peak.
     """
     shape = shape or (ISOTROPIC if table.info.isotropic else ANISOTROPIC)
     sheet = table if isinstance(table, TwoSided) else TwoSided(table)
@@ -80,9 +80,9 @@ def _share_of(part: str, wi: Floats, wo: Floats) -> Any:
 
 
 def _twins(table: TwoSided, shape: GridShape) -> list[tuple[int, Any]]:
-    """For each viewer azimuth the one whose values it shares, and in which order of cells; tables are often symmetric.
+    """For each viewer azimuth, the one whose values it can share, and the order of cells; tables are often symmetric.
 
-    The symmetry, mirrored at x = 0 and y = 0 or turned by half a turn, is found by look-ups at random pairs.
+    Mirror symmetry at x = 0 and y = 0, and under half a turn, is detected by look-ups at random pairs.
     """
     n, columns = shape.viewer_phi, shape.phi_h
     own = [(k, np.arange(shape.cells)) for k in range(n)]
@@ -116,7 +116,7 @@ def _twins(table: TwoSided, shape: GridShape) -> list[tuple[int, Any]]:
 def _viewer_nodes(shape: GridShape) -> Floats:
     """(viewer_theta, viewer_phi, 3) directions of the viewer nodes."""
     left = np.linspace(1, 0, shape.viewer_theta)
-    theta = np.radians(LAST_VIEWER_DEG * (1 - left * np.sqrt(left)))  # closer towards grazing, where f bends most
+    theta = np.radians(LAST_VIEWER_DEG * (1 - left * np.sqrt(left)))  # denser towards grazing, where f curves most
     phi = np.arange(shape.viewer_phi) * 2 * np.pi / shape.viewer_phi
     return direction(theta[:, None], phi)
 
@@ -129,9 +129,9 @@ def _cell_centres(shape: GridShape) -> Floats:
 
 
 def _with_distributions(shape: GridShape, values: Floats, weights: Floats, peak: Floats) -> HalfVectorGrid:
-    """The grid with the CDFs of weights (faces, kinds, viewers, cells), which are densities up to a factor.
+    """The grid with the CDFs of weights (faces, kinds, viewers, cells), which are unnormalized densities.
 
-    Cells and densities are derived from the stored CDFs, rounded to float32, so that both agree.
+    Cells and densities are derived from the stored float32 CDFs, so that both agree.
     """
     faces, kinds = weights.shape[:2]
     edges = (np.arange(shape.theta_h + 1) / shape.theta_h) ** 2 * np.pi / 2
@@ -139,7 +139,7 @@ def _with_distributions(shape: GridShape, values: Floats, weights: Floats, peak:
     mass = weights.reshape(faces, kinds, shape.viewers, shape.theta_h, shape.phi_h) * omega
     total = mass.sum(axis=(-1, -2))
     across = total[:, 1] / np.maximum(total.sum(axis=1), 1e-30) if kinds == 2 else np.zeros((faces, shape.viewers))
-    mass = np.where(total[..., None, None] > 0, mass, omega)  # a black viewer node: any distribution serves
+    mass = np.where(total[..., None, None] > 0, mass, omega)  # for a black viewer node any distribution works
     rows = mass.sum(axis=-1)
     mass = np.where(rows[..., None] > 0, mass, 1.0)
     marginal, conditional = _cdf(rows), _cdf(mass)

@@ -1,12 +1,13 @@
 """Homomorphic factors (McCool, Ang & Ahmad 2001): f = alpha P(wi) Q(h) P(wo), from two textures and three numbers.
 
-A text beside the textures holds alpha: alone, one number per channel; or after a title and the kind of the file (0: P
-and Q; 1: and a highlight; 2: the highlight alone), before an exposure that is not used. NAME.txt goes with the pictures
-NAME_0 and NAME_1 or NAMEp and NAMEq; a text of alpha alone goes with the one pair of its folder that ends with p and q.
+A text file beside the textures gives alpha: either alone, one number per channel; or after a title and the kind of file
+(0: P and Q; 1: P, Q and a highlight; 2: the highlight alone), followed by an unused exposure. NAME.txt belongs to the
+pictures NAME_0 and NAME_1, or NAMEp and NAMEq; a text of alpha alone belongs to its folder's one pair ending in p and
+q.
 
 Textures are linear and hold the upper hemisphere as a parabolic map: (x, y) / (1 + z) from -1 to 1 across the picture.
-A highlight, which has no scale of its own in the file, is left out. P and Q have an unknown absolute scale: alpha makes
-f what the file says, in 1/sr.
+A highlight, which has no scale in the file, is ignored. P and Q have an unknown absolute scale; alpha makes f the
+file's values in 1/sr.
 """
 
 from __future__ import annotations
@@ -32,14 +33,14 @@ from lambent.materials.measured.text_numbers import head_text, read_text, shown,
 NAME = "homomorphic factors"
 LIMIT_BYTES = 1 << 16
 KINDS = ("P and Q", "P, Q and a highlight", "a highlight alone")
-EVEN = 0.02  # of the textures' range: how far they may be from round and still count as isotropic
+EVEN = 0.02  # of the textures' range: largest deviation from rotational symmetry that counts as isotropic
 _NUMBER = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-_LONGEST_NUMBER = 40  # characters: the pattern takes the square of them to refuse one
+_LONGEST_NUMBER = 40  # characters: the pattern needs quadratic time to reject one
 _SAMPLES = 20_000
 
 
 def recognise(head: bytes, size: int) -> bool:
-    """Whether the file is a title, a kind, alpha and an exposure, or alpha alone, one number a line."""
+    """Whether the file is a title, a kind, alpha and an exposure, or alpha alone, one number per line."""
     text = head_text(head)
     if text is None or size > LIMIT_BYTES:
         return False
@@ -56,7 +57,7 @@ def _is_titled(text: bytes) -> bool:
 
 
 def _numbers(line: bytes) -> int:
-    """How many numbers a line has; 0 where it has anything else."""
+    """Number of numbers in a line; 0 if it has anything else."""
     words = line.split()
     return len(words) * all(len(word) <= _LONGEST_NUMBER and _NUMBER.fullmatch(word) is not None for word in words)
 
@@ -112,7 +113,7 @@ class HomomorphicTable(ReflectionTable):
         return np.asarray(self.alpha * parts[0] * parts[1] * parts[2])
 
     def samples(self, max_count: int | None = None) -> MeasuredSamples:
-        """The product at 20,000 pairs spread evenly over d_wi d_wo."""
+        """The product at 20,000 pairs, uniform over d_wi d_wo."""
         k = np.arange(_SAMPLES)
         z_i, phi_i, z_o, phi_o = (radical_inverse(k, base) for base in (2, 3, 5, 7))
         wi, wo = (direction(np.arccos(z), 2 * np.pi * phi) for z, phi in ((z_i, phi_i), (z_o, phi_o)))
@@ -158,7 +159,7 @@ def _beside(path: Path, letter: str, endings: tuple[str, ...]) -> Path:
 
 
 def _pair_of(path: Path) -> list[Path]:
-    """The one pair of pictures of the folder whose names differ in a final p and q."""
+    """The one pair of pictures in the folder whose names differ in a final p and q."""
     pairs = [p for p in sorted(path.parent.glob("*p.png")) if p.with_name(f"{p.stem[:-1]}q.png").is_file()]
     if len(pairs) != 1:
         got = f"{len(pairs)} pairs" + "".join(f", {p.name}" for p in pairs[:3])
@@ -182,7 +183,7 @@ def radial_means(texture: ParabolicMap, angle_rad: Floats) -> Floats:
 
 
 def _unevenness(texture: ParabolicMap) -> float:
-    """Largest deviation from the radial mean within 80 degrees."""
+    """Largest deviation from the radial mean within 80 degrees of the normal."""
     theta = np.radians(np.arange(1.0, 81))
     w = direction(theta[:, None], np.arange(64) * (2 * np.pi / 64))
     values = np.stack(texture.at(components(w)), axis=-1)

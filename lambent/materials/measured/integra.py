@@ -24,8 +24,8 @@ Channels are red, gre and blu, or bw, or one `wl` with its wavelength in nm each
 diffuser: f = value / pi; Intensity holds the cosine: f = value / cos theta_o. `kbdf` multiplies Absolute values, and
 is the share of the light that Relative ones are scaled to.
 
-Geometry: MPI's Atrium project, "BRDF format representation"; keywords and units as libbsdf's DdrReader reads them.
-Nothing in the file says whether it holds reflection: `sigmat`, or the name's ending .ddt, makes it transmission.
+Geometry: MPI's Atrium project, "BRDF format representation"; keywords and units as in libbsdf's DdrReader. Reflection
+and transmission are not marked in the file: `sigmat`, or the suffix .ddt, indicates transmission.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def read(path: Path) -> GonioTable:
     channels = _channels(text[first.start() :] if first else b"", grid, keys.get("typecolormodel", ""), path)
     values = np.stack([channel.values for channel in channels], axis=-1)
     cos_o = _cos_theta_o(grid)[..., None]
-    # Writers fill the horizon and what is below with 0.
+    # Writers fill the horizon and everything below with 0.
     values = np.where(np.isfinite(values) & np.isfinite(cos_o), values, np.nan)
     with np.errstate(over="ignore"):
         values = values / cos_o if kind.startswith("intensity") else values / np.pi
@@ -109,7 +109,7 @@ def read(path: Path) -> GonioTable:
     kbdf = np.stack(shares, axis=-1) if len(shares) == len(channels) else None
     grid, values, kbdf, said = _below_90(grid, values, kbdf)
     notes += said
-    # A turn that is listed to 180 degrees is half of one, whatever TypeSym says.
+    # Azimuths up to 180 degrees cover half a turn, whatever TypeSym says.
     mirrored = len(grid.azimuth) > 1 and grid.azimuth[-1] <= 180
     if kind.endswith("absolute"):
         values = values if kbdf is None else values * kbdf[:, :, None, None]
@@ -162,7 +162,7 @@ def _channels(body: bytes, grid: SpecularGrid, model: str, path: Path) -> list[_
     starts = [*_CHANNEL.finditer(body)]
     ends = [found.start() for found in starts[1:]] + [len(body)]
     parts: dict[str, _Channel] = {}
-    for found, end in zip(starts, ends, strict=False):  # without a channel, `ends` has one more
+    for found, end in zip(starts, ends, strict=False):  # `ends` has one more than there are channels
         name = shown(found[1]).lower()[:3]
         channel = _channel(body[found.end() : end], name, grid, path)
         key = f"wl {channel.wavelength_nm:g}" if name == "wl" else name
@@ -214,7 +214,7 @@ def _cos_theta_o(grid: SpecularGrid) -> Floats:
 def _below_90(
     grid: SpecularGrid, values: Floats, kbdf: Floats | None
 ) -> tuple[SpecularGrid, Floats, Floats | None, tuple[str, ...]]:
-    """Without light at grazing incidence, which lights nothing."""
+    """The grid and values without grazing incidence, which receives no light."""
     kept = grid.theta_i < 90
     if kept.all() or not kept.any():
         return grid, values, kbdf, ()

@@ -1,11 +1,11 @@
-"""Angle bases of LBNL's matrices, and f that is constant over their patches.
+"""Angle bases of LBNL's matrices, with f constant over their patches.
 
-A basis cuts the hemisphere into rings of theta and each ring into n_phis equal patches; the first patch of a ring is
+A basis divides the hemisphere into rings of theta and each ring into n_phis equal patches; the first patch of a ring is
 centred on phi = 0. The three of Klems (1994) are built in: full (145 patches), half (77) and quarter (41). A patch's
 weight is its projected solid angle, the integral of cos(theta) over it: pi (cos^2 lower - cos^2 upper) / n_phis.
 
-Directions of a matrix are headings: the direction light travels in, projected on the sheet. A patch of incident light
-at phi = 0 holds the light from phi = 180 degrees, so that straight and mirrored light leaves by the patch of the same
+Matrices use headings: the direction light travels in, projected on the sheet. A patch of incident light at phi = 0
+receives the light from phi = 180 degrees, so that transmitted and mirrored light leaves by the patch of the same
 number.
 """
 
@@ -22,16 +22,16 @@ from lambent.materials.lobes import NUMPY
 from lambent.materials.measured.half_vector_grid import turns
 
 OUTSIDE = -1
-BEYOND = 4.0  # as sin^2(theta): above that of any direction
+BEYOND = 4.0  # as sin^2(theta): above any direction's
 WHOLE_DEG = 90 - 1e-3  # a basis up to here reaches the horizon
 _TURNS_DEG = (15.0, 30.0, 45.0, 60.0, 90.0)
 _EXACT = 1e-9
-_THIRDS = 3  # pieces of a patch, in theta and in phi, that give a tuple each
+_THIRDS = 3  # divisions of a patch, in theta and in phi, each of which gives a tuple
 
 
 @dataclass(frozen=True)
 class AngleBasis:
-    """Patches of the hemisphere, numbered ring by ring from the normal, with rising phi within a ring.
+    """Patches of the hemisphere, numbered ring by ring from the normal, with increasing phi within a ring.
 
     Attributes
     ----------
@@ -73,8 +73,8 @@ class AngleBasis:
     def upper_sin2(self) -> Floats:
         """(R,) sin^2 of the rings' upper bounds, rounded to float32; BEYOND at the horizon.
 
-        A direction belongs to the first ring whose bound is above the sum of its squares of x and y. All look-ups, on
-        tables and in sheets, decide by these very numbers: a direction on a border is in the same patch everywhere.
+        A direction belongs to the first ring whose bound exceeds x^2 + y^2. All look-ups, on tables and in sheets, use
+        exactly these numbers, so that a direction on a border is in the same patch everywhere.
         """
         upper = np.array(self.edges_deg[1:])
         sin2 = np.where(upper < WHOLE_DEG, np.sin(np.radians(upper)) ** 2, BEYOND)
@@ -98,18 +98,18 @@ class AngleBasis:
 
     @cached_property
     def centres(self) -> Floats:
-        """(count, 3) unit directions in the middle of the patches; the normal for a patch around it."""
+        """(count, 3) unit directions at the patches' centres; the normal for a patch around it."""
         edges, n = np.radians(self.edges_deg), np.array(self.n_phis)
         middle = np.where((n == 1) & (edges[:-1] == 0), 0.0, (edges[:-1] + edges[1:]) / 2)
         return direction(middle[self.rings], 2 * np.pi * self.places / n[self.rings])
 
     @cached_property
     def opposite(self) -> Indices:
-        """(count,) the patch at phi + 180 degrees; rings of an odd number of patches have the nearest one."""
+        """(count,) the patch at phi + 180 degrees; the nearest one in rings with an odd number of patches."""
         return self.index(self.centres * HALF_TURN)
 
     def points(self, patch: Indices, u: Floats) -> Floats:
-        """(N, 3) directions in patches (N,) for u (N, 2) in [0, 1)^2, even in projected solid angle."""
+        """(N, 3) directions in patches (N,) for u (N, 2) in [0, 1)^2, uniform in projected solid angle."""
         ring = self.rings[patch]
         cos2 = self._cos2[ring] + u[:, 0] * (self._cos2[ring + 1] - self._cos2[ring])
         phi = 2 * np.pi * (self.places[patch] + u[:, 1] - 0.5) / np.array(self.n_phis)[ring]
@@ -117,9 +117,9 @@ class AngleBasis:
         return np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
 
     def direct_share(self, f: Floats) -> float:
-        """Share of uniform incident light that leaves by the patch it came in by; f (count, count), 0 if f is black.
+        """Share of uniform incident light that leaves by the patch it entered by; f (count, count), 0 if f is black.
 
-        That is the patch of the mirrored or the straight direction.
+        This is the patch of the mirrored or the undeviated direction.
         """
         projected = self.projected_sr
         power = projected @ f @ projected
@@ -161,7 +161,7 @@ class PatchMatrix:
 
     @property
     def negative(self) -> int:
-        """Number of pairs of patches below zero in any channel."""
+        """Number of pairs of patches with a channel below zero."""
         return int((self.values < 0).any(axis=-1).sum())
 
     @cached_property
@@ -180,7 +180,7 @@ class PatchMatrix:
         return self._looked_up(np.tensordot(self.outgoing.projected_sr, self.f, 1), self.incident, entering)
 
     def hemispherical_reversed(self, leaving: Floats) -> Floats:
-        """The same for reversed light, which enters at a heading by which light of this part leaves."""
+        """Likewise for reversed light, which enters at a heading by which light of this part leaves."""
         return self._looked_up(np.tensordot(self.f, self.incident.projected_sr, ((1,), (0,))), self.outgoing, leaving)
 
     @staticmethod
@@ -191,7 +191,7 @@ class PatchMatrix:
     def tuples(self) -> tuple[Floats, Floats, Floats, Floats]:
         """Headings (M, 3) of light that enters and leaves, f (M, C), and a weight (M,) in sr, of every pair of patches.
 
-        Light enters in the middle of its patch and leaves at nine places of its own: with the middle alone, a lobe far
+        Light enters at the centre of its patch and leaves at nine places of its own; with the centre alone, a lobe far
         narrower than the patch would fit with any energy. The weights times the cosines of the leaving headings sum to
         the patch's projected solid angle, so that sums over tuples are sums over patches.
         """
@@ -199,7 +199,7 @@ class PatchMatrix:
         return self._tuples(self.incident.centres[i], self.outgoing, o)
 
     def tuples_reversed(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """The same for reversed light; `entering` and `leaving` are its own headings."""
+        """Likewise for reversed light; `entering` and `leaving` are its own headings."""
         o, i = np.indices(self.values.shape[:2]).reshape(2, -1)
         entering, leaving, f, weight = self._tuples(self.outgoing.centres[o], self.incident, i)
         return entering * HALF_TURN, leaving * HALF_TURN, f, weight
@@ -214,8 +214,7 @@ class PatchMatrix:
     def anisotropy(self) -> float:
         """Change of f when the sheet is turned, over the mean of f.
 
-        Turns by 15 to 90 degrees count that map the patches of both rings onto themselves; infinite where there are
-        none.
+        Uses turns by 15 to 90 degrees that map the patches of both rings onto themselves; infinite if there are none.
         """
         difference, size = 0.0, 0.0
         for a, n_i in enumerate(self.incident.n_phis):
@@ -235,14 +234,14 @@ class PatchMatrix:
 
     @property
     def direct_share(self) -> float:
-        """`AngleBasis.direct_share`; 0 where the two bases differ."""
+        """`AngleBasis.direct_share`; 0 if the two bases differ."""
         return self.incident.direct_share(self.f.sum(axis=-1)) if self.incident == self.outgoing else 0.0
 
 
 def _spread(basis: AngleBasis) -> tuple[Floats, Floats]:
-    """Nine directions (count, 9, 3) in every patch, its middle among them, and weights (count, 9) in sr.
+    """Nine directions (count, 9, 3) in every patch, its centre among them, and weights (count, 9) in sr.
 
-    Theta and phi are cut in three each. A weight times the cosine is the projected solid angle of its piece.
+    Theta and phi are divided in three. A weight times the cosine is the projected solid angle of its piece.
     """
     n, ring = np.array(basis.n_phis), basis.rings
     lower, upper = np.radians(basis.edges_deg[:-1]), np.radians(basis.edges_deg[1:])

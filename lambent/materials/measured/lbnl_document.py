@@ -1,8 +1,8 @@
 """Parser of the XML of LBNL's BSDF files (schema BSDF v1.4): blocks of numbers as text, with their metadata.
 
-The file is untrusted. It is read by events, so nesting costs nothing. A document type declaration is refused, and so
-are the entities it could define; the number of elements, their depth and the length of a tag are limited. A few lines
-of text before the XML are skipped, because genBSDF's own output begins with one ("Recover using: ...").
+The file is untrusted. It is parsed by events, so that nesting costs nothing. Document type declarations, and with them
+entities, are refused; the number of elements, their depth and the length of a tag are limited. A few lines of text
+before the XML are skipped, because genBSDF's own output begins with one ("Recover using: ...").
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from lambent.core.errors import UserError
 ROOT = "WindowElement"
 _ROOT_TAG = re.compile(rb"<([\w.-]{1,64}:)?WindowElement[\s>/]")
 _LONG_TAG = re.compile(rb"<[A-Za-z_:][^<>]{8192}")
-_PREAMBLE = re.compile(  # at most 16 lines of at most 1024 bytes; a line of markup is none
+_PREAMBLE = re.compile(  # at most 16 lines of at most 1024 bytes, without markup
     rb"(?:\xef\xbb\xbf)?(?:(?![ \t]*<)[^\r\n\x00-\x08\x0e-\x1f]{0,1024}(?:\r\n?|\n)){1,16}?[ \t]*"
     rb"(?=<\?xml\s|<(?:[\w.-]{1,64}:)?WindowElement[\s>/])"
 )
@@ -51,7 +51,7 @@ class Document:
 
 
 def preamble(head: bytes) -> bytes:
-    """The lines of text before the XML of a file that begins with `head`; empty where there are none, or too many."""
+    """The lines of text before the XML of a file that begins with `head`; empty if there are none, or too many."""
     found = _PREAMBLE.match(head)
     return found[0] if found else b""
 
@@ -113,7 +113,7 @@ def _document(root: ET.Element, path: Path) -> Document:
     layers = root.findall("Optical/Layer")
     with_data = [layer for layer in layers if layer.find("WavelengthData/WavelengthDataBlock") is not None]
     layer = (with_data[:1] or layers[-1:] or [root])[0]
-    _texts(layer.find("Material"), path)  # names that are not used, and may not be too long either
+    _texts(layer.find("Material"), path)  # unused names, checked for length
     structure, bases, blocks = "", [], []
     for definition in layer.findall("DataDefinition"):
         structure = _texts(definition, path).get("IncidentDataStructure", structure)
@@ -129,7 +129,7 @@ def _document(root: ET.Element, path: Path) -> Document:
 
 
 def _texts(element: ET.Element | None, path: Path) -> Texts:
-    """Texts of the children, the last of several, with single blanks; ScatteringData's as it is."""
+    """Texts of the children, the last of repeated ones, with blanks collapsed; ScatteringData's unchanged."""
     found = {}
     for child in element if element is not None else ():
         text = child.text or ""

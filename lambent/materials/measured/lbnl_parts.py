@@ -1,4 +1,4 @@
-"""Make the parts of a BSDF file from its text: choose blocks, bases and colour, and parse the numbers."""
+"""Convert the text of a BSDF file to its parts: choose blocks, bases and colour, and parse the numbers."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ _CHROMA = {"cie-x": 0, "cie-z": 1, "cie-u": 0, "cie-v": 1}
 _SHIRLEY_CHIU = "LBNL/Shirley-Chiu"
 _MOST_RINGS = 46  # Radiance's limit
 _SAME_DEG = 1e-4
-_SATURATED = 1e-3  # of Y: smaller negative values come from rounding in the file
+_SATURATED = 1e-3  # relative to Y: smaller negative values are rounding in the file
 
 
 def parts_of(document: Document, file: Path) -> tuple[dict[Where, Part], tuple[str, ...]]:
     """The parts of a file by way and side, and notes on the choices made.
 
-    Parts that are zero throughout are left out, as by Radiance: the other side's transmission then stands for both.
+    Parts that are zero everywhere are dropped, as in Radiance: the other side's transmission then serves both sides.
 
     Raises
     ------
     UserError
-        A basis, structure, quantity or value is not of this format, or nothing can be used.
+        If a basis, structure, quantity or value is not of this format, or nothing is usable.
     """
     structure = next((s for s in _STRUCTURES if s.lower() == document.structure.lower()), None)
     if structure is None:
@@ -74,7 +74,7 @@ def parts_of(document: Document, file: Path) -> tuple[dict[Where, Part], tuple[s
 
 
 def sizes_of(parts: Iterable[Part]) -> dict[str, int]:
-    """Grid dimensions by name; leaves of several trees are counted together."""
+    """Grid dimensions by name; the leaves of all trees are added up."""
     total: dict[str, int] = {}
     for part in parts:
         for name, size in part.sizes.items():
@@ -83,7 +83,7 @@ def sizes_of(parts: Iterable[Part]) -> dict[str, int]:
 
 
 def _choose(document: Document, file: Path) -> tuple[dict[Where, list[Texts]], list[str]]:
-    """Blocks by way and side, [luminance] or [luminance, X or u', Z or v'], and notes; the last of equals counts."""
+    """Blocks by way and side, [luminance] or [luminance, X or u', Z or v'], and notes; the last duplicate wins."""
     names = {block["Wavelength"].lower(): block["Wavelength"] for block in document.blocks}
     main = next((n for n in (*_LUMINANCE, "solar") if n in names), None)
     if main is None:
@@ -151,7 +151,7 @@ def _matrix_of(
         raise UserError("colour blocks have a different angle basis than Visible", file=file)
     values = np.stack([values for _, _, values in channels], axis=-1)
     if len(channels) == 3:
-        read = np.asarray((values >= 0).all(axis=-1, keepdims=True))  # else noise, which is no saturated colour
+        read = np.asarray((values >= 0).all(axis=-1, keepdims=True))  # otherwise it is noise, not a saturated colour
         rgb = rgb_of_xyz(values[..., [1, 0, 2]])
         outside = int((rgb.min(axis=-1) < -_SATURATED * values[..., 0])[read[..., 0]].sum())
         if outside:
@@ -198,7 +198,7 @@ def _tree(block: Texts, rank: Rank, file: Path) -> TensorTree:
 
 
 def _data(block: Texts) -> bytes:
-    """ScatteringData; a letter that is not ASCII becomes one that is no number, which is refused later."""
+    """ScatteringData; non-ASCII letters are replaced by one that is not a number and is rejected later."""
     return block.get("ScatteringData", "").encode("ascii", "replace")
 
 

@@ -1,7 +1,7 @@
 """BSDF files of LBNL WINDOW and Radiance: Klems and other matrices, tensor trees, both sides of a sheet.
 
-n = +z is the side the files call Back and Radiance calls front; both take x and y as given. f is Radiance's own,
-without its jitter: constant over patches or leaves, never interpolated. A transmission given for one side alone is
+n = +z is the side that the files call Back and Radiance calls front; x and y agree. f is evaluated as in Radiance,
+without its jitter: constant over patches or leaves, never interpolated. A transmission given for one side only is
 reversed for the other; a reflection that is not given is black.
 
 Sources: Klems 1994, "A new method for predicting the solar heat gain of complex fenestration systems"; Ward, Kurt &
@@ -26,7 +26,7 @@ from lambent.materials.measured.table import on_flat_pairs
 from lambent.materials.measured.text_numbers import shown
 
 NAME = "LBNL BSDF XML"
-ISOTROPIC_WITHIN = 0.02  # of the mean of f
+ISOTROPIC_WITHIN = 0.02  # relative to the mean of f
 _DIRECT_SHARE = 0.5
 
 _NAMES: dict[Where, str] = {
@@ -67,7 +67,7 @@ class Use:
 
 
 class LbnlTable(MeasuredTable):
-    """Both sides of a sheet, each with reflection and transmission, as far as the file has them.
+    """Both sides of a sheet, each with the reflection and transmission that the file has.
 
     `uses` maps (way, side of the light) to the part to use.
 
@@ -78,7 +78,7 @@ class LbnlTable(MeasuredTable):
     parts : dict
         (way, side) -> part; side +1 is light from +z.
     notes : tuple of str
-        On the choices made when the file was read.
+        On choices made while reading the file.
     """
 
     def __init__(self, file: str, parts: dict[Where, Part], notes: tuple[str, ...] = ()) -> None:
@@ -99,7 +99,7 @@ class LbnlTable(MeasuredTable):
 
     @property
     def has_a_back(self) -> bool:
-        """Whether the table holds data of light from -z."""
+        """Whether the table has data for light from -z."""
         return any(side == -1 for _, side in self.uses)
 
     @property
@@ -132,9 +132,9 @@ class LbnlTable(MeasuredTable):
         return self._hemispherical(wi, "transmission")
 
     def samples(self, max_count: int | None = None) -> MeasuredSamples:
-        """Tuples of the side +z: all pairs of patches, or the leaves at an even choice of wi.
+        """Tuples of the side +z: all pairs of patches, or the leaves at a uniform choice of wi.
 
-        A file with light from -z alone is turned over, z for -z.
+        A file with light from -z alone is turned over, z becomes -z.
         """
         side: Side = -1 if self._turned else 1
         tuples = []

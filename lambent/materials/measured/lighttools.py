@@ -16,9 +16,9 @@
       (a line per azimuth, with the BSDF in 1/sr per radial angle)
     DataEnd
 
-`#` begins a comment. The radial angle is that from the normal of the side that the light leaves by. The light is at
-azimuth 90, as libbsdf reads these files, so that its mirror direction is at 270. XYZ files have three blocks in place
-of each, with `TristimulusValue` TrisX, TrisY and TrisZ. The back is used where the file has no front.
+`#` begins a comment. The radial angle is measured from the normal of the side that the light leaves by. The light is at
+azimuth 90, as in libbsdf's reader, so that its mirror direction is at 270. XYZ files have three blocks instead of one,
+with `TristimulusValue` TrisX, TrisY and TrisZ. The back is used if the file has no front.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def read(path: Path) -> MeasuredTable:
         if set(found) != set(channels):
             field = f"{kind} at AOI {aoi:g}"
             raise UserError("channels are missing", file=path, field=field, got=len(found), expected=len(channels))
-        once = azimuth < azimuth[0] + 360  # a last azimuth of 360 repeats the first
+        once = azimuth < azimuth[0] + 360  # a final azimuth of 360 repeats the first
         phi_o, theta_o = np.meshgrid(azimuth[once], radial, indexing="ij")
         theta_o = 180 - theta_o if kind == "BTDF" else theta_o
         lit = np.broadcast_to((aoi, LIGHT_AZIMUTH_DEG), (theta_o.size, 2))
@@ -145,13 +145,13 @@ def _blocks(body: bytes, shape: tuple[int, int], path: Path) -> list[Block]:
 
 
 def _aoi(words: dict[str, str], path: Path) -> float:
-    """The angle of incidence from the lit side's normal; a back may be given from the front's."""
+    """The angle of incidence from the lit side's normal; for a back it may be given from the front's."""
     angle = _number(words["AOI"], "AOI", path)
     return 180 - angle if words["Side"] == "Back" and angle > 90 else angle
 
 
 def _channel(words: dict[str, str], coloured: bool, path: Path) -> float:
-    """X, Y and Z by number, or the wavelength in nm."""
+    """Index of X, Y or Z, or the wavelength in nm."""
     if coloured:
         return float(_TRISTIMULUS.index(words["TristimulusValue"])) if words["TristimulusValue"] else -1.0
     return _number(words.get("Wavelength", "0"), "Wavelength", path)

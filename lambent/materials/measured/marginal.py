@@ -3,7 +3,7 @@
 Dupuy & Jakob 2018, "An adaptive parameterization for efficient material acquisition and rendering", section 4: the
 density is bilinear between nodes; the row is drawn from its marginal and the column from its conditional distribution.
 Values, marginals and conditionals of neighbouring parameters are interpolated separately, as in the renderers that
-define the format; f depends on this order.
+define the format; f depends on the order of these steps.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ class Corners:
 
 
 def _rising(weight: Floats, dimensions: int) -> Floats:
-    """The array with so many more dimensions of size 1."""
+    """The array with `dimensions` more axes of size 1."""
     return weight.reshape(weight.shape + (1,) * dimensions)
 
 
 def _cell(shape: tuple[int, ...], xy: Floats) -> tuple[Indices, Indices, Floats, Floats]:
-    """(column, row, x, y): the patch of a (rows, columns) grid of nodes that holds xy (N, 2), and the place in it."""
+    """(column, row, x, y): the cell of a (rows, columns) grid of nodes with xy (N, 2), and the place in it."""
     scaled = xy.clip(0, 1) * (shape[1] - 1, shape[0] - 1)
     column = scaled[:, 0].astype(np.int64).clip(0, shape[1] - 2)
     row = scaled[:, 1].astype(np.int64).clip(0, shape[0] - 2)
@@ -69,7 +69,7 @@ class Warp:
         marginal = np.cumsum((row_mass[:, :-1] + row_mass[:, 1:]) / (2 * (rows - 1)), axis=1)
         total = marginal[:, -1]
         self.density = values / total[:, None, None]
-        # A leading zero makes entry k the mass before cell k.
+        # A leading zero: entry k is the mass before cell k.
         self.conditional = np.pad(conditional / total[:, None, None], ((0, 0), (0, 0), (1, 0)))
         self.marginal = np.pad(marginal / total[:, None], ((0, 0), (1, 0)))
 
@@ -115,7 +115,7 @@ def _integral(x: Floats, v0: Floats, v1: Floats) -> Floats:
 
 
 def _solve(mass: Floats, v0: Floats, v1: Floats) -> Floats:
-    """x in [0, 1] whose `_integral` is `mass`, in the form that does not cancel for v0 near v1."""
+    """x in [0, 1] at which `_integral` is `mass`, in the form that does not cancel for v0 near v1."""
     root = np.sqrt(np.maximum(v0 * v0 + 2 * mass * (v1 - v0), 0))
     denominator = v0 + root
     x: Floats = np.divide(2 * mass, denominator, out=np.zeros_like(mass), where=denominator > 0)

@@ -71,7 +71,7 @@ class MerlTable(ReflectionTable):
     def __init__(self, planes: Floats, path: Path) -> None:
         self._raw = planes
         with np.errstate(invalid="ignore"):
-            # Channel by channel, because flags of a million bins at once would take as much memory as a plane.
+            # Channel by channel: flags of a million bins at once would take as much memory as a plane.
             bounds = [scale * LARGEST_F for scale in 1 / SCALES]
             self._measured = np.logical_and.reduce(
                 [(plane >= 0) & (plane <= bound) for plane, bound in zip(planes, bounds, strict=True)]
@@ -115,7 +115,7 @@ class MerlTable(ReflectionTable):
         cell_d = (np.pi / 2 / shape[1]) * (np.pi / shape[2]) * np.sin(theta_d)
         weight = 4 * np.cos(theta_d) * np.sin(theta_h) * cell_h * cell_d * turns
         f = np.empty((len(wi), 3))
-        with np.errstate(invalid="ignore", over="ignore"):  # collect leaves out and counts values that are not finite
+        with np.errstate(invalid="ignore", over="ignore"):  # collect counts and drops values that are not finite
             for channel, (plane, scale) in enumerate(zip(self._raw, SCALES, strict=True)):
                 np.multiply(plane[exists], scale, out=f[:, channel])
         shadowed = np.asarray((f < 0).any(axis=1))
@@ -129,16 +129,16 @@ def bin_centres(shape: tuple[int, ...]) -> tuple[Floats, Floats, Floats]:
 
 
 def _between(unit: Floats, count: int) -> tuple[Indices, Floats]:
-    """Index of the bin centre at or before `unit` in [0, 1], from -1 on, and the share of the next one."""
+    """Index of the bin centre at or before `unit` in [0, 1], from -1 on, and the weight of the next one."""
     place = unit * count - 0.5
     low = np.floor(place)
     return low.astype(np.int64), np.asarray(place - low)
 
 
 def _above_horizon(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats, Floats, Flags]:
-    """wi (N, 3) at phi_i = 0 and wo (N, 3) on the grid of half and difference angles, where both are above the surface.
+    """wi (N, 3) at phi_i = 0 and wo (N, 3) at half and difference angles for which both are above the surface.
 
-    By component, because whole (..., 3) arrays of a million bins take four times the memory.
+    By component: whole (..., 3) arrays of a million bins would take four times the memory.
     """
     across, along = np.cos(theta_h) * np.sin(theta_d) * np.cos(phi_d), np.sin(theta_h) * np.cos(theta_d)
     up, tilt = np.cos(theta_h) * np.cos(theta_d), np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)

@@ -18,7 +18,7 @@ from lambent.core.discovery import known
 from lambent.materials.document import Side
 from lambent.materials.measured.protocol import MeasuredSamples
 
-BLOCK = 8192  # tuples evaluated together, so that intermediate results stay in the processor's cache
+BLOCK = 8192  # tuples evaluated together, so that intermediate results fit into the processor's cache
 CUBEROOT_EPS = 1e-5  # keeps the slope of the cube root finite where nothing is scattered
 
 
@@ -41,8 +41,8 @@ class Metric:
     cosine : "wi" or "wo"
         Whose cosine multiplies f before the transform; with "wo", |cos theta_i| multiplies the weight.
     transform, slope : callable
-        T of f cos in 1/sr, and its derivative where f cos >= 0. Where T is as good as linear about 0 it takes negative
-        readings as they are, so that noise about zero has no mean; a cube root would magnify it, and takes them as 0.
+        T of f cos in 1/sr, and its derivative for f cos >= 0. If T is nearly linear about 0, it takes negative readings
+        unchanged, so that noise about zero averages out; a cube root would magnify it, and takes them as 0.
     """
 
     name: str
@@ -55,12 +55,12 @@ class Metric:
 
     @property
     def linear(self) -> bool:
-        """Whether T is the identity, so that the best coefficient has a closed form."""
+        """Whether T is the identity, which gives the best coefficient in closed form."""
         return self.transform is _same
 
     @property
     def clamps(self) -> bool:
-        """Whether T takes a negative reading as 0."""
+        """Whether T treats a negative reading as 0."""
         return bool(self.transform(-1.0) == self.transform(0.0))
 
     def terms(self, samples: MeasuredSamples) -> tuple[Floats, Floats]:
@@ -115,7 +115,7 @@ def errors_of(samples: MeasuredSamples, f_model: Floats) -> dict[str, float]:
 
 
 def light_ratios(samples: MeasuredSamples, f_model: Floats) -> dict[Side, float]:
-    """Light scattered to each side by a model with f (N, C), summed over the tuples, over the light measured there."""
+    """Ratio per side of the light scattered by a model with f (N, C), summed over the tuples, to the light measured."""
     light = samples.weight * np.abs(samples.wo[:, 2])
     ratios: dict[Side, float] = {}
     for side in samples.sides:
@@ -127,6 +127,6 @@ def light_ratios(samples: MeasuredSamples, f_model: Floats) -> dict[Side, float]
 
 
 def errors_and_shares(samples: MeasuredSamples, f_model: Floats) -> tuple[dict[str, float], dict[str, float]]:
-    """`errors_of`, and the same as shares of the errors of a black surface; 0 where that error is 0."""
+    """`errors_of`, and each relative to the error of a black surface; 0 if that error is 0."""
     errors, black = errors_of(samples, f_model), errors_of(samples, np.zeros_like(samples.f))
     return errors, {name: error / black[name] if black[name] > 0 else 0.0 for name, error in errors.items()}

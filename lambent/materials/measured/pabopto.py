@@ -1,4 +1,4 @@
-"""pab-opto text: what Mountain, the program of pab's goniophotometers (pg2), writes; one file per incident direction.
+"""pab-opto text, the format of Mountain, the program of pab's goniophotometers (pg2); one file per incident direction.
 
     #sample_name "blind 45"
     #incident_angle 60 180
@@ -11,8 +11,8 @@ Then a measurement per line: theta, phi and one value or three, in degrees and 1
 the specimen; theta over 90 is its back. Conventions are those of Radiance's pabopto2bsdf (man page and source): phi is
 turned so that `upphi` becomes 90, and incident directions that span half a turn stand for their mirror images.
 
-Files of one specimen that are joined to one (`cat *.txt`) make one table: every header with an incident direction
-begins a new one.
+Files of one specimen may be joined into one (`cat *.txt`) to make one table: every header with an incident direction
+starts a new one.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ _COMMENTS = re.compile(rb"^(?:[ \t]*#[^\n]*(?:\n|\Z))+", re.MULTILINE)
 _LINE = re.compile(rb"^[^\n]*\S", re.MULTILINE)
 _QUANTITIES: dict[str, Quantity] = {"bsdf": "f", "brdf": "f", "btdf": "f", "dsf": "f_cos"}
 _VALUES = {"cie-y": 1, "cie-xyz": 3}
-_INCIDENT_DECIMALS = 2  # of degrees: motors do not stop closer
+_INCIDENT_DECIMALS = 2  # of degrees: precision of the motors
 _LARGEST_DEG = 3600.0
 _QUARTER, _HALF = 90.0, 180.0
 
 
 @dataclass(frozen=True)
 class _Beam:
-    """One incident direction: its header's words, and the rows below."""
+    """One incident direction: the header's keywords, and the rows below."""
 
     theta_i: float
     phi_i: float
@@ -97,7 +97,7 @@ def read(path: Path) -> GonioTable:
 
 
 def _beams(text: bytes, path: Path) -> list[_Beam]:
-    """The incident directions of a file; a comment among the rows begins none."""
+    """The incident directions of a file; a comment among the rows does not start a new one."""
     beams: list[_Beam] = []
     keys: dict[str, str] = {}
     body, end = b"", 0
@@ -148,7 +148,7 @@ def _number(word: str, name: str, where: str, path: Path) -> float:
 
 
 def _angles(beam: _Beam) -> Floats:
-    """(N, 4) theta_i, phi_i, theta_o, phi_o, turned so that up is at 90 degrees."""
+    """(N, 4) theta_i, phi_i, theta_o, phi_o, rotated to put up at 90 degrees."""
     turn = 90 - beam.up_phi
     light = np.round((beam.theta_i, (beam.phi_i + turn) % 360), _INCIDENT_DECIMALS) % (361, 360)
     lit = np.broadcast_to(light, (len(beam.rows), 2))
@@ -156,7 +156,7 @@ def _angles(beam: _Beam) -> Floats:
 
 
 def _from_the_front(angles: Floats, path: Path) -> tuple[Floats, tuple[str, ...]]:
-    """The angles, of the specimen turned over where its back is lit."""
+    """The angles, with the specimen turned over if its back is lit."""
     back = angles[:, 0] > 90
     if not back.any():
         return angles, ()
@@ -167,9 +167,9 @@ def _from_the_front(angles: Floats, path: Path) -> tuple[Floats, tuple[str, ...]
 
 
 def _whole_turn(angles: Floats, values: Floats) -> tuple[Floats, Floats, tuple[str, ...]]:
-    """With mirror images where the incident directions span more than a quarter and at most half a turn.
+    """Add mirror images if the incident directions span more than a quarter and at most half a turn.
 
-    The mirror goes through the first of them; what lies in it is not repeated.
+    The mirror plane contains the first of them; directions in it are not repeated.
     """
     tilted = angles[:, 0] > 0
     phi = np.unique(angles[tilted, 1]) if tilted.any() else np.zeros(1)

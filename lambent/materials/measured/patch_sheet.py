@@ -1,15 +1,15 @@
 """A sheet of patch matrices that a renderer looks up and samples exactly, patch by patch.
 
-f is constant over pairs of patches, so nothing is resampled: a direction's patch follows from the bounds of its basis'
-rings, f is one entry of the matrix, and a sample is the light's patch by the row's CDF (mean of the channels times
-projected solid angle), then a direction even in projected solid angle within it. f cos(theta_i) / pdf, mean over the
+f is constant over pairs of patches, so nothing is resampled: a direction's patch follows from the ring bounds of its
+basis, and f is one entry of the matrix. A sample draws the light's patch from the row's CDF (mean of the channels times
+projected solid angle), then a direction in it, uniform in projected solid angle. f cos(theta_i) / pdf, mean over the
 channels, is therefore the same for all samples of a row: the albedo.
 
-Roles: the viewer (wo) is given, the light (wi) is sampled. Radiance's matrices need not be reciprocal, so a row holds
-all incident patches of one outgoing patch; `reverse` exchanges the roles, for photons.
+Roles: the viewer (wo) is given, the light (wi) is sampled. Radiance's matrices need not be reciprocal, so a row has all
+incident patches of one outgoing patch; `reverse` swaps the roles, for photons.
 
 Conventions are those of half_vector_grid.py: components, f in 1/sr without the cosine, `ops` is the array library.
-A patch's sin^2 and cos^2 are both stored, so that neither cancels in float32.
+Both sin^2 and cos^2 of a patch are stored, so that neither cancels in float32.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from lambent.materials.measured.two_sided import Reversed
 
 _WAYS: tuple[Way, ...] = ("reflection", "transmission")
 _BOUNDS = 6
-_SLIVER = 1e-5  # rad; float32 bounds of phi are no better
+_SLIVER = 1e-5  # rad; accuracy of phi bounds in float32
 _BELOW_ONE = 1 - 2.0**-24
 
 
@@ -114,7 +114,7 @@ class PatchSheet:
         return ops.select(seen, ops.gather(self.density, pair) * ops.abs(wi[2]) * share, 0.0)
 
     def sample(self, wo: Vector, u_select: Any, u1: Any, u2: Any, ops: ArrayOps = NUMPY) -> Vector:
-        """wi; u_* uniform in [0, 1). wi.z = 0 at the horizon, and where nothing is scattered."""
+        """wi; u_* uniform in [0, 1). wi.z = 0 at the horizon, and if nothing is scattered."""
         across, u_select = chosen_side(u_select, self.share_across(wo, ops), ops)
         page = self._page(wo, across, ops)
         row, inside = self._viewer_row(wo, page, ops)
@@ -160,7 +160,7 @@ class PatchSheet:
         return face * self.kinds + ops.whole(ops.select(across & (self.kinds == 2), 1.0, 0.0))
 
     def _viewer_row(self, wo: Vector, page: Any, ops: ArrayOps) -> tuple[Any, Any]:
-        """Number of the viewer's patch among all pages', and whether there is one."""
+        """Index of the viewer's patch over all pages, and whether the direction is in a patch."""
         patch, inside = self._patch(wo, 2 * page, ops)
         return page * self.patches + patch, inside
 
@@ -174,7 +174,7 @@ class PatchSheet:
         return row * self.patches + light, seen & ((wi[2] * wo[2] > 0) | (self.kinds == 2))
 
     def _patch(self, w: Vector, basis: Any, ops: ArrayOps) -> tuple[Any, Any]:
-        """Patch of a direction in a basis (2 page + role), as from `AngleBasis.index`, and whether it is within it."""
+        """Patch of a direction in a basis (2 page + role), as from `AngleBasis.index`, and whether it is inside."""
         first, sign = basis * self.rings, ops.gather(self.signs, basis)
         x, y = sign * w[0], sign * w[1]
         ring = first + first_above(x * x + y * y, self.edges, first, self.rings, ops)
@@ -185,15 +185,15 @@ class PatchSheet:
 
 
 Lookup = HalfVectorGrid | PatchSheet | TwinGrid
-_TREE = GridShape(180, 1, 256, 64)  # isotropic trees: their steps do not follow the mirror direction between viewers
+_TREE = GridShape(180, 1, 256, 64)  # isotropic trees: their steps do not follow the mirror direction
 
 
 def lookup_of(
     table: MeasuredTable, shape: GridShape | None = None, progress: Progress = silent, *, reverse: bool = False
 ) -> Lookup:
-    """The patches of a table made of patch matrices, else its dense grid of the given `shape`, or two of them.
+    """The patches of a table that consists of patch matrices, else its dense grid of the given `shape`, or two of them.
 
-    `reverse`: the light's direction is given and the viewer's is sampled; all methods exchange `wi` and `wo`.
+    `reverse`: the light's direction is given and the viewer's is sampled; all methods swap `wi` and `wo`.
     """
     sheet = patch_sheet_of(table, reverse=reverse)
     if sheet is not None:
@@ -205,7 +205,7 @@ def lookup_of(
 
 
 def patch_sheet_of(table: MeasuredTable, *, reverse: bool = False) -> PatchSheet | None:
-    """The sheet of a table made of patch matrices alone, else None; `reverse` as in `lookup_of`."""
+    """The sheet of a table that consists of patch matrices alone, else None; `reverse` as in `lookup_of`."""
     if not isinstance(table, LbnlTable):
         return None
     matrices = [use.part for use in table.uses.values() if isinstance(use.part, PatchMatrix)]
@@ -218,7 +218,7 @@ def patch_sheet_of(table: MeasuredTable, *, reverse: bool = False) -> PatchSheet
     for face in range(faces):
         for way in _WAYS[:kinds]:
             given: Side = -1 if face else 1
-            # `uses` goes by the light's side
+            # keys of `uses` refer to the light's side
             side: Side = given if reverse or way == "reflection" else (1 if given == -1 else -1)
             pages.append(_page_of(table.uses.get((way, side)), reverse, patches, rings))
     flat = {name: np.stack([page[name] for page in pages]).astype(np.float32).ravel() for name in pages[0]}
@@ -226,15 +226,15 @@ def patch_sheet_of(table: MeasuredTable, *, reverse: bool = False) -> PatchSheet
 
 
 def _page_of(use: Use | None, reverse: bool, patches: int, rings: int) -> dict[str, Floats]:
-    """The arrays of one page; black ones for a missing part."""
+    """The arrays of one page; black if the part is missing."""
     if use is None:
         dark = AngleBasis("", (0.0, 90.0), (1,))
         return _arrays(dark, 1.0, dark, 1.0, np.zeros((1, 1, 3)), patches, rings)
     matrix = use.part
     assert isinstance(matrix, PatchMatrix)
     f = np.broadcast_to(matrix.f, (*matrix.f.shape[:2], 3))
-    incoming, outgoing = (matrix.incident, -1.0), (matrix.outgoing, 1.0)  # light comes against its heading
-    # used backwards, light comes from where it would go
+    incoming, outgoing = (matrix.incident, -1.0), (matrix.outgoing, 1.0)  # light arrives against its heading
+    # used backwards, light arrives from where it would leave
     viewer, light = (incoming, outgoing) if use.backwards != reverse else (outgoing, incoming)
     if use.backwards != reverse:
         f = f.swapaxes(0, 1)
@@ -251,7 +251,7 @@ def _arrays(
     mass = np.zeros((patches, patches))
     mass[: viewer.count, : light.count] = mean * light.projected_sr
     total = mass.sum(axis=-1)
-    # rows reach 1 at their last patch that scatters, so that none beyond it is drawn
+    # rows reach 1 at their last scattering patch, so that none beyond it is drawn
     cdf = np.cumsum(mass, axis=-1) / np.where(total > 0, total, 1.0)[:, None]
     cdf = np.where(np.arange(patches) < patches - 1 - np.argmax(mass[:, ::-1] > 0, axis=-1)[:, None], cdf, 1.0)
     cdf = cdf.astype(np.float32)
@@ -285,7 +285,7 @@ def _bounds(basis: AngleBasis, sign: float, patches: int) -> Floats:
 
 
 def _strips(bounds: Floats) -> list[tuple[float, float, float, float]]:
-    """Ranges of z >= 0 and phi, in [0, 2 pi], of patches (N, 6), and of the rest beyond the last ring."""
+    """Ranges of z >= 0 and phi, in [0, 2 pi], of patches (N, 6), and of the remainder beyond the last ring."""
     used = bounds[bounds[:, 5] > 0]
     strips = []
     edges = np.sqrt(np.unique(used[:, 2:4]))

@@ -1,8 +1,8 @@
 """Measured tables, whatever their file format: metadata, look-up, albedos and raw tuples.
 
 Conventions: directions are unit vectors (..., 3) in the local frame with n = +z, pointing away from the surface; `wi`
-to the light, `wo` to the viewer. f is in 1/sr per channel and holds no cosine; the transfer probability is
-p(wo|wi) = f |cos theta_o| (2.4), and a reader converts its file's quantity to f. One channel is grey; three are linear
+to the light, `wo` to the viewer. f is in 1/sr per channel without a cosine; the transfer probability is
+p(wo|wi) = f |cos theta_o| (2.4), and readers convert their file's quantity to f. One channel is grey; three are linear
 RGB with Rec.709 primaries.
 """
 
@@ -21,11 +21,11 @@ from lambent.core.sequences import radical_inverse
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import SIDES, Lobe, Material, Side
 
-GRAZING_DEG = 84.0  # beyond it, errors of gonio-photometers and grids prevail
+GRAZING_DEG = 84.0  # beyond it, errors of gonio-photometers and grids dominate
 LARGEST_F = 1e9  # 1/sr; no surface is that bright, and its square still fits float32
 _COS_GRAZING = float(np.cos(np.radians(GRAZING_DEG)))
 Quantity = Literal["f", "f_cos", "p"]
-# The quadrature's mixture has lobes of all widths that measured lobes can have.
+# The quadrature's mixture has lobes of every width that measured lobes can have.
 _WHITE, _HALF = (1.0, 1.0, 1.0), (0.5, 0.5, 0.5)
 _PROPOSAL = Material(
     kd=_WHITE, lobes=tuple(Lobe(distribution="ggx", mx=m, my=m, r0=_WHITE, k=_HALF) for m in (0.02, 0.08, 0.3))
@@ -37,10 +37,10 @@ _QUADRATURE_POINTS = 4096
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Number of raw tuples that cannot be used, by the first reason that holds, in this order."""
+    """Numbers of unusable raw tuples, by the first applicable reason in this order."""
 
     shadowed: int = 0  # not measured: the device was in the way, or the file marks the cell as empty
-    not_finite: int = 0  # or impossible: beyond LARGEST_F, or further below zero than the brightest tuple is above it
+    not_finite: int = 0  # or impossible: above LARGEST_F, or further below zero than the brightest tuple is above it
     grazing: int = 0  # theta_i or theta_o beyond GRAZING_DEG
 
     @property
@@ -90,12 +90,12 @@ class MeasuredSamples:
     wi, wo : (N, 3) float64
         Unit directions to the light and to the viewer; wi.z > 0; wo.z < 0 is transmission.
     f : (N, C) float64
-        BSDF in 1/sr, without the cosine; C = 1 or 3; finite. A dark reading is noise about zero, so that a channel can
-        be negative: clamped at 0, it would have a mean above what was measured.
+        BSDF in 1/sr, without the cosine; C = 1 or 3; finite. Dark readings are noise about zero, so a channel can be
+        negative: clamping at 0 would raise the mean.
     weight : (N,) float64
-        Solid angle of the tuple, in sr: sin(theta_o) dtheta_o dphi_o of its cell where the table has incident
-        directions (the sin(theta_o) of (3.7)); the share of the joint measure d_wi d_wo, in sr^2, where it has none
-        (MERL, Cornell). Only ratios within a table have a meaning.
+        Solid angle of the tuple, in sr: sin(theta_o) dtheta_o dphi_o of its cell if the table has incident directions
+        (the sin(theta_o) of (3.7)); otherwise (MERL, Cornell) the share of the joint measure d_wi d_wo, in sr^2. Only
+        ratios within a table are meaningful.
     left_out : LeftOut
         Tuples of the table that were left out.
     """
@@ -126,7 +126,7 @@ class MeasuredSamples:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of tuples: used, those of them below zero, and left out by reason."""
+        """Number of tuples: used, below zero among these, and left out by reason."""
         return {"used": len(self), "below_zero": self.below_zero, **asdict(self.left_out)}
 
     @property
@@ -145,13 +145,13 @@ class MeasuredSamples:
 
 
 class MeasuredTable(ABC):
-    """One measured material; its albedos follow from the format's `eval`."""
+    """One measured material; its albedos are integrals of the format's `eval`."""
 
     info: TableInfo
 
     @property
     def proposal(self) -> Material:
-        """A material with lobes where the table may have peaks, whose samples integrate it."""
+        """A material with lobes wherever the table may have peaks; its samples integrate the table."""
         return _PROPOSAL
 
     @abstractmethod
@@ -160,7 +160,7 @@ class MeasuredTable(ABC):
 
     @abstractmethod
     def samples(self, max_count: int | None = None) -> MeasuredSamples:
-        """The raw tuples, or an even, deterministic choice of at most `max_count` of them."""
+        """The raw tuples, or a uniform, deterministic choice of at most `max_count` of them."""
 
     def reflectivity(self, wi: Floats) -> Floats:
         """r (..., C): the integral of f |cos theta_o| over the side of wi (2.7), to about .5 % for a smooth table."""
@@ -188,7 +188,7 @@ class MeasuredTable(ABC):
 
 
 def quadrature(wi: Floats, toward: Material = _PROPOSAL, points: int = _QUADRATURE_POINTS) -> tuple[Floats, Floats]:
-    """wo (N, 3) on the side of wi (3,), where `toward` scatters to, and weights (N,) whose sum over f is r."""
+    """wo (N, 3) on the side of wi (3,), drawn from `toward`, and weights (N,) whose sum times f is r."""
     proposal, u = MaterialBSDF(toward), _low_discrepancy(points)
     all_wi = np.broadcast_to(wi, u.shape)
     wo = proposal.sample(all_wi, u)
@@ -241,18 +241,18 @@ def collect(
 
 
 def too_negative(f: Floats, wo: Floats, measured: Flags) -> Flags:
-    """(N,) whether f cos theta_o is further below zero than any measured one is above it: a mark, not noise."""
+    """(N,) whether f cos theta_o is further below zero than any measured value is above it: a mark, not noise."""
     p = np.where(measured[:, None], f, 0) * np.abs(wo[:, 2:])
     return np.asarray(p.min(axis=1) < -p.max(initial=0))
 
 
 def even_choice(count: int, most: int) -> Indices:
-    """(most,) numbers below `count` >= `most`, jittered and evenly spread, always the same."""
+    """(most,) indices below `count` >= `most`, jittered and evenly spread, deterministic."""
     return ((np.arange(most) + np.random.default_rng(0).random(most)) * (count / most)).astype(np.int64)
 
 
 def negative_readings(samples: MeasuredSamples) -> str:
-    """How many of the tuples are negative, in which channels and how far; empty where none is."""
+    """A sentence on the number, channels and size of negative readings; empty without any."""
     count = samples.below_zero
     if not count:
         return ""

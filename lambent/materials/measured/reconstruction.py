@@ -1,15 +1,16 @@
-"""How a gonio table is looked up between its incident directions, and which way predicts the table itself best.
+"""Methods for looking up a gonio table between its incident directions, and the choice of the best for a table.
 
-Each way says where the sheet of a neighbouring incident direction w_k is looked up for a pair (thesis M, 3.2):
+Each method gives the direction at which the sheet of a neighbouring incident direction w_k is looked up for a pair
+(thesis M, 3.2):
 
-- `half_vector`: at w_k mirrored about h(wi, wo). Peaks follow the mirror direction (Rusinkiewicz 1998).
-- `back_vector`: so too, but where wo is nearer to the light than to its mirror direction, at wo turned as wi is turned
-  to w_k. Peaks about the light, those of retro-reflectors, follow it. At normal incidence both peaks are one; it
-  counts as the light's, which is the stronger one by far where this way is taken.
-- `quadrilinear`: at wo itself. Peaks stay where they were measured.
+- `half_vector`: w_k mirrored about h(wi, wo). Peaks follow the mirror direction (Rusinkiewicz 1998).
+- `back_vector`: the same, but if wo is nearer to the light than to its mirror direction, wo turned as wi is turned to
+  w_k. Peaks about the light, those of retro-reflectors, follow it. At normal incidence the peaks coincide and count as
+  the light's, which is far stronger in tables that use this method.
+- `quadrilinear`: wo itself. Peaks stay where they were measured.
 
-The choice is by leaving one out: inner theta_i are predicted from their neighbours, and the error is E under the
-cube-root metric, which sees faint peaks and dark parts alike, as a share of E against black.
+The choice is made by leaving one out: inner theta_i are predicted from their neighbours. The error is E under the
+cube-root metric, which weighs faint peaks and dark parts alike, relative to E against black.
 """
 
 from __future__ import annotations
@@ -30,24 +31,24 @@ from lambent.materials.measured.protocol import MeasuredSamples
 Reconstruction = Literal["half_vector", "back_vector", "quadrilinear"]
 RECONSTRUCTIONS: tuple[Reconstruction, ...] = get_args(Reconstruction)
 AUTO: Literal["auto"] = "auto"
-CLEARLY = 0.9  # times the error of `half_vector`: what another way must stay below to be taken
-_TUPLES = 3000  # of an incident direction that is left out
+CLEARLY = 0.9  # share of the error of `half_vector` that another method must not exceed
+_TUPLES = 3000  # per incident direction that is left out
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The way in use; `errors` has E of each way as a share of E against black, and is empty where none is known."""
+    """The method in use; `errors` has E of each method relative to E against black, and is empty if unknown."""
 
     way: Reconstruction
     errors: dict[Reconstruction, float] = field(default_factory=dict)
 
 
 Fold = tuple[MeasuredSamples, Callable[[Reconstruction, MeasuredSamples], Floats]]
-"""Tuples of an incident direction, and f (N, C) at them as a table without it predicts it."""
+"""Tuples of an incident direction, and f (N, C) at them as predicted by the table without it."""
 
 
 def choice_of(folds: Iterable[Fold]) -> Choice:
-    """The way that predicts what was left out best; `half_vector` unless another one is clearly better."""
+    """The method with the best predictions; `half_vector` unless another one is clearly better."""
     off, whole = dict.fromkeys(RECONSTRUCTIONS, 0.0), 0.0
     for samples, predicted in folds:
         some = _thinned(samples)
@@ -62,7 +63,7 @@ def choice_of(folds: Iterable[Fold]) -> Choice:
 
 
 def _thinned(samples: MeasuredSamples) -> MeasuredSamples:
-    """Up to _TUPLES tuples, half of them by solid angle and half by light; weights make up for the choice."""
+    """Up to _TUPLES tuples, half of them by solid angle and half by light; weights compensate for the choice."""
     if len(samples) <= _TUPLES:
         return samples
     light = samples.weight * np.abs(samples.wo[:, 2])
@@ -75,9 +76,9 @@ def _thinned(samples: MeasuredSamples) -> MeasuredSamples:
 
 
 def looked_up(way: Reconstruction, wi: Floats, wo: Floats) -> Callable[[Floats], list[tuple[Floats, Any, bool]]]:
-    """Where the sheets of neighbouring incident directions (N, 3) are looked up for the pairs wi, wo (N, 3).
+    """Where to look up the sheets of neighbouring incident directions (N, 3) for the pairs wi, wo (N, 3).
 
-    The function gives directions (N, 3), their shares (N), and whether they belong to a peak about the light.
+    The returned function gives directions (N, 3), their weights (N), and whether they belong to a peak about the light.
     """
     if way == "quadrilinear":
         return lambda neighbour: [(wo, 1.0, False)]
@@ -88,9 +89,9 @@ def looked_up(way: Reconstruction, wi: Floats, wo: Floats) -> Callable[[Floats],
 
     def both(neighbour: Floats) -> list[tuple[Floats, Any, bool]]:
         mirrored = reflect(neighbour, h)
-        # two half-turns, about wi and about the middle: the shortest turn from wi to the neighbour
+        # two half turns, about wi and about the midpoint: the shortest rotation from wi to the neighbour
         turned = reflect(behind, half_vector(wi, neighbour))
-        # where h is the neighbour itself, its peak about the light would appear elsewhere
+        # if h is the neighbour itself, its peak about the light would appear elsewhere
         of_light = np.maximum(share, back_share(components(neighbour), components(mirrored)))
         return [(mirrored, 1 - of_light, False), (turned, of_light, True)]
 

@@ -1,7 +1,7 @@
 """Find the reader of a measured file by its content.
 
 A reader is a module of this package that has `NAME` (str), `recognise(head: bytes, size: int) -> bool` and
-`read(path: Path) -> MeasuredTable`. Endings are never looked at: three formats share `.bsdf`.
+`read(path: Path) -> MeasuredTable`. File suffixes are ignored: three formats share `.bsdf`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ HEAD_BYTES = 1 << 16
 
 
 class Reader(Protocol):
-    """A format's module."""
+    """Interface of a format's module."""
 
     NAME: str
 
@@ -41,20 +41,21 @@ class Reader(Protocol):
 
 @cache
 def readers() -> tuple[Reader, ...]:
-    """Every reader found in the package, by name."""
-    package = sys.modules[__name__.rpartition(".")[0]]  # imports this module, so importing it would be a circle
+    """All readers in the package, by name."""
+    package = sys.modules[__name__.rpartition(".")[0]]  # imports this module, so importing it would be circular
     return tuple(sorted(modules_in(package, having="recognise").values(), key=lambda reader: reader.NAME))
 
 
 def load(path: Path | str, reconstruction: Reconstruction | Literal["auto"] = AUTO) -> MeasuredTable:
     """Read a measured material of any known format.
 
-    `reconstruction` says how a gonio table is looked up between its incident directions, see reconstruction.py.
+    `reconstruction` selects the look-up of a gonio table between its incident directions, see reconstruction.py.
 
     Raises
     ------
     UserError
-        The file is missing, of no known format, or broken; or a reconstruction was given and it is no gonio table.
+        If the file is missing, of no known format, or broken; or if `reconstruction` is given for another kind of
+        table.
     """
     path = Path(path)
     head, size = _head(path)
@@ -76,13 +77,13 @@ def load(path: Path | str, reconstruction: Reconstruction | Literal["auto"] = AU
 
 
 def is_known(path: Path | str) -> bool:
-    """Whether some reader recognises the file, sound or not; a `UserError` as from `load`."""
+    """Whether some reader recognises the file, damaged or not; raises `UserError` like `load`."""
     path = Path(path)
     return _reader_of(*_head(path), path) is not None
 
 
 def _head(path: Path) -> tuple[bytes, int]:
-    """The first bytes of a file and its size, or a `UserError`."""
+    """The first bytes of a file and its size; raises `UserError` if it cannot be read."""
     with open_input(path) as file:
         head, size = file.read(HEAD_BYTES), os.fstat(file.fileno()).st_size
     if not size:
@@ -91,14 +92,14 @@ def _head(path: Path) -> tuple[bytes, int]:
 
 
 def _reader_of(head: bytes, size: int, path: Path) -> Reader | None:
-    """The first reader that claims the file; where none does, the error of the first that failed to tell."""
+    """The first reader that claims the file; without one, raise the first reader's error, if any."""
     failed: UserError | None = None
     for reader in readers():
         try:
             with foreign_bytes(reader.NAME, path):
                 if reader.recognise(head, size):
                     return reader
-        except UserError as error:  # the file may still be another reader's
+        except UserError as error:  # another reader may still claim the file
             failed = failed or error
     if failed is not None:
         raise failed

@@ -1,4 +1,4 @@
-"""Retro-reflection: whether a table has a peak about the light, away from the mirror direction."""
+"""Detect retro-reflection: a peak about the light, away from the mirror direction."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from lambent.core.directions import Floats, angles, direction, normalize
 from lambent.materials.measured.gonio import GonioTable
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 
-RETRO_RATIO = 1.5  # f around the light over f beside it, from which it is a peak
+RETRO_RATIO = 1.5  # f around the light over f beside it, above which it is a peak
 _INNER_DEG = np.array([0.0, 0.2, 0.5, 1.5, 3.0])  # rings about the light; peaks of prisms are narrower than 1 degree
-_OUTER_DEG = np.array([7.0, 12.0, 18.0, 24.0])  # the last two are beside the light
-_LEVEL = 1.05  # a ring that exceeds the one within it by less than noise counts as level
+_OUTER_DEG = np.array([7.0, 12.0, 18.0, 24.0])  # rings farther out; the last two are beside the light
+_LEVEL = 1.05  # a ring exceeding the next inner one by less than this noise counts as level
 _NEAR_DEG, _BESIDE_DEG, _LEAST_NEAR = (0.15, 0.4, 1.0, 3.0, 10.0), (18.0, 30.0), 3
 
 
 def retro(table: MeasuredTable, samples: MeasuredSamples) -> tuple[float, list[str]]:
-    """f in the light's direction over f 18 to 24 degrees beside it; 1 unless f falls from ring to ring about the light.
+    """f towards the light over f 18 to 24 degrees beside it; 1 unless f falls from ring to ring about the light.
 
-    A table with a grid of incident directions is tested at those, so that interpolation neither makes nor hides a peak.
-    A ring counts by its median over azimuth, so that neither a lobe elsewhere nor one wrong reading counts. The peak
-    must stand at most incident directions, and measured tuples near the light must show it too: the lamp often hides
-    them, and `eval` then guesses.
+    A table with a grid of incident directions is tested at these, so that interpolation neither creates nor hides a
+    peak. Each ring counts with its median over azimuth, which ignores lobes elsewhere and single wrong readings. The
+    peak must appear at most incident directions, and in measured tuples near the light: the lamp often hides them, and
+    `eval` then extrapolates.
     """
     found = []
     for theta_deg, phi_deg in _asked(table) if towards_light(samples) > (1 + RETRO_RATIO) / 2 else []:
@@ -40,9 +40,9 @@ def retro(table: MeasuredTable, samples: MeasuredSamples) -> tuple[float, list[s
 
 
 def towards_light(samples: MeasuredSamples) -> float:
-    """How much brighter reflected tuples are near the light than beside it: the largest ratio of medians of f.
+    """The largest ratio, over theta_i, of median f of reflected tuples near the light to that beside it.
 
-    1 where too few tuples tell. Only theta_i at which the mirror direction is well apart count.
+    1 if there are too few tuples. Only theta_i with a clearly separate mirror direction count.
     """
     theta_i = np.degrees(angles(samples.wi)[0])
     apart_deg = np.degrees(2 * np.arcsin((np.linalg.norm(samples.wi - samples.wo, axis=1) / 2).clip(0, 1)))
@@ -55,7 +55,7 @@ def towards_light(samples: MeasuredSamples) -> float:
 
 
 def _between(table: MeasuredTable) -> str:
-    """What becomes of the peak between incident directions."""
+    """A description of the peak between incident directions."""
     if not isinstance(table, GonioTable):
         return "`lambent check` says how well the path tracer's look-up holds that peak"
     if table.choice.way == "back_vector":
@@ -70,7 +70,7 @@ def _between(table: MeasuredTable) -> str:
 
 
 def _asked(table: MeasuredTable) -> list[tuple[float, float]]:
-    """Incident directions in degrees at which the light and the mirror direction are well apart."""
+    """Incident directions in degrees with clearly separate light and mirror directions."""
     if not isinstance(table, GonioTable):
         return [(theta, 0.0) for theta in (30.0, 45.0, 60.0)]
     theta_i = [float(theta) for theta in table.theta_i_deg if 25 <= theta <= 65]

@@ -2,8 +2,8 @@
 
 The file gives f cos(theta_o) = spectra(u) D(u_m) / (4 sigma(u_i)), with u the point that the distribution of visible
 normals warps to the half vector's u_m. Mappings: u_theta = sqrt(2 theta / pi), u_phi = (phi + pi) / (2 pi). Isotropic
-files have at most two phi_i and measure phi_m from phi_i; anisotropic ones may cover half or a quarter of the circle of
-phi_i, with or without a closing node (`azimuths`).
+files have at most two phi_i and measure phi_m from phi_i; anisotropic ones may cover the full circle of phi_i, half or
+a quarter, with or without a closing node (`azimuths`).
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ class RglTable(ReflectionTable):
         return value
 
     def _at(self, wi: Floats, wo: Floats, phi_i: Floats) -> Floats:
-        """f (N, 3) between the nodes around phi_i (N,), or at the outermost."""
+        """f (N, 3) interpolated between the nodes around phi_i (N,), clamped to the outermost."""
         theta_i = elevation(wi)
         m = half_vector(wi, wo)
         phi_m = np.arctan2(m[:, 1], m[:, 0]) - (phi_i if self._isotropic else 0)
@@ -146,7 +146,7 @@ class RglTable(ReflectionTable):
         return np.asarray(np.maximum(value, 0) / wo[:, 2:])
 
     def _factor(self, u_m: Floats, theta_i: Floats, phi_i: Floats) -> Floats:
-        """(N, 1) D / (4 sigma), or 1 for a file that stores f cos itself."""
+        """(N, 1) D / (4 sigma), or 1 for a file that stores f cos directly."""
         if not self._with_jacobian:
             return np.ones((len(u_m), 1))
         whole = Corners((np.zeros(1), np.zeros(1)), (theta_i, phi_i))
@@ -167,7 +167,7 @@ class RglTable(ReflectionTable):
         wi = direction(self._theta[j], self._phi[i])
         m = half_vectors_at(u_m, self._phi[i] if self._isotropic else 0)
         wo = reflect(wi, m)
-        with np.errstate(invalid="ignore", over="ignore"):  # collect leaves out and counts values that are not finite
+        with np.errstate(invalid="ignore", over="ignore"):  # collect counts and drops values that are not finite
             value = self._raw.reshape(-1, 3) * self._factor(u_m, self._theta[j], self._phi[i])
         below: Flags = (wo[:, 2] <= 0) | (density <= 0)
         f = np.divide(value, wo[:, 2:], out=np.zeros_like(value, dtype=float), where=~below[:, None])
@@ -188,7 +188,7 @@ def d_wo_d_um(u_m: Floats, wi: Floats, m: Floats) -> Floats:
 
 
 def _share(index: NDArray[np.integer], count: int) -> Floats:
-    """Weight of a node of an even grid on [0, 1], by the trapezoidal rule."""
+    """Weight of a node of a uniform grid on [0, 1], by the trapezoidal rule."""
     return np.where((index == 0) | (index == count - 1), 0.5, 1.0) / (count - 1)
 
 

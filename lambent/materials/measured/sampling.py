@@ -1,12 +1,12 @@
-"""Scatter from a measured table without a model: reflect, transmit or absorb (thesis M, 3.1), then a new direction.
+"""Scatter from a measured table without a model: reflect, transmit or absorb (thesis M, 3.1), then draw a direction.
 
-Two samplers of the new direction; `docs/decisions.md` compares them:
+Two samplers of the direction, compared in `docs/decisions.md`:
 
 - `Rejection`, the thesis's 3.2: uniform low-discrepancy candidates, accepted with p / (largest p of the row). It
-  follows the table itself, whatever its shape, and needs 2 pi p_max / r candidates per sample: 3 for white paper, 20
+  samples the table itself, whatever its shape, and needs 2 pi p_max / r candidates per sample: 3 for white paper, 20
   for satin, 40 000 for chrome.
-- `Tabulated`: the CDF of `half_vector_grid`, one candidate per sample; the weight corrects its small deviation from the
-  table, so estimates follow the table. For patch matrices it is the CDF of `patch_sheet`, which is exact.
+- `Tabulated`: the CDF of `half_vector_grid`, one candidate per sample; a weight corrects its small deviation, so that
+  estimates follow the table. For patch matrices it is the CDF of `patch_sheet`, which is exact.
 
 `TableBSDF` makes a table a BSDF (eval, pdf, sample), for materials.check and path tracers.
 
@@ -39,7 +39,7 @@ _STEP = 1.2207440846057596 ** -np.arange(1.0, 4.0)  # of Roberts' additive seque
 
 @dataclass(frozen=True)
 class Scattered:
-    """Scattered photons.
+    """Photons after scattering.
 
     Attributes
     ----------
@@ -48,11 +48,11 @@ class Scattered:
     fate : (N,) int8
         ABSORBED, REFLECTED or TRANSMITTED.
     weight : (N, C)
-        Weight per channel; 0 where absorbed. For exact samplers the mean over channels of the others is 1.
+        Weight per channel; 0 where absorbed. For exact samplers the mean over channels is 1 for all others.
     proposals : int
         Number of candidates tried.
     exceeded : int
-        Accepted candidates whose p was above the row's bound; if not 0, such directions are drawn too rarely.
+        Accepted candidates with p above the row's bound; if not 0, such directions are drawn too rarely.
     """
 
     wo: Floats
@@ -63,7 +63,7 @@ class Scattered:
 
 
 class TableBSDF:
-    """A measured table as a BSDF: `eval` is the table's own, `pdf` and `sample` those of its patches or its grid.
+    """A measured table as a BSDF: `eval` comes from the table, `pdf` and `sample` from its patches or its grid.
 
     It is the two-sided sheet that the path tracer renders.
     """
@@ -88,19 +88,20 @@ class TableBSDF:
         return _Part(self.lookup).sample(wo, u)
 
     def looked_up(self, wi: Floats, wo: Floats) -> Floats:
-        """f (..., 3) in 1/sr as the path tracer looks it up; on a grid it deviates a little from `eval`."""
+        """f (..., 3) in 1/sr as looked up by the path tracer; on a grid it deviates slightly from `eval`."""
         return np.stack(self.lookup.evaluate(components(wi), components(wo)), axis=-1)
 
     def steps(self, w: Floats, reverse: bool = False) -> Floats | None:
-        """(N, 4) cells of z and phi within which f is constant; None for tables that are not patches.
+        """(N, 4) cells of z and phi within which f is constant; None for tables without patches.
 
-        Cells of the light's directions, given the viewer's w (3,); with `reverse`, of the viewer's, given the light's.
+        The cells are of the light's directions, given the viewer's w (3,); with `reverse`, of the viewer's, given the
+        light's.
         """
         sheet = patch_sheet_of(self.sheet.table, reverse=reverse)
         return None if sheet is None else sheet.cell_borders(w)
 
     def chi_square(self, wo: Floats, *, samples: int = 1_000_000, seed: int = 0) -> ChiSquare:
-        """Test of `sample` against `pdf` for one wo (3,), in cells along the steps of the density."""
+        """Test `sample` against `pdf` for one wo (3,), in cells along the steps of the density."""
         if isinstance(self.lookup, HalfVectorGrid):
             return _chi_square_in_half_vectors(self, self.lookup, wo, samples, seed)
         if isinstance(self.lookup, TwinGrid):
@@ -120,7 +121,7 @@ class TableBSDF:
 
 @dataclass(frozen=True)
 class _Part:
-    """The sampler and the density of a look-up, on arrays."""
+    """The sampler and the density of one look-up, on arrays."""
 
     lookup: Lookup
 
@@ -134,9 +135,9 @@ class _Part:
 def _chi_square_in_half_vectors(
     bsdf: TableBSDF | _Part, grid: HalfVectorGrid, wo: Floats, samples: int, seed: int
 ) -> ChiSquare:
-    """Test of a sampler on a grid against its density for one wo (3,), in the cells of half or back vectors.
+    """Test a grid's sampler against its density for one wo (3,), in the cells of half or back vectors.
 
-    A transmitted direction counts by that of its mirror image, below the surface.
+    A transmitted direction counts as its mirror image, below the surface.
     """
     theta, phi = (float(a) for a in angles(wo))
     wo = direction(theta, phi if grid.anisotropic else 0.0)
@@ -171,7 +172,7 @@ class _Photons:
         return r, t
 
     def _fates(self, wi: Floats, u: Floats) -> tuple[NDArray[np.int8], Floats, Floats]:
-        """Fates (3.1) for u (N,) uniform in [0, 1), and the probability of each side; r + t > 1 absorbs none."""
+        """Fates (3.1) for u (N,) uniform in [0, 1), and the probability of each side; r + t > 1 absorbs nothing."""
         r, t = self.albedo(wi)
         whole = np.maximum(r + t, 1.0)
         r, t = r / whole, t / whole
@@ -182,8 +183,8 @@ class Rejection(_Photons):
     """Rejection sampling of the table (thesis M, 3.2).
 
     The candidates of all photons of a call form one low-discrepancy sequence, dealt out in random order: evenly spread
-    as a whole, independent for each photon. A photon that took consecutive points would be biased, because the next
-    point depends on the one it rejected.
+    as a whole, independent for each photon. Consecutive points for one photon would cause bias, because the next point
+    depends on the rejected one.
     """
 
     def scatter(self, wi: Floats, seed: int = 0, progress: Progress = silent) -> Scattered:
@@ -237,7 +238,7 @@ class Tabulated(_Photons):
         fate, r, t = self._fates(wi, rng.random(len(wi)))
         u_select, u1, u2 = rng.random((3, len(wi)))
         across = self.lookup.share_across(components(wi))
-        # the fate drawn replaces the sampler's own choice of the side
+        # the drawn fate replaces the sampler's own choice of side
         u_select = np.where(fate == TRANSMITTED, u_select * across, across + u_select * (1 - across))
         wo = np.stack(self.lookup.sample(components(wi), u_select, u1, u2), axis=-1)
         pdf = self.lookup.pdf(components(wo), components(wi))

@@ -1,4 +1,4 @@
-"""Isotropic tables of measurements without a grid, looked up by a moving plane through the nearest of them."""
+"""Isotropic tables of ungridded measurements, looked up by moving least squares over the nearest of them."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, coll
 from lambent.materials.measured.table import ReflectionTable, sensible
 
 NEIGHBOURS = 16
-_SLOPE_PENALTY = 1e-4  # of the plane, per radius of the neighbourhood: keeps it flat where the data are on a line
-_DARK = 0.05  # share of the median f by which the logarithm is shifted: darker values count as alike
+_SLOPE_PENALTY = 1e-4  # of the plane, per radius of the neighbourhood: keeps it flat if the data are on a line
+_DARK = 0.05  # share of the median f added before the logarithm: darker values count as equal
 _ASIDE = 0.7  # .65 = 3/8 sqrt(3) in a corner of the space of pairs that is measured evenly
 _PEAK_RAD = 0.1  # theta_h within which distances count most
 _POINTS_PER_TUPLE, _WEIGHT_POINTS = 90, (1 << 12, 1 << 18)  # of the Monte Carlo weights, and their bounds
@@ -26,16 +26,16 @@ class ScatteredTable(ReflectionTable):
     """Isotropic reflection at scattered directions.
 
     `eval` fits log(f + dark) of the 16 nearest tuples as linear in theta_h, cos theta_d and phi_d, weighted by
-    (1 - d^2)^2 / d^2 with d the distance as a share of that to the 16th (Shepard's interpolation with local planes;
-    Franke & Nielson 1980). The plane may leave the weighted mean of log(f + dark) by 1 - d^2 of the way to any of the
-    16. So f takes the measured value at a tuple, is never brighter or darker than all of the 16, and is continuous
-    where the 16th gives way to another.
+    (1 - d^2)^2 / d^2 with d the distance relative to the 16th (Shepard's interpolation with local planes; Franke &
+    Nielson 1980). The plane may deviate from the weighted mean of log(f + dark) by 1 - d^2 of the distance to any of
+    the 16. So f reproduces the measured value at a tuple, stays within the range of the 16, and is continuous when
+    another tuple replaces the 16th.
 
     Parameters
     ----------
     wi, wo : (N, 3)
     f : (N, 3)
-        1/sr; NaN where it was not measured, negative as measured.
+        1/sr; NaN where not measured, negative as measured.
     """
 
     QUERIES_AT_ONCE: ClassVar[int] = 1 << 11
@@ -45,7 +45,7 @@ class ScatteredTable(ReflectionTable):
         self._usable = sensible(f)
 
     @cached_property
-    def _tree(self) -> Any:  # scipy's class is imported where it is needed
+    def _tree(self) -> Any:  # scipy is imported on demand
         from scipy.spatial import cKDTree
 
         return cKDTree(_place(self._wi[self._usable], self._wo[self._usable]))
@@ -55,7 +55,7 @@ class ScatteredTable(ReflectionTable):
         return _variables(self._wi[self._usable], self._wo[self._usable])
 
     def _nearest(self, place: Floats) -> tuple[Floats, Indices]:
-        """Distances and indices (N, K) of the nearest usable tuples, the nearest first."""
+        """Distances and indices (N, K) of the nearest usable tuples, nearest first."""
         k = min(NEIGHBOURS, self._tree.n)
         distance, index = self._tree.query(place, k=list(range(1, k + 1)))
         return distance, index
@@ -78,20 +78,20 @@ class ScatteredTable(ReflectionTable):
         height = np.log(near + dark)
         plane = np.linalg.solve(normal, weighed @ height)[:, 0]
         mean = (weight[..., None] * height).sum(axis=1)
-        reach = fade[..., None] * (height - mean[:, None])  # how far each tuple lets the plane leave the mean
+        reach = fade[..., None] * (height - mean[:, None])  # largest deviation from the mean that each tuple allows
         bounded = mean + (plane - mean).clip(np.minimum(reach.min(axis=1), 0), np.maximum(reach.max(axis=1), 0))
-        return np.asarray((np.exp(bounded) - dark).clip(near.min(axis=1), near.max(axis=1)))  # against rounding
+        return np.asarray((np.exp(bounded) - dark).clip(near.min(axis=1), near.max(axis=1)))  # against rounding errors
 
     @cached_property
     def lowest_cosine(self) -> float:
-        """cos theta of the direction nearest to grazing that was measured, for the light or the viewer."""
+        """cos theta of the measured direction nearest to grazing, for the light or the viewer."""
         return float(min(self._wi[self._usable, 2].min(), self._wo[self._usable, 2].min()))
 
     def extrapolates(self, wi: Floats, wo: Floats) -> Flags:
-        """(...) whether nothing was measured around the pairs wi, wo (..., 3).
+        """(...) whether no tuples surround the pairs wi, wo (..., 3).
 
-        One of the directions is nearer to grazing than any measured; or the 16 nearest tuples are all to one side, so
-        that their mean is further away than _ASIDE of the distance to the 16th.
+        That is, one direction is nearer to grazing than any measured, or the 16 nearest tuples are all to one side:
+        their mean is further away than _ASIDE of the distance to the 16th.
         """
         wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
         place = _place(wi.reshape(-1, 3), wo.reshape(-1, 3))
@@ -101,7 +101,7 @@ class ScatteredTable(ReflectionTable):
         return np.asarray(aside.reshape(wi.shape[:-1]) | low)
 
     def samples(self, max_count: int | None = None) -> MeasuredSamples:
-        """The file's tuples; the weight is the part of d_wi d_wo nearest to the tuple, in sr^2."""
+        """The file's tuples; the weight is the part of d_wi d_wo nearest to each, in sr^2."""
         from scipy.spatial import cKDTree
 
         count = int(np.clip(_POINTS_PER_TUPLE * len(self._f), *_WEIGHT_POINTS))
@@ -122,7 +122,7 @@ def _place(wi: Floats, wo: Floats) -> Floats:
 
 
 def _variables(wi: Floats, wo: Floats) -> Floats:
-    """(..., 3) variables in which log f is taken as linear; cos theta_d, because f is even in theta_d."""
+    """(..., 3) variables in which log f is linear; cos theta_d, because f is even in theta_d."""
     theta_h, theta_d, folded = _angles(wi, wo)
     return np.stack([theta_h, np.cos(theta_d), folded], axis=-1)
 
@@ -130,7 +130,7 @@ def _variables(wi: Floats, wo: Floats) -> Floats:
 def _angles(wi: Floats, wo: Floats) -> tuple[Floats, Floats, Floats]:
     """theta_h and theta_d, and phi_d in [0, 1], folded by reciprocity and the mirror symmetry of isotropic materials.
 
-    phi_d is scaled by the size of its circle, which is small for theta_h or theta_d near 0.
+    phi_d is scaled by the circumference of its circle, which is small for theta_h or theta_d near 0.
     """
     theta_h, theta_d, phi_d = half_difference_angles(wi, wo)
     return theta_h, theta_d, np.minimum(phi_d, np.pi - phi_d) * (2 / np.pi) * np.sin(theta_h) * np.sin(theta_d)

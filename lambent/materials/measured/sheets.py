@@ -19,10 +19,10 @@ from lambent.materials.measured.protocol import too_negative
 from lambent.materials.measured.table import bracket, fill_holes, sensible
 
 LookUp = Callable[[Floats], Floats]
-_IN_PLANE = 1e-3  # radians off a plane through the pole that still count as in it
+_IN_PLANE = 1e-3  # radians: directions closer to a plane through the pole count as in it
 _LEAST_TRIANGULATED = 4
 _WEIGHT_POINTS = (1 << 12, 1 << 16)
-_HEAVIEST = 4.0  # times the median weight: a tuple at a gap or at the rim does not stand for all beyond
+_HEAVIEST = 4.0  # multiple of the median weight: a tuple at a gap or at the rim does not represent everything beyond
 
 
 @dataclass(frozen=True)
@@ -36,11 +36,11 @@ class Sheet:
     phi_deg : (P,) increasing in [0, 360)
         One turn, spaced as measured.
     f : (T, P, C)
-        1/sr; NaN where it was not measured; negative as the sensor read. Nodes below the horizon are never used.
+        1/sr; NaN where not measured; negative as read. Nodes below the horizon are never used.
     frame : (3, 3), optional
         Orthonormal rows: the directions of phi = 0 and phi = 90 from the pole, and the pole.
     images : (T, P) bool, optional
-        Nodes that repeat another: across the plane of incidence, where only one side was measured, or along the pole.
+        Nodes that duplicate another: across the plane of incidence if only one side was measured, or along the pole.
     """
 
     theta_deg: Floats
@@ -56,7 +56,7 @@ class Sheet:
 
     @cached_property
     def directions(self) -> Floats:
-        """(T P, 3) of the nodes, phi fastest."""
+        """(T P, 3) directions of the nodes, phi fastest."""
         grid = np.radians(np.meshgrid(self.theta_deg, self.phi_deg, indexing="ij"))
         w = direction(*grid).reshape(-1, 3)
         return w if self.frame is None else np.asarray(w @ self.frame)
@@ -69,14 +69,14 @@ class Sheet:
 
     @cached_property
     def _whole(self) -> Floats:
-        """(T, P + 1, C) without holes, the first column repeated at the end."""
+        """(T, P + 1, C) with holes filled, the first column repeated at the end."""
         f = self.values.reshape(self.f.shape)
         usable = _usable(self.values, self.directions).reshape(f.shape[:2])
         filled = fill_holes(f, usable, periodic_axis=1) if usable.any() else np.zeros_like(f)
         return np.concatenate([filled, filled[:, :1]], axis=1)
 
     def at(self, w: Floats, *, about_light: bool = False) -> Floats:
-        """f (N, C) of directions (N, 3), bilinear, negative as read; beyond the grid's theta, that of its last ring."""
+        """f (N, C) of directions (N, 3), bilinear, negative as read; beyond the grid's theta, the last ring is used."""
         theta, phi = angles(w if self.frame is None else w @ self.frame.T)
         t, t1, u = bracket(self.theta_deg, np.degrees(theta))
         turn = np.append(self.phi_deg, self.phi_deg[0] + 360)
@@ -86,7 +86,7 @@ class Sheet:
         return np.asarray(low * (1 - u) + high * u)
 
     def weights(self) -> Floats:
-        """(T P,) solid angles in sr of the nodes' cells, which tile the grid; images give theirs to their nodes."""
+        """(T P,) solid angles in sr of the nodes' cells, which tile the grid; images add theirs to their originals."""
         theta, turn = np.radians(self.theta_deg), np.radians(np.append(self.phi_deg, self.phi_deg[0] + 360))
         half = np.diff(theta) / 2 if len(theta) > 1 else np.array([np.pi])
         edges = np.concatenate([theta[:1] - half[:1], theta[:-1] + half[: len(theta) - 1], theta[-1:] + half[-1:]])
@@ -128,7 +128,7 @@ class ScatteredSheet:
 
     @property
     def measured(self) -> Flags:
-        """(N,) the directions that are not mirror images."""
+        """(N,) whether each direction was measured, that is, is not a mirror image."""
         return ~self.images
 
     @cached_property
@@ -151,14 +151,14 @@ class ScatteredSheet:
     def at(self, w: Floats, *, about_light: bool = False) -> Floats:
         """f (N, C) of directions (N, 3), negative as read.
 
-        A scan in the plane of incidence is looked up by the angle from the mirror direction, or from the light; the
-        lobe is taken as turned about it from one half of the plane to the other. Other sets are interpolated linearly
-        over the triangles of their directions, beyond them by the nearest.
+        A scan in the plane of incidence is looked up by the angle from the mirror direction, or from the light; between
+        the half planes the lobe is assumed rotationally symmetric about it. Other sets are interpolated linearly over
+        the triangles of their directions; beyond them, the nearest is used.
         """
         return (self._lookup_about_light if about_light else self._lookup)(w)
 
     def weights(self) -> Floats:
-        """(N,) the part of the hemisphere nearest to each direction, in sr; one with a mirror image stands for both."""
+        """(N,) the part of the hemisphere nearest to each direction, in sr; mirror images count for the original."""
         from scipy.spatial import cKDTree
 
         count = int(np.clip(16 * len(self.directions), *_WEIGHT_POINTS))
@@ -171,7 +171,7 @@ class ScatteredSheet:
 
 
 def _usable(f: Floats, w: Floats) -> Flags:
-    """(N,) whether values (N, C) are readings: possible ones, and not marks below zero."""
+    """(N,) whether values (N, C) are readings: possible values, and not marks below zero."""
     possible = sensible(f)
     return np.asarray(possible & ~too_negative(f, w, possible))
 
@@ -199,7 +199,7 @@ def _triangulated(w: Floats, f: Floats) -> LookUp:
     tree = cKDTree(w)
     try:
         inside = LinearNDInterpolator(_flat(w), f) if len(w) >= _LEAST_TRIANGULATED else None
-    except QhullError:  # directions on one line, or all the same: the nearest serves
+    except QhullError:  # directions on one line, or all equal: use the nearest
         inside = None
 
     def look_up(asked: Floats) -> Floats:
@@ -218,7 +218,7 @@ def _flat(w: Floats) -> Floats:
 def specular_frame(theta_i_deg: float, phi_i_deg: float) -> Floats:
     """(3, 3) frame about the mirror direction of wi; its x points towards the normal, its y is counter-clockwise.
 
-    On the far side, whose directions are mirrored into the near one, it is the frame about straight transmission.
+    For the far side, whose directions are mirrored to the near one, it is the frame about undeviated transmission.
     """
     theta, phi = np.radians(theta_i_deg), np.radians(phi_i_deg)
     back = np.array([np.cos(phi), np.sin(phi), 0.0])

@@ -11,9 +11,9 @@ from lambent.core.colour import XYZ_TO_RGB, xyz_to_rgb
 def rgb_of_spectra(wavelengths_nm: Floats) -> Floats:
     """Matrix (3, K) that converts K spectral values of a reflectance or BSDF to linear RGB (Rec.709).
 
-    CIE 1931 2 degree observer under illuminant D65, whose white is the white of Rec.709: a flat spectrum of value v
-    becomes (v, v, v). Between the wavelengths the spectrum is taken as linear, beyond them as constant. Saturated
-    spectra can have a negative channel.
+    CIE 1931 2 degree observer under illuminant D65, whose white is that of Rec.709: a flat spectrum of value v becomes
+    (v, v, v). The spectrum is linear between the wavelengths and constant beyond them. Saturated spectra can give a
+    negative channel.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def rgb_of_spectra(wavelengths_nm: Floats) -> Floats:
     hats = np.stack([np.interp(fine_nm, wavelengths_nm, unit) for unit in np.eye(len(wavelengths_nm))])
     xyz = (cmf * power) @ hats.T / (cmf[1] * power).sum()
     rgb = XYZ_TO_RGB @ xyz
-    return np.asarray(rgb / rgb.sum(axis=1, keepdims=True))  # observer and primaries round the white differently
+    return np.asarray(rgb / rgb.sum(axis=1, keepdims=True))  # observer and primaries round the white point differently
 
 
 def rgb_of_measured(spectra: Floats, usable: Flags, wavelengths_nm: Floats) -> tuple[Floats, tuple[str, ...]]:
@@ -43,7 +43,7 @@ def rgb_of_measured(spectra: Floats, usable: Flags, wavelengths_nm: Floats) -> t
 
 
 def rgb_of_xyz(values: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """Linear RGB (..., 3) of tristimulus values under D65, and notes; negative ones stay negative."""
+    """Linear RGB (..., 3) of tristimulus values under D65, and notes; negative values stay negative."""
     rgb, outside = _within_gamut(xyz_to_rgb(values), values)
     notes: tuple[str, ...] = ("tristimulus values were converted to linear RGB under D65",)
     if outside:
@@ -52,7 +52,7 @@ def rgb_of_xyz(values: Floats) -> tuple[Floats, tuple[str, ...]]:
 
 
 def _within_gamut(rgb: Floats, source: Floats) -> tuple[Floats, int]:
-    """RGB (..., 3) without the negative channels of colours outside Rec.709, and how many there are.
+    """RGB (..., 3) with negative channels of colours outside Rec.709 removed, and the number of such colours.
 
     The source (..., K) of such a colour, spectral or tristimulus values, is nowhere negative; otherwise it is noise.
     """

@@ -1,4 +1,4 @@
-"""Tables whose outgoing directions are one grid about the mirror direction, or about that of straight transmission."""
+"""Tables with one grid of outgoing directions about the direction of mirror reflection or undeviated transmission."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def specular_table(
 
 
 def _mirrored(azimuth: Floats, values: Floats) -> tuple[Floats, Floats, Flags]:
-    """Azimuths and values of the whole turn, mirrored from a to -a, and flags (radials, azimuths) of the images."""
+    """Azimuths and values of the full turn, mirrored from a to -a, and flags (radials, azimuths) of the images."""
     half = azimuth <= 180
     inner = (azimuth > 0) & (azimuth < 180)
     whole = np.concatenate([azimuth[half], 360 - azimuth[inner][::-1]])

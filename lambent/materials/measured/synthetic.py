@@ -1,6 +1,6 @@
-"""A gonio-photometer in software: incident grid, outgoing grid, sensor noise, and directions hidden by the lamp's arm.
+"""A simulated gonio-photometer: incident grid, outgoing grid, sensor noise, and directions hidden by the lamp's arm.
 
-It measures any function f(wi, wo): a material document here, any of the path tracer's BSDFs in `bake`.
+It measures any function f(wi, wo): here a material document, in `bake` any BSDF of the path tracer.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Evaluate = Callable[[Floats, Floats], Floats]
 
 @dataclass(frozen=True)
 class Setup:
-    """Settings of the device.
+    """Settings of the simulated device.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ def record(
 
 
 def synthesise(material: Material, setup: Setup | None = None, progress: Progress = silent) -> GonioTable:
-    """The table of a material document, whose fit is therefore known; by default on the thesis's grids."""
+    """The table of a material document, for fits with a known answer; by default on the thesis's grids."""
     setup = setup or (ANISOTROPIC if any(lobe.mx != lobe.my for lobe in material.lobes) else ISOTROPIC)
     evaluate = MaterialBSDF(material).eval
     return record(evaluate, material.name, setup, transmits=material.transmits, progress=progress)
@@ -116,7 +116,7 @@ def outgoing_grid(theta_i_deg: float, phi_i_deg: float, setup: Setup) -> tuple[F
     near = theta_i_deg + np.arange(-reach, reach + 1e-9, fine)
     theta = np.union1d(theta, near[(near >= 0) & (near <= setup.grazing_deg)].round(6))
     phi = np.arange(0, 360, step)
-    across = max(np.sin(np.radians(theta_i_deg)), 1e-3)  # factor by which a step in phi is shorter on the sphere
+    across = max(np.sin(np.radians(theta_i_deg)), 1e-3)  # a step in phi is shorter on the sphere by this factor
     if fine / across < step:
         for middle in (180, 0) if setup.about_lamp else (180,):
             near = phi_i_deg + middle + np.arange(-reach, reach + 1e-9, fine) / across

@@ -1,4 +1,4 @@
-"""Shared by the tables of all formats: interpolation, filled holes, refusal of empty files."""
+"""Shared by the tables of all formats: interpolation, hole filling, rejection of empty files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.errors import UserError
 from lambent.materials.measured.protocol import LARGEST_F, MeasuredTable, TableInfo
 
-MARKS = (-1.0, -99.0, -999.0, -9999.0)  # exactly these; any other negative number is a reading below zero
+MARKS = (-1.0, -99.0, -999.0, -9999.0)  # "not measured"; any other negative number is a reading
 
 
 class ReflectionTable(MeasuredTable):
@@ -51,7 +51,7 @@ def isotropic_brdf(path: Path, reader: str, sizes: dict[str, int], notes: tuple[
 
 
 def mirrored_to_range(wi: Floats, wo: Floats, sign: float, *, quadrant: bool) -> tuple[Floats, Floats]:
-    """The pair (N, 3), mirrored so that wi.y has this sign: turned by 180 degrees, or in x and y for a quadrant."""
+    """The pair (N, 3), mirrored to give wi.y this sign: turned by 180 degrees, or in x and y for a quadrant."""
     flip_y = np.where(wi[:, 1] * sign < 0, -1.0, 1.0)
     flip_x = np.where(wi[:, 0] * sign < 0, -1.0, 1.0) if quadrant else flip_y
     flip = np.stack([flip_x, flip_y, np.ones_like(flip_y)], axis=-1)
@@ -80,12 +80,12 @@ def usable_values(values: Floats) -> Flags:
 
 
 def unmarked(values: Floats) -> Floats:
-    """`values` as in a text file, NaN where a number is one of those that by custom mean: not measured."""
+    """`values` of a text file with the customary marks for "not measured" replaced by NaN."""
     return np.where(np.isin(values, MARKS), np.nan, values)
 
 
 def fill_holes(values: Floats, measured: Flags, periodic_axis: int | None = None) -> Floats:
-    """`values` (grid..., C) with every cell that was not measured set to the nearest measured one, counted in cells.
+    """`values` (grid..., C) with every unmeasured cell set to the nearest measured one, counted in cells.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def fill_holes(values: Floats, measured: Flags, periodic_axis: int | None = None
 
 
 def require_values(values: Floats, measured: Flags, file: Path | str) -> None:
-    """`UserError` where no cell of values (grid..., C) was measured; the message counts the values found."""
+    """Raise `UserError` if no cell of values (grid..., C) was measured; the message counts the values found."""
     if measured.any():
         return
     with np.errstate(invalid="ignore"):

@@ -25,12 +25,12 @@ _DIMENSIONS_MAX = 16
 
 
 def read_tensors(path: Path) -> Tensors:
-    """Every tensor of the file by name, as views of its bytes.
+    """All tensors of the file by name, as views of its bytes.
 
     Raises
     ------
     UserError
-        The header is broken, or a tensor lies outside the file.
+        If the header is broken, or a tensor lies outside the file.
     """
     content = read_bytes(path, TENSOR_BYTES)
     try:
@@ -57,7 +57,7 @@ def _parse(content: bytes, path: Path) -> Tensors:
         at += 11 + 8 * dimensions
         dtype = np.dtype(_TYPES[kind])
         end = offset + math.prod(shape) * dtype.itemsize
-        # One size of 0 makes the product 0, so the others are checked too.
+        # A size of 0 makes the product 0, so the other sizes are checked too.
         if end > len(content) or max(shape, default=0) > len(content):
             got, expected = f"shape {shape} at byte {offset}", f"to end by byte {len(content)}"
             raise UserError("tensor lies outside the file", file=path, field=name, got=got, expected=expected)
@@ -66,7 +66,7 @@ def _parse(content: bytes, path: Path) -> Tensors:
 
 
 def tensor_bytes(tensors: Tensors) -> bytes:
-    """A file of these tensors for `read_tensors`, in their order; each begins at a multiple of 8 bytes."""
+    """Bytes of a file with these tensors in order, readable by `read_tensors`; each starts at a multiple of 8 bytes."""
     kinds = {np.dtype(name): kind for kind, name in _TYPES.items()}
     names = {name: name.encode("utf-8") for name in tensors}
     offset = len(MAGIC) + 6 + sum(13 + len(names[name]) + 8 * tensor.ndim for name, tensor in tensors.items())

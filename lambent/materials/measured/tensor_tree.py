@@ -1,13 +1,13 @@
-"""Tensor trees of Radiance: f that is constant over cells of a disk map, finer where it varies.
+"""Radiance's tensor trees: f constant over cells of a disk map, finer where it varies.
 
-A direction is a place in the unit square: its projection on the sheet, a point of the unit disk, is mapped to the
+A direction is a point in the unit square: its projection on the sheet, a point of the unit disk, is mapped to the
 square by the equal-area map of Shirley & Chiu 1997, "A low distortion map between disk and square". A cell of side s
-therefore has the projected solid angle pi s^2. Rank 4 has the incident heading and the outgoing direction; rank 3 is
+therefore has the projected solid angle pi s^2. Rank 4 has the incident heading and the outgoing direction. Rank 3 is
 isotropic: its first coordinate is (1 - sin theta_i) / 2, of which only [0, 1/2] is used, and the outgoing direction is
-turned so that the incident heading lies at phi = 0.
+turned to put the incident heading at phi = 0.
 
-As text, a tree is nested braces. Braces in braces are the 2^rank halves of a cell; the first coordinate is the lowest
-bit of a branch's number. Numbers in braces are a grid of 2^(rank k) leaves, with the last coordinate fastest.
+As text, a tree is nested braces. Braces in braces are the 2^rank children of a cell; the first coordinate is the lowest
+bit of a child's number. Numbers in braces are a grid of 2^(rank k) leaves, with the last coordinate fastest.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def disk_of(square: Floats) -> Floats:
     """Points (..., 2) of the unit disk for points of [0, 1]^2."""
     a, b = 2 * square[..., 0] - 1, 2 * square[..., 1] - 1
     wide = np.abs(a) > np.abs(b)
-    r = np.where(wide, a, b)  # signed: the opposite quadrant is the same one turned by half a turn
+    r = np.where(wide, a, b)  # signed: the opposite quadrant is the same one turned by 180 degrees
     ratio = np.divide(np.where(wide, b, a), r, out=np.zeros_like(r), where=r != 0)
     phi = np.pi / 4 * np.where(wide, ratio, 2 - ratio)
     return np.stack([r * np.cos(phi), r * np.sin(phi)], axis=-1)
@@ -85,7 +85,7 @@ def grid_points(size: int, dimensions: int) -> Indices:
 
 @dataclass(frozen=True)
 class Cells:
-    """Leaves that queries meet, one entry per query and leaf.
+    """Leaves that queries intersect, one entry per query and leaf.
 
     Attributes
     ----------
@@ -167,12 +167,12 @@ class TensorTree:
         return self.values[index], side / (1 << log)
 
     def walk(self, fixed: tuple[int, ...], place: Floats) -> Cells:
-        """The leaves met by each query, which fixes some coordinates and leaves the rest free.
+        """The leaves that each query intersects; a query fixes some coordinates and leaves the others free.
 
         Parameters
         ----------
         fixed : tuple of int
-            Numbers of the fixed coordinates.
+            Indices of the fixed coordinates.
         place : (Q, len(fixed)) in [0, 1]
         """
         free = self._free(fixed)
@@ -214,12 +214,12 @@ class TensorTree:
 
 
 def parse_tree(text: bytes, rank: Rank) -> TensorTree:
-    """The tree of a text.
+    """Parse the tree of a text.
 
     Raises
     ------
     Malformed
-        Braces do not match, a count of branches or values is impossible, or a word is not a number.
+        If braces do not match, a number of branches or values is impossible, or a word is not a number.
     """
     nest = _Nest(rank)
     for opens, words in _braces(text):
@@ -231,7 +231,7 @@ def parse_tree(text: bytes, rank: Rank) -> TensorTree:
         raise Malformed("a brace that is not closed" if nest.unclosed else "no braces")
     values = numbers_of(text)
     logs = np.frombuffer(nest.logs, np.int8)
-    sizes = np.left_shift(1, rank * logs, dtype=np.int32)  # none is longer than the text
+    sizes = np.left_shift(1, rank * logs, dtype=np.int32)  # no grid is longer than the text
     if len(values) != sizes.sum():
         raise Malformed("a word that is not a number")
     children = np.frombuffer(nest.children, np.int32).reshape(-1, 1 << rank)
@@ -239,13 +239,13 @@ def parse_tree(text: bytes, rank: Rank) -> TensorTree:
 
 
 class _Nest:
-    """Collects branches and grids from braces in order, on a stack of its own, so that depth costs nothing."""
+    """Collects branches and grids from braces in order; its explicit stack makes depth cheap."""
 
     def __init__(self, rank: Rank) -> None:
         self.children = array("i")
         self.logs = array("b")
         self.root: int | None = None
-        self._opened = False  # a brace was opened; its content is not known yet
+        self._opened = False  # a brace was opened; its content is not yet known
         self._rank, self._branches = rank, 1 << rank
         self._log_of = {1 << rank * log: log for log in range(64 // rank)}
         self._path: list[list[int]] = []  # open branches: number, halves filled
@@ -294,12 +294,12 @@ class _Nest:
 
 
 def _braces(text: bytes) -> Iterator[tuple[bool, int]]:
-    """Whether each brace opens, and how many words precede it since the last one; in chunks, to save memory.
+    """Whether each brace opens, and the number of words since the last brace; in chunks, to save memory.
 
     Raises
     ------
     Malformed
-        Words follow the last brace.
+        If words follow the last brace.
     """
     words = 0
     for start in range(0, len(text), _CHUNK):
@@ -327,7 +327,7 @@ def _word_starts(letters: NDArray[np.uint8], before: int) -> Flags:
 
 
 def count_words(text: bytes) -> int:
-    """Number of words between blanks, commas and braces, without making them."""
+    """Number of words between blanks, commas and braces, without creating them."""
     return int(_word_starts(np.frombuffer(text, np.uint8), _BLANKS[0]).sum()) if text else 0
 
 

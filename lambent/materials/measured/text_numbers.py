@@ -21,7 +21,7 @@ HINT_DECIMAL_COMMA = "replace the decimal commas by points, and separate the col
 
 
 def plain_text(content: bytes) -> bytes:
-    """`content` without a byte order mark, with lines ended by a line feed alone."""
+    """`content` without a byte order mark, with line feeds as the only line ends."""
     return content.removeprefix(codecs.BOM_UTF8).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
 
@@ -31,7 +31,7 @@ def head_text(head: bytes) -> bytes | None:
 
 
 def begins_with(pattern: re.Pattern[bytes], head: bytes) -> bool:
-    """Whether the first bytes of a file are text that, without comments, begins with the pattern."""
+    """Whether the first bytes of a file are text that, comments aside, begins with the pattern."""
     text = head_text(head)
     return text is not None and pattern.match(without_comments(text)) is not None
 
@@ -61,7 +61,7 @@ def without_comments(text: bytes) -> bytes:
 
 
 def shown(text: bytes) -> str:
-    """Bytes of a user's file as text for parsing and messages; what is not UTF-8 is replaced."""
+    """Bytes of a user's file as text for parsing and messages; invalid UTF-8 is replaced."""
     return text.decode("utf-8", "replace")
 
 
@@ -78,7 +78,7 @@ def numbers(text: bytes, path: Path, field: str | None = None) -> Floats:
     try:
         return np.fromstring(text, dtype=np.float64, sep=" ")
     except ValueError:
-        pass  # the slow search below finds the word
+        pass  # the slow search below finds the faulty word
     for match in re.finditer(rb"\S+", text):
         try:
             float(match[0])
@@ -95,5 +95,5 @@ def refuse_decimal_commas(text: bytes, path: Path) -> None:
 
 
 def has_decimal_commas(text: bytes) -> bool:
-    """Whether numbers such as 0,25 stand between blanks or semicolons."""
+    """Whether there are numbers such as 0,25 between blanks or semicolons."""
     return _DECIMAL_COMMA.search(text) is not None

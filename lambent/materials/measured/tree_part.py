@@ -1,6 +1,7 @@
 """f of reflection or transmission on one side as tensor trees, grey or in colour.
 
-Colour is a tree of luminance and two of CIE 1976 u' and v', each with its own cells; f is constant where all three are.
+Colour is a tree of luminance and two of CIE 1976 u' and v', each with its own cells; f is constant over intersections
+of their cells.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ from lambent.materials.measured.tensor_tree import (
 )
 
 Tuples = tuple[Floats, Floats, Floats, Floats]
-"""Headings of light that enters (M, 3) and leaves (M, 3), f (M, C), and the solid angle (M,) it leaves by, in sr."""
+"""Headings of light that enters (M, 3) and leaves (M, 3), f (M, C), and the outgoing solid angle (M,) in sr."""
 
-_CHUNK = 16  # queries at a time: a fine tree has tens of thousands of leaves for each
-_RADII, _GRID = 32, 16  # incident directions of the tuples: rank 3, and per side of the square rank 4
-_COARSEST, _THIRDS = 1 / 16, 3  # side of the largest piece of a cell that gives one tuple; pieces per side at least
+_CHUNK = 16  # queries at a time: a fine tree has tens of thousands of leaves per query
+_RADII, _GRID = 32, 16  # number of incident directions of the tuples: for rank 3, and per side of the square for rank 4
+_COARSEST, _THIRDS = 1 / 16, 3  # side of a cell's largest piece per tuple; least pieces per side
 _MOST_TUPLES = 500_000
 _REVERSED_GRID = 32
 
@@ -66,7 +67,7 @@ class TreePart:
 
     @property
     def anisotropy(self) -> float:
-        """0 for rank 3, which is isotropic; infinite for rank 4, whose square cannot be turned."""
+        """0 for rank 3, which is isotropic; infinite for rank 4, whose square cannot be rotated."""
         return 0.0 if self.rank == 3 else np.inf
 
     @property
@@ -84,14 +85,14 @@ class TreePart:
         return self._summed(fixed, incident_coordinates(self.rank, entering))
 
     def hemispherical_reversed(self, leaving: Floats) -> Floats:
-        """The same for reversed light, which enters at a heading by which light of this part leaves."""
+        """Likewise for reversed light, which enters at a heading by which light of this part leaves."""
         if self.rank == 4:
             return self._summed((2, 3), square_of(leaving[:, :2]))
         radii = np.hypot(leaving[:, 0], leaving[:, 1])
         return np.array([self._summed_along(r) for r in radii]).reshape(-1, self.channels)
 
     def tuples(self) -> Tuples:
-        """Every leaf that light of an even choice of incident directions can leave by; large leaves are cut."""
+        """All leaves by which light of a uniform choice of incident directions can leave; large leaves are divided."""
         entering = self._even_incident()
         fixed = tuple(range(self.rank - 2))
         most, cells = _MOST_TUPLES // len(entering), []
@@ -114,7 +115,7 @@ class TreePart:
         return light, leaving, f, np.pi / (_REVERSED_GRID**2 * leaving[:, 2])
 
     def _even_incident(self) -> Floats:
-        """(N, 3) even headings of incident light; at phi = 0 for rank 3, as in the tree."""
+        """(N, 3) uniform headings of incident light; at phi = 0 for rank 3, as in the tree."""
         if self.rank == 4:
             return on_sphere(_square_grid(_GRID))
         r = 1 - (np.arange(_RADII) + 0.5) / _RADII
@@ -140,10 +141,10 @@ class TreePart:
         return total
 
     def _cells(self, fixed: tuple[int, ...], place: Floats) -> Cells:
-        """The cells on which all trees are constant.
+        """The cells over which all trees are constant.
 
-        A leaf of one tree is such a cell if no other tree is finer in its middle: leaves are nested or disjoint, and a
-        tree that cuts a leaf has only smaller leaves there. Of equal leaves the first tree's counts.
+        A leaf of one tree is such a cell if no other tree is finer at its centre: leaves are nested or disjoint, and a
+        tree that divides a leaf has only smaller leaves there. Of equal leaves, the first tree's is used.
         """
         kept = []
         for k, tree in enumerate(self.trees):
@@ -169,9 +170,9 @@ class TreePart:
     def _summed_along(self, radius: float) -> Floats:
         """Share (C,) of reversed light that is scattered, for rank 3.
 
-        Light that enters at sin(theta) = radius meets a circle of that radius over all directions it can leave by. The
-        disk map turns the circle into the outline of a square and keeps the angle linear along each side. A leaf's
-        share is its part of the outline times the ring r dr of its first coordinate.
+        Light that enters at sin(theta) = radius can leave by a circle of that radius over all directions. The disk map
+        turns the circle into the outline of a square and keeps the angle linear along each side. A leaf's share is its
+        part of the outline times the ring r dr of its first coordinate.
         """
         low, high, f_ring = self._backwards
         return np.asarray(_outline(low, high, max(radius, 1e-9)) @ f_ring)
@@ -189,7 +190,7 @@ def _outline(low: Floats, high: Floats, half: float) -> Floats:
 
 
 def _composed(rank: Rank, fixed: tuple[int, ...], at: Floats, middle: Floats) -> Floats:
-    """Places (N, rank) of fixed coordinates and the others."""
+    """Places (N, rank) composed of fixed coordinates and the others."""
     place = np.empty((len(middle), rank))
     place[:, list(fixed)] = at
     place[:, [d for d in range(rank) if d not in fixed]] = middle
@@ -197,7 +198,7 @@ def _composed(rank: Rank, fixed: tuple[int, ...], at: Floats, middle: Floats) ->
 
 
 def _cut(cells: Cells) -> Cells:
-    """The cells cut into nine, and large ones into pieces of at most `_COARSEST`.
+    """The cells divided into nine, and large ones into pieces of at most `_COARSEST`.
 
     With one tuple per cell, a lobe far narrower than the cell would fit with any energy.
     """
@@ -212,7 +213,7 @@ def _cut(cells: Cells) -> Cells:
 
 
 def _square_grid(n: int) -> Floats:
-    """(n^2, 2) points of the disk in the middle of n x n cells of the square."""
+    """(n^2, 2) points of the disk at the centres of n x n cells of the square."""
     return disk_of((grid_points(n, 2) + 0.5) / n)
 
 

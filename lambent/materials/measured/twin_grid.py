@@ -1,8 +1,8 @@
-"""Two half-vector grids for a table with peaks about the light: one holds what mirrors, the other what returns.
+"""Two half-vector grids for a table with peaks about the light: one for mirrored light, one for returned light.
 
-f is the sum of both, divided by `back_share`, which is smooth, so that either part lies in the same cells for every
-viewer. A sample comes from one of them, with a probability by their albedos; the density is that mixture's. Light that
-is transmitted is in the first alone. Conventions and array libraries are those of half_vector_grid.py.
+f is their sum, split by `back_share`, which is smooth, so that each part lies in the same cells for every viewer. A
+sample comes from one of them, with probabilities by albedo; the density is that of the mixture. Transmitted light is in
+the first only. Conventions and array libraries are those of half_vector_grid.py.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from lambent.materials.measured.two_sided import TwoSided
 
 @dataclass(frozen=True)
 class TwinGrid:
-    """The two parts; `returned` (faces, viewers) flat float32 is the probability that a sample is one of `light`."""
+    """The two parts; `returned` (faces, viewers) flat float32 is the probability that a sample comes from `light`."""
 
     ARRAYS: ClassVar[tuple[str, ...]] = (
         *(f"{part}.{name}" for part in ("mirror", "light") for name in HalfVectorGrid.ARRAYS), "returned",
@@ -76,7 +76,7 @@ class TwinGrid:
         return x, y, z
 
     def share_returned(self, wo: Vector, ops: ArrayOps = NUMPY) -> Any:
-        """Probability of a sample of `light`."""
+        """Probability that a sample comes from `light`."""
         return self.mirror.of_viewer(self.returned, wo, ops)
 
     def share_across(self, wo: Vector, ops: ArrayOps = NUMPY) -> Any:
@@ -95,7 +95,7 @@ class TwinGrid:
 def twin_grid_of(
     table: MeasuredTable | TwoSided, shape: GridShape | None = None, progress: Progress = silent
 ) -> TwinGrid:
-    """A table on two grids; `shape` as in `grid_of`, for each."""
+    """Resample a table to two grids; `shape` as in `grid_of`, for each."""
     mirror, light = (grid_of(table, shape, progress, part=part) for part in ("mirror", "light"))
     nodes = (mirror.faces, mirror.kinds, mirror.shape.viewers)
     whole = mirror.albedo.reshape(nodes).sum(axis=1)

@@ -1,4 +1,4 @@
-"""A table as the two-sided sheet that renderers put on meshes, and with light and viewer exchanged."""
+"""A table as the two-sided sheet that renderers put on meshes, and with light and viewer swapped."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from lambent.materials.measured.protocol import MeasuredTable
 
 
 class TwoSided:
-    """A table for light from both sides; without a back of its own it treats light from below as the mirrored pair.
+    """A table for light from both sides; without its own back, it treats light from below as the mirrored pair.
 
-    A table may state whether it has a back by an attribute `has_a_back`. Otherwise it has one if its f for light from
-    below (wi.z < 0) is not that of the mirrored pair, at random pairs.
+    The attribute `has_a_back`, if present, decides. Otherwise the table has a back if, at random pairs, f for light
+    from below (wi.z < 0) differs from that of the mirrored pair.
     """
 
     def __init__(self, table: MeasuredTable) -> None:
@@ -36,7 +36,7 @@ class TwoSided:
 
 
 class Reversed(TwoSided):
-    """The sheet with light and viewer exchanged; its grid samples wo for a given wi."""
+    """The sheet with light and viewer swapped; its grid samples wo for a given wi."""
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         return super().eval(wo, wi)

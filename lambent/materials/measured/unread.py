@@ -1,6 +1,6 @@
-"""Files of measured materials that Lambent knows by their content and does not read, and what to do with each.
+"""Formats of measured materials that Lambent recognises but cannot read, each with advice.
 
-Asked only about files that no reader recognises.
+Used only for files that no reader recognises.
 """
 
 from __future__ import annotations
@@ -25,6 +25,6 @@ _KINDS = (
 
 
 def kind_of(head: bytes) -> tuple[str, str] | None:
-    """What a file that begins with `head` is, and what to do with it; None where that is not known."""
+    """Format of a file that begins with `head`, and advice on it; None if unknown."""
     begin = head[:_HEAD_BYTES]
     return next(((name, remedy) for name, signature, remedy in _KINDS if re.search(signature, begin)), None)

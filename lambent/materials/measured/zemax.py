@@ -6,8 +6,8 @@ Then, per channel (Monochrome, or TristimulusX, Y and Z), DataBegin, the blocks,
 (slow) and angle of incidence (fast): `TIS value`, then a line per azimuth with the BSDF (1/sr, no cosine) per radial
 angle.
 
-ScatterRadial is the angle from the direction of mirror reflection (BTDF: straight transmission), ScatterAzimuth the
-angle about it, 0 towards the normal. The angles of incidence are those of this direction, which are the same.
+ScatterRadial is the angle from the direction of mirror reflection (BTDF: undeviated transmission), ScatterAzimuth the
+angle about it, 0 towards the normal. Angles of incidence are given for this direction; their values are the same.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ _WORDS = {
 }
 _FIRST = re.compile(rb"\s*(?:Source\s+\w+\s+)?(?:Symmetry|SpectralContent|ScatterType|SampleRotation)\s")
 _BLOCK = re.compile(rb"\bTIS\b", re.IGNORECASE)
-_MOST_CHECKED = 16  # angles of incidence whose TIS is compared
+_MOST_CHECKED = 16  # angles of incidence at which TIS is compared
 
 
 def recognise(head: bytes, size: int) -> bool:
-    """Whether the first words are the format's."""
+    """Whether the first words belong to the format."""
     return begins_with(_FIRST, head)
 
 
@@ -76,7 +76,7 @@ def read(path: Path) -> GonioTable:
 
 
 def _header(head: bytes, path: Path) -> tuple[dict[str, str], dict[str, Floats]]:
-    """The words and the lists of angles above the data."""
+    """The keywords and the lists of angles above the data."""
     words: dict[str, str] = {}
     lists: dict[str, Floats] = {}
     for name, (low, high) in LISTS.items():
@@ -113,7 +113,7 @@ def _section(part: bytes, shape: tuple[int, ...], path: Path) -> tuple[Floats, F
         raise UserError("wrong number of data blocks", file=path, got=len(blocks) - 1, expected=expected)
     read_blocks = []
     for number, block in enumerate(blocks[1:], 1):
-        # Without a DataEnd, the next channel's name follows the last block.
+        # Without DataEnd, the next channel's name follows the last block.
         field = f"block {number}"
         found = numbers(re.sub(rb"\n\s*(?:Tristimulus\w*|Monochrome)\s*$", b"", block), path, field)
         if len(found) != each + 1:
@@ -136,7 +136,7 @@ def _table(values: Floats, tis: Floats, lists: dict[str, Floats], words: dict[st
 
 
 def _measured(values: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """Values with NaN where a channel is 0, which writers of the format use for directions that were not measured."""
+    """Values with NaN where a channel is 0, which writers of the format use for unmeasured directions."""
     with np.errstate(invalid="ignore"):
         empty = np.any(values == 0, axis=-1, keepdims=True)
         values = np.where(empty | (np.abs(values) > LARGEST_F), np.nan, unmarked(values))
@@ -144,11 +144,11 @@ def _measured(values: Floats) -> tuple[Floats, tuple[str, ...]]:
 
 
 def _with_tis(table: GonioTable, tis: Floats) -> GonioTable:
-    """The table with a note that compares the file's total integrated scatter with the table's integral."""
+    """The table with a note comparing the file's total integrated scatter with the table's integral."""
     with np.errstate(over="ignore", invalid="ignore"):
         stated = tis[:_MOST_CHECKED].mean(axis=-1)
     wi = direction(np.radians(table.theta_i_deg[:_MOST_CHECKED]), np.radians(table.phi_i_deg[0]))
-    measured = replace(table, reconstruction="quadrilinear")  # at measured directions all ways are one
+    measured = replace(table, reconstruction="quadrilinear")  # at measured directions all methods agree
     ours = (measured.transmissivity(wi) if table.transmitted else measured.reflectivity(wi)).mean(axis=-1)
     pairs = ", ".join(
         f"{s:.4f} ({o:.4f}) at {theta:g}" for s, o, theta in zip(stated, ours, table.theta_i_deg, strict=False)

@@ -1,4 +1,4 @@
-"""Analytic models, one file each, found by discovery: put a file here and it is known everywhere.
+"""Analytic models, one file each, found by discovery: a new file here is available everywhere.
 
 See docs/adding-a-model.md.
 """
@@ -13,7 +13,7 @@ from lambent.materials.models.model import Model
 
 
 def models() -> dict[str, type[Model]]:
-    """Every model by its name, in alphabetical order."""
+    """All models by name, in alphabetical order."""
     found: dict[str, type[Model]] = {}
     for module in modules_in(sys.modules[__name__]).values():
         for _, kind in inspect.getmembers(module, inspect.isclass):
@@ -24,6 +24,6 @@ def models() -> dict[str, type[Model]]:
 
 
 def model_named(name: str) -> type[Model]:
-    """The model of that name; raises `UserError` with the nearest known one."""
+    """The model of that name; raises `UserError` that suggests the nearest known one."""
     found = models()
     return found[known("model", name, found)]

@@ -1,6 +1,6 @@
 """Ashikhmin and Shirley's anisotropic Phong lobe with its coupled diffuse term.
 
-Hazard: 1 - (h.n)^2 in the exponent cancels near the normal; it is built from h.x^2 + h.y^2.
+Hazard: 1 - (h.n)^2 in the exponent cancels near the normal; it is computed from h.x^2 + h.y^2.
 """
 
 from __future__ import annotations

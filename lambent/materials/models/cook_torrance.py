@@ -1,6 +1,6 @@
 """Cook and Torrance's microfacets: Beckmann's distribution, V-shaped grooves, and Fresnel's equations of a metal.
 
-The factor is that of microfacet theory, 1/4 (Walter et al. 2007, eq. 20); the original's 1/pi loses light.
+The factor is microfacet theory's 1/4 (Walter et al. 2007, eq. 20); the original's 1/pi loses light.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""GGX as current engines read it: height-correlated Smith masking, Schlick's Fresnel, visible-normal sampling.
+"""GGX as in current engines: height-correlated Smith masking, Schlick's Fresnel, visible-normal sampling.
 
-Hazard: 1 - (n.h)^2 cancels at low roughness; everything is built from the components of h instead.
+Hazard: 1 - (n.h)^2 cancels at low roughness; everything is computed from the components of h instead.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Ggx(Model):
         stretch = np.array([self.number("alpha_x"), self.number("alpha_y"), 1.0])
         v = normalize(wo * stretch)
         length = np.hypot(v[..., 0], v[..., 1])
-        flat = length < 1e-12  # the viewer is straight above: any tangent serves
+        flat = length < 1e-12  # the viewer is straight above: any tangent works
         safe = np.where(flat, 1.0, length)
         t1 = np.stack([np.where(flat, 1.0, -v[..., 1] / safe), v[..., 0] / safe * ~flat, 0 * safe], axis=-1)
         t2 = np.cross(v, t1)

@@ -37,7 +37,7 @@ class Kurt(Model):
 
     @property
     def lobe(self) -> Lobe:
-        """The lobe with these values, as a material document holds it."""
+        """The lobe with these values, in the form of a material document."""
         mx, my, alpha = (self.number(name) for name in ("mx", "my", "alpha"))
         k, r0 = (triple(self.rgb(name)) for name in ("k", "r0"))
         return Lobe(

@@ -3,7 +3,7 @@
 Conventions: directions (..., 3) in the local frame, wi to the light, wo to the viewer, f in 1/sr without the cosine,
 one row of RGB per direction. A model is two-sided unless it says otherwise.
 
-A parameter's metadata stands once, in its model; validation, sliders and documentation read it from there.
+A parameter's metadata is defined once, in its model; validation, sliders and documentation use it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from lambent.core.arrays import Floats as Floats  # models import it from here
+from lambent.core.arrays import Floats as Floats  # re-exported for models
 from lambent.core.errors import UserError, did_you_mean
 from lambent.core.plain import Triple, triple
 
@@ -33,7 +33,7 @@ PROPERTIES: dict[str, str] = {
 
 @dataclass(frozen=True)
 class Parameter:
-    """One user-controlled variable. `rgb` parameters take one value per channel; `scale` is for sliders and fits."""
+    """One user-controlled parameter. `rgb` parameters take one value per channel; `scale` is for sliders and fits."""
 
     name: str
     low: float
@@ -45,7 +45,7 @@ class Parameter:
     rgb: bool = False
 
     def checked(self, value: object) -> Value:
-        """`value` as float, or as RGB for an rgb parameter; raises `UserError` unless it is within the bounds."""
+        """`value` as float, or as RGB for an rgb parameter; raises `UserError` if it is out of bounds."""
         try:
             numbers = np.asarray(value, float)
         except (TypeError, ValueError):
@@ -64,7 +64,7 @@ class Model(ABC):
     title: ClassVar[str]
     source: ClassVar[str]  # author, year, title, equations
     parameters: ClassVar[tuple[Parameter, ...]]
-    white: ClassVar[Mapping[str, Value]]  # parameters that should reflect everything
+    white: ClassVar[Mapping[str, Value]]  # parameters with which everything should be reflected
     known_deficiencies: ClassVar[Mapping[str, str]] = {}  # name in PROPERTIES -> why the model lacks it
 
     def __init__(self, **values: object) -> None:
@@ -99,6 +99,6 @@ class Model(ABC):
 
     @classmethod
     def shader(cls) -> str | None:
-        """WGSL of the model, from the .wgsl file beside its own; None where there is none."""
+        """WGSL of the model, from the .wgsl file beside its module; None if there is none."""
         file = Path(inspect.getfile(cls)).with_suffix(".wgsl")
         return file.read_text(encoding="utf-8") if file.is_file() else None

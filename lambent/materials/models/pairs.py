@@ -1,4 +1,4 @@
-"""Shared by the models: pairs of directions turned to the upper side, Beckmann's distribution, and samples."""
+"""Shared by the models: pairs of directions mirrored to the upper side, Beckmann's distribution, and samplers."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Pair:
 
 
 def upper(wi: Floats, wo: Floats) -> Pair:
-    """The pair (..., 3) seen from above; a two-sided surface scatters alike from below."""
+    """The pair (..., 3) seen from above; a two-sided surface scatters identically from below."""
     seen = np.asarray(wi[..., 2] * wo[..., 2] > 0)
     up_i, up_o = np.broadcast_arrays(raised(wi), raised(wo))
     up_i, up_o = (np.maximum(w, (-np.inf, -np.inf, LOWEST_COSINE)) for w in (up_i, up_o))
@@ -51,7 +51,7 @@ def upper(wi: Floats, wo: Floats) -> Pair:
 def beckmann(h: Floats, mx: float, my: float) -> Floats:
     """Beckmann's distribution of the normals h (..., 3) with slopes mx, my, in 1/sr.
 
-    tan^2(theta_h) is built from the components of h, which do not cancel.
+    tan^2(theta_h) is computed from the components of h, which avoids cancellation.
     """
     slope2 = ((h[..., 0] / mx) ** 2 + (h[..., 1] / my) ** 2) / np.maximum(h[..., 2] ** 2, 1e-12)
     return np.asarray(np.exp(-slope2) / (np.pi * mx * my * np.maximum(h[..., 2] ** 4, 1e-24)))
@@ -64,7 +64,7 @@ def sample_beckmann(u1: Floats, u2: Floats, mx: float, my: float) -> Floats:
 
 
 def reflected(wo: Floats, h: Floats) -> Floats:
-    """wi = wo mirrored about h (..., 3), which is on the upper side; wi.z = 0 where that ends below the surface."""
+    """wi = wo mirrored about h (..., 3), which is on the upper side; wi.z = 0 if that falls below the surface."""
     wi = reflect(raised(wo), h)
     wi[..., 2] = np.maximum(wi[..., 2], 0.0) * np.where(wo[..., 2] > 0, 1.0, -1.0)
     return wi

@@ -9,8 +9,8 @@ G = min(1, 2 h.z wi.z / wi.h, 2 h.z wo.z / wo.h):
 
 - `Lambertian`: albedo / pi.
 - `NganWard` (Ngan, Durand & Matusik 2005): albedo exp(-tan^2 theta_h / m^2) / (4 pi m^2 sqrt(wi.z wo.z)) (Ward 1992).
-- `NganCookTorrance` (the same paper): albedo F (D0 / pi) G / (pi wi.z wo.z); F is Schlick's with `eta` as the
-  reflectance at normal incidence, in spite of its name.
+- `NganCookTorrance` (the same paper): albedo F (D0 / pi) G / (pi wi.z wo.z); F is Schlick's, and `eta`, despite its
+  name, the reflectance at normal incidence.
 - `LowCookTorrance` (Low, Kronander, Ynnerman & Unger 2012): albedo F D0 G / (pi wi.z wo.z), pi times the above; F is
   that of a dielectric with the real index of refraction `eta`.
 
@@ -35,7 +35,7 @@ from lambent.core.plain import Triple, triple
 from lambent.materials.fresnel import dielectric, schlick_weight
 
 MERL_CHANNELS = np.array([1.0, 1.15, 1.66])
-"""Factors that convert Ngan's coefficients to f as MERL's readers give it."""
+"""Factors that convert Ngan's coefficients to f as read by MERL's readers."""
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _RGB = rf"\[\s*({_NUMBER})\s*,\s*({_NUMBER})\s*,\s*({_NUMBER})\s*\]"
 _LINE = re.compile(
@@ -99,12 +99,12 @@ class Published:
 
 
 def read_fits(path: Path) -> dict[str, Published]:
-    """Every material of a .fit file, by its name.
+    """All materials of a .fit file, by name.
 
     Raises
     ------
     UserError
-        A line is no material of this form, names an unknown model or field, or holds an impossible number.
+        If a line is not a material of this form, names an unknown model or field, or has an impossible number.
     """
     try:
         text = read_bytes(path, FITS_BYTES).decode("utf-8-sig")
