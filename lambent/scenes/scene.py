@@ -7,7 +7,7 @@ All dataclasses are frozen; arrays are not to be written to.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -28,6 +28,7 @@ UvTransform = tuple[Triple, Triple]
 IDENTITY: UvTransform = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 EYE_HEIGHT_M = 1.6  # of a standing person
 SUN_RADIUS_DEG = 0.2679  # Mitsuba's aperture of .5358 degrees
+TRIANGLES_AT_ONCE = 1 << 20
 LEAST_SUN_DEG, MOST_SUN_DEG = 0.05, 30.0
 Ground = Literal["diffuse", "black"]
 
@@ -321,7 +322,7 @@ class Scene:
     @property
     def corners(self) -> Array:
         """(F, 3, 3) float64 world positions of the corners of all triangles, object after object."""
-        return np.concatenate([o.mesh.corners for o in self.objects])
+        return corners_of([o.mesh for o in self.objects])
 
     def merged(self, same: Mapping[str, str]) -> Scene:
         """With objects of each material named in `same` made of the other one."""
@@ -333,5 +334,36 @@ class Scene:
 
 def bounds_of(objects: Iterable[SceneObject]) -> tuple[Array, Array]:
     """Corners (3,), (3,) of the box around objects."""
-    lows, highs = zip(*(o.mesh.bounds for o in objects), strict=True)
-    return np.min(lows, axis=0), np.max(highs, axis=0)
+    boxes = boxes_of([o.mesh for o in objects])
+    return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+
+
+def boxes_of(meshes: Sequence[Mesh]) -> Array:
+    """(N, 2, 3) float32 least and largest corner of the box around each mesh, all of them at once."""
+    positions = np.concatenate([mesh.positions for mesh in meshes])
+    first = np.cumsum([0] + [len(mesh.positions) for mesh in meshes[:-1]])
+    return np.stack([np.minimum.reduceat(positions, first), np.maximum.reduceat(positions, first)], axis=1)
+
+
+def corners_of(meshes: Sequence[Mesh]) -> Array:
+    """(F, 3, 3) float64 positions of the corners of all triangles, mesh after mesh, all of them at once."""
+    return vertices_at_corners(meshes, [mesh.positions for mesh in meshes])
+
+
+def vertices_at_corners(meshes: Sequence[Mesh], values: Sequence[Array]) -> Array:
+    """(F, 3, ...) float64 values at the corners of all triangles; `values` are those of each mesh's vertices."""
+    first = np.cumsum([0] + [len(own) for own in values[:-1]])
+    faces = np.concatenate([mesh.faces for mesh in meshes]).astype(np.int64)
+    faces += np.repeat(first, [len(mesh.faces) for mesh in meshes])[:, None]
+    return np.asarray(np.concatenate(values)[faces], float)
+
+
+def batches_of(meshes: Sequence[Mesh]) -> Iterator[slice]:
+    """Meshes in batches of about TRIANGLES_AT_ONCE triangles: what is found of all at once then takes little memory."""
+    ends = np.cumsum([len(mesh.faces) for mesh in meshes])
+    first = 0
+    while first < len(meshes):
+        before = ends[first - 1] if first else 0
+        last = max(first + 1, int(np.searchsorted(ends, before + TRIANGLES_AT_ONCE, side="right")))
+        yield slice(first, last)
+        first = last
