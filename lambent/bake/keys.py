@@ -28,17 +28,25 @@ def key_of(what: str, revision: int, *inputs: object) -> str:
     result = hashlib.sha256(f"{what} {revision}".encode())
     for one in inputs:
         if isinstance(one, np.ndarray):
-            result.update(f"{_name_of(one.dtype)} {one.shape}".encode())
-            result.update(np.ascontiguousarray(one).tobytes())
+            result.update(_head_of(one.dtype, one.shape))
+            result.update(np.ascontiguousarray(one).data)
+        elif type(one) is float:
+            result.update(_number(one))
         else:
             result.update(_TEXT.encode(one).encode())
     return result.hexdigest()
 
 
-@lru_cache(maxsize=64)
-def _name_of(dtype: np.dtype[Any]) -> str:
-    """As str(dtype), which takes longer than to hash a small array."""
-    return str(dtype)
+@lru_cache(maxsize=256)
+def _head_of(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
+    """Of an array: to make it takes longer than to hash a small one."""
+    return f"{dtype} {shape}".encode()
+
+
+@lru_cache(maxsize=256)
+def _number(value: float) -> bytes:
+    """As JSON has it: an encoder takes long to start."""
+    return json.dumps(value).encode()
 
 
 def _nested(value: object) -> object:

@@ -10,7 +10,8 @@ import numpy as np
 from lambent.core.arrays import Flags, Floats
 from lambent.core.camera import Camera, overview
 from lambent.core.plain import triple
-from lambent.scenes.scene import EYE_HEIGHT_M, SceneObject, boxes_of, corners_of
+from lambent.scenes.mesh import boxes_of, corners_of
+from lambent.scenes.scene import EYE_HEIGHT_M, SceneObject
 
 GROUND, FLAT = 4.0, 0.05  # a ground is so many times as large as all others together, and not higher than its share
 PLACES, MOST_TRIED = 11, 25  # on each side of the floor, and of those with a floor and a ceiling

@@ -7,7 +7,7 @@ All dataclasses are frozen; arrays are not to be written to.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -21,6 +21,8 @@ from lambent.core.plain import Triple
 from lambent.core.surroundings import Axis, Layout
 from lambent.materials.document import Material
 from lambent.scenes.ies import Photometry
+from lambent.scenes.mesh import Mesh as Mesh  # most users of scenes want it too
+from lambent.scenes.mesh import boxes_of, corners_of
 
 Array = NDArray[np.floating]
 Border = tuple[float, float, float, float]
@@ -28,36 +30,8 @@ UvTransform = tuple[Triple, Triple]
 IDENTITY: UvTransform = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 EYE_HEIGHT_M = 1.6  # of a standing person
 SUN_RADIUS_DEG = 0.2679  # Mitsuba's aperture of .5358 degrees
-TRIANGLES_AT_ONCE = 1 << 20
 LEAST_SUN_DEG, MOST_SUN_DEG = 0.05, 30.0
 Ground = Literal["diffuse", "black"]
-
-
-@dataclass(frozen=True)
-class Mesh:
-    """Triangles. positions, normals (V, 3) float32; uv (V, 2) float32; tangents (V, 3) float32; faces (T, 3) uint32.
-
-    `tangents` is the brushing direction t of the shading frame, unit, at right angles to the normal (b = n x t).
-    """
-
-    positions: Array
-    normals: Array
-    tangents: Array
-    uv: Array
-    faces: NDArray[np.uint32]
-
-    @property
-    def bounds(self) -> tuple[Array, Array]:
-        return self.positions.min(axis=0), self.positions.max(axis=0)
-
-    @property
-    def corners(self) -> Array:
-        """(T, 3, 3) float64 positions of the triangles' corners."""
-        return self.corners_of(slice(None))
-
-    def corners_of(self, faces: NDArray[np.integer] | slice) -> Array:
-        """(K, 3, 3) float64 positions of the corners of some triangles."""
-        return np.asarray(self.positions[self.faces[faces]], float)
 
 
 @dataclass(frozen=True)
@@ -336,34 +310,3 @@ def bounds_of(objects: Iterable[SceneObject]) -> tuple[Array, Array]:
     """Corners (3,), (3,) of the box around objects."""
     boxes = boxes_of([o.mesh for o in objects])
     return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
-
-
-def boxes_of(meshes: Sequence[Mesh]) -> Array:
-    """(N, 2, 3) float32 least and largest corner of the box around each mesh, all of them at once."""
-    positions = np.concatenate([mesh.positions for mesh in meshes])
-    first = np.cumsum([0] + [len(mesh.positions) for mesh in meshes[:-1]])
-    return np.stack([np.minimum.reduceat(positions, first), np.maximum.reduceat(positions, first)], axis=1)
-
-
-def corners_of(meshes: Sequence[Mesh]) -> Array:
-    """(F, 3, 3) float64 positions of the corners of all triangles, mesh after mesh, all of them at once."""
-    return vertices_at_corners(meshes, [mesh.positions for mesh in meshes])
-
-
-def vertices_at_corners(meshes: Sequence[Mesh], values: Sequence[Array]) -> Array:
-    """(F, 3, ...) float64 values at the corners of all triangles; `values` are those of each mesh's vertices."""
-    first = np.cumsum([0] + [len(own) for own in values[:-1]])
-    faces = np.concatenate([mesh.faces for mesh in meshes]).astype(np.int64)
-    faces += np.repeat(first, [len(mesh.faces) for mesh in meshes])[:, None]
-    return np.asarray(np.concatenate(values)[faces], float)
-
-
-def batches_of(meshes: Sequence[Mesh]) -> Iterator[slice]:
-    """Meshes in batches of about TRIANGLES_AT_ONCE triangles: what is found of all at once then takes little memory."""
-    ends = np.cumsum([len(mesh.faces) for mesh in meshes])
-    first = 0
-    while first < len(meshes):
-        before = ends[first - 1] if first else 0
-        last = max(first + 1, int(np.searchsorted(ends, before + TRIANGLES_AT_ONCE, side="right")))
-        yield slice(first, last)
-        first = last

@@ -11,7 +11,8 @@ from lambent.core.arrays import Floats, Indices
 from lambent.core.directions import normalize
 from lambent.core.geometry import area_vectors, triangle_normals
 from lambent.scenes.geometry import tangents_along
-from lambent.scenes.scene import Mesh, SceneObject, batches_of, corners_of, vertices_at_corners
+from lambent.scenes.mesh import Mesh, batches_of, corners_of, vertices_at_corners
+from lambent.scenes.scene import SceneObject
 
 LEANING_DEG = 40.0  # from its face, for a normal to be worth a warning; those of a round thing of 10 sides lean 18
 MUCH = 0.2  # of an object's area: fillets lean, and are meant to
