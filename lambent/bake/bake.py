@@ -138,7 +138,7 @@ def bake(
         undivided, sight = scene, Sight(scene)
         if "geometry" in order:
             sight = cut_for_viewers(divided(sight, store, progress, timed), store, timed)
-            find_backs(sight, store, timed, anew=not resume)
+            find_backs(sight, store, timed, progress, anew=not resume)
             scene = sight.scene
         store.set_document("changes", changes)
         write_source(store, scene)

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import basis
 from lambent.core.geometry import triangle_areas, triangle_normals
+from lambent.core.progress import Progress, silent, tracked
 from lambent.materials.document import Material
 from lambent.scenes.floor_plan import FloorPlan, Surroundings, floor_plan, may_have_walls, shared_cells
 from lambent.scenes.mesh import Mesh, batches_of, corners_of, vertices_at_corners
@@ -74,7 +75,7 @@ class Reflector:
         return sum(part.area_m2 for part in self.parts)
 
 
-def find_reflectors(scene: Scene) -> tuple[Reflector, ...]:
+def find_reflectors(scene: Scene, progress: Progress = silent) -> tuple[Reflector, ...]:
     """The planar reflectors of a scene, the largest first."""
     rulings = [_ruling(scene.reflector_rules, o.name) for o in scene.objects]
     forced = {o.name for o, ruling in zip(scene.objects, rulings, strict=True) if ruling is True}
@@ -101,7 +102,7 @@ def find_reflectors(scene: Scene) -> tuple[Reflector, ...]:
 
     for plane in _given_planes(scene.reflector_rules):
         take(plane)
-    for seed in faces.seeds(is_forced):
+    for seed in tracked(faces.seeds(is_forced), progress, "planar reflectors"):
         wanted = free[seed] and (count < TRIED or is_forced[seed])
         if wanted and len(near := faces.in_plane(faces.plane_of(seed), free)):
             take(faces.fitted(near))
@@ -238,8 +239,9 @@ class _Faces:
         self, plane: Floats, mine: Indices, objects: list[SceneObject], materials: Mapping[str, Material]
     ) -> Reflector:
         parts, two_sided = [], False
-        for i in np.unique(self.owner[mine]):
-            here = mine[self.owner[mine] == i]
+        owners, counts = np.unique(self.owner[mine], return_counts=True)
+        ordered = mine[np.argsort(self.owner[mine], kind="stable")]
+        for i, here in zip(owners, np.split(ordered, np.cumsum(counts)[:-1]), strict=True):
             whole = len(here) == len(objects[i].mesh.faces)
             two_sided |= bool(whole or materials[objects[i].material].transmits)
             parts.append(ReflectorPart(objects[i].name, self.number[here], float(self.area[here].sum())))

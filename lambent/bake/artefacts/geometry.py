@@ -66,7 +66,7 @@ def describe(context: BakeContext) -> None:
         reflectors = tuple(map(ReflectorRecord.model_validate, store.documents[SCENE]["reflectors"]))
     else:
         with context.timed(REFLECTORS):
-            reflectors = tuple(map(_reflector_record, find_reflectors(scene)))
+            reflectors = tuple(map(_reflector_record, find_reflectors(scene, context.progress)))
     write_scene_record(store, scene_record_of(scene, reflectors))
     store.set_document(REFLECTORS, key)
 

@@ -81,6 +81,7 @@ def cuts_of(sight: Sight, progress: Progress = silent) -> dict[str, Cut]:
     from lambent.bake.tracing.solids import SolidTest
     from lambent.bake.tracing.visibility import viewing_places
 
+    progress(0, 1, "views of probes")
     places = viewing_places(scene, sight.everything)
     tried = _worth_trying(sight, shiny, places)
     if not tried:
