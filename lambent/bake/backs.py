@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from lambent.bake.engine import engine
 from lambent.bake.keys import geometry_inputs, key_of
+from lambent.bake.sight import Sight
 from lambent.bake.timing import Timed, untimed
+from lambent.core.progress import Progress, silent
 from lambent.scenes.scene import Scene
 from lambent.store.contract import is_two_sided
 from lambent.store.store import Store
@@ -17,8 +19,9 @@ BACKS = "backs"  # document: its key, and the objects
 LEAST = 4e-5  # share of all that viewers see, below which a back is left black: ten rays
 
 
-def find_backs(scene: Scene, store: Store, timed: Timed = untimed, *, anew: bool = False) -> None:
+def find_backs(sight: Sight, store: Store, timed: Timed = untimed, progress: Progress = silent, *, anew: bool = False) -> None:
     """Note in the store whose backs are seen: as before where geometry is the same, whatever cameras, unless `anew`."""
+    scene = sight.scene
     clear = sorted(name for name, material in scene.materials.items() if material.transmits)
     key = key_of(BACKS, 2, clear, [o.material for o in scene.objects], *geometry_inputs(scene))
     if not anew and store.documents.get(BACKS, {}).get("key") == key:
@@ -26,8 +29,9 @@ def find_backs(scene: Scene, store: Store, timed: Timed = untimed, *, anew: bool
     engine()  # before Mitsuba is imported
     from lambent.bake.tracing.viewed import seen_from_behind
 
+    progress(0, 1, "backs in view")
     with timed(BACKS):
-        found = seen_from_behind(scene, LEAST)
+        found = seen_from_behind(sight, LEAST)
     store.set_document(BACKS, {"key": key, "objects": found})
 
 

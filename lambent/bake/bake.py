@@ -26,6 +26,7 @@ from lambent.bake.memory import check_memory
 from lambent.bake.methods import METHODS, check_groups, chosen
 from lambent.bake.probes.division import divided
 from lambent.bake.quality import Quality, quality_named
+from lambent.bake.sight import Sight
 from lambent.bake.timing import Stopwatch
 from lambent.bake.view import View
 from lambent.bake.watch import Watch
@@ -134,10 +135,11 @@ def bake(
     with Store.create(store_path, inputs_of(scene)) as store:
         store.set_document(METHODS, methods)
         timed = Stopwatch(store)
-        undivided = scene
+        undivided, sight = scene, Sight(scene)
         if "geometry" in order:
-            scene = cut_for_viewers(divided(scene, store, progress, timed), store, timed)
-            find_backs(scene, store, timed, anew=not resume)
+            sight = cut_for_viewers(divided(sight, store, progress, timed), store, timed)
+            find_backs(sight, store, timed, progress, anew=not resume)
+            scene = sight.scene
         store.set_document("changes", changes)
         write_source(store, scene)
         if not resume:
@@ -145,7 +147,7 @@ def bake(
         context = BakeContext(
             scene, store, kinds, quality, methods, seed, progress, undivided, tuple(views), editables or {},
             environment, bounces or Bounces(), workers or InProcess(), timed,
-            watch or Watch(),
+            watch or Watch(), sight,
         )  # fmt: skip
         for kind in order:
             if context.stale(kind):

@@ -23,6 +23,7 @@ from lambent.bake.backs import backs_of, crossed_by_light
 from lambent.bake.bounces import Bounces
 from lambent.bake.engine import engine
 from lambent.bake.quality import Quality
+from lambent.bake.sight import Sight
 from lambent.bake.surfaces.atlas import Atlas, separated
 from lambent.bake.timing import Timed, untimed
 from lambent.bake.view import View
@@ -59,7 +60,7 @@ class BakeContext:
     them whole, as views show them. `editables` are terms of materials that are not those of their documents;
     `bounces` says what interreflections are baked for, and `environment` lights the views instead of the scene's own.
     `workers` do jobs that other processes can do. `timed(step)` notes what a step takes that is no kind of artefact.
-    `watch` is told what is finished.
+    `watch` is told what is finished. `sight` is what was found of `scene` before, if anything was.
     """
 
     scene: Scene
@@ -77,6 +78,7 @@ class BakeContext:
     workers: Workers = field(default_factory=InProcess)
     timed: Timed = untimed
     watch: Watch = field(default_factory=Watch)
+    sight: Sight | None = None
     _keys: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def settings(self, kind: str) -> Any:

@@ -8,40 +8,43 @@ import numpy as np
 
 from lambent.bake.engine import engine
 from lambent.bake.keys import geometry_inputs, key_of
-from lambent.bake.surfaces.cutting import cut, is_too_long
+from lambent.bake.sight import Sight
+from lambent.bake.surfaces.cutting import cut, too_long
 from lambent.bake.timing import Timed, untimed
-from lambent.scenes.scene import Scene
 from lambent.store.contract import CUTS
 from lambent.store.store import Store
 
 MOST_EYES = 128
 
 
-def cut_for_viewers(scene: Scene, store: Store, timed: Timed = untimed) -> Scene:
+def cut_for_viewers(sight: Sight, store: Store, timed: Timed = untimed) -> Sight:
     """The scene with very large triangles cut (`surfaces.cutting`), as they were before if geometry is the same.
 
     The document "cuts" says for which eyes: cameras that are added later change nothing.
     """
-    long = [o.name for o in scene.objects if is_too_long(o.mesh)]
-    if not long:
-        return scene
+    scene = sight.scene
+    long = too_long([o.mesh for o in scene.objects])
+    if not len(long):
+        return sight
     key = key_of("cuts", 1, *geometry_inputs(scene))
     found = store.documents.get(CUTS)
     if not isinstance(found, dict) or found.get("key") != key:
         engine()  # before Mitsuba is imported
-        from lambent.bake.tracing.viewed import viewers_of
-
         with timed(CUTS):
-            viewers = viewers_of(scene)
+            viewers = sight.viewers
         found = {"key": key, "eyes": [], "reach_m": 0.0, "objects": []}
         if viewers is not None:
-            names = [o.name for o in scene.objects if is_too_long(o.mesh, viewers.reach_m)]
+            longer = too_long([scene.objects[number].mesh for number in long], viewers.reach_m)
             eyes = np.unique(viewers.eyes.round(2), axis=0)[:MOST_EYES]
+            names = [scene.objects[number].name for number in long[longer]]
             found |= {"eyes": eyes.tolist(), "reach_m": round(viewers.reach_m, 2), "objects": names}
         store.set_document(CUTS, found)
+    if not found["objects"]:
+        return sight
     eyes, reach = np.array(found["eyes"]).reshape(-1, 3), found["reach_m"]
-    objects = (replace(o, mesh=cut(o.mesh, eyes, reach)) if o.name in found["objects"] else o for o in scene.objects)
-    return replace(scene, objects=tuple(objects))
+    names = set(found["objects"])
+    objects = (replace(o, mesh=cut(o.mesh, eyes, reach)) if o.name in names else o for o in scene.objects)
+    return Sight(replace(scene, objects=tuple(objects)))
 
 
 def longest_piece(store: Store) -> float:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from lambent.core.images import read_image
 from lambent.core.inputs import sha256_of
 from lambent.scenes.computed import lat_long_image
 from lambent.scenes.light_groups import names_of_lights
-from lambent.scenes.scene import ComputedEnvironment, Environment, ImageEnvironment, Scene, SunSky
+from lambent.scenes.scene import ComputedEnvironment, Environment, ImageEnvironment, Scene, SceneObject, SunSky
 from lambent.scenes.textures import digest, parts
 
 DAYLIGHT = "clear_sky 1"  # the model that daylight is calibrated to: raise where it changes
@@ -28,17 +28,14 @@ def key_of(what: str, revision: int, *inputs: object) -> str:
     result = hashlib.sha256(f"{what} {revision}".encode())
     for one in inputs:
         if isinstance(one, np.ndarray):
-            result.update(f"{_name_of(one.dtype)} {one.shape}".encode())
-            result.update(np.ascontiguousarray(one).tobytes())
+            result.update(f"{one.dtype} {one.shape}".encode())
+            result.update(np.ascontiguousarray(one).data)
+        elif isinstance(one, _Meshes):
+            for part in one.parts():
+                result.update(part)
         else:
             result.update(_TEXT.encode(one).encode())
     return result.hexdigest()
-
-
-@lru_cache(maxsize=64)
-def _name_of(dtype: np.dtype[Any]) -> str:
-    """As str(dtype), which takes longer than to hash a small array."""
-    return str(dtype)
 
 
 def _nested(value: object) -> object:
@@ -57,10 +54,36 @@ def _nested(value: object) -> object:
 _TEXT = json.JSONEncoder(sort_keys=True, default=_nested)
 
 
+@dataclass(frozen=True)
+class _Meshes:
+    """Objects whose names, scales in the light map and arrays are hashed one by one: there may be 100,000."""
+
+    objects: tuple[SceneObject, ...]
+
+    def parts(self) -> Iterator[bytes]:
+        """What `key_of` hashes of each object, as if each input were given to it by itself."""
+        for o in self.objects:
+            found: list[Any] = [json.dumps(o.name).encode(), _number(o.light_map_scale)]
+            for array in (o.mesh.positions, o.mesh.normals, o.mesh.tangents, o.mesh.uv, o.mesh.faces):
+                found += (_head_of(array.dtype, array.shape), np.ascontiguousarray(array))
+            yield b"".join(found)
+
+
+@lru_cache(maxsize=256)
+def _head_of(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
+    """Of an array: to make it takes longer than to hash a small one."""
+    return f"{dtype} {shape}".encode()
+
+
+@lru_cache(maxsize=256, typed=True)
+def _number(value: float) -> bytes:
+    """As JSON has it."""
+    return json.dumps(value).encode()
+
+
 def geometry_inputs(scene: Scene) -> list[object]:
     """All meshes, and their scale in the light map."""
-    arrays = ((o, o.mesh.positions, o.mesh.normals, o.mesh.tangents, o.mesh.uv, o.mesh.faces) for o in scene.objects)
-    return [one for o, *mesh in arrays for one in (o.name, o.light_map_scale, *mesh)]
+    return [_Meshes(scene.objects)]
 
 
 def material_inputs(scene: Scene) -> object:

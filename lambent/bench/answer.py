@@ -269,6 +269,7 @@ def context_of(store: Store) -> BakeContext:
     from lambent.bake.methods import METHODS
     from lambent.bake.probes.division import divided
     from lambent.bake.quality import quality_named
+    from lambent.bake.sight import Sight
     from lambent.bake.timing import untimed
     from lambent.scenes.textures import prepared
     from lambent.store.source import scene_of
@@ -276,7 +277,7 @@ def context_of(store: Store) -> BakeContext:
     engine()
     scene = scene_of(store)
     ready = replace(scene, textures=prepared(scene.textures))
-    as_baked = cut_for_viewers(divided(ready, store, silent, untimed), store, untimed)
+    as_baked = cut_for_viewers(divided(Sight(ready), store, silent, untimed), store, untimed).scene
     return BakeContext(as_baked, store, found(), quality_named("preview"), store.documents.get(METHODS, {}))
 
 

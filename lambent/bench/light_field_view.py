@@ -167,9 +167,10 @@ def _lit(scene: Scene, folder: Path, quality: Quality, progress: Progress) -> Ba
     from lambent.bake.cuts import cut_for_viewers
     from lambent.bake.methods import METHODS
     from lambent.bake.probes.division import divided
+    from lambent.bake.sight import Sight
     from lambent.bake.timing import untimed
 
     store = bake(scene, folder, quality=quality, only=("light_map", "environment"), progress=progress)
     ready = replace(scene, textures=prepared(scene.textures))
-    as_baked = cut_for_viewers(divided(ready, store, progress, untimed), store, untimed)
+    as_baked = cut_for_viewers(divided(Sight(ready), store, progress, untimed), store, untimed).scene
     return BakeContext(as_baked, store, found(), quality, store.documents.get(METHODS, {}))

@@ -10,7 +10,8 @@ import numpy as np
 from lambent.core.arrays import Flags, Floats
 from lambent.core.camera import Camera, overview
 from lambent.core.plain import triple
-from lambent.scenes.scene import EYE_HEIGHT_M, SceneObject, bounds_of
+from lambent.scenes.mesh import boxes_of, corners_of
+from lambent.scenes.scene import EYE_HEIGHT_M, SceneObject
 
 GROUND, FLAT = 4.0, 0.05  # a ground is so many times as large as all others together, and not higher than its share
 PLACES, MOST_TRIED = 11, 25  # on each side of the floor, and of those with a floor and a ceiling
@@ -33,21 +34,18 @@ def first_views(objects: Sequence[SceneObject]) -> tuple[Camera, ...]:
 
 def content_bounds(objects: Sequence[SceneObject]) -> tuple[Floats, Floats]:
     """Corners (3,), (3,) of the box around the objects, without flat grounds and skies that dwarf all others."""
-    by_size = sorted(objects, key=_size)
-    while len(by_size) > 1 and _surrounds(by_size[-1], *bounds_of(by_size[:-1])):
-        by_size.pop()
-    low, high = bounds_of(by_size)
-    return np.asarray(low, float), np.asarray(high, float)
+    boxes = boxes_of([o.mesh for o in objects])
+    size = np.linalg.norm(boxes[:, 0] - boxes[:, 1], axis=1)
+    boxes = boxes[np.argsort(size, kind="stable")]
+    while len(boxes) > 1 and _surrounds(boxes[-1], boxes[:-1, 0].min(axis=0), boxes[:-1, 1].max(axis=0)):
+        boxes = boxes[:-1]
+    return np.asarray(boxes[:, 0].min(axis=0), float), np.asarray(boxes[:, 1].max(axis=0), float)
 
 
-def _size(o: SceneObject) -> float:
-    return float(np.linalg.norm(np.subtract(*o.mesh.bounds)))
-
-
-def _surrounds(o: SceneObject, low: Floats, high: Floats) -> bool:
-    near, far = o.mesh.bounds
-    flat, around = (far - near)[1] <= FLAT * _size(o), (near < low).all() and (far > high).all()
-    return bool((flat or around) and _size(o) > GROUND * np.linalg.norm(high - low))
+def _surrounds(box: Floats, low: Floats, high: Floats) -> bool:
+    (near, far), size = box, np.linalg.norm(box[0] - box[1])
+    flat, around = (far - near)[1] <= FLAT * size, (near < low).all() and (far > high).all()
+    return bool((flat or around) and size > GROUND * np.linalg.norm(high - low))
 
 
 def inside(objects: Sequence[SceneObject]) -> Camera | None:
@@ -104,7 +102,7 @@ class _Walls:
     """The largest triangles of objects, for few rays."""
 
     def __init__(self, objects: Sequence[SceneObject]) -> None:
-        corners = np.concatenate([o.mesh.corners for o in objects])
+        corners = corners_of([o.mesh for o in objects])
         of_object = np.repeat(np.arange(len(objects)), [len(o.mesh.faces) for o in objects])
         area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         largest = np.argsort(area)[-MOST_TRIANGLES:]

@@ -19,6 +19,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -27,9 +28,11 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import basis
 from lambent.core.geometry import triangle_areas, triangle_normals
+from lambent.core.progress import Progress, silent, tracked
 from lambent.materials.document import Material
 from lambent.scenes.floor_plan import FloorPlan, Surroundings, floor_plan, may_have_walls, shared_cells
-from lambent.scenes.scene import Mesh, ReflectorRule, Scene, SceneObject
+from lambent.scenes.mesh import Mesh, batches_of, corners_of, vertices_at_corners
+from lambent.scenes.scene import ReflectorRule, Scene, SceneObject
 
 log = logging.getLogger(__name__)
 
@@ -72,10 +75,16 @@ class Reflector:
         return sum(part.area_m2 for part in self.parts)
 
 
-def find_reflectors(scene: Scene) -> tuple[Reflector, ...]:
+def find_reflectors(scene: Scene, progress: Progress = silent) -> tuple[Reflector, ...]:
     """The planar reflectors of a scene, the largest first."""
-    forced = {o.name for o in scene.objects if _ruling(scene.reflector_rules, o.name) is True}
-    candidates = [o for o in scene.objects if _is_candidate(scene, o)]
+    rulings = [_ruling(scene.reflector_rules, o.name) for o in scene.objects]
+    forced = {o.name for o, ruling in zip(scene.objects, rulings, strict=True) if ruling is True}
+    shining = {n for n, material in scene.materials.items() if any(lobe.mirrors for lobe in material.lobes)}
+    glossy = {n for n in shining if is_glossy(scene.materials[n])}
+    candidates = [
+        o for o, ruling in zip(scene.objects, rulings, strict=True)
+        if (o.material in glossy if ruling is None else ruling and o.material in shining)
+    ]  # fmt: skip
     if not candidates:
         return ()
     faces = _Faces.of(candidates)
@@ -93,15 +102,15 @@ def find_reflectors(scene: Scene) -> tuple[Reflector, ...]:
 
     for plane in _given_planes(scene.reflector_rules):
         take(plane)
-    for seed in faces.seeds(is_forced):
+    for seed in tracked(faces.seeds(is_forced), progress, "planar reflectors"):
         wanted = free[seed] and (count < TRIED or is_forced[seed])
         if wanted and len(near := faces.in_plane(faces.plane_of(seed), free)):
             take(faces.fitted(near))
     large = []
     for plane, mine in found:
-        owner = faces.owner[mine]
-        parts = np.flatnonzero(np.bincount(owner, faces.area[mine], len(candidates)) > LEAST_PART_M2)
-        mine = mine[np.isin(owner, parts)]
+        owners, part = np.unique(faces.owner[mine], return_inverse=True)
+        is_large = np.bincount(part, faces.area[mine], len(owners)) > LEAST_PART_M2
+        parts, mine = owners[is_large], mine[is_large[part]]
         if faces.area[mine].sum() >= LEAST_AREA_M2 or any(candidates[i].name in forced for i in parts):
             large.append(faces.reflector(plane, mine, candidates, scene.materials))
     kept = _largest(large, forced)
@@ -123,7 +132,7 @@ def _with_walls(found: Sequence[Reflector], scene: Scene) -> list[Reflector]:
         return []
     around = Surroundings(scene.corners)
     meshes = {o.name: o.mesh for o in scene.objects}
-    faces = [np.concatenate([meshes[part.object].corners[part.faces] for part in r.parts]) for r in found]
+    faces = [np.concatenate([meshes[part.object].corners_of(part.faces) for part in r.parts]) for r in found]
     normals = [np.array(r.plane[:3]) for r in found]
     near = [around.over(*one) for one in zip(faces, normals, strict=True)]
     walled = [i for i in range(len(found)) if may_have_walls(faces[i], normals[i], near[i])]
@@ -142,12 +151,6 @@ def _ruling(rules: Iterable[ReflectorRule], name: str) -> bool | None:
     """`use` of the last rule that fits an object; None if none does."""
     uses = [rule.use for rule in rules if fnmatchcase(name, rule.objects)]
     return uses[-1] if uses else None
-
-
-def _is_candidate(scene: Scene, o: SceneObject) -> bool:
-    ruling = _ruling(scene.reflector_rules, o.name)
-    shines = any(lobe.mirrors for lobe in scene.materials[o.material].lobes)
-    return shines and (is_glossy(scene.materials[o.material]) if ruling is None else ruling)
 
 
 def _given_planes(rules: Iterable[ReflectorRule]) -> list[Floats]:
@@ -171,10 +174,11 @@ class _Faces:
 
     @staticmethod
     def of(objects: list[SceneObject]) -> _Faces:
-        parts = [_face_arrays(o.mesh) for o in objects]
+        meshes = [o.mesh for o in objects]
+        parts = [_face_arrays(meshes[some]) for some in batches_of(meshes)]
         corners, normal, area, tilt = (np.concatenate([part[i] for part in parts]) for i in range(4))
-        owner = np.repeat(np.arange(len(objects)), [len(o.mesh.faces) for o in objects])
-        number = np.concatenate([np.arange(len(o.mesh.faces)) for o in objects])
+        owner = np.repeat(np.arange(len(objects)), [len(mesh.faces) for mesh in meshes])
+        number = np.concatenate([np.arange(len(mesh.faces)) for mesh in meshes])
         return _Faces(corners, normal, area, tilt, owner, number)
 
     def plane_of(self, face: int) -> Floats:
@@ -205,24 +209,39 @@ class _Faces:
         return np.array([*n, -n @ (weight @ self.corners[mine].mean(axis=1)) / weight.sum()])
 
     def seeds(self, forced: NDArray[np.bool_]) -> list[int]:
-        """The largest face of every bin of (normal, offset) with enough area, the fullest bin first."""
+        """The largest face of every bin of (normal, offset) with enough area, the fullest bin first.
+
+        Bins that cannot make a reflector even with all of their neighbours are left out, but for those with `forced`
+        faces (F,): a scene may have 100,000.
+        """
         offset = (self.normal * self.corners.mean(axis=1)).sum(axis=1)
         step = np.radians(FLAT_DEG)
-        key = np.concatenate([np.round(self.normal / step), np.round(offset / (8 * FLAT_M))[:, None]], axis=1)
-        _, group = np.unique(key.astype(np.int64), axis=0, return_inverse=True)
-        group = group.reshape(-1)
+        bins = np.concatenate([np.round(self.normal / step), np.round(offset / (8 * FLAT_M))[:, None]], axis=1)
+        bins = bins.astype(np.int64)
+        bins += 1 - bins.min(axis=0)
+        sides = bins.max(axis=0) + 2  # an empty bin between rows
+        weights = np.cumprod(np.append(1, sides[:0:-1]))[::-1]  # the offset counts least: neighbours are consecutive
+        key, group = np.unique(bins @ weights, return_inverse=True)
         filled = np.bincount(group, self.area)
         largest = np.lexsort((self.area, group))[np.append(np.flatnonzero(np.diff(np.sort(group))), len(group) - 1)]
         order = np.argsort(-filled, kind="stable")
-        wanted = (filled >= SEED_SHARE * LEAST_AREA_M2) | (np.bincount(group, forced * self.area) > 0)
+        around = np.zeros(len(key))
+        up_to = np.append(0.0, np.cumsum(filled))
+        for beside in product((-1, 0, 1), repeat=3):
+            middle = key + np.dot(beside, weights[:3])
+            low, high = np.searchsorted(key, middle - 1), np.searchsorted(key, middle + 1, side="right")
+            around += up_to[high] - up_to[low]
+        wanted = (filled >= SEED_SHARE * LEAST_AREA_M2) & (around >= (1 - 1e-6) * LEAST_AREA_M2)
+        wanted |= np.bincount(group, forced * self.area) > 0
         return [int(largest[g]) for g in order if wanted[g]]
 
     def reflector(
         self, plane: Floats, mine: Indices, objects: list[SceneObject], materials: Mapping[str, Material]
     ) -> Reflector:
         parts, two_sided = [], False
-        for i in np.unique(self.owner[mine]):
-            here = mine[self.owner[mine] == i]
+        owners, counts = np.unique(self.owner[mine], return_counts=True)
+        ordered = mine[np.argsort(self.owner[mine], kind="stable")]
+        for i, here in zip(owners, np.split(ordered, np.cumsum(counts)[:-1]), strict=True):
             whole = len(here) == len(objects[i].mesh.faces)
             two_sided |= bool(whole or materials[objects[i].material].transmits)
             parts.append(ReflectorPart(objects[i].name, self.number[here], float(self.area[here].sum())))
@@ -233,11 +252,11 @@ class _Faces:
         return Reflector((nx, ny, nz, d), outline, float(np.abs(height).max()), two_sided, tuple(parts))
 
 
-def _face_arrays(mesh: Mesh) -> tuple[Floats, Floats, Floats, Floats]:
-    corners = mesh.corners
+def _face_arrays(meshes: Sequence[Mesh]) -> tuple[Floats, Floats, Floats, Floats]:
+    corners = corners_of(meshes)
     normal = triangle_normals(corners)
-    tilt = (mesh.normals[mesh.faces] * normal[:, None]).sum(axis=2).min(axis=1)
-    return corners, normal, triangle_areas(corners), tilt
+    shading = vertices_at_corners(meshes, [mesh.normals for mesh in meshes])
+    return corners, normal, triangle_areas(corners), (shading * normal[:, None]).sum(axis=2).min(axis=1)
 
 
 def _outline(points: Floats, normal: Floats) -> Floats:

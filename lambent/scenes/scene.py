@@ -21,6 +21,8 @@ from lambent.core.plain import Triple
 from lambent.core.surroundings import Axis, Layout
 from lambent.materials.document import Material
 from lambent.scenes.ies import Photometry
+from lambent.scenes.mesh import Mesh as Mesh  # most users of scenes want it too
+from lambent.scenes.mesh import boxes_of, corners_of
 
 Array = NDArray[np.floating]
 Border = tuple[float, float, float, float]
@@ -30,33 +32,6 @@ EYE_HEIGHT_M = 1.6  # of a standing person
 SUN_RADIUS_DEG = 0.2679  # Mitsuba's aperture of .5358 degrees
 LEAST_SUN_DEG, MOST_SUN_DEG = 0.05, 30.0
 Ground = Literal["diffuse", "black"]
-
-
-@dataclass(frozen=True)
-class Mesh:
-    """Triangles. positions, normals (V, 3) float32; uv (V, 2) float32; tangents (V, 3) float32; faces (T, 3) uint32.
-
-    `tangents` is the brushing direction t of the shading frame, unit, at right angles to the normal (b = n x t).
-    """
-
-    positions: Array
-    normals: Array
-    tangents: Array
-    uv: Array
-    faces: NDArray[np.uint32]
-
-    @property
-    def bounds(self) -> tuple[Array, Array]:
-        return self.positions.min(axis=0), self.positions.max(axis=0)
-
-    @property
-    def corners(self) -> Array:
-        """(T, 3, 3) float64 positions of the triangles' corners."""
-        return self.corners_of(slice(None))
-
-    def corners_of(self, faces: NDArray[np.integer] | slice) -> Array:
-        """(K, 3, 3) float64 positions of the corners of some triangles."""
-        return np.asarray(self.positions[self.faces[faces]], float)
 
 
 @dataclass(frozen=True)
@@ -321,7 +296,7 @@ class Scene:
     @property
     def corners(self) -> Array:
         """(F, 3, 3) float64 world positions of the corners of all triangles, object after object."""
-        return np.concatenate([o.mesh.corners for o in self.objects])
+        return corners_of([o.mesh for o in self.objects])
 
     def merged(self, same: Mapping[str, str]) -> Scene:
         """With objects of each material named in `same` made of the other one."""
@@ -333,5 +308,5 @@ class Scene:
 
 def bounds_of(objects: Iterable[SceneObject]) -> tuple[Array, Array]:
     """Corners (3,), (3,) of the box around objects."""
-    lows, highs = zip(*(o.mesh.bounds for o in objects), strict=True)
-    return np.min(lows, axis=0), np.max(highs, axis=0)
+    boxes = boxes_of([o.mesh for o in objects])
+    return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)

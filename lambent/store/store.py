@@ -45,6 +45,7 @@ class Store:
         self.documents: dict[str, Any] = {}
         self._artefacts: dict[str, Artefact] = {}
         self._entries: dict[str, _Entry] = {}  # as in the last manifest, less those changed since
+        self._texts: dict[str, tuple[Any, str]] = {}  # of documents, likewise
         self._lock: WriterLock | None = None
 
     @classmethod
@@ -116,6 +117,7 @@ class Store:
         """Keep a small JSON value (scene record, timings) in the manifest."""
         self._own()
         self.documents[name] = document
+        self._texts.pop(name, None)
         self._save()
 
     def forget_all(self) -> None:
@@ -292,11 +294,17 @@ class Store:
             "format": FORMAT,
             "version": VERSIONS[any(entry.rewritten for entry in entries.values())],
             "inputs": self.inputs,
-            "documents": self.documents,
         }
+        self._texts = {name: self._text(name, document) for name, document in self.documents.items()}
         parts = {key: json.dumps(value) for key, value in manifest.items()}
+        parts["documents"] = _object({name: text for name, (_, text) in self._texts.items()})
         parts["artefacts"] = _object({name: entry.text for name, entry in entries.items()})
         write_text(self.folder / MANIFEST, _object(parts))
+
+    def _text(self, name: str, document: Any) -> tuple[Any, str]:
+        """A document and its text, which is kept: the scene record of 100,000 objects takes a second to write."""
+        known = self._texts.get(name)
+        return known if known is not None and known[0] is document else (document, json.dumps(document))
 
     def _entry(self, artefact: Artefact) -> _Entry:
         """Cached manifest entry: a bake saves thousands of times, and encoding all entries would dominate."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.cuts import cut_for_viewers, longest_piece
 from lambent.bake.engine import engine
+from lambent.bake.sight import Sight
 from lambent.bake.surfaces.atlas import Atlas, merged, unwrap
 from lambent.bake.surfaces.coverage import texel_areas
 from lambent.bake.surfaces.cutting import cut, lengths_of
@@ -55,8 +57,8 @@ def seen_atlas(scene: Scene, folder: Path) -> Atlas:
     from lambent.bake.tracing.viewed import texel_sizes
 
     with Store.create(folder / "s", {}) as store:
-        scene = cut_for_viewers(scene, store)
-        return unwrap(scene, 128, sizes=texel_sizes, longest_m=longest_piece(store))
+        sight = cut_for_viewers(Sight(scene), store)
+        return unwrap(sight.scene, 128, sizes=partial(texel_sizes, sight), longest_m=longest_piece(store))
 
 
 @pytest.mark.parametrize("half_m", [100.0, 25_000.0])
@@ -76,7 +78,8 @@ def test_an_object_whose_texels_are_too_coarse_is_named(caplog: pytest.LogCaptur
     from lambent.bake.tracing.viewed import texel_sizes
 
     with caplog.at_level(logging.WARNING):
-        unwrap(room_on_a_plain(100.0), 128, sizes=texel_sizes)  # not cut
+        uncut = room_on_a_plain(100.0)
+        unwrap(uncut, 128, sizes=partial(texel_sizes, Sight(uncut)))
     assert len(caplog.messages) == 1
     assert caplog.messages[0].startswith("plain: its texels in the light map are ") and "cut it" in caplog.messages[0]
     assert "light_map_scale = " in caplog.messages[0]
@@ -106,9 +109,9 @@ def test_cuts_leave_no_gaps_and_stay_with_the_store(tmp_path: Path) -> None:
     assert np.allclose(mesh.normals, (0, 1, 0)) and np.allclose(np.linalg.norm(mesh.tangents, axis=1), 1, atol=1e-6)
     scene = room_on_a_plain(1000.0)
     with Store.create(tmp_path / "s", {}) as store:
-        first = cut_for_viewers(scene, store)
+        first = cut_for_viewers(Sight(scene), store).scene
         moved = replace(scene, cameras=(replace(EYE, position=(400.0, 1.6, 400.0)),))
-        assert np.array_equal(cut_for_viewers(moved, store).objects[0].mesh.faces, first.objects[0].mesh.faces)
+        assert np.array_equal(cut_for_viewers(Sight(moved), store).scene.objects[0].mesh.faces, first.objects[0].mesh.faces)
         assert len(first.objects[0].mesh.faces) > 100 and first.objects[2] is scene.objects[2]
 
 

@@ -63,12 +63,13 @@ def test_object_in_two_rooms_has_a_probe_in_each(tmp_path: Path) -> None:
 def test_a_cut_that_viewers_do_not_see_is_not_made() -> None:
     """From a camera in the red room nobody sees the half of the bar that mirrors the blue one."""
     from lambent.bake.probes.division import cuts_of
+from lambent.bake.sight import Sight
 
-    assert set(cuts_of(two_rooms())) == {"bar"}
+    assert set(cuts_of(Sight(two_rooms()))) == {"bar"}
     red = Camera("red", (-1.5, 0.5, 1.5), (-1.5, 0, 0))
     blue = replace(red, name="blue", position=(2.0, 0.5, 1.5), target=(2.0, 0.0, 0.0))
-    assert not cuts_of(replace(two_rooms(), cameras=(red,)))
-    assert set(cuts_of(replace(two_rooms(), cameras=(red, blue)))) == {"bar"}
+    assert not cuts_of(Sight(replace(two_rooms(), cameras=(red,))))
+    assert set(cuts_of(Sight(replace(two_rooms(), cameras=(red, blue))))) == {"bar"}
 
 
 def test_too_few_probes_are_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -57,7 +57,7 @@ def test_leaning_normals_are_told_once_and_a_crease_angle_mends_them(tmp_path: P
 
 def test_edges_below_the_angle_stay_smooth() -> None:
     ball = sphere(1.0, 24, 12)
-    assert leaning_faces(ball) == 0 and leaning_faces(box((1, 1, 1))) == 0
+    assert not leaning_faces([ball, box((1, 1, 1))]).any()
     smooth = creased(ball, 40.0)
     outwards = normalize(smooth.positions.astype(float))
     assert (smooth.normals * outwards).sum(axis=1).min() > np.cos(np.radians(8))

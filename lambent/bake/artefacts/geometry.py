@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from functools import partial
 
 from lambent.bake.context import GEOMETRY, BakeContext
 from lambent.bake.cuts import longest_piece
 from lambent.bake.engine import engine
 from lambent.bake.keys import geometry_inputs, key_of
 from lambent.bake.quality import QualityName
+from lambent.bake.sight import Sight
 from lambent.bake.surfaces.atlas import merged, object_records, unwrap
 from lambent.core.plain import triple
 from lambent.scenes.reflectors import Reflector, find_reflectors
@@ -43,7 +45,9 @@ def bake(context: BakeContext) -> None:
     from lambent.bake.tracing.viewed import texel_sizes
 
     texels, longest_m = context.settings(KIND).texels, longest_piece(context.store)
-    atlas = unwrap(context.scene, texels, context.progress, texel_sizes, longest_m)
+    sight = context.sight or Sight(context.scene)
+    atlas = unwrap(context.scene, texels, context.progress, partial(texel_sizes, sight), longest_m)
+    sight.forget()
     meta = {"light_map_size": [atlas.width, atlas.height]}
     for name, array in merged(atlas).items():
         context.put(KIND, f"geometry/{name}", array, meta)
@@ -62,7 +66,7 @@ def describe(context: BakeContext) -> None:
         reflectors = tuple(map(ReflectorRecord.model_validate, store.documents[SCENE]["reflectors"]))
     else:
         with context.timed(REFLECTORS):
-            reflectors = tuple(map(_reflector_record, find_reflectors(scene)))
+            reflectors = tuple(map(_reflector_record, find_reflectors(scene, context.progress)))
     write_scene_record(store, scene_record_of(scene, reflectors))
     store.set_document(REFLECTORS, key)
 

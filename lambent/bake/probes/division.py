@@ -19,6 +19,7 @@ import numpy as np
 from lambent.bake.artefacts.geometry import REVISION
 from lambent.bake.engine import engine
 from lambent.bake.keys import geometry_inputs, key_of
+from lambent.bake.sight import Sight
 from lambent.bake.surfaces.cutting import cut_across
 from lambent.bake.timing import Timed, untimed
 from lambent.core.arrays import Flags, Floats, Indices
@@ -44,11 +45,13 @@ RAYS, LEAST_RAYS = 8192, 256  # from an object, and from each of its parts
 BURIED = 0.9  # share above which a centre may lie in a solid: of what is looked for from there, nothing is seen
 LEAST_RAD = 0.06  # that an object measures for the median viewer: smaller ones are left whole
 CERTAIN = 0.75  # of HIDDEN by few rays: of an object with less, too little is hidden
-MOST = 24  # objects that cuts are tried on, the largest
+SCREENED = 4096  # objects that are looked at more closely, the largest...
+MOST = 24  # ...and those that cuts are tried on
 
 
-def divided(scene: Scene, store: Store, progress: Progress, timed: Timed = untimed) -> Scene:
+def divided(sight: Sight, store: Store, progress: Progress, timed: Timed = untimed) -> Sight:
     """The scene with its objects in parts; the cuts are found again only where geometry has changed."""
+    scene = sight.scene
     centres = sorted(scene.probe_centres.items())
     shiny = sorted(name for name, material in scene.materials.items() if needs_probe(material))
     clear = sorted(n for n, m in scene.materials.items() if m.transmits or n in scene.textures)
@@ -59,25 +62,28 @@ def divided(scene: Scene, store: Store, progress: Progress, timed: Timed = untim
     found = store.documents.get(PARTS)
     if not isinstance(found, dict) or found.get("key") != key:
         with timed(PARTS):
-            found = {"key": key, "cuts": cuts_of(scene, progress)}
+            found = {"key": key, "cuts": cuts_of(sight, progress)}
         store.set_document(PARTS, found)
-    return split(scene, {name: [tuple(map(quad, borders)) for borders in cut] for name, cut in found["cuts"].items()})
+    cuts = {name: [tuple(map(quad, borders)) for borders in cut] for name, cut in found["cuts"].items()}
+    return Sight(split(scene, cuts)) if cuts else sight
 
 
-def cuts_of(scene: Scene, progress: Progress = silent) -> dict[str, Cut]:
+def cuts_of(sight: Sight, progress: Progress = silent) -> dict[str, Cut]:
     """By name of the objects that are cut, the borders of each of their parts. Deterministic."""
-    shiny = [o for o in scene.objects if needs_probe(scene.materials[o.material]) and o.name not in scene.probe_centres]
+    scene = sight.scene
+    mirrors = {name for name, material in scene.materials.items() if needs_probe(material)}
+    shiny = [o for o in scene.objects if o.material in mirrors and o.name not in scene.probe_centres]
     shiny = [o for o in shiny if len(o.mesh.faces) >= FACES and o.name not in scene.light_fields]
     if not shiny:
         return {}
     engine()  # before Mitsuba is imported
-    from lambent.bake.tracing.scene_builder import SceneBuilder, bare_scene
+    from lambent.bake.tracing.scene_builder import SceneBuilder
     from lambent.bake.tracing.solids import SolidTest
     from lambent.bake.tracing.visibility import viewing_places
 
-    bare = bare_scene(scene.corners)
-    places = viewing_places(scene, bare)
-    tried = _worth_trying(scene, shiny, bare, places)
+    progress(0, 1, "views of probes")
+    places = viewing_places(scene, sight.everything)
+    tried = _worth_trying(sight, shiny, places)
     if not tried:
         return {}
     builder = SceneBuilder(scene, coarse_sky=True)
@@ -90,7 +96,7 @@ def cuts_of(scene: Scene, progress: Progress = silent) -> dict[str, Cut]:
     return cuts
 
 
-def _worth_trying(scene: Scene, objects: list[SceneObject], bare: Any, places: Floats) -> list[SceneObject]:
+def _worth_trying(sight: Sight, objects: list[SceneObject], places: Floats) -> list[SceneObject]:
     """Those not flat that look large and of which much seems hidden from one probe, the MOST largest, in order."""
     from lambent.bake.probes.centre import flat_axis
     from lambent.bake.probes.screening import hidden_shares, median_distances, widths
@@ -101,10 +107,11 @@ def _worth_trying(scene: Scene, objects: list[SceneObject], bare: Any, places: F
     if len(places):
         size /= np.maximum(median_distances(meshes, places), size)
         large = np.flatnonzero(size > LEAST_RAD)
+    large = np.sort(large[np.argsort(-size[large], kind="stable")][:SCREENED])
     large = np.array([i for i in large if flat_axis(meshes[i]) is None], np.int64)
-    numbers = {o.name: number for number, o in enumerate(scene.objects)}
-    owner = np.repeat(np.arange(len(scene.objects)), [len(o.mesh.faces) for o in scene.objects])
-    hidden = hidden_shares(bare, owner, [meshes[i] for i in large], [numbers[objects[i].name] for i in large])
+    numbers = {o.name: number for number, o in enumerate(sight.scene.objects)}
+    mine = [meshes[i] for i in large], [numbers[objects[i].name] for i in large]
+    hidden = hidden_shares(sight.everything, sight.owner, *mine)
     tried = large[hidden > CERTAIN * HIDDEN]
     return [objects[i] for i in sorted(tried[np.argsort(-size[tried], kind="stable")][:MOST])]
 

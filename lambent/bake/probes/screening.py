@@ -14,8 +14,7 @@ import numpy as np
 from lambent.bake.probes.hidden import SHORT, spread
 from lambent.bake.tracing.rays import OFFSET, cosine_directions, rays_from
 from lambent.core.arrays import Floats, Indices
-from lambent.core.geometry import triangle_areas
-from lambent.scenes.scene import Mesh
+from lambent.scenes.mesh import Mesh, areas_of, boxes_of
 
 RAYS = 512  # per object
 CROSSINGS = 8  # of an object's own surface; rays that cross it more often meet nothing
@@ -24,12 +23,14 @@ AT_ONCE = 1 << 20
 
 def widths(meshes: Sequence[Mesh]) -> Floats:
     """(N,) metres: the roots of objects' mean shadows, a quarter of their areas (Cauchy)."""
-    return np.sqrt([triangle_areas(mesh.corners).sum() / 4 for mesh in meshes])
+    return np.asarray(np.sqrt(areas_of(meshes) / 4))
 
 
 def median_distances(meshes: Sequence[Mesh], places: Floats) -> Floats:
     """(N,) metres of the middles of objects from the median of the viewers at `places` (m, 3)."""
-    return np.array([np.median(np.linalg.norm(places - np.mean(m.bounds, axis=0), axis=1)) for m in meshes])
+    middles, step = boxes_of(meshes).mean(axis=1), max(1, AT_ONCE // len(places))
+    some = (middles[first : first + step] for first in range(0, len(middles), step))
+    return np.concatenate([np.median(np.linalg.norm(places - m[:, None], axis=2), axis=1) for m in some])
 
 
 def hidden_shares(bare: Any, owner: Indices, meshes: Sequence[Mesh], numbers: Sequence[int]) -> Floats:

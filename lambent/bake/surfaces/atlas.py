@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +13,14 @@ from lambent.bake.surfaces.charts import Chart, Piece, charts_of, pieces_of
 from lambent.bake.surfaces.copies import copies_of
 from lambent.bake.surfaces.packing import packed, snapped
 from lambent.core.arrays import Floats, Indices
-from lambent.core.geometry import triangle_areas
 from lambent.core.plain import triple
 from lambent.core.progress import Progress, silent
+from lambent.scenes.mesh import areas_of_faces, boxes_of
 from lambent.scenes.scene import Mesh, Scene
 from lambent.scenes.variants import documents_of
 from lambent.store.contract import ObjectRecord, needs_probe
 
-Sizes = Callable[[Scene, list[Piece], int], Floats]  # of texels on pieces, in metres, for a number of texels
+Sizes = Callable[[list[Piece], int], Floats]  # of texels on pieces, in metres, for a number of texels
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ def unwrap(
     copies = copies_of([o.mesh for o in scene.objects])
     pieces = pieces_of(scene.objects, copies, longest_m)
     owner = np.array([piece.owner for piece in pieces])
-    sizes_m = copies.stepped(owner, (sizes or even)(scene, pieces, resolution**2))
+    sizes_m = copies.stepped(owner, (sizes or partial(even, scene))(pieces, resolution**2))
     charts = charts_of(scene.objects, pieces, sizes_m, copies, progress)
     once = {id(own): own for own in charts}
     shapes = {key: [snapped(chart.corners) for chart in own] for key, own in once.items()}
@@ -75,8 +76,9 @@ def unwrap(
 
 def areas_of(scene: Scene, pieces: list[Piece]) -> Floats:
     """(N,) square metres of pieces."""
-    areas = [triangle_areas(o.mesh.corners) for o in scene.objects]
-    return np.array([areas[piece.owner][piece.faces].sum() for piece in pieces])
+    first = np.cumsum([0] + [len(o.mesh.faces) for o in scene.objects])
+    areas = areas_of_faces([o.mesh for o in scene.objects])
+    return np.array([areas[first[piece.owner] + piece.faces].sum() for piece in pieces])
 
 
 def scales_of(scene: Scene, pieces: list[Piece]) -> Floats:
@@ -140,12 +142,14 @@ def separated(scene: Scene, arrays: dict[str, Floats], width: int, height: int) 
 def object_records(scene: Scene) -> tuple[ObjectRecord, ...]:
     """The store's record of each object, in the order of `merged`."""
     records, first = [], 0
-    for o in scene.objects:
-        low, high = o.mesh.bounds
+    boxes = boxes_of([o.mesh for o in scene.objects]).tolist()
+    worn = {o.material for o in scene.objects}
+    wants_probe = {material: any(map(needs_probe, documents_of(scene, material))) for material in worn}
+    for o, (low, high) in zip(scene.objects, boxes, strict=True):
         records.append(ObjectRecord(
             name=o.name, material=o.material, first_face=first, face_count=len(o.mesh.faces), emission=o.emission,
             bounds=(triple(low), triple(high)),
-            probe=any(map(needs_probe, documents_of(scene, o.material))),
+            probe=wants_probe[o.material],
             part_of=scene.parts.get(o.name, ""), borders=scene.borders.get(o.name, ()),
         ))  # fmt: skip
         first += len(o.mesh.faces)

@@ -7,13 +7,14 @@ T-junctions.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import normalize
-from lambent.scenes.scene import Mesh
+from lambent.scenes.mesh import Mesh, boxes_of
 
 LEAST_M = 10.0  # a shorter triangle is never cut
 TIMES = 4.0  # as long as viewers see, from where on an object's triangles are cut
@@ -27,13 +28,13 @@ def lengths_of(corners: Floats) -> Floats:
     return np.asarray(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1, initial=0))
 
 
-def is_too_long(mesh: Mesh, reach_m: float = 0.0) -> bool:
-    """Whether triangles of a mesh are so long that they are cut where viewers see `reach_m` far."""
+def too_long(meshes: Sequence[Mesh], reach_m: float = 0.0) -> Indices:
+    """Numbers of the meshes with triangles so long that they are cut where viewers see `reach_m` far."""
     longest = max(LEAST_M, TIMES * reach_m)
-    low, high = mesh.bounds
-    if np.linalg.norm(high.astype(float) - low) <= longest:
-        return False
-    return bool(lengths_of(mesh.corners).max(initial=0) > longest)
+    boxes = boxes_of(meshes).astype(float)
+    large = np.flatnonzero(np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) > longest)
+    lengths = (lengths_of(meshes[number].corners).max(initial=0) for number in large)
+    return large[np.fromiter(lengths, float, len(large)) > longest]
 
 
 def cut(mesh: Mesh, eyes: Floats, reach_m: float) -> Mesh:

@@ -12,15 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from lambent.bake.sight import Sight
 from lambent.bake.surfaces.atlas import areas_of, even, scales_of
 from lambent.bake.surfaces.charts import Piece
 from lambent.bake.surfaces.density import Views, coarse_objects, sizes_seen
 from lambent.bake.tracing.rays import rays_from, towards
-from lambent.bake.tracing.scene_builder import bare_scene
 from lambent.bake.tracing.visibility import viewing_places
 from lambent.core.arrays import Floats, Indices
 from lambent.core.geometry import points_on_triangles, triangle_areas, triangle_normals
-from lambent.scenes.scene import Scene
 
 log = logging.getLogger(__name__)
 
@@ -39,54 +38,49 @@ class Viewers:
     reach_m: float
 
 
-def viewers_of(scene: Scene, traced: Any = None) -> Viewers | None:
+def viewers_of(sight: Sight) -> Viewers | None:
     """Eyes at the cameras and at free places in view of them, half each; None without cameras, or if they see nothing.
 
-    Places that are further away than cameras see are left out: rays that leave by a window end far outside. `traced`
-    is the scene of opaque triangles, if there is one.
+    Places that are further away than cameras see are left out: rays that leave by a window end far outside.
     """
+    scene = sight.scene
     cameras = [*scene.cameras, *(key for path in scene.paths for key in path.keys)]
-    opaque = _opaque(scene)
-    if not cameras or not len(opaque):
+    if not cameras or sight.traced is None:
         return None
     eyes = np.array([camera.position for camera in cameras], float)
-    traced = traced or bare_scene(scene.corners[opaque])
-    _, distance = _seen(traced, eyes, RAYS // 16)
+    _, _, distance = met(sight.traced, eyes, RAYS // 16)
     if not len(distance):
         return None
     reach = float(np.quantile(distance, 0.9))
-    places = viewing_places(scene, traced)
+    places = viewing_places(scene, sight.traced)
     places = places[np.linalg.norm(places[:, None] - eyes, axis=2).min(axis=1) < reach]
     return Viewers(np.concatenate([np.resize(eyes, (max(len(places), len(eyes)), 3)), places]), reach)
 
 
-def texel_sizes(scene: Scene, pieces: list[Piece], texels: int) -> Floats:
+def texel_sizes(sight: Sight, pieces: list[Piece], texels: int) -> Floats:
     """Size of the texels of each piece in metres (N,); even where the scene has no cameras, or they see nothing.
 
     Objects that get far larger texels than viewers need are logged as warnings.
     """
-    corners, opaque = scene.corners, _opaque(scene)
-    traced = bare_scene(corners[opaque]) if len(opaque) else None
-    viewers = viewers_of(scene, traced)
+    scene, viewers = sight.scene, sight.viewers
     if viewers is None:
         return even(scene, pieces, texels)
     eyes, nearest = viewers.eyes, NEAREST * viewers.reach_m
-    first = np.cumsum([0] + [len(o.mesh.faces) for o in scene.objects])
-    faces = [first[piece.owner] + piece.faces for piece in pieces]
-    piece_of = np.zeros(first[-1], np.int64)
-    for number, mine in enumerate(faces):
-        piece_of[mine] = number
-    face, distance = _seen(traced, eyes, RAYS)
+    _, face, distance = sight.met
     face, distance = face[distance > nearest], distance[distance > nearest]
     if not len(face):
         return even(scene, pieces, texels)
+    first = np.cumsum([0] + [len(o.mesh.faces) for o in scene.objects])
+    faces = [first[piece.owner] + piece.faces for piece in pieces]
+    piece_of = np.zeros(first[-1], np.int64)
+    piece_of[np.concatenate(faces)] = np.repeat(np.arange(len(pieces)), [len(mine) for mine in faces])
     areas = areas_of(scene, pieces)
-    part = piece_of[opaque[face]]
+    part = piece_of[face]
     hits = np.bincount(part, minlength=len(pieces))
     weight = np.bincount(part, 1 / distance, len(pieces)) / RAYS / np.maximum(areas, 1e-30)
     share = hits / len(face)
     rare = np.flatnonzero(hits < FEW)
-    weight[rare], solid_angle = _looked_back(traced, [corners[faces[i]] for i in rare], eyes, nearest)
+    weight[rare], solid_angle = _looked_back(sight.traced, scene.corners, [faces[i] for i in rare], eyes, nearest)
     share[rare] = areas[rare] * solid_angle * RAYS / len(face)
     sizes = sizes_seen(areas, scales_of(scene, pieces), Views(weight, share), texels)
     owner = np.array([piece.owner for piece in pieces])[part]
@@ -95,54 +89,40 @@ def texel_sizes(scene: Scene, pieces: list[Piece], texels: int) -> Floats:
     return sizes
 
 
-def seen_from_behind(scene: Scene, least: float) -> list[str]:
+def seen_from_behind(sight: Sight, least: float) -> list[str]:
     """Names of opaque objects, sorted, whose backs are more than a share `least` of all that viewers see."""
-    opaque = _opaque(scene)
-    corners = scene.corners[opaque]
-    traced = bare_scene(corners) if len(opaque) else None
-    viewers = viewers_of(scene, traced)
-    if viewers is None:
+    if sight.viewers is None:
         return []
-    ray, face, _ = _met(traced, viewers.eyes, RAYS)
-    behind = (triangle_normals(corners[face]) * ray).sum(axis=1) > 0
-    owner = np.repeat(np.arange(len(scene.objects)), [len(o.mesh.faces) for o in scene.objects])[opaque]
-    counts = np.bincount(owner[face[behind]], minlength=len(scene.objects))
-    return sorted(scene.objects[number].name for number in np.flatnonzero(counts > least * len(face)))
+    ray, face, _ = sight.met
+    objects = sight.scene.objects
+    seen, which = np.unique(face, return_inverse=True)
+    normals = triangle_normals(sight.scene.corners[seen])[which.reshape(-1)]
+    counts = np.bincount(sight.owner[face[(normals * ray).sum(axis=1) > 0]], minlength=len(objects))
+    return sorted(objects[number].name for number in np.flatnonzero(counts > least * len(face)))
 
 
-def _opaque(scene: Scene) -> Indices:
-    """Numbers of all triangles through which nothing is seen."""
-    clear = [scene.materials[o.material].transmits or _has_holes(scene, o.material) for o in scene.objects]
-    return np.flatnonzero(~np.repeat(clear, [len(o.mesh.faces) for o in scene.objects]))
-
-
-def _has_holes(scene: Scene, material: str) -> bool:
-    textures = scene.textures.get(material)
-    return textures is not None and textures.opacity is not None
-
-
-def _seen(traced: Any, eyes: Floats, count: int) -> tuple[Indices, Floats]:
-    """Triangles (M,) that so many rays from the eyes meet, and how far away (M,)."""
-    return _met(traced, eyes, count)[1:]
-
-
-def _met(traced: Any, eyes: Floats, count: int) -> tuple[Floats, Indices, Floats]:
+def met(traced: Any, eyes: Floats, count: int) -> tuple[Floats, Indices, Floats]:
     """Directions (M, 3) of the rays from the eyes, of so many, that meet a triangle, which (M,), how far away (M,)."""
     rng = np.random.default_rng(0)
     z, phi = 1 - 2 * rng.random(count), 2 * np.pi * rng.random(count)
     directions = np.stack([np.sqrt(1 - z**2) * np.cos(phi), z, np.sqrt(1 - z**2) * np.sin(phi)], axis=-1)
-    met = traced.ray_intersect_preliminary(rays_from(eyes[np.arange(count) % len(eyes)], directions))
-    hit = np.flatnonzero(np.array(met.is_valid()))
-    return directions[hit], np.array(met.prim_index)[hit].astype(np.int64), np.array(met.t)[hit].astype(float)
+    found = traced.ray_intersect_preliminary(rays_from(eyes[np.arange(count) % len(eyes)], directions))
+    hit = np.flatnonzero(np.array(found.is_valid()))
+    return directions[hit], np.array(found.prim_index)[hit].astype(np.int64), np.array(found.t)[hit].astype(float)
 
 
-def _looked_back(traced: Any, surfaces: list[Floats], eyes: Floats, nearest: float) -> tuple[Floats, Floats]:
-    """Means over surfaces (F, 3, 3) and the eyes of |cos| / (4 pi d^3) and |cos| / (4 pi d^2), 0 where hidden: (N,)."""
+def _looked_back(
+    traced: Any, triangles: Floats, surfaces: list[Indices], eyes: Floats, nearest: float
+) -> tuple[Floats, Floats]:
+    """Means over surfaces and the eyes of |cos| / (4 pi d^3) and |cos| / (4 pi d^2), 0 where hidden: (N,).
+
+    `surfaces` are numbers (K,) of the `triangles` (F, 3, 3).
+    """
     if not surfaces:
         return np.zeros(0), np.zeros(0)
     rng = np.random.default_rng(0)
     looks = max(LEAST_LOOKS, min(LOOKS, MOST_LOOKS // len(surfaces)))
-    corners = np.concatenate(surfaces)
+    corners = triangles[np.concatenate(surfaces)]
     number = np.repeat(np.arange(len(surfaces)), [len(surface) for surface in surfaces])
     sums = np.cumsum(np.append(0.0, triangle_areas(corners)))
     first = np.searchsorted(number, np.arange(len(surfaces) + 1))

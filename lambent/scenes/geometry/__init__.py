@@ -3,10 +3,10 @@
 from lambent.scenes.geometry.curves import catmull_rom, smooth_curve
 from lambent.scenes.geometry.grid import (
     build,
+    copies_under,
     grid,
     merge,
     placed,
-    positions_under,
     signed_volume,
     tangents_along,
     transformed,
@@ -17,8 +17,8 @@ from lambent.scenes.geometry.subdivision import subdivided
 from lambent.scenes.geometry.teapot import teapot, teapot_parts
 
 __all__ = [
-    "box", "build", "catmull_rom", "cushion", "cylinder", "extrusion", "fan", "grid", "lathe", "merge",
-    "patch", "placed", "positions_under", "signed_volume", "smooth_curve", "sphere", "subdivided",
+    "box", "build", "catmull_rom", "copies_under", "cushion", "cylinder", "extrusion", "fan", "grid", "lathe", "merge",
+    "patch", "placed", "signed_volume", "smooth_curve", "sphere", "subdivided",
     "tangents_along", "teapot",
     "teapot_parts",
     "transformed", "tube", "turn",

@@ -12,6 +12,7 @@ from lambent.core.geometry import area_vectors, triangle_areas
 from lambent.scenes.scene import Mesh
 
 FLAT = 1e-10  # triangles below this share of their sheet's extent squared count as degenerate
+VERTICES_AT_ONCE = 1 << 18
 
 
 def tangents_along(normals: Floats, direction: ArrayLike) -> Floats:
@@ -68,22 +69,34 @@ def merge(meshes: Iterable[Mesh]) -> Mesh:
 
 def transformed(mesh: Mesh, matrix: ArrayLike) -> Mesh:
     """`mesh` under an affine 4x4 matrix; a mirroring one reverses the winding, so that outside stays outside."""
-    m = np.asarray(matrix, float)
-    linear = m[:3, :3]
-    normals = normalize(mesh.normals.astype(float) @ np.linalg.inv(linear))
-    mirrored = np.linalg.det(linear) < 0
-    return Mesh(
-        positions_under(mesh, m),
-        normals.astype(np.float32),
-        tangents_along(normals, mesh.tangents @ linear.T).astype(np.float32),
-        mesh.uv,
-        mesh.faces[:, ::-1].copy() if mirrored else mesh.faces,
-    )
+    return copies_under(mesh, np.asarray(matrix, float)[None])[0]
 
 
-def positions_under(mesh: Mesh, matrix: Floats) -> NDArray[np.float32]:
-    """Positions (V, 3) float32 of a mesh under an affine 4x4 matrix."""
-    return (mesh.positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+def copies_under(mesh: Mesh, matrices: Floats) -> list[Mesh]:
+    """`mesh` as `transformed` by each of the matrices (N, 4, 4). Copies that are only moved share all but positions."""
+    _, first, which = np.unique(
+        matrices[:, :3, :3].reshape(-1, 9), axis=0, return_index=True, return_inverse=True
+    )  # fmt: skip
+    which, turned = which.reshape(-1), []
+    for mine in _some(len(first), len(mesh.positions)):
+        linear = matrices[first[mine], :3, :3]
+        normals = normalize(mesh.normals.astype(float) @ np.linalg.inv(linear))
+        tangents = tangents_along(normals, mesh.tangents @ linear.transpose(0, 2, 1)).astype(np.float32)
+        turned += list(zip(normals.astype(np.float32), tangents, np.linalg.det(linear) < 0, strict=True))
+    mirrored = mesh.faces[:, ::-1].copy() if any(flips for _, _, flips in turned) else mesh.faces
+    copies = []
+    for mine in _some(len(matrices), len(mesh.positions)):
+        linear, moved = matrices[mine, :3, :3].transpose(0, 2, 1), matrices[mine, None, :3, 3]
+        for positions, number in zip((mesh.positions @ linear + moved).astype(np.float32), which[mine], strict=True):
+            normals, tangents, flips = turned[number]
+            copies.append(Mesh(positions, normals, tangents, mesh.uv, mirrored if flips else mesh.faces))
+    return copies
+
+
+def _some(count: int, vertices: int) -> Iterable[slice]:
+    """Copies of a mesh of so many vertices, as many at a time as VERTICES_AT_ONCE allows."""
+    step = max(1, VERTICES_AT_ONCE // vertices)
+    return (slice(first, first + step) for first in range(0, count, step))
 
 
 def turn(axis: str, angle_deg: float) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from lambent.core.directions import Floats, normalize
 from lambent.core.errors import UserError
 from lambent.core.photometry import radiometric
 from lambent.core.plain import Triple, triple
-from lambent.scenes.geometry import positions_under, transformed
+from lambent.scenes.geometry import copies_under
 from lambent.scenes.loaders.contents import Contents, UniqueNames
 from lambent.scenes.loaders.gltf.container import Gltf, read
 from lambent.scenes.loaders.gltf.luminaires import Luminaires
@@ -44,6 +44,7 @@ def load(path: Path, root: Path | None = None) -> Contents:
     """
     reading = _Reading(read(path, root))
     reading.walk()
+    reading.place()
     return reading.contents()
 
 
@@ -81,7 +82,7 @@ class _Reading:
         self._names, self._camera_names = UniqueNames(), UniqueNames()
         self._renamed: dict[str, list[str]] = {}
         self._meshes: dict[tuple[int, int, int], Mesh | None] = {}
-        self._turned: dict[tuple[int, int, int, bytes], Mesh] = {}  # by mesh and the linear part of its transform
+        self._placed: dict[tuple[int, int, int], list[tuple[int, Floats]]] = {}  # by mesh, objects and their transforms
         self._triangles = 0
 
     def contents(self) -> Contents:
@@ -123,6 +124,8 @@ class _Reading:
             roots = gltf.pick(document.scenes, document.scene, "scene").nodes
         else:
             roots = sorted(set(range(len(document.nodes))) - {c for n in document.nodes for c in n.children})
+        matrices = _locals(document.nodes)
+        skewed = np.abs(matrices[:, 3] - (0, 0, 0, 1)).max(axis=1) > 1e-6
         stack = [(index, np.eye(4)) for index in reversed(roots)]
         seen: set[int] = set()
         while stack:
@@ -134,10 +137,11 @@ class _Reading:
                 )
             seen.add(index)
             node = gltf.pick(document.nodes, index, "nodes")
-            world = parent @ _local(node)
-            if np.abs(world[3] - (0, 0, 0, 1)).max() > 1e-6:
-                raise gltf.error("not an affine matrix", f"{field}.matrix", world[3].tolist(), "a last row of 0 0 0 1")
-            if not (np.abs(world) < FAR).all():
+            if skewed[index]:
+                last = matrices[index, 3].tolist()
+                raise gltf.error("not an affine matrix", f"{field}.matrix", last, "a last row of 0 0 0 1")
+            world = parent @ matrices[index]
+            if not np.abs(world).max() < FAR:
                 raise UserError("transform is not finite or too large", file=gltf.path, field=field)
             self._visit(node, world)
             stack += [(child, world) for child in reversed(node.children)]
@@ -157,7 +161,7 @@ class _Reading:
         gltf = self._gltf
         mesh = gltf.pick(gltf.document.meshes, index, "meshes")
         wanted = node_name or mesh.name or f"mesh_{index}"
-        if abs(np.linalg.det(world[:3, :3])) < 1e-18:
+        if _volume(world) < 1e-18:
             self._warnings.append(f"{wanted}: left out, its node's scale is zero")
             return
         for k, primitive in enumerate(mesh.primitives):
@@ -177,17 +181,19 @@ class _Reading:
             name = self._names.unique(single)
             if name != single:
                 self._renamed.setdefault(single, []).append(name)
-            self._objects.append(SceneObject(name, self._placed(key, local, world), material, emission))
+            self._placed.setdefault(key, []).append((len(self._objects), world))
+            self._objects.append(SceneObject(name, local, material, emission))  # where it is placed follows for all
             self._note_variants(primitive, name)
 
-    def _placed(self, key: tuple[int, int, int], local: Mesh, world: Floats) -> Mesh:
-        """A mesh in the world. Nodes that only move it share its other arrays: thousands of screws are one normal."""
-        turned = (*key, world[:3, :3].tobytes())
-        if turned not in self._turned:
-            self._turned[turned] = found = transformed(local, world)
-            return found
-        first = self._turned[turned]
-        return Mesh(positions_under(local, world), first.normals, first.tangents, first.uv, first.faces)
+    def place(self) -> None:
+        """Bring the objects of every mesh into the world, all copies of one at once."""
+        for key, placed in self._placed.items():
+            numbers, worlds = zip(*placed, strict=True)
+            local = self._meshes[key]
+            assert local is not None
+            for number, mesh in zip(numbers, copies_under(local, np.array(worlds)), strict=True):
+                o = self._objects[number]
+                self._objects[number] = SceneObject(o.name, mesh, o.material, o.emission)
 
     def _note_variants(self, primitive: Primitive, name: str) -> None:
         """Note an object's material in each of the file's material sets that has one for it."""
@@ -228,19 +234,28 @@ class _Reading:
             self._lights.append(PointLight(position, power, direction, min(inner, outer), outer, name))
 
 
-def _local(node: Node) -> Floats:
-    if node.matrix is not None:
-        return np.asarray(node.matrix, float).reshape(4, 4).T
-    matrix = np.eye(4)
-    if any(node.rotation[:3]) or node.scale != (1, 1, 1):
-        x, y, z, w = normalize(np.asarray(node.rotation, float)) if any(node.rotation) else (0.0, 0.0, 0.0, 1.0)
-        matrix[:3, :3] = [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ] @ np.diag(node.scale)
-    matrix[:3, 3] = node.translation
-    return matrix
+def _locals(nodes: Sequence[Node]) -> Floats:
+    """(N, 4, 4) matrices of nodes, relative to their parents."""
+    quaternions = np.array([node.rotation for node in nodes], float).reshape(-1, 4)
+    x, y, z, w = normalize(np.where(quaternions.any(axis=1, keepdims=True), quaternions, (0.0, 0.0, 0.0, 1.0))).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrices = np.tile(np.eye(4), (len(nodes), 1, 1))
+    scales = np.array([node.scale for node in nodes], float).reshape(-1, 1, 3)
+    matrices[:, :3, :3] = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2) * scales
+    matrices[:, :3, 3] = np.array([node.translation for node in nodes], float).reshape(-1, 3)
+    given = [i for i, node in enumerate(nodes) if node.matrix is not None]
+    matrices[given] = np.array([nodes[i].matrix for i in given], float).reshape(-1, 4, 4).transpose(0, 2, 1)
+    return matrices
+
+
+def _volume(world: Floats) -> float:
+    """How much larger a transform (4, 4) makes things; for so many nodes numpy's determinant is slow."""
+    (a, b, c), (d, e, f), (g, h, i) = world[:3, :3].tolist()
+    return abs(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
 
 
 def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int) -> tuple[Mesh | None, list[str]]:

@@ -7,29 +7,41 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Floats, Indices
 from lambent.core.directions import normalize
 from lambent.core.geometry import area_vectors, triangle_normals
 from lambent.scenes.geometry import tangents_along
-from lambent.scenes.scene import Mesh, SceneObject
+from lambent.scenes.mesh import Mesh, batches_of, corners_of, vertices_at_corners
+from lambent.scenes.scene import SceneObject
 
 LEANING_DEG = 40.0  # from its face, for a normal to be worth a warning; those of a round thing of 10 sides lean 18
 MUCH = 0.2  # of an object's area: fillets lean, and are meant to
 NAMED = 2
 
 
-def leaning_faces(mesh: Mesh) -> int:
-    """Triangles with a normal that leans more than LEANING_DEG from them; 0 if they are less than MUCH of the area."""
-    vectors = area_vectors(mesh.corners.astype(float))
-    faces, areas = normalize(vectors), np.linalg.norm(vectors, axis=-1) / 2
-    cosine = np.abs((mesh.normals[mesh.faces].astype(float) * faces[:, None]).sum(axis=2)).min(axis=1)
-    leaning = (cosine < np.cos(np.radians(LEANING_DEG))) & (areas > 0)
-    return int(leaning.sum()) if areas[leaning].sum() > MUCH * areas.sum() else 0
+def leaning_faces(meshes: Sequence[Mesh]) -> Indices:
+    """(N,) triangles of each mesh with a normal that leans more than LEANING_DEG from them.
+
+    0 where they are less than MUCH of the mesh's area.
+    """
+    found = [np.zeros(0, np.int64)]
+    for mine in batches_of(meshes):
+        some = meshes[mine]
+        owner = np.repeat(np.arange(len(some)), [len(mesh.faces) for mesh in some])
+        vectors = area_vectors(corners_of(some))
+        faces, areas = normalize(vectors), np.linalg.norm(vectors, axis=-1) / 2
+        normals = vertices_at_corners(some, [mesh.normals for mesh in some])
+        cosine = np.abs((normals * faces[:, None]).sum(axis=2)).min(axis=1)
+        leaning = (cosine < np.cos(np.radians(LEANING_DEG))) & (areas > 0)
+        share = np.bincount(owner, areas * leaning, len(some)), MUCH * np.bincount(owner, areas, len(some))
+        found.append(np.where(share[0] > share[1], np.bincount(owner[leaning], minlength=len(some)), 0))
+    return np.concatenate(found)
 
 
 def leaning_warnings(objects: Sequence[SceneObject]) -> list[str]:
     """One warning for all objects with `leaning_faces`, or none."""
-    counts = {o.name: count for o in objects if (count := leaning_faces(o.mesh))}
+    found = leaning_faces([o.mesh for o in objects])
+    counts = {objects[i].name: int(found[i]) for i in np.flatnonzero(found)}
     if not counts:
         return []
     names = ", ".join([*list(counts)[:NAMED], *(["..."] if len(counts) > NAMED else [])])
@@ -79,4 +91,5 @@ def creased(mesh: Mesh, angle_deg: float) -> Mesh:
 
 def with_creases(objects: Sequence[SceneObject], angle_deg: float) -> tuple[SceneObject, ...]:
     """The objects whose normals lean, `creased`; the others as they are."""
-    return tuple(replace(o, mesh=creased(o.mesh, angle_deg)) if leaning_faces(o.mesh) else o for o in objects)
+    leaning = leaning_faces([o.mesh for o in objects])
+    return tuple(replace(o, mesh=creased(o.mesh, angle_deg)) if n else o for o, n in zip(objects, leaning, strict=True))

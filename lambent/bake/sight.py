@@ -1,0 +1,76 @@
+"""What the viewers of a scene see of its triangles, found once for every step of a bake that asks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from lambent.bake.tracing.viewed import Viewers
+
+
+@dataclass(frozen=True)
+class Sight:
+    """A scene, and what is found of it on demand; the engine is chosen before the first demand."""
+
+    scene: Scene
+
+    @cached_property
+    def owner(self) -> Indices:
+        """(F,) number of the object of each triangle."""
+        return np.repeat(np.arange(len(self.scene.objects)), [len(o.mesh.faces) for o in self.scene.objects])
+
+    @cached_property
+    def is_opaque(self) -> Flags:
+        """(F,) triangles through which nothing is seen."""
+        masked = {name for name, textures in self.scene.textures.items() if textures.opacity is not None}
+        clear = masked | {name for name, material in self.scene.materials.items() if material.transmits}
+        return ~np.array([o.material in clear for o in self.scene.objects], bool)[self.owner]
+
+    @cached_property
+    def opaque(self) -> Indices:
+        """Numbers of all triangles through which nothing is seen."""
+        return np.flatnonzero(self.is_opaque)
+
+    @cached_property
+    def everything(self) -> Any:
+        """mi.Scene of all triangles."""
+        from lambent.bake.tracing.scene_builder import bare_scene
+
+        return bare_scene(self.scene.corners)
+
+    @cached_property
+    def traced(self) -> Any:
+        """mi.Scene of the opaque triangles; None without any."""
+        from lambent.bake.tracing.scene_builder import bare_scene
+
+        if not len(self.opaque):
+            return None
+        return self.everything if self.is_opaque.all() else bare_scene(self.scene.corners[self.opaque])
+
+    @cached_property
+    def viewers(self) -> Viewers | None:
+        """Where viewers are, as `tracing.viewed.viewers_of` finds it."""
+        from lambent.bake.tracing.viewed import viewers_of
+
+        return viewers_of(self)
+
+    @cached_property
+    def met(self) -> tuple[Floats, Indices, Floats]:
+        """Directions (M, 3) of the viewers' rays that meet an opaque triangle, which of all (M,), how far away (M,)."""
+        from lambent.bake.tracing.viewed import RAYS, met
+
+        assert self.viewers is not None, "without viewers there are no rays"
+        directions, face, distance = met(self.traced, self.viewers.eyes, RAYS)
+        return directions, self.opaque[face], distance
+
+    def forget(self) -> None:
+        """Drop what was found, for its memory; it is found again on demand."""
+        for name in ("owner", "is_opaque", "opaque", "everything", "traced", "viewers", "met"):
+            self.__dict__.pop(name, None)
