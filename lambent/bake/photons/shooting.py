@@ -77,7 +77,7 @@ def shoot(
 
 
 def learnt_sky(scene: Scene, whole: Any, over_area: Floats, max_bounces: int) -> SkyPhotons | None:
-    """Learn how to draw the environment's photons in a pre-pass; None without an environment or its guide. Deterministic.
+    """Learn in a pre-pass how to draw the environment's photons; None without an environment or a guide. Deterministic.
 
     over_area (H, W) is 1 over the area of a light map's texel in m^2, 0 without surface.
     """

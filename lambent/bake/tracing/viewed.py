@@ -1,7 +1,7 @@
-"""What viewers see of a scene: rays from its cameras and from free places in view of them, in all directions.
+"""What viewers see of a scene: rays in all directions from its cameras and from free places in their view.
 
-Rays find how much is seen of large parts. Parts that few rays meet are looked at the other way round: from points on
-them towards those places.
+Rays measure how much is seen of large parts. Parts that few rays hit are tested in reverse: from points on them towards
+the viewers.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ from lambent.scenes.scene import Scene
 log = logging.getLogger(__name__)
 
 RAYS = 1 << 18
-FEW = 64  # rays that meet a part: with fewer, points on it are looked from
-LOOKS, LEAST_LOOKS = 256, 16  # back from each of those, and from each of very many...
-MOST_LOOKS = 1 << 22  # ...where all together would be more
-NEAREST = 0.1  # of how far viewers see: what is closer is behind them, as the wall that a camera stands against
+FEW = 64  # parts hit by fewer rays are tested in reverse
+LOOKS, LEAST_LOOKS = 256, 16  # reverse looks per part, and for very many parts...
+MOST_LOOKS = 1 << 22  # ...when the total would exceed this
+NEAREST = 0.1  # share of the viewing distance: anything closer is behind viewers, like the wall a camera stands against
 
 
 @dataclass(frozen=True)
 class Viewers:
-    """Eyes (E, 3) of the viewers of a scene, and how far they see: nine tenths of their looks end within `reach_m`."""
+    """Eyes (E, 3) of a scene's viewers, and their reach: nine tenths of their looks end within `reach_m`."""
 
     eyes: Floats
     reach_m: float
 
 
 def viewers_of(scene: Scene, traced: Any = None) -> Viewers | None:
-    """Eyes at the cameras and at free places in view of them, half each; None without cameras, or if they see nothing.
+    """Eyes at the cameras and at free places in their view, half each; None without cameras, or if they see nothing.
 
-    Places that are further away than cameras see are left out: rays that leave by a window end far outside. `traced`
-    is the scene of opaque triangles, if there is one.
+    Places beyond the cameras' reach are left out, because rays through a window end far outside. `traced` is the scene
+    of opaque triangles, if already built.
     """
     cameras = [*scene.cameras, *(key for path in scene.paths for key in path.keys)]
     opaque = _opaque(scene)
@@ -61,9 +61,9 @@ def viewers_of(scene: Scene, traced: Any = None) -> Viewers | None:
 
 
 def texel_sizes(scene: Scene, pieces: list[Piece], texels: int) -> Floats:
-    """Size of the texels of each piece in metres (N,); even where the scene has no cameras, or they see nothing.
+    """Texel size of each piece in metres (N,); equal if the scene has no cameras, or they see nothing.
 
-    Objects that get far larger texels than viewers need are logged as warnings.
+    Objects whose texels are far larger than viewers need are logged as warnings.
     """
     corners, opaque = scene.corners, _opaque(scene)
     traced = bare_scene(corners[opaque]) if len(opaque) else None
@@ -96,7 +96,7 @@ def texel_sizes(scene: Scene, pieces: list[Piece], texels: int) -> Floats:
 
 
 def seen_from_behind(scene: Scene, least: float) -> list[str]:
-    """Names of opaque objects, sorted, whose backs are more than a share `least` of all that viewers see."""
+    """Sorted names of opaque objects whose backs take more than the share `least` of all that viewers see."""
     opaque = _opaque(scene)
     corners = scene.corners[opaque]
     traced = bare_scene(corners) if len(opaque) else None
@@ -111,7 +111,7 @@ def seen_from_behind(scene: Scene, least: float) -> list[str]:
 
 
 def _opaque(scene: Scene) -> Indices:
-    """Numbers of all triangles through which nothing is seen."""
+    """Numbers of all opaque triangles."""
     clear = [scene.materials[o.material].transmits or _has_holes(scene, o.material) for o in scene.objects]
     return np.flatnonzero(~np.repeat(clear, [len(o.mesh.faces) for o in scene.objects]))
 
@@ -122,12 +122,12 @@ def _has_holes(scene: Scene, material: str) -> bool:
 
 
 def _seen(traced: Any, eyes: Floats, count: int) -> tuple[Indices, Floats]:
-    """Triangles (M,) that so many rays from the eyes meet, and how far away (M,)."""
+    """Triangles (M,) hit by `count` rays from the eyes, and their distances (M,)."""
     return _met(traced, eyes, count)[1:]
 
 
 def _met(traced: Any, eyes: Floats, count: int) -> tuple[Floats, Indices, Floats]:
-    """Directions (M, 3) of the rays from the eyes, of so many, that meet a triangle, which (M,), how far away (M,)."""
+    """Of `count` rays from the eyes, those that hit: directions (M, 3), triangles (M,), distances (M,)."""
     rng = np.random.default_rng(0)
     z, phi = 1 - 2 * rng.random(count), 2 * np.pi * rng.random(count)
     directions = np.stack([np.sqrt(1 - z**2) * np.cos(phi), z, np.sqrt(1 - z**2) * np.sin(phi)], axis=-1)
@@ -137,7 +137,7 @@ def _met(traced: Any, eyes: Floats, count: int) -> tuple[Floats, Indices, Floats
 
 
 def _looked_back(traced: Any, surfaces: list[Floats], eyes: Floats, nearest: float) -> tuple[Floats, Floats]:
-    """Means over surfaces (F, 3, 3) and the eyes of |cos| / (4 pi d^3) and |cos| / (4 pi d^2), 0 where hidden: (N,)."""
+    """Means over surfaces (F, 3, 3) and eyes of |cos| / (4 pi d^3) and |cos| / (4 pi d^2), 0 if hidden: (N,)."""
     if not surfaces:
         return np.zeros(0), np.zeros(0)
     rng = np.random.default_rng(0)
