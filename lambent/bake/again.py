@@ -1,7 +1,6 @@
-"""A store's light baked again for other materials, into a copy beside it: same geometry, same effort, same seed.
+"""Rebake a store's light for other materials into a copy: same geometry, same settings, same seed.
 
-The copy has the geometry, the light map and the probes. Texel for texel and probe for probe it can stand in for the
-store's own.
+The copy has the geometry, the light map and the probes. Each texel and each probe can replace the store's own.
 """
 
 from __future__ import annotations
@@ -22,13 +21,13 @@ from lambent.store.contract import LAST_RUN, SIDES, TIMINGS, needs_probe, probe_
 from lambent.store.source import SOURCE, scene_of
 from lambent.store.store import MANIFEST, Store
 
-COPY_OF = "copy_of"  # document: name of the store whose light the copy has for other materials
+COPY_OF = "copy_of"  # document: name of the store that was copied
 KINDS = ("light_map", "probe")
 LIGHT, BACK = (f"light_map/{side}" for side in SIDES)
 
 
 def copy_beside(folder: Path) -> Path:
-    """Where the copy of a store is: ROOM.rebake.store beside ROOM.store."""
+    """Path of a store's copy: ROOM.rebake.store beside ROOM.store."""
     folder = folder.resolve()
     return folder.with_name(f"{folder.name.removesuffix('.store')}.rebake.store")
 
@@ -45,23 +44,22 @@ def bake_again(
 ) -> Store:
     """Bake light map and probes of the store in `folder` into `copy`, with some of its materials replaced.
 
-    A copy that is there is brought up to date; one that an interrupted bake left is gone on with. The store itself is
-    only read.
+    An existing copy is brought up to date; an interrupted bake is resumed. The store itself is only read.
 
     Parameters
     ----------
     textures : mapping, optional
-        Names of materials whose textures others wear, by the name of these; "" is none.
+        By material, the name of the material whose textures it uses; "" for none.
     quality : Quality, optional
-        By default the preset that the store was baked with.
+        By default the store's preset.
     watch : Watch, optional
-        Told what the copy has of the light.
+        Notified as light arrives in the copy.
 
     Raises
     ------
     UserError
-        Where the store does not say where its scene is, or was baked with settings of its own; where `copy` is
-        something else; where other materials need other geometry, probes or sides of the light map.
+        If the store's scene is unknown or its bake used custom settings; if `copy` is something else; if the new
+        materials need other geometry, probes or sides of the light map.
     """
     store = Store.open(folder)
     if not isinstance(store.documents.get(SOURCE), str):
@@ -88,9 +86,9 @@ def bake_again(
 
 
 def _check_parts(store: Store, scene: Scene, materials: Mapping[str, Material]) -> None:
-    """`UserError` where a material needs a probe, or a light map of its far side, that the store does not have.
+    """Raise `UserError` if a material needs a probe, or a light map of its far side, that the store lacks.
 
-    The renderer would show the nearest probe, and no light, in their place: such a picture is not that of a bake.
+    The renderer would substitute the nearest probe, and no light, which a complete bake would not show.
     """
     record, shared = scene_record(store), shared_probes(store)
     for name in sorted(materials):
@@ -111,7 +109,7 @@ def _check_parts(store: Store, scene: Scene, materials: Mapping[str, Material]) 
 
 
 def _prepare(store: Store, folder: Path) -> None:
-    """Make the copy with the geometry and the notes of the store, where it is not there yet."""
+    """Create the copy with the geometry and notes of the store, if it does not exist yet."""
     if (folder / MANIFEST).exists() and Store.open(folder).documents.get(COPY_OF) != store.folder.name:
         raise UserError("is another store", file=folder, hint="move it: edited materials are baked into this folder")
     with Store.create(folder, store.inputs) as copy:
@@ -125,6 +123,6 @@ def _prepare(store: Store, folder: Path) -> None:
 
 
 def _same_geometry(store: Store, copy: Store) -> bool:
-    """Whether all geometry is that of the store."""
+    """Whether all geometry arrays equal the store's."""
     keys = {artefact.name: artefact.key for artefact in store.artefacts("geometry")}
     return keys == {artefact.name: artefact.key for artefact in copy.artefacts("geometry")}

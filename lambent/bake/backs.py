@@ -1,7 +1,7 @@
-"""Opaque objects that viewers see from behind, whose backs get a light map too.
+"""Opaque objects whose backs viewers see; their backs get a light map too.
 
-A sheet without thickness, such as a shelf, is seen from both sides, and a file may hold a box whose faces look inwards.
-Only points on such backs that viewers see are lit: of a wall's far side nothing is sampled.
+A sheet without thickness, such as a shelf, is visible from both sides, and a file may have a box whose faces look
+inwards. Only points on visible backs are lit: a wall's far side is not sampled.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from lambent.store.contract import is_two_sided
 from lambent.store.store import Store
 
 BACKS = "backs"  # document: its key, and the objects
-LEAST = 4e-5  # share of all that viewers see, below which a back is left black: ten rays
+LEAST = 4e-5  # share of viewers' rays, ten in number, below which a back stays black
 
 
 def find_backs(sight: Sight, store: Store, timed: Timed = untimed, progress: Progress = silent, *, anew: bool = False) -> None:
-    """Note in the store whose backs are seen: as before where geometry is the same, whatever cameras, unless `anew`."""
+    """Store which backs are seen; kept while geometry is unchanged, even if cameras change, unless `anew`."""
     scene = sight.scene
     clear = sorted(name for name, material in scene.materials.items() if material.transmits)
     key = key_of(BACKS, 2, clear, [o.material for o in scene.objects], *geometry_inputs(scene))
@@ -36,11 +36,11 @@ def find_backs(sight: Sight, store: Store, timed: Timed = untimed, progress: Pro
 
 
 def backs_of(store: Store) -> frozenset[str]:
-    """Names of the opaque objects whose backs are seen; none before they were looked for."""
+    """Names of the opaque objects with visible backs; empty before `find_backs`."""
     return frozenset(store.documents.get(BACKS, {}).get("objects", []))
 
 
 def crossed_by_light(scene: Scene) -> list[bool]:
-    """By object, whether light crosses it: all of its back is lit, as far as light gets there."""
+    """By object, whether light crosses it: its whole back is then lit, as far as light reaches it."""
     masked = {name for name, textures in scene.textures.items() if textures.opacity}
     return [is_two_sided(scene.materials[o.material], masked=o.material in masked) for o in scene.objects]

@@ -2,8 +2,8 @@
 
     store = bake(load_scene("builtin:room"), Path("room.store"), quality="preview")
 
-Every array carries a key, the hash of its inputs: arrays whose inputs have not changed are not baked again. A bake that
-was interrupted, even by kill -9, continues where it was and ends with the same arrays, bit for bit.
+Every array carries a key, the hash of its inputs; arrays with unchanged inputs are not baked again. An interrupted
+bake, even by kill -9, resumes where it was and ends with bitwise identical arrays.
 """
 
 from __future__ import annotations
@@ -68,12 +68,17 @@ def bake(
 
     Parameters
     ----------
+    scene : Scene
+    store_path : Path
+        Folder of the store, created if needed.
     quality : {'preview', 'normal', 'final'} or Quality
     only : collection of str, optional
-        Kinds of artefacts to bake, modules of `artefacts/`; their needs are baked too. By default all but those that
-        are made on request alone.
+        Kinds of artefacts to bake, modules of `artefacts/`; their needs are baked too. By default all kinds except
+        those baked only on request.
     resume : bool
-        False bakes everything anew, even what is up to date.
+        False bakes everything again, even arrays that are up to date.
+    progress : Progress
+        May raise `Cancelled` or KeyboardInterrupt; a later bake resumes.
     seed : int
         The same seed gives the same arrays.
     light_map : {'paths', 'photons'}, optional
@@ -81,34 +86,37 @@ def bake(
     probes : {'cached', 'traced'}, optional
         Whether surfaces seen by probes show the light map, or all paths are traced. By default as in the store.
     light_groups : {'none', 'scene'}, optional
-        Whether light map and probes are also kept by group of emitters (`scenes.light_groups`), so that a renderer can
-        dim and colour each. Path traced light maps alone have groups. By default as in the store.
+        Whether light map and probes are also stored by group of emitters (`scenes.light_groups`), so that a renderer
+        can dim and colour each. Only path traced light maps support groups. By default as in the store.
     light_fields : str, optional
         Objects that get a light field: "scene", those that the scene names; "none"; "auto", also those that the bake
-        chooses, within `light_field_mb` of memory; or names and patterns, with commas. By default as in the store.
+        chooses, within `light_field_mb` of memory; or names and patterns, separated by commas. By default as in the
+        store.
+    light_field_mb : float, optional
+        Memory limit in MB for the light fields that "auto" chooses.
     views : sequence of View, optional
-        Views whose materials are to be edited: what they show, its visibility and its transport are baked. For these
-        alone, without light map and probes, `only` is {"transport"}.
+        Views for editing materials: their points, visibility and transport are baked. To bake these alone, without
+        light map and probes, pass {"transport"} as `only`.
     editables : mapping, optional
-        Terms and curves of materials, by name, that are to be edited as something else than their documents say.
+        By material name, terms and curves to edit instead of those of its document.
     bounces : Bounces, optional
-        Of "interreflection": its series of bands, samples, and the materials that are not edited.
+        Settings of "interreflection": its series of bands, samples, and uneditable materials.
     environment : ImageEnvironment, optional
-        What lights the views instead of the scene's own environment.
+        Lights the views instead of the scene's own environment.
     workers : Workers, optional
-        Who traces "interreflection", tile by tile: see `lambent.bake.cluster.opened`. By default this process.
+        Trace "interreflection", tile by tile: see `lambent.bake.cluster.opened`. By default this process.
     watch : Watch, optional
-        Told what is finished, and regions of the light map before it is.
+        Notified of finished artefacts, and of regions of the light map before that.
 
     Returns
     -------
     Store
-        Changed inputs are told by the logger and kept in the document "changes".
+        Changed inputs are logged and stored in the document "changes".
 
     Raises
     ------
     UserError
-        Where an option is unknown, the scene has no objects or is too large, or no path tracing engine works.
+        If an option is unknown, the scene has no objects or is too large, or no path tracing engine works.
     """
     start = time.perf_counter()
     kinds, quality = found(), quality_named(quality)
@@ -161,23 +169,23 @@ def bake(
 
 
 def found() -> dict[str, Artefact]:
-    """Every kind of artefact there is, by its name."""
+    """All kinds of artefacts, by name."""
     modules = modules_in(artefacts)
     assert all(name == module.KIND for name, module in modules.items()), "the file's name is that of the kind"
     return cast(dict[str, Artefact], modules)
 
 
 def in_order(kinds: Mapping[str, Artefact], wanted: Collection[str]) -> list[str]:
-    """The wanted kinds and all that they need, each after its needs.
+    """The wanted kinds and everything they need, each after its needs.
 
     Raises
     ------
     UserError
-        Where a kind needs one that does not exist, or, in a circle, itself.
+        If a kind needs one that does not exist, or the needs are circular.
     """
     needs: dict[str, tuple[str, ...]] = {}
     left = [known("kind of artefact", kind, kinds) for kind in wanted]
-    for kind in left:  # grows on the way
+    for kind in left:  # grows during the loop
         needs[kind] = kinds[kind].NEEDS
         left += [known("artefact", need, kinds, field=f"NEEDS of {kind}") for need in needs[kind] if need not in needs]
     try:

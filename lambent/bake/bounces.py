@@ -1,4 +1,4 @@
-"""What the interreflections of an edited view are baked for."""
+"""Settings for baking the interreflections of an edited view."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class Bounces:
     samples : int
         Paths per pixel. More can be added to a store later.
     fixed : frozenset of str
-        Materials that are not edited. They scatter as they are, and need neither bands nor tails of their own.
+        Uneditable materials. They scatter by their own BRDF and need neither bands nor tails.
     diffuse_seen : bool
-        Surfaces seen in others are Lambertian, as in the thesis, and do not keep the shape that their lobes have as
-        baked. For edits that make narrow lobes anything else.
+        Treat surfaces seen in others as Lambertian, as in the thesis, instead of keeping the shape of their baked
+        lobes. Intended for edits that replace narrow lobes by anything else.
     """
 
     series: tuple[int, ...] = (64, 1, 1, 1)
@@ -61,7 +61,7 @@ class Bounces:
 
     @classmethod
     def of_text(cls, text: str) -> tuple[int, ...]:
-        """The series of "64,1,1,1"."""
+        """Parse a series such as "64,1,1,1"."""
         try:
             return tuple(int(part) for part in text.split(","))
         except ValueError:

@@ -6,7 +6,7 @@
         ...
 
 Only this process reads and writes the store. Work and jobs travel as bytes within Dask's tasks, so that the scheduler
-can give them to another worker where one dies.
+can reassign them if a worker dies.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ from lambent.core.errors import UserError
 
 J = TypeVar("J")
 R = TypeVar("R")
-AHEAD = 2  # jobs that each worker has: one is sent while another is done
-SECONDS = 30.0  # for the first worker to appear
+AHEAD = 2  # jobs per worker: one is sent while another runs
+SECONDS = 30.0  # timeout for the first worker to appear
 LIBRARIES = ("lambent", "mitsuba", "drjit", "numba", "numpy")
-_one_at_a_time = threading.Lock()  # a job uses all threads that its process may
+_one_at_a_time = threading.Lock()  # a job uses all threads of its process
 
 
 @contextmanager
 def opened(count: int | None = None, address: str | None = None) -> Iterator[DaskWorkers]:
-    """`count` new processes of this machine, or the workers of the cluster at `address`, which stay when it ends.
+    """`count` new processes on this machine, or the workers of the cluster at `address`, which outlive this context.
 
-    New processes start Python anew: a program that is a file needs `if __name__ == "__main__":`.
+    New processes start Python afresh: a script needs `if __name__ == "__main__":`.
 
     Raises
     ------
     UserError
-        Where Dask is missing, nothing answers at the address, or no worker appears.
+        If Dask is missing, nothing answers at the address, or no worker appears.
     """
     try:
         import distributed
@@ -54,7 +54,7 @@ def opened(count: int | None = None, address: str | None = None) -> Iterator[Das
         raise UserError("workers and cluster exclude each other", field="workers", expected="one of both")
     if count is not None and count < 1:
         raise UserError("no workers", field="workers", got=count, expected="at least 1")
-    warnings.filterwarnings("ignore", "Sending large graph")  # tiles go with their jobs on purpose
+    warnings.filterwarnings("ignore", "Sending large graph")  # sending tiles with their jobs is intended
     with ExitStack() as stack:
         threads = None
         if count is not None:
@@ -78,7 +78,7 @@ def opened(count: int | None = None, address: str | None = None) -> Iterator[Das
 
 @contextmanager
 def _deaf() -> Iterator[None]:
-    """Processes that are started here do not hear Ctrl-C, which is for the one that started them."""
+    """Shield processes started here from Ctrl-C, which is for their parent."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -90,7 +90,7 @@ def _deaf() -> Iterator[None]:
 
 
 async def _connect(address: str | None) -> None:
-    """Raise what connecting raises. A `Client` that cannot connect may block the next one when it is collected."""
+    """Raise connection errors early. A `Client` that cannot connect may block the next one when garbage collected."""
     from distributed import Security
     from distributed.comm import connect
 
@@ -105,15 +105,15 @@ class DaskWorkers:
         self.client, self._threads = client, threads
 
     def each(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
-        """Jobs and their results, as they are done.
+        """Yield jobs with their results, in order of completion.
 
-        A job whose worker dies is done by another, until it was with three that died.
+        If a worker dies, its job goes to another worker, until three have died with it.
 
         Raises
         ------
         UserError
-            Where a worker has other versions of the libraries that results depend on, a job kills its workers, or the
-        scheduler is gone.
+            If a worker has other versions of libraries that affect results, a job kills its workers, or the scheduler
+            is gone.
         """
         from distributed import wait
 
@@ -139,7 +139,7 @@ class DaskWorkers:
 
 
 def made_with() -> dict[str, str]:
-    """What results depend on besides jobs: versions, and the engine's variant."""
+    """Everything besides jobs that affects results: versions, and the engine's variant."""
     return {name: version(name) for name in LIBRARIES} | {"engine": engine().variant}
 
 
@@ -154,12 +154,12 @@ def _result(future: Any) -> Any:
 
 
 def _same(work: bytes) -> bytes:
-    """The work as the result of a task: unlike scattered data, Dask makes it anew where its holder dies."""
+    """The work as a task's result: unlike scattered data, Dask recreates it if its holder dies."""
     return work
 
 
 def _do(work: bytes, job: bytes, makers: dict[str, str], threads: int | None) -> Any:
-    """A job, on a worker."""
+    """Run a job on a worker."""
     with _one_at_a_time:
         mine = made_with()
         for name, wanted in makers.items():

@@ -1,14 +1,14 @@
-"""The bake context: scene, store, settings, and everything that several artefacts share, made once.
+"""The bake context: scene, store, settings, and shared objects, each created once.
 
 A kind of artefact is a module of `artefacts/`, found by its file:
 
-    KIND = "light_map"           the file's name, and that of the kind in the store
+    KIND = "light_map"           the file's name, and the kind's name in the store
     NEEDS = ("geometry",)        kinds whose arrays it reads, baked before it
     SETTINGS = {...}             optional: a dataclass for each QualityName
-    def keys(context)            {array name: key} of every array it writes, samples kept for a later bake included
+    def keys(context)            {array name: key} of every array it writes, including samples kept for a later bake
     def bake(context)            writes the stale arrays
     OF_VIEWS = True              optional: nothing is baked without views
-    ON_REQUEST = True            optional: baked only where it is asked for by name
+    ON_REQUEST = True            optional: baked only if requested by name
     def describe(context)        optional: writes documents, which have no keys; called by every bake
 """
 
@@ -54,13 +54,13 @@ class Artefact(Protocol):
 
 @dataclass
 class BakeContext:
-    """One bake: the scene as it is baked, the store that it goes to, and what several artefacts share.
+    """One bake: the scene in baked form, the store, and objects that several artefacts share.
 
-    `scene` has its textures as they are stored, and objects in the parts that have probes of their own; `undivided` has
-    them whole, as views show them. `editables` are terms of materials that are not those of their documents;
-    `bounces` says what interreflections are baked for, and `environment` lights the views instead of the scene's own.
-    `workers` do jobs that other processes can do. `timed(step)` notes what a step takes that is no kind of artefact.
-    `watch` is told what is finished. `sight` is what was found of `scene` before, if anything was.
+    `scene` has its textures as stored, and objects divided into parts with their own probes; `undivided` has whole
+    objects, as views show them. `editables` replace the terms of materials' documents; `bounces` has the settings of
+    interreflections, and `environment` lights the views instead of the scene's own. `workers` run jobs in other
+    processes. `timed(step)` times a step that is not a kind of artefact. `watch` is notified of finished artefacts.
+    `sight` is what viewers of `scene` see, if already computed.
     """
 
     scene: Scene
@@ -82,7 +82,7 @@ class BakeContext:
     _keys: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def settings(self, kind: str) -> Any:
-        """The settings of a kind of artefact at this bake's quality, of its own dataclass."""
+        """The settings of a kind of artefact at this bake's quality, an instance of the kind's dataclass."""
         return self.quality.settings(kind, getattr(self.artefacts[kind], "SETTINGS", {}))
 
     def keys(self, kind: str) -> dict[str, str]:
@@ -92,12 +92,12 @@ class BakeContext:
         return self._keys[kind]
 
     def begun(self, kind: str) -> set[str]:
-        """Names of the arrays of a kind that the store holds, or holds chunks of, under their present keys."""
+        """Names of the arrays of a kind that the store has, completely or partly, under their current keys."""
         keys = self.keys(kind)
         return {a.name for a in self.store.artefacts() if keys.get(a.name) == a.key}
 
     def stale(self, kind: str) -> set[str]:
-        """Names of the arrays of a kind that are absent, partial or made from something else."""
+        """Names of the arrays of a kind that are absent, partial or baked from other inputs."""
         return self.keys(kind).keys() - {name for name in self.begun(kind) if name in self.store}
 
     def put(self, kind: str, name: str, array: Array, meta: Mapping[str, Any] | None = None) -> None:
@@ -105,7 +105,7 @@ class BakeContext:
         self.store.put(name, kind, array, key=self.keys(kind)[name], meta=meta)
 
     def samples(self, kind: str, name: str, shape: Sequence[int], chunks: Sequence[int]) -> Writer:
-        """Writer of float32 samples, which stay in the store, so that an interrupted bake continues from them."""
+        """Writer of float32 samples, which stay in the store, so that an interrupted bake continues with them."""
         key = self.keys(kind)[name]
         return self.store.begin(name, "raw", shape, chunks, "float32", key=key, meta=self.provenance())
 
@@ -114,7 +114,7 @@ class BakeContext:
         return self.editables.get(material) or of_material(self.scene.materials[material])
 
     def provenance(self, **more: Any) -> dict[str, Any]:
-        """Notes of an array: quality, seed, engine, and more."""
+        """Meta of an array: quality, seed, engine, and more."""
         return {"quality": self.quality.name, "seed": self.seed, "engine": engine().variant, **more}
 
     @cached_property
@@ -130,26 +130,26 @@ class BakeContext:
 
     @cached_property
     def two_sided(self) -> list[bool]:
-        """By object, whether light crosses it or viewers see it from behind, so that its back has a light map too."""
+        """By object, whether its back has a light map too: because light crosses it, or viewers see it from behind."""
         backs = backs_of(self.store)
         return [one or o.name in backs for o, one in zip(self.scene.objects, crossed_by_light(self.scene), strict=True)]
 
     @cached_property
     def traced(self) -> TracedScene:
-        """The scene for Mitsuba, and the points of its light map."""
+        """The scene for Mitsuba, with the points of its light map."""
         from lambent.bake.tracing.traced_scene import TracedScene
 
         return TracedScene(self.atlas, self.geometry, self.two_sided, self.progress)
 
     @cached_property
     def in_views(self) -> Scene:
-        """The scene with whole objects, in the light of the views."""
+        """The scene with whole objects, lit as in the views."""
         scene = self.undivided or self.scene
         return scene if self.environment is None else replace(scene, environment=self.environment)
 
     @cached_property
     def view_tracer(self) -> ViewTracer:
-        """The scene of the views as it is traced, and its lights."""
+        """The scene of the views for tracing, with its lights."""
         from lambent.bake.transport.view_tracer import ViewTracer
 
         return ViewTracer(self.in_views, self.editables)

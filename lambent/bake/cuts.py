@@ -1,4 +1,4 @@
-"""Very large triangles of a scene, cut near its viewers before it is baked."""
+"""Cut very large triangles of a scene near its viewers, before the bake."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ MOST_EYES = 128
 
 
 def cut_for_viewers(sight: Sight, store: Store, timed: Timed = untimed) -> Sight:
-    """The scene with very large triangles cut (`surfaces.cutting`), as they were before if geometry is the same.
+    """The scene with very large triangles cut (`surfaces.cutting`); unchanged geometry keeps its previous cuts.
 
-    The document "cuts" says for which eyes: cameras that are added later change nothing.
+    The document "cuts" stores the eyes used: adding cameras later changes nothing.
     """
     scene = sight.scene
     long = too_long([o.mesh for o in scene.objects])
@@ -48,6 +48,6 @@ def cut_for_viewers(sight: Sight, store: Store, timed: Timed = untimed) -> Sight
 
 
 def longest_piece(store: Store) -> float:
-    """How long parts of objects are that share a size of texels, in metres."""
+    """Length limit in metres for parts of objects that share a size of texels."""
     found = store.documents.get(CUTS)
     return float(found["reach_m"]) if found and found["objects"] else np.inf

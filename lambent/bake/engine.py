@@ -1,8 +1,8 @@
-"""The path tracing engine: the only file that chooses a Mitsuba variant.
+"""The path tracing engine: the only file that selects a Mitsuba variant.
 
-With LLVM 15 to 18 Dr.Jit loads, and aborts the whole process at its first real kernel, which nothing can catch. So
-each candidate renders a few pixels in a subprocess, and only one that has rendered is taken. A positive result is kept
-in the user's cache folder: only the first command on a machine pays for it.
+With LLVM 15 to 18, Dr.Jit loads but aborts the whole process at its first real kernel, which cannot be caught. So each
+candidate renders a few pixels in a subprocess, and only one that succeeds is used. A success is cached in the user's
+cache folder: only the first command on a machine pays for it.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from lambent.core.errors import UserError
 from lambent.core.files import write_text
 
 T = TypeVar("T")
-LLVM_OLDEST = 19  # 14 is refused by Dr.Jit, 15 to 18 abort
+LLVM_OLDEST = 19  # Dr.Jit refuses 14 and aborts with 15 to 18
 LIBRARY_VARIABLE = "DRJIT_LIBLLVM_PATH"
 VARIANT_VARIABLE = "LAMBENT_VARIANT"
 VARIANTS = ("cuda_ad_rgb", "llvm_ad_rgb")
-PROBE_SECONDS = 300  # the first OptiX start compiles for a minute or more on some drivers
+PROBE_SECONDS = 300  # the first OptiX start compiles for a minute or more with some drivers
 MEND = (
     "install LLVM 19 or newer (Debian and Ubuntu: apt-get install libllvm19; macOS: brew install llvm), "
     f"or set {LIBRARY_VARIABLE} to its library"
@@ -56,7 +56,7 @@ print("lambent-probe " + json.dumps({"llvm_version": llvm and ".".join(map(str, 
 
 @dataclass(frozen=True)
 class Engine:
-    """A variant that has rendered on this machine. `llvm_library` is None where Dr.Jit finds LLVM by itself."""
+    """A variant that has rendered on this machine. `llvm_library` is None if Dr.Jit finds LLVM itself."""
 
     variant: str
     llvm_version: str | None
@@ -66,7 +66,7 @@ class Engine:
 
 @dataclass(frozen=True)
 class EngineProbe:
-    """Result of the search: `engine` is None where nothing renders; `failures` has a reason per attempt."""
+    """Result of the search: `engine` is None if nothing renders; `failures` has a reason per attempt."""
 
     engine: Engine | None
     failures: tuple[str, ...]
@@ -75,14 +75,14 @@ class EngineProbe:
 
 @functools.cache
 def engine() -> Engine:
-    """Choose and set the Mitsuba variant: CUDA if it renders, else LLVM. Further calls cost nothing.
+    """Select and set the Mitsuba variant: CUDA if it renders, else LLVM. Further calls cost nothing.
 
-    The environment variable LAMBENT_VARIANT names one variant to use instead.
+    The environment variable LAMBENT_VARIANT forces one variant.
 
     Raises
     ------
     UserError
-        Where neither renders, with a hint what to install.
+        If neither renders, with a hint on what to install.
     """
     probe = probe_engine()
     if probe.engine is None:
@@ -98,19 +98,20 @@ def engine() -> Engine:
         mi.set_variant(chosen.variant)
     import drjit as dr
 
-    # To find loop invariants, Dr.Jit traces a loop twice, and one within it four times; kernels gain nothing here.
+    # To find loop invariants, Dr.Jit traces a loop twice, and a nested one four times; our kernels gain nothing from
+    # it.
     dr.set_flag(dr.JitFlag.OptimizeLoops, False)
     return chosen
 
 
 def once_per_variant(make: Callable[[], T]) -> Callable[[], T]:
-    """A function that is called once for each variant, such as one with a class that derives from the variant's own."""
+    """Cache a function per variant, for example one that defines a class derived from the variant's own."""
     made = functools.cache(lambda variant: make())
     return functools.wraps(make)(lambda: made(engine().variant))
 
 
 def probe_engine() -> EngineProbe:
-    """Find an engine; sets nothing in this process and raises nothing, for `lambent doctor`."""
+    """Search for an engine without setting it or raising, for `lambent doctor`."""
     names = _wanted_variants()
     library = find_llvm()
     key = _cache_key(names, library)
@@ -128,9 +129,9 @@ def probe_engine() -> EngineProbe:
 
 
 def find_llvm() -> Path | None:
-    """The LLVM library to use: the user's DRJIT_LIBLLVM_PATH, else the oldest in the usual places that is new enough.
+    """The LLVM library: the user's DRJIT_LIBLLVM_PATH, else the oldest in the usual places that is new enough.
 
-    Dr.Jit is tested with the oldest; a newer one may have changed its C interface.
+    Dr.Jit is tested with the oldest; a newer version may have changed its C interface.
     """
     named = os.environ.get(LIBRARY_VARIABLE)
     if named:
@@ -164,7 +165,7 @@ def _wanted_variants() -> tuple[str, ...]:
 
 @functools.cache
 def _cuda_driver() -> int | None:
-    """Version number of the CUDA driver; None, where there is none, spares a failing probe."""
+    """Version number of the CUDA driver; None without one, which saves a probe that would fail."""
     try:
         library = ctypes.CDLL("nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1")
         number = ctypes.c_int()
@@ -174,7 +175,7 @@ def _cuda_driver() -> int | None:
 
 
 def _try(name: str, library: Path | None) -> Engine | str:
-    """Render a few pixels with variant `name` in a subprocess: the engine, or a line with the reason."""
+    """Render a few pixels with variant `name` in a subprocess; returns the engine, or a line with the reason."""
     if name.startswith("cuda") and _cuda_driver() is None:
         return "no CUDA driver"
     environment = os.environ | _kernel_cache_without_home()
@@ -203,7 +204,7 @@ def _reason(code: int, stderr: str, library: Path | None) -> str:
 
 
 def _cache_key(names: tuple[str, ...], library: Path | None) -> str:
-    """Hash of everything the result depends on: Mitsuba, LLVM, driver, graphics card."""
+    """Hash of everything that affects the result: Mitsuba, LLVM, driver, graphics card."""
     stamp = library.stat().st_mtime_ns if library is not None and library.exists() else None
     cards = sorted(path.name for path in Path("/dev").glob("nvidia[0-9]*"))
     facts: list[object] = [names, version("mitsuba"), version("drjit"), sys.executable, str(library), stamp]
@@ -212,7 +213,7 @@ def _cache_key(names: tuple[str, ...], library: Path | None) -> str:
 
 
 def _cache_file() -> Path | None:
-    """Where positive results are kept; None on an account without a home."""
+    """Cache file for successful probes; None for an account without a home."""
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA")
     elif sys.platform == "darwin":
@@ -223,7 +224,7 @@ def _cache_file() -> Path | None:
 
 
 def _read_cache(key: str) -> Engine | None:
-    """The kept engine; None where there is none, or the file cannot be read or has another shape."""
+    """The cached engine; None if there is none, or the file is unreadable or malformed."""
     with suppress(OSError, ValueError, KeyError, TypeError):
         if file := _cache_file():
             kept = json.loads(file.read_text(encoding="utf-8"))
@@ -232,13 +233,13 @@ def _read_cache(key: str) -> Engine | None:
 
 
 def _write_cache(key: str, found: Engine) -> None:
-    with suppress(OSError):  # a read-only home costs the probe's seconds every time, and nothing else
+    with suppress(OSError):  # a read-only home only costs the probe's seconds every time
         if file := _cache_file():
             write_text(file, json.dumps({"key": key, "engine": asdict(found)}))
 
 
 def _kernel_cache_without_home() -> dict[str, str]:
-    """Variable with a folder for compiled kernels, where HOME is missing: Dr.Jit stops without it."""
+    """Environment variable with a folder for compiled kernels if HOME is missing, without which Dr.Jit aborts."""
     if sys.platform == "win32" or "HOME" in os.environ or "DRJIT_CACHE_DIR" in os.environ:
         return {}
     return {"DRJIT_CACHE_DIR": str(Path(tempfile.gettempdir()) / f"drjit-{os.getuid()}")}

@@ -1,4 +1,4 @@
-"""Keys of arrays: hashes of everything that an array is made from. Where a key changes, the array is stale."""
+"""Keys of arrays: hashes of all their inputs. If a key changes, the array is stale."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from lambent.scenes.light_groups import names_of_lights
 from lambent.scenes.scene import ComputedEnvironment, Environment, ImageEnvironment, Scene, SceneObject, SunSky
 from lambent.scenes.textures import digest, parts
 
-DAYLIGHT = "clear_sky 1"  # the model that daylight is calibrated to: raise where it changes
+DAYLIGHT = "clear_sky 1"  # the model that daylight is calibrated to; increment it when the calibration changes
 
 
 def key_of(what: str, revision: int, *inputs: object) -> str:
-    """SHA-256 of inputs: numbers, texts, arrays, nested. Raise `revision` where code changes what is made from them."""
+    """SHA-256 of inputs: numbers, texts, arrays, nested. Increment `revision` when the code that uses them changes."""
     result = hashlib.sha256(f"{what} {revision}".encode())
     for one in inputs:
         if isinstance(one, np.ndarray):
@@ -39,13 +39,13 @@ def key_of(what: str, revision: int, *inputs: object) -> str:
 
 
 def _nested(value: object) -> object:
-    """What JSON takes of an input within another; an array's text would leave out its middle."""
+    """JSON form of a nested input; the text of an array would omit its middle."""
     if isinstance(value, np.ndarray):
         return key_of("array", 1, value)
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, frozenset | set):
-        return sorted(map(str, value))  # their order changes from process to process
+        return sorted(map(str, value))  # sets are ordered differently in each process
     if isinstance(value, Path):
         return str(value)
     raise TypeError(f"no key of {type(value).__name__}: it has no text that is the same in every process")
@@ -87,7 +87,7 @@ def geometry_inputs(scene: Scene) -> list[object]:
 
 
 def material_inputs(scene: Scene) -> object:
-    """How each object scatters light; neither names nor provenance of materials."""
+    """How each object scatters light, without names and provenance of materials."""
     look: dict[str, object] = {
         n: m.model_dump(mode="json", exclude={"name", "provenance"}) for n, m in scene.materials.items()
     }
@@ -100,7 +100,7 @@ def material_inputs(scene: Scene) -> object:
 
 
 def texture_inputs(scene: Scene, *channels: str) -> object:
-    """These channels of all textures, and what they are masked by, by material."""
+    """These channels of all textures, and their masks, by material."""
     found = {}
     for name, textures in scene.textures.items():
         images = {part: digest(t) for part, t in parts(textures).items() if part in (*channels, "opacity")}
@@ -109,7 +109,7 @@ def texture_inputs(scene: Scene, *channels: str) -> object:
 
 
 def light_inputs(scene: Scene) -> object:
-    """Everything that emits; names of lights only sort it."""
+    """All emitters; names of lights only affect groups."""
     emissions = [(o.name, o.emission) for o in scene.objects]
     lights = [(type(x).__name__, {k: v for k, v in asdict(x).items() if k != "name"}) for x in scene.lights]
     return [emissions, lights, environment_inputs(scene.environment)]
@@ -124,19 +124,19 @@ def group_inputs(scene: Scene) -> object:
 
 @lru_cache(maxsize=16)
 def _layout(file: Path, content: str) -> str:
-    """The layout that a picture is recognised by; `content` is its hash, for the cache."""
+    """The detected layout of a picture; `content` is its hash, for the cache."""
     return layout_of(read_image(file), file)
 
 
 def environment_inputs(environment: Environment | None) -> object:
-    """The environment; an image counts by its content, wherever it comes from."""
+    """The environment; an image counts by content, not by path."""
     if environment is None:
         return None
     values: Mapping[str, object] = asdict(environment)
     if isinstance(environment, ImageEnvironment):
         content = sha256_of(environment.file)
         values = {**values, "file": content, "layout": environment.layout or _layout(environment.file, content)}
-        plain = {"layout": "lat-long", "up": "+y"}  # all there was once: the keys of its stores stay
+        plain = {"layout": "lat-long", "up": "+y"}  # the former defaults: older stores keep their keys
         values = {name: value for name, value in values.items() if plain.get(name) != value}
     elif isinstance(environment, ComputedEnvironment):
         values = {**values, "image": key_of("computed", 1, lat_long_image(environment.name))}

@@ -1,7 +1,7 @@
-"""What a bake takes of memory, found before it is taken.
+"""Memory that a bake needs, checked before it is allocated.
 
-Files store an instance as a transform, and loaders let instances share arrays. A bake cannot: each has light of its
-own, and so texels, vertices and triangles of its own.
+Files store an instance as a transform, and loaders let instances share arrays. A bake cannot: each instance has its own
+light, and so its own texels, vertices and triangles.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from lambent.core.errors import UserError
 from lambent.core.machine import memory_bytes
 from lambent.scenes.scene import Scene, SceneObject
 
-BYTES_PER_TRIANGLE = 650  # at most while geometry is baked: 610 with 2000 objects of 352, 580 with one of a million
+BYTES_PER_TRIANGLE = 650  # peak while baking geometry: 610 with 2000 objects of 352, 580 with one of a million
 
 
 def check_memory(scene: Scene) -> None:
-    """`UserError` where the triangles of a scene do not fit into the memory of this machine."""
+    """Raise `UserError` if the triangles of a scene do not fit into this machine's memory."""
     triangles = sum(len(o.mesh.faces) for o in scene.objects)
     needed, there = triangles * BYTES_PER_TRIANGLE, memory_bytes()
     if needed > there:
@@ -26,7 +26,7 @@ def check_memory(scene: Scene) -> None:
 
 
 def _copies(objects: tuple[SceneObject, ...]) -> str:
-    """What to do, with the mesh that has most copies."""
+    """A remedy that names the mesh with the most copies."""
     shared: dict[int, list[SceneObject]] = {}
     for o in objects:
         shared.setdefault(id(o.mesh.faces), []).append(o)

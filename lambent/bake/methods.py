@@ -1,4 +1,4 @@
-"""Methods between which a bake can choose; the first of each is the default."""
+"""Methods that a bake can choose from; the first of each is the default."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import StrEnum
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
 
-METHODS = "ways"  # document: the methods that a store was baked with
+METHODS = "ways"  # document: the methods of the store's bake
 
 
 class LightMapMethod(StrEnum):
@@ -26,7 +26,7 @@ class ProbeMethod(StrEnum):
 
 
 class LightGroupMethod(StrEnum):
-    """Whether light is sorted by the group of its emitter (`scenes.light_groups`), or baked as one."""
+    """Whether light is separated by the group of its emitter (`scenes.light_groups`)."""
 
     none = "none"
     scene = "scene"
@@ -38,12 +38,12 @@ _CHOICES: dict[str, type[StrEnum]] = {
 
 
 def chosen(before: Mapping[str, str], **wanted: str | None) -> dict[str, str]:
-    """The method for each of `_CHOICES`: the one wanted, else that of `before`, else the default.
+    """The method for each of `_CHOICES`: the wanted one, else that of `before`, else the default.
 
     Raises
     ------
     UserError
-        Where there is no such method.
+        If there is no such method.
     """
     found = {}
     for name, methods in _CHOICES.items():
@@ -53,12 +53,12 @@ def chosen(before: Mapping[str, str], **wanted: str | None) -> dict[str, str]:
 
 
 def check_groups(methods: Mapping[str, str]) -> None:
-    """`UserError` where light is to be sorted by a method that cannot."""
+    """Raise `UserError` if light is to be separated by a method that cannot."""
     if sorts_light(methods) and methods["light_map"] == LightMapMethod.photons:
         hint = "bake with --light-map paths, or with --light-groups none"
         raise UserError("photons cannot be stored by light group", field="--light-groups", got="scene", hint=hint)
 
 
 def sorts_light(methods: Mapping[str, str]) -> bool:
-    """Whether these methods keep light by group."""
+    """Whether these methods store light by group."""
     return methods.get("light_groups") == LightGroupMethod.scene

@@ -1,4 +1,4 @@
-"""How much work a bake puts into its artefacts. Each kind of artefact has settings of its own for every quality."""
+"""The effort of a bake. Each kind of artefact has its own settings for every quality."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from lambent.core.discovery import known
 
 
 class QualityName(StrEnum):
-    """Qualities that every kind of artefact has settings for."""
+    """Qualities for which every kind of artefact has settings."""
 
     preview = "preview"
     normal = "normal"
@@ -22,7 +22,7 @@ class QualityName(StrEnum):
 class Quality:
     """The settings of a named quality, with changes.
 
-    The store keeps `name`; `changes` maps kinds of artefacts to new values of their settings' fields.
+    The store records `name`; `changes` maps kinds of artefacts to new values of their settings' fields.
     """
 
     name: str
@@ -30,17 +30,17 @@ class Quality:
     changes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def changed(self, name: str | None = None, /, **changes: Mapping[str, Any]) -> Quality:
-        """This quality with other values, by kind: `changed("draft", probe={"texels": 64})`."""
+        """A copy with other values, by kind: `changed("draft", probe={"texels": 64})`."""
         merged = {**self.changes, **{kind: {**self.changes.get(kind, {}), **new} for kind, new in changes.items()}}
         return Quality(name or self.name, self.base, merged)
 
     def settings(self, kind: str, by_quality: Mapping[Any, Any]) -> Any:
-        """Settings of a kind of artefact, a dataclass, from those it has by quality."""
+        """Settings of a kind of artefact, a dataclass, chosen from `by_quality` and changed."""
         return replace(by_quality[self.base], **self.changes.get(kind, {}))
 
 
 def quality_named(name: str | Quality) -> Quality:
-    """The quality of this name; a `Quality` is itself."""
+    """The quality of this name; a `Quality` is returned unchanged."""
     if isinstance(name, Quality):
         return name
     return Quality(name, QualityName(known("quality", name, list(QualityName))))

@@ -1,6 +1,6 @@
-"""Work as a list of independent tiles: the chunks of one array, each with a seed of its own.
+"""Work divided into independent tiles: the chunks of one array, each with its own seed.
 
-Because the seed belongs to the tile, the result is the same whatever the order, and after any interruption.
+Because the seed belongs to the tile, the result is independent of order and interruptions.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ Tile = Callable[[tuple[slice, ...], int], NDArray[Any]]  # (region of the array,
 
 
 def seed_of(seed: int, *place: object) -> int:
-    """32-bit seed of a piece of work, from the user's seed and what tells the piece from others."""
+    """32-bit seed of a piece of work, from the user's seed and an identifier of the piece."""
     text = "/".join(map(str, (seed, *place)))
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
 
 
 def slices(count: int, at_once: int) -> list[slice]:
-    """Slices of so many items, some at once."""
+    """Slices that cover `count` items, `at_once` at a time."""
     return [slice(first, min(first + at_once, count)) for first in range(0, count, at_once)]
 
 
 class TileWriter(Protocol):
-    """What `run_tiles` writes to: a `Writer`, or several as one."""
+    """Output of `run_tiles`: a `Writer`, or several combined."""
 
     @property
     def artefact(self) -> Artefact: ...

@@ -1,4 +1,4 @@
-"""What the steps of a bake take, in seconds of wall clock, and of processor time in this process."""
+"""Duration of the steps of a bake, in seconds of wall time, and of processor time in this process."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from lambent.store.store import Store
 
 
 class Timed(Protocol):
-    """`with timed("reflectors"):` notes what a step takes."""
+    """`with timed("reflectors"):` times a step."""
 
     def __call__(self, step: str, *, continued: bool = False) -> AbstractContextManager[None]: ...
 
@@ -22,11 +22,11 @@ def untimed(step: str, *, continued: bool = False) -> AbstractContextManager[Non
 
 
 class Stopwatch:
-    """Notes seconds in documents of a store.
+    """Stores durations in seconds in documents of a store.
 
-    "timings" has them by step; a step that continues an interrupted bake adds to those that are there. "last_run" has
-    those of one run alone, with "other" for what is no step, so that they add up to the whole. "processor_timings" has
-    seconds of all cores by step, which other work on the machine does not lengthen as much.
+    "timings" has wall time by step; a step that continues an interrupted bake adds to the previous value. "last_run"
+    has that of a single run, with "other" for the remainder, so that it sums to the whole run. "processor_timings" has
+    processor time by step, summed over cores, which other work on the machine affects less.
     """
 
     def __init__(self, store: Store) -> None:
@@ -47,7 +47,7 @@ class Stopwatch:
                 self._store.set_document(document, {**noted, step: round(before + seconds, 3)})
 
     def finish(self, start: float) -> None:
-        """Write "last_run"; the run began at `start` of `time.perf_counter`."""
+        """Write "last_run"; `start` is the run's start by `time.perf_counter`."""
         other = time.perf_counter() - start - sum(self._steps.values())
         steps = {**self._steps, "other": other}
         self._store.set_document(LAST_RUN, {step: round(seconds, 3) for step, seconds in steps.items()})

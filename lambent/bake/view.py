@@ -1,4 +1,4 @@
-"""A view that arrays are baked for."""
+"""A view for which arrays are baked."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SIZE, MOST = (512, 512), 16384  # pixels
 
 @dataclass(frozen=True)
 class View:
-    """A camera and the size of its image, in pixels, that arrays are baked for."""
+    """A camera, and the size of its image in pixels, for which arrays are baked."""
 
     camera: Camera
     width: int
@@ -33,7 +33,7 @@ class View:
 
 
 def view_named(text: str, cameras: Iterable[Camera]) -> View:
-    """The view of "CAMERA" or "CAMERA:WIDTHxHEIGHT"; `UserError` where there is no such camera or size."""
+    """Parse a view "CAMERA" or "CAMERA:WIDTHxHEIGHT"; `UserError` if the camera or the size is invalid."""
     found = {camera.name: camera for camera in cameras}
     size = re.fullmatch(r"(.*):(\d+)x(\d+)", text, re.DOTALL | re.ASCII)
     if text in found or size is None:

@@ -1,4 +1,4 @@
-"""Who wants to see a bake's light before the bake is done: what is finished is told at once."""
+"""Observers of a bake, notified as soon as light is finished."""
 
 from __future__ import annotations
 
@@ -11,25 +11,26 @@ from lambent.core.arrays import Flags
 
 
 class Watch:
-    """Told what is there; by itself it does nothing with it.
+    """Base class of observers; ignores all notifications.
 
     Attributes
     ----------
     region_pause : float or None
-        Regions of the light map are finished early, and again after so many times what that took. None: never.
+        Pause between early regions of the light map, as a multiple of the time that finishing one took. None: no
+        regions.
     """
 
     region_pause: float | None = None
 
     def arrived(self, kind: str, names: Collection[str]) -> None:
-        """Arrays of a kind that the store now holds for the scene as it is; those it held before are told, too.
+        """Arrays of a kind that the store now has for the current scene, including those it had before.
 
-        Kinds are told when they are whole, probes one by one as well. A name may be told twice.
+        A kind is reported when it is complete; probes are also reported one by one. A name may be reported twice.
         """
 
     def region(self, light: NDArray[np.float16], finished: Flags) -> None:
-        """The front of the light map by light group (n, H, W, 3), float16; n is 1 where light is not sorted.
+        """The front of the light map by light group (n, H, W, 3), float16; n is 1 if light is not separated.
 
-        It counts where all samples are there, `finished` (H, W). Texels beside unfinished ones may change a little
+        It is valid where all samples are done, `finished` (H, W). Texels next to unfinished ones may change slightly
         until the light map arrives, which closes its seams.
         """

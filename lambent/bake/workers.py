@@ -1,4 +1,4 @@
-"""Where jobs are done: one after another in this process, or in others (`cluster`)."""
+"""Execution of jobs: one after another in this process, or in other processes (`cluster`)."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ R = TypeVar("R")
 
 
 class Workers(Protocol):
-    """Does jobs that depend on nothing but themselves, so that any process, in any order, finds the same."""
+    """Runs self-contained jobs, with equal results in any process and any order."""
 
     def each(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
-        """Jobs and their results, as they are done. `work` and the jobs can be pickled; jobs are made when their turn
-        comes, so that their arrays are in memory only then."""
+        """Yield jobs with their results, in order of completion.
+
+        `work` and the jobs must be picklable; jobs are created on demand, to have their arrays in memory only then.
+        """
 
 
 class InProcess:
-    """Does jobs here, in their order."""
+    """Runs jobs in this process, in order."""
 
     def each(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
         return ((job, work(job)) for job in jobs)

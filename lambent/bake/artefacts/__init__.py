@@ -1,1 +1,1 @@
-"""Kinds of artefacts, one file each; `lambent.bake.context` describes its contents."""
+"""Kinds of artefacts, one file each; `lambent.bake.context` describes what a file must contain."""

@@ -1,4 +1,4 @@
-"""What the light of a baked scene needs to answer other colours of its materials: `store.answer`, `core.answer`."""
+"""Arrays from which indirect light follows edits of materials: see `store.answer` and `core.answer`."""
 
 from __future__ import annotations
 
@@ -51,16 +51,16 @@ BETWEEN = (
     "shares",
 )
 SEEN = ("spots", "tint", "sun")
-TILES = 16  # of rays
+TILES = 16  # tiles of rays
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Patches, and what light is gathered with.
+    """Patches, and samples for direct and gathered light.
 
-    Where the light map keeps no direct light, texels get `direct_samples` of it; where that is sorted, what lobes have
-    sent on takes `lobe_samples`. One texel of each block of `block` x `block` texels gathers by `gather_rays`; those
-    beside contacts that do not send trace half as many and keep `receiver_rays` of these.
+    If the light map keeps no direct light, texels get `direct_samples` of it; if light is separated by group, light
+    through lobes takes `lobe_samples`. One texel of each block of `block` x `block` texels gathers with `gather_rays`;
+    points near contacts, which do not send, trace half as many and keep `receiver_rays` of these.
     """
 
     patches: int = 1000
@@ -92,7 +92,7 @@ def keys(context: BakeContext) -> dict[str, str]:
     sampled = () if ready else TRACED[:count]
     by_group = map(_by_group, sampled) if sorts_light(context.methods) else ()
     found = dict.fromkeys((*sampled, *by_group, *(() if ready else MAPS[:count])), key)
-    worn = [(o.name, o.material) for o in context.scene.objects]  # patches are of one material, by its name
+    worn = [(o.name, o.material) for o in context.scene.objects]  # each patch has one material, by name
     found |= dict.fromkeys(map(answer_name, (*PATCH, *BETWEEN)), key_of(KIND, REVISION, key, worn))
     of_probes = context.keys("probe")
     for o in context.scene.objects:
@@ -102,7 +102,7 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 
 def _by_group(name: str) -> str:
-    """Name of the samples by light group that belong to samples."""
+    """Name of the array of samples by light group for an array of samples."""
     return f"{name}_by_group"
 
 
@@ -123,7 +123,7 @@ def bake(context: BakeContext) -> None:
 def _direct(context: BakeContext, side: int) -> Floats:
     """Direct light (G, H, W, 3) of a side by group, at most that of the light map.
 
-    What lobes alone have sent on counts as direct.
+    Light that arrives through lobes alone counts as direct.
     """
     if keeps_direct(context):
         return np.asarray(context.store.read(_direct_name(context, side)))
@@ -136,12 +136,12 @@ def _direct(context: BakeContext, side: int) -> Floats:
 
 
 def _direct_name(context: BakeContext, side: int) -> str:
-    """Name of the array of a side's direct light: the light map's, where it keeps all."""
+    """Name of the array of a side's direct light: the light map's, if it keeps all of it."""
     return group_name(SIDES[side], direct=True) if keeps_direct(context) else MAPS[side]
 
 
 def _sampled_direct(context: BakeContext, side: int, lit: Floats) -> Floats:
-    """The same for a light map `lit` (G, H, W, 3) that does not keep it."""
+    """Likewise for a light map `lit` (G, H, W, 3) that keeps none."""
     from lambent.bake.answering.direct import cleaned_direct
     from lambent.bake.light.sampling import closed, sampled_halves
 
@@ -153,18 +153,18 @@ def _sampled_direct(context: BakeContext, side: int, lit: Floats) -> Floats:
         clean = cleaned_direct(halves, known, lit[0], labels)[None]
     if not known.any():
         return clean
-    return closed(clean, known, context.traced.texels, labels, context.traced.cuts)  # as the light map is
+    return closed(clean, known, context.traced.texels, labels, context.traced.cuts)  # as in the light map
 
 
 def _lit(context: BakeContext) -> list[Floats]:
-    """All light (G, H, W, 3) by group, of each side that the light map has."""
+    """All light (G, H, W, 3) by group, for each side of the light map."""
     if sorts_light(context.methods):
         return [light for light in finished_groups(context) if light is not None]
     return [light[None] for light in finished_maps(context) if light is not None]
 
 
 def _direct_by_group(context: BakeContext, side: int, lit: Floats, known: Flags, labels: Indices) -> Floats:
-    """The same where light is sorted: the light map's own direct light, denoised, and what lobes alone have sent on."""
+    """Likewise for separated light: the light map's own direct light, denoised, plus light through lobes alone."""
     from lambent.bake.answering.direct import cleaned_direct
 
     parts = context.store.read(_by_group(TRACED[side]))[0].reshape(*known.shape, -1, 3)
@@ -178,7 +178,7 @@ def _direct_by_group(context: BakeContext, side: int, lit: Floats, known: Flags,
 
 
 def _direct_samples(context: BakeContext, side: int) -> Indices:
-    """Take samples of direct light of a side, those by group beside; returns the charts that viewers see (H, W)."""
+    """Sample direct light of a side, by group too; returns the charts that viewers see (H, W)."""
     from lambent.bake.light.groups import BothWriters
     from lambent.bake.light.sampling import Sampling, tile_samples
     from lambent.bake.tracing.group_tally import Direct
@@ -192,7 +192,7 @@ def _direct_samples(context: BakeContext, side: int) -> Indices:
     half = max(1, (how.lobe_samples if grouped else how.direct_samples) // 2)
     sampling = Sampling((2 * half, 2 * half), 0.0, depth, half, unseen=traced.unseen(diffuse=False))
     if grouped:
-        parts = 2 * len(traced.sorted_lights.groups)  # all of it, and what comes straight from emitters
+        parts = 2 * len(traced.sorted_lights.groups)  # all direct light, and the part straight from emitters
         beside = context.samples(KIND, _by_group(TRACED[side]), (1, *size, 3 * parts), (1, tile, tile, 3 * parts))
         writer = BothWriters(whole, beside)
         sampling = replace(sampling, tally=traced.tally(diffuse=False, direct=Direct.straight), parts=parts)
@@ -215,7 +215,7 @@ def _spots(context: BakeContext, directs: list[Floats]) -> Spots:
 
 
 def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
-    """The patches in the store, or new ones."""
+    """The stored patches, or new ones."""
     from lambent.bake.answering.patches import Clusters, clustered
     from lambent.bake.answering.transfer import hits_from_viewed, patch_means
 
@@ -243,7 +243,7 @@ def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
 
 
 def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Clusters) -> None:
-    """Transfer between patches, and rays between points."""
+    """Compute the transfer between patches, and the rays between points."""
     from lambent.bake.answering.points import (
         bounded_points,
         neighbours,
@@ -308,7 +308,7 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
 
 
 def _seen_by_probes(context: BakeContext, stale: set[str]) -> None:
-    """What the probes in the store see of the light map."""
+    """Store which texels of the light map each probe sees."""
     from lambent.bake.answering.probe_spots import ProbeEyes
     from lambent.bake.probes.division import family
 

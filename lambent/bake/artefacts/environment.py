@@ -14,12 +14,12 @@ KIND = "environment"
 NEEDS = ()
 REVISION = 1
 RADIANCE = "environment/radiance"
-BLACK_TEXELS = 16  # along a side, where there is no environment
+BLACK_TEXELS = 16  # along a side, without an environment
 
 
 @dataclass(frozen=True)
 class Settings:
-    """`texels` along a side of a cube's face."""
+    """`texels` along a side of each face of the cube map."""
 
     texels: int
 

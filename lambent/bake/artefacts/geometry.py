@@ -1,4 +1,4 @@
-"""Meshes with the coordinates of their light map, the textures on them, and the scene record."""
+"""Meshes with light map coordinates, their textures, and the scene record."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from lambent.store.textures import texture_records, write_textures
 KIND = "geometry"
 NEEDS = ()
 REVISION = 4
-REFLECTORS = "reflectors"  # document: the key of everything that reflectors in the scene record depend on
+REFLECTORS = "reflectors"  # document: the key of all inputs of the reflectors in the scene record
 
 
 @dataclass(frozen=True)
 class Settings:
-    """`texels` along a side of the light map, about."""
+    """Approximate number of `texels` along a side of the light map."""
 
     texels: int
 
@@ -54,9 +54,9 @@ def bake(context: BakeContext) -> None:
 
 
 def describe(context: BakeContext) -> None:
-    """Write the textures and the scene record: cameras may change, and geometry stay.
+    """Write the textures and the scene record: cameras may change without a change of geometry.
 
-    Reflectors are looked for again only where what they depend on has changed.
+    Reflectors are searched again only if their inputs have changed.
     """
     write_textures(context.store, context.scene.textures)
     scene, store = context.scene, context.store
@@ -72,7 +72,7 @@ def describe(context: BakeContext) -> None:
 
 
 def scene_record_of(scene: Scene, reflectors: tuple[ReflectorRecord, ...]) -> SceneRecord:
-    """The scene but for its arrays."""
+    """The scene without its arrays."""
     low, high = scene.bounds
     return SceneRecord(
         name=scene.name, objects=object_records(scene), materials=dict(scene.materials), cameras=scene.cameras,

@@ -1,7 +1,7 @@
-"""Interreflections of a view: light that met other surfaces first, by bands of the curves and by tails (`store.tails`).
+"""Interreflections of a view: indirect light, by bands of the curves and by tails (`store.tails`).
 
-Passes over all points add samples, each as many as there are, so that a picture is soon there and its noise falls. A
-tile of points is one array, written whole: work that ends early loses at most one tile's pass.
+Each pass over all points doubles the samples, so that a picture is available early and its noise falls. A tile of
+points is one array, written whole: an interruption loses at most one tile's pass.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ NEEDS = ("view_points",)
 OF_VIEWS = True
 ON_REQUEST = True
 REVISION = 2
-POINTS = 1 << 12  # of a tile
+POINTS = 1 << 12  # per tile
 FIRST_PASS, LONGEST_PASS = 16, 1 << 16  # samples
 
 
@@ -47,13 +47,13 @@ class Part:
     key: str
 
     def names(self, tile: int) -> list[str]:
-        """Of a tile's arrays, one for each term."""
+        """Names of a tile's arrays, one per term."""
         terms = range(len(self.bins.bands))
         return [self.view.name(KIND, f"{self.material}/{term}/{tile}") for term in terms]
 
 
 def keys(context: BakeContext) -> dict[str, str]:
-    """Of the tails and the samples; tiles have keys of their own (`Part.key`), and are not counted before the bake."""
+    """Keys of tails and samples; tiles have their own keys (`Part.key`) and are not counted before the bake."""
     found: dict[str, str] = {}
     for view in context.views:
         found[view.name(KIND, "tails")] = key_of(KIND, REVISION, _series_key(context, view), context.bounces.series)
@@ -77,7 +77,7 @@ def bake(context: BakeContext) -> None:
 
 
 def passes(samples: int) -> list[int]:
-    """Samples that all points have after each pass of a bake."""
+    """Samples per point after each pass of a bake."""
     found = [min(FIRST_PASS, samples)]
     while found[-1] < samples:
         found.append(min(found[-1] + min(found[-1], LONGEST_PASS), samples))
@@ -85,7 +85,7 @@ def passes(samples: int) -> list[int]:
 
 
 def _bring(context: BakeContext, work: TileTracer, view: View, samples: int) -> None:
-    """Bring every tile of a view to so many samples."""
+    """Bring every tile of a view to `samples`."""
     points = context.view_tracer.points(view)
     materials = np.array([o.material for o in context.in_views.objects])[points.object]
     found = list(parts(context, view))
@@ -122,7 +122,7 @@ def _write(context: BakeContext, part: Part, tile: int, found: tuple[Tile, ...],
 
 
 def parts(context: BakeContext, view: View) -> Iterator[Part]:
-    """The materials of a scene's objects."""
+    """One part per material used by the scene's objects."""
     key = _series_key(context, view)
     textures: Any = texture_inputs(context.in_views, "diffuse", "specular")
     rough: Any = texture_inputs(context.in_views, "roughness")
@@ -133,7 +133,7 @@ def parts(context: BakeContext, view: View) -> Iterator[Part]:
 
 
 def said(part: Part, term: int) -> dict[str, Any]:
-    """What a tile says of its bands."""
+    """A tile's meta for its bands."""
     if not part.bins.terms:
         return {"material": part.material, "term": -1, "fixed": None, "curves": []}
     one, factors = part.bins.terms[term]
@@ -142,7 +142,7 @@ def said(part: Part, term: int) -> dict[str, Any]:
 
 
 def _samples(context: BakeContext, part: Part, tile: int) -> int:
-    """Samples that a tile has: none where its terms differ, because a bake was interrupted between them."""
+    """Samples of a tile: 0 if its terms differ, because a bake was interrupted between them."""
     store, names = context.store, part.names(tile)
     if not all(name in store and store.artefact(name).key == part.key for name in names):
         return 0
@@ -151,7 +151,7 @@ def _samples(context: BakeContext, part: Part, tile: int) -> int:
 
 
 def _put_tails(context: BakeContext, view: View) -> None:
-    """The document of the tails: an array without numbers, whose notes say what they are."""
+    """Write the document of the tails, as the meta of an array without numbers."""
     tails = tails_of(_editables(context), context.bounces)
     environment = environment_note(context.environment)
     meta = {
@@ -162,14 +162,14 @@ def _put_tails(context: BakeContext, view: View) -> None:
 
 
 def _series_key(context: BakeContext, view: View) -> str:
-    """The key of all that tiles depend on, but the material of their points."""
+    """Key of all inputs of tiles except the material of their points."""
     scene, bounces, editables = context.in_views, context.bounces, _editables(context)
     lights, tails = light_inputs(scene), tails_of(editables, bounces).said()
     return key_of(KIND, REVISION, points_key(context, view), lights, _as_baked(context), tails, context.seed)
 
 
 def _as_baked(context: BakeContext) -> list[Any]:
-    """The state of the materials whose BRDFs paths know: not of those that scatter by the cosine."""
+    """States of the materials whose BRDFs enter the paths, that is, without those scattered by the cosine."""
     scene, editables, bounces = context.in_views, _editables(context), context.bounces
     known = bounces.fixed | (set() if bounces.diffuse_seen else shapes_of(scene, editables).keys())
     textures: Any = texture_inputs(scene, *SCATTERING_TEXTURES)

@@ -1,7 +1,7 @@
-"""The light map: irradiance of both sides of surfaces, its noise, and the dominant direction of its light.
+"""The light map: irradiance on both sides of surfaces, its noise, and the dominant direction of its light.
 
-The samples stay in the store as `light_map/traced`, `gathered`, `photons` and `leaning`: an interrupted bake continues
-from them, and the noise is found from them.
+Samples stay in the store as `light_map/traced`, `gathered`, `photons` and `leaning`: an interrupted bake continues with
+them, and the noise is estimated from them.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ class Settings:
     """Samples per texel, and bounces.
 
     Tiles get path traced samples until their relative noise (root mean square, before denoising) is below `noise`,
-    within the bounds `samples`. With `gather_samples`, that map only lights the first bounce of a second, final map: it
-    gathers that many samples per texel, or as many as bring a tile below `gather_noise`, at a fraction of the noise.
-    Photons take `photons_per_texel`, on average over the map, and gather nothing.
-    Maps are sampled and kept in tiles of `tile_texels` per side, the most that an interruption costs.
+    within the bounds `samples`. With `gather_samples`, that map only lights the first bounce of a second, final map,
+    which gathers that many samples per texel, or as many as bring a tile below `gather_noise`, at a fraction of the
+    noise. A photon map takes `photons_per_texel`, averaged over the map, without gathering. Maps are sampled and stored
+    in tiles of `tile_texels` per side, the most that an interruption costs.
     """
 
     samples: tuple[int, int]
@@ -71,7 +71,7 @@ SETTINGS = {
 
 
 def keys(context: BakeContext) -> dict[str, str]:
-    """Samples share one key; filtered arrays, the irradiance, its noise and the dominant direction, another."""
+    """All sample arrays share one key; filtered arrays (irradiance, noise, dominant direction) share another."""
     how: Settings = context.settings(KIND)
     effort: list[object] = [how.samples, how.noise, how.gather_samples, how.gather_noise]
     effort += [how.tile_texels, how.max_depth, context.seed]
@@ -92,7 +92,7 @@ def keys(context: BakeContext) -> dict[str, str]:
     count = _sides(context)
     names = [*IRRADIANCE[:count], *NOISE[:count]]
     raw = [PHOTONS] if _by_photons(context) else [_of_side(stage, i) for stage in _stages(how) for i in range(count)]
-    direct: list[str] = []  # of the last stage
+    direct: list[str] = []  # direct light of the last stage
     if grouped:
         names += map(group_name, SIDES[:count])
         raw += [_parts(_of_side(stage, side)) for stage in _stages(how)[:-1] for side in range(count)]
@@ -126,19 +126,19 @@ def bake(context: BakeContext) -> None:
 
 
 def finished_maps(context: BakeContext) -> tuple[Floats, Floats | None]:
-    """The light map (H, W, 3) of both sides in the store; None where no surface is two-sided."""
+    """The stored light map (H, W, 3) of both sides; None for the back if no surface is two-sided."""
     front, *back = (context.store.read(name) for name in IRRADIANCE[: _sides(context)])
     return front, back[0] if back else None
 
 
 def finished_groups(context: BakeContext) -> tuple[Floats, Floats | None]:
-    """The same by light group, (n, H, W, 3)."""
+    """Likewise by light group, (n, H, W, 3)."""
     front, *back = (context.store.read(group_name(side)) for side in SIDES[: _sides(context)])
     return front, back[0] if back else None
 
 
 def keeps_direct(context: BakeContext) -> bool:
-    """Whether the light map keeps all of its direct light apart, what lobes have sent on included.
+    """Whether the light map stores all its direct light separately, light through lobes included.
 
     Final gathering knows where a path ends: at an emitter, or on cached light.
     """
@@ -150,7 +150,7 @@ def _by_photons(context: BakeContext) -> bool:
 
 
 def _may_have_sun(scene: Scene) -> bool:
-    """Whether direct light of a sun is left out, if there is one: which takes the environment's picture to know."""
+    """Whether direct light of a sun would be left out; certain only once the environment's picture is read."""
     constant = scene.environment is None or isinstance(scene.environment, ConstantEnvironment)
     return not constant or any(isinstance(light, DirectionalLight) for light in scene.lights)
 
@@ -160,7 +160,7 @@ def _sides(context: BakeContext) -> int:
 
 
 def _stages(how: Settings) -> tuple[str, ...]:
-    """Arrays of samples of path traced maps, the final map's last."""
+    """Sample arrays of path traced maps, the final map's last."""
     return (TRACED, GATHERED) if how.gather_samples else (TRACED,)
 
 
@@ -169,7 +169,7 @@ def _of_side(stage: str, side: int) -> str:
 
 
 def _parts(stage: str) -> str:
-    """Name of the samples of parts that belong to samples."""
+    """Name of the array of samples of parts for an array of samples."""
     return f"{stage}_by_group"
 
 
@@ -208,7 +208,7 @@ def _sampled_maps(context: BakeContext) -> Maps:
 
 
 def _sorted_maps(context: BakeContext) -> Maps:
-    """The same as sums of the maps of light groups, which are put into the store beside."""
+    """Likewise as sums of the maps of light groups, which are stored as well."""
     from lambent.bake.light.groups import finished_groups, group_notes
     from lambent.bake.light.sampling import gathered, path_traced
     from lambent.bake.tracing.group_tally import Direct
@@ -244,9 +244,9 @@ def _sorted_maps(context: BakeContext) -> Maps:
 def _samples(
     context: BakeContext, stage: str, side: int, how: Sampling, faces: Flags | None = None
 ) -> tuple[Floats, Indices]:
-    """The samples of one side (2, H, W, 4), on `faces` (T,) if given, and the charts that viewers see (H, W).
+    """Samples of one side (2, H, W, 4), on `faces` (T,) if given, and the charts that viewers see (H, W).
 
-    Samples of parts, (1, H, W, 3 parts), the means of both halves, are in the store beside.
+    The store also receives samples of parts, (1, H, W, 3 parts), averaged over both halves.
     """
     from lambent.bake.light.groups import BothWriters
     from lambent.bake.light.sampling import tile_samples
@@ -282,7 +282,7 @@ def _samples(
 
 
 def _early(context: BakeContext, stage: str, side: int, labels: Indices) -> Callable[[], None]:
-    """What tells a watch regions of the light that is shown: samples of the last stage, on the front."""
+    """Callback that shows a watch finished regions of light: samples of the last stage, on the front."""
     from lambent.bake.light.early import EarlyLight
 
     if context.watch.region_pause is None or side or stage != _stages(context.settings(KIND))[-1]:
@@ -326,7 +326,7 @@ def _dominant_direction(context: BakeContext) -> None:
 
 
 def _noise(context: BakeContext) -> None:
-    """Noise by texel, from the samples in the store."""
+    """Estimate noise per texel from the stored samples."""
     from lambent.bake.light.noise import noise_map
     from lambent.bake.light.sampling import sampled_halves
 

@@ -1,4 +1,4 @@
-"""Probes: the surroundings of objects from one point each, and bounding planes of them."""
+"""Probes: the surroundings of each object from one point, and their bounding planes."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 KIND = "probe"
 NEEDS = ("geometry", "light_map")
 REVISION = 6
-HELD = "held"  # in the document of shared probes: objects that no probe leaves out
-SHARING = "sharing"  # the step that finds whose probe each object shows
+HELD = "held"  # key in the document of shared probes: objects that no probe leaves out
+SHARING = "sharing"  # the step that assigns shared probes
 PARTS = ("radiance", "distance", "planes")
-GROUPS = "groups"  # a further part, where light is sorted
+GROUPS = "groups"  # an additional part if light is separated
 TOO_FEW = (
     "%s: its probe misses %.0f %% of what the object mirrors; a tenth of its look-ups are %.0f degrees or more off"
 )
@@ -111,14 +111,14 @@ def _parts(context: BakeContext) -> tuple[str, ...]:
 
 
 def sharing(owners: Mapping[str, str], name: str) -> tuple[str, ...]:
-    """The objects that show the probe of this one."""
+    """The objects that show the probe of object `name`."""
     return tuple(sorted(other for other, owner in owners.items() if owner == name))
 
 
 def _owners(context: BakeContext) -> dict[str, str]:
-    """By each object without a probe, the one whose it shows; found again only where geometry or materials changed.
+    """Owner of the shown probe, by object without its own; recomputed only if geometry or materials changed.
 
-    Nothing before the geometry is baked, which viewers are then looked for in.
+    Empty before the geometry is baked, because viewers are searched in it.
     """
     scene, names, store = context.scene, _objects(context), context.store
     if not names or context.stale("geometry"):
@@ -154,6 +154,6 @@ def _cached(context: BakeContext) -> bool:
 
 
 def _objects(context: BakeContext) -> list[str]:
-    """Names of the objects that want a probe, as they are or in a variant."""
+    """Names of the objects that need a probe, with their materials or those of a variant."""
     scene = context.scene
     return [o.name for o in scene.objects if any(map(needs_probe, documents_of(scene, o.material)))]

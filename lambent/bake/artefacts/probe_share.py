@@ -1,4 +1,4 @@
-"""Shares of probes' light by direction, in texels of the light map (`probes.shares`)."""
+"""Directional shares of probes' light, per texel of the light map (`probes.shares`)."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def bake(context: BakeContext) -> None:
 
 
 def _shown(context: BakeContext) -> Iterator[Shown]:
-    """The opaque objects that show a probe; reflectors find by distances what their mirrored views do not hold."""
+    """Opaque objects that show a probe; reflectors look up by distance what their mirrored views miss."""
     from lambent.bake.probes.device_lookup import DeviceProbe
     from lambent.bake.probes.selection import UNSCALED, Scaling, largest_r0, widest_lobe
     from lambent.bake.probes.shares import Shown

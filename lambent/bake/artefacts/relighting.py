@@ -1,4 +1,4 @@
-"""What the points of a view reflect of each part of an environment, all materials as they are: for relighting."""
+"""Reflected light of a view's points by part of the environment, with fixed materials: for relighting."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ NEEDS = ("view_points",)
 OF_VIEWS = True
 ON_REQUEST = True
 REVISION = 1
-POINTS = 1 << 11  # a block: all triangles of so many points are in memory at once
+POINTS = 1 << 11  # per block: all triangles of this many points are in memory at once
 LAMPS, LIGHT, ERRORS = "lamps", "light", "errors"
 SPARSE = ("spans", "points", "values")
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How finely, and how exactly.
+    """Resolution and accuracy.
 
     Attributes
     ----------
@@ -41,9 +41,9 @@ class Settings:
     levels, samples
         Directions at each point: 4^levels in every triangle, and those drawn by the BSDF.
     tolerance
-        Share of the norm of a point's transport that may be left out of the store.
+        Share of the norm of a point's transport that may be omitted from the store.
     paths
-        Of a point to the lamps.
+        Per point, to the lamps.
     """
 
     depth: int
@@ -91,7 +91,7 @@ def bake(context: BakeContext) -> None:
 
 
 def _lamps(context: BakeContext, view: View) -> np.ndarray:
-    """(P, 3) light of all that shines but the environment."""
+    """(P, 3) light of all emitters except the environment."""
     from lambent.bake.transport.triangle_transport import light_of_lamps
 
     tracer = context.view_tracer
@@ -102,7 +102,7 @@ def _lamps(context: BakeContext, view: View) -> np.ndarray:
 
 
 def _bake_transport(context: BakeContext, view: View, tree: TriangleTree) -> None:
-    """Wavelets of blocks of points: the entries of a block are written before its spans."""
+    """Write wavelets by blocks of points, the entries of a block before its spans."""
     from lambent.scenes.triangle_wavelets import FACES
 
     points = len(context.view_tracer.points(view))
@@ -141,7 +141,7 @@ def _bake_transport(context: BakeContext, view: View, tree: TriangleTree) -> Non
 def _blocks(
     context: BakeContext, view: View, tree: TriangleTree, missing: list[Any]
 ) -> Iterator[tuple[int, np.ndarray]]:
-    """The wavelets (N, 3, P) of each missing block of points."""
+    """Yield the wavelets (N, 3, P) of each missing block of points."""
     import drjit as dr
     import mitsuba as mi
 

@@ -1,4 +1,4 @@
-"""Transport of the terms of a view's materials: direct light by bands of their curves, first of few lights."""
+"""Transport of the terms of a view's materials: direct light by bands of their curves, starting with few lights."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ KIND = "transport"
 NEEDS = ("view_points", "visibility")
 OF_VIEWS = True
 REVISION = 4
-POINTS = 1 << 15  # a chunk
-LEAST = 2.0**-10  # of the light of a band of the first curve: less moves to a neighbour along a smooth second one
-ENTRIES = 1 << 20  # of pairs, a chunk: each costs milliseconds until it is on the disk
-MANY_LIGHTS = 1000  # fewer have half the bands along both of two sharp curves
+POINTS = 1 << 15  # per chunk
+LEAST = 2.0**-10  # of the light of a band of the first curve: less is moved to a neighbour along a smooth second curve
+ENTRIES = 1 << 20  # of pairs, per chunk: each chunk costs milliseconds to write
+MANY_LIGHTS = 1000  # below this, two sharp curves have half the bands each
 SMOOTH = ("theta_i", "theta_o", "theta_d")  # angles over which curves have no narrow peaks
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Bands, powers of two, of curves over angles with narrow peaks and over `SMOOTH` ones, alone or as one of two."""
+    """Numbers of bands, powers of two, for curves with narrow peaks and `SMOOTH` ones, alone or as one of two."""
 
     sharp: int
     smooth: int
@@ -57,7 +57,7 @@ SETTINGS = {
 
 @dataclass(frozen=True)
 class _Part:
-    """One term of one material in one view under so many lights."""
+    """One term of one material in one view with a number of lights."""
 
     view: View
     lights: int
@@ -131,7 +131,7 @@ def _bake_view(context: BakeContext, view: View, count: int) -> None:
 
 @dataclass(frozen=True)
 class _Baking:
-    """The points of a part and what they see."""
+    """The points of a part and their visibility."""
 
     part: _Part
     points: ViewPoints
@@ -142,7 +142,7 @@ class _Baking:
     progress: Progress
 
     def rows(self, store: Store) -> None:
-        """Transport by wavelets of one curve; without a curve, one row."""
+        """Write transport by wavelets of one curve; without a curve, as one row."""
         from lambent.bake.transport.bands import transport
         from lambent.bake.transport.stored import wavelet_rows
 
@@ -157,7 +157,7 @@ class _Baking:
         writer.finish()
 
     def pairs(self, store: Store) -> None:
-        """Transport by pairs of bands: the entries of a block of points are written before its spans."""
+        """Write transport by pairs of bands, the entries of a block of points before its spans."""
         from lambent.bake.transport.bands import pair_transport
 
         bands, many, term = self._bands(), len(self.points), self.part.term
@@ -210,7 +210,7 @@ class _Baking:
         return store.begin(name, KIND, shape, chunks, dtype, key=self.part.key, meta=meta, growing=growing)
 
     def _missing(self, writer: Writer) -> Iterator[tuple[int, ...]]:
-        """The chunks that are missing, each reported when it is taken."""
+        """Yield the missing chunks, and report each when it is taken."""
         total = len(writer.artefact.chunk_grid)
         for chunk in writer.missing:
             self.progress(total - len(writer.missing), total, self.what)
@@ -219,7 +219,7 @@ class _Baking:
 
 
 class _Stream:
-    """Writes entries into whole chunks from `begin`, the last one filled with zeros."""
+    """Writes entries into whole chunks from `begin`, the last one padded with zeros."""
 
     def __init__(self, writer: Writer, begin: int, after: Behind) -> None:
         self._writer, self._next, self._after = writer, begin // ENTRIES, after
@@ -248,7 +248,7 @@ class _Stream:
 
 
 def append(writer: Writer, begin: int, entries: np.ndarray) -> None:
-    """Write entries into whole chunks from `begin`, the last one filled with zeros."""
+    """Write entries into whole chunks from `begin`, the last one padded with zeros."""
     size = -(-len(entries) // ENTRIES) * ENTRIES
     padded = np.concatenate([entries, np.zeros((size - len(entries), entries.shape[1]), entries.dtype)])
     if begin + size > writer.artefact.shape[0]:
@@ -258,7 +258,7 @@ def append(writer: Writer, begin: int, entries: np.ndarray) -> None:
 
 
 def _parts(context: BakeContext, view: View, count: int) -> Iterator[_Part]:
-    """The terms of every material that an object of the scene has."""
+    """Yield the terms of every material used by an object of the scene."""
     scene = context.in_views
     light = lights_key(context, view, count)
     textures: Any = texture_inputs(scene, "diffuse", "specular")
@@ -273,10 +273,10 @@ def _parts(context: BakeContext, view: View, count: int) -> Iterator[_Part]:
 
 
 def _bands(how: Settings, term: Term, lights: int) -> tuple[tuple[Factor, int], ...]:
-    """The curves of a term and their bands under so many lights.
+    """The curves of a term, and their bands for this many lights.
 
-    Pairs of two sharp curves cost by the product of their bands. Few lights are too wide for so many: of 400, one
-    turns the half vector by 5 degrees.
+    The cost of pairs of two sharp curves is the product of their bands. Few lights are too wide for so many bands: one
+    of 400 turns the half vector by 5 degrees.
     """
     of_two = len(term.factors) == 2
     smooth, sharp = (how.smooth_of_two, how.sharp_of_two) if of_two else (how.smooth, how.sharp)

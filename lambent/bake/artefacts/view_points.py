@@ -1,4 +1,4 @@
-"""What the pixels of a view show: the points of surfaces, and all that shines by itself."""
+"""The surface points that the pixels of a view show, and everything that emits light."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BACKDROP = "backdrop"
 
 
 def points_key(context: BakeContext, view: View) -> str:
-    """The key of a view's points, all that is at them included."""
+    """Key of a view's points and all their data."""
     scene = context.in_views
     places = [view.meta["view"]["camera"] | {"name": ""}, view.width, view.height]
     worn = [o.material for o in scene.objects]
@@ -37,7 +37,7 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 
 def describe(context: BakeContext) -> None:
-    """Write a scene record without objects where the store is of views alone: their materials, cameras and exposure."""
+    """For a store of views alone, write a scene record without objects: their materials, cameras and exposure."""
     store, scene = context.store, context.in_views
     if any(artefact.name.startswith("geometry/") for artefact in store.artefacts()):
         return

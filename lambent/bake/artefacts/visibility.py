@@ -1,4 +1,4 @@
-"""Which lights the points of a view see: traced once, whatever is edited."""
+"""Visibility of lights from the points of a view: traced once, independent of edits."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ KIND = "visibility"
 NEEDS = ("view_points",)
 OF_VIEWS = True
 REVISION = 3
-POINTS = 1 << 16  # a chunk
+POINTS = 1 << 16  # per chunk
 BITS = 32
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Numbers of `lights`, rising: editing begins with the first and goes on with the next when it is there."""
+    """Numbers of `lights`, ascending: editing starts with the first and switches to the next when it is ready."""
 
     lights: tuple[int, ...]
 
@@ -37,13 +37,13 @@ SETTINGS = {
 
 
 def lights_key(context: BakeContext, view: View, count: int) -> str:
-    """The key of what a view's points see of so many lights, and of these."""
+    """Key of the visibility from a view's points for this many lights."""
     scene = context.in_views
     return key_of(KIND, REVISION, points_key(context, view), light_inputs(scene), count, *_through(context))
 
 
 def _through(context: BakeContext) -> list[bool]:
-    """By object, whether light that comes from behind it counts."""
+    """By object, whether light from behind it counts."""
     materials = (context.editable(o.material) for o in context.in_views.objects)
     return [any(term.side == "transmission" for term in material.terms) for material in materials]
 
@@ -54,13 +54,13 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 
 def bake(context: BakeContext) -> None:
-    """The first lights of each view: `transport` traces the others when it comes to them."""
+    """Trace the first lights of each view; `transport` traces the others when it needs them."""
     for view in context.views:
         trace(context, view, context.settings(KIND).lights[0])
 
 
 def trace(context: BakeContext, view: View, count: int) -> None:
-    """Go on with the visibility of so many lights until it is complete."""
+    """Continue the visibility of this many lights until it is complete."""
     engine()  # before Mitsuba is imported
     from lambent.bake.transport.visibility import visibility
 

@@ -1,9 +1,9 @@
-"""An edited material as a Mitsuba BSDF: the path tracer renders its terms and curves, whatever edits made of them.
+"""An edited material as a Mitsuba BSDF: the path tracer renders its edited terms and curves.
 
     scene["floor"]["bsdf"] = edited_dict(material, editable)
 
-Conventions are those of material_plugin.py, whose textures and frames it has. Directions are sampled without knowledge
-of the curves, as those of interreflections are.
+Conventions, textures and frames are those of material_plugin.py. Sampling of directions ignores the curves, as for
+interreflections.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import MaterialTextures
 
 PLUGIN = "lambent_edited"
-_GIVEN: list[Editable] = []  # plugins are told a number
+_GIVEN: list[Editable] = []  # a plugin receives only an index into this list
 
 
 def edited_dict(material: Material, edited: Editable, textures: MaterialTextures | None = None) -> dict[str, Any]:
-    """The dictionary for `mi.load_dict`, of a material of this document that was edited; registers the plugin."""
+    """The dictionary for `mi.load_dict`, for a material of this document after edits; registers the plugin."""
     _register()
     _GIVEN.append(edited)
     return material_dict(material, textures) | {"type": PLUGIN, "number": len(_GIVEN) - 1}
@@ -85,7 +85,7 @@ def _register() -> None:
 
 
 def _rest(u: Any, sides: Sides) -> Any:
-    """What the choice of a side leaves of a random number: uniform in [0, 1) again."""
+    """Rescale a random number after it chose a side: uniform in [0, 1) again."""
     both = sides.through + sides.back
     above = dr.select(u < both, (u - sides.through) / sides.back, (u - both) / (1 - both))
     return dr.select(u < sides.through, u / sides.through, above)

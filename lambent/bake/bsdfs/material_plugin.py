@@ -11,9 +11,9 @@ perpendicular to the normal), t is its projection onto the shading plane and b =
 `si.sh_frame`, which Mitsuba derives from the uv's (dp/du), or arbitrarily for a mesh that has none.
 Isotropic materials without a normal map do not use it.
 
-`eval_null_transmission` is what goes straight on. It is 1 where a texture says that there is no surface, with the flag
-Null: `tracing.rays` go on there. Mitsuba's own integrators do not: for them the surface is whole. It is between 0 and 1
-on clear glass (`materials.clear`), whose lobes scatter that same light: who adds it to theirs counts it twice.
+`eval_null_transmission` is the undeviated transmittance. It is 1, with the flag Null, where a texture says that there
+is no surface: `tracing.rays` pass through such holes. Mitsuba's own integrators do not: they see a whole surface. On
+clear glass (`materials.clear`) it is between 0 and 1; its lobes scatter the same light, so adding both counts it twice.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ PLUGIN = "lambent_material"
 TANGENT_ATTRIBUTE = "vertex_tangent"
 # Attributes of the BSDF: the textures that multiply kd and kt_d, and k of every lobe; the shading frame in world space.
 DIFFUSE_ATTRIBUTE, SPECULAR_ATTRIBUTE, NORMAL_ATTRIBUTE = "diffuse", "specular", "normal"
-# The factor of roughness; the normal of the mesh where a normal map bends it, else 0.
+# The factor of roughness; the mesh's normal if a normal map bends it, else 0.
 ROUGHNESS_ATTRIBUTE, SHEET_ATTRIBUTE = "roughness", "sheet"
 ATTRIBUTES = (
     DIFFUSE_ATTRIBUTE, SPECULAR_ATTRIBUTE, NORMAL_ATTRIBUTE, TANGENT_ATTRIBUTE, ROUGHNESS_ATTRIBUTE, SHEET_ATTRIBUTE,
@@ -47,9 +47,9 @@ ATTRIBUTES = (
 def material_dict(
     material: Material, textures: MaterialTextures | None = None, *, diffuse: bool = True
 ) -> dict[str, Any]:
-    """The dictionary for `mi.load_dict`, of the lobes alone where `diffuse` is false.
+    """The dictionary for `mi.load_dict`; of the lobes alone if `diffuse` is false.
 
-    Surfaces without textures that scatter light alike have equal dictionaries, whatever their materials' names.
+    Untextured surfaces that scatter light alike have equal dictionaries, whatever their materials' names.
     """
     scattering = material if diffuse else bsdf.specular_only(material)
     result: dict[str, Any] = {"type": PLUGIN, "material": scattering.model_dump_json(exclude={"name", "provenance"})}
@@ -62,7 +62,7 @@ def material_dict(
 
 @once_per_variant
 def register_material_plugin() -> type:
-    """Choose the engine and make `lambent_material` known to it: its class. Further calls cost nothing."""
+    """Select the engine and register `lambent_material` with it; returns its class. Further calls cost nothing."""
 
     class MaterialBSDF(mi.BSDF):  # type: ignore[misc]
         """Diffuse terms and lobes; component i of Mitsuba is component i of `bsdf.selection`."""
@@ -77,7 +77,7 @@ def register_material_plugin() -> type:
             glossy = {"reflection": flags.GlossyReflection, "transmission": flags.GlossyTransmission}
             self.kinds = [flags.DiffuseReflection, flags.DiffuseTransmission, *(glossy[lobe.side] for lobe in lobes)]
             turned = [0, 0, *(int(flags.Anisotropic) * (lobe.mx != lobe.my) for lobe in lobes)]
-            # A black component is none: emitters are not sampled for a material without any.
+            # Skip black components: emitters are not sampled for a material without any.
             shown = [any(self.material.kd), any(self.material.kt_d), *(any(lobe.k) for lobe in lobes)]
             both = int(flags.FrontSide) | int(flags.BackSide)
             parts = zip(self.kinds, turned, shown, strict=True)
@@ -131,7 +131,7 @@ def register_material_plugin() -> type:
             return mi.Bool(name in ATTRIBUTES)
 
         def eval_attribute_3(self, name: str, si: Any, active: Any = True) -> Any:
-            """One of ATTRIBUTES; a texture whatever the coefficients it multiplies."""
+            """One of ATTRIBUTES; textures are returned regardless of the coefficients they multiply."""
             if name == DIFFUSE_ATTRIBUTE:
                 return self.textures.diffuse(si, active)
             if name == SPECULAR_ATTRIBUTE:
@@ -149,7 +149,7 @@ def register_material_plugin() -> type:
             return f"{PLUGIN}[{self.material.model_dump_json()}]"
 
         def _enabled(self, ctx: Any, si: Any, active: Any) -> Material:
-            """The material at `si` with the components that `ctx` leaves out at coefficient zero."""
+            """The material at `si`, with coefficients of components excluded by `ctx` set to zero."""
             on = [ctx.is_enabled(kind, i) for i, kind in enumerate(self.kinds)]
             return self.textures.material(self.material if all(on) else _masked(self.material, on), si, active)
 
@@ -158,7 +158,7 @@ def register_material_plugin() -> type:
             return self.textures.frame(tangent, si, active) if self.framed else facing_frame(tangent, si)
 
         def _is_possible(self, si: Any, wi: Any, in_frame: Any) -> Any:
-            """False for light from behind the surface that a normal map would let in."""
+            """False for light from behind the surface that a bent normal would admit."""
             if "normal" not in self.textures:
                 return mi.Bool(True)
             turned = faced_side(si)[0] * si.wi.z < 0

@@ -2,9 +2,9 @@
 
     scene["ball"]["bsdf"] = table_dict(load("satin.bsdf"))
 
-A table of patch matrices (LBNL Klems) is looked up itself, by `patch_sheet`. Every other table is resampled once onto a
-`half_vector_grid`, whose docstring describes look-up and sampling, or, with peaks about the light, onto a `twin_grid`;
-docs/performance.md has the error of resampling.
+A table of patch matrices (LBNL Klems) is looked up directly, by `patch_sheet`. Every other table is resampled once to a
+`half_vector_grid`, which documents look-up and sampling, or, with peaks about the light, to a `twin_grid`;
+docs/performance.md states the error of resampling.
 
 Conventions are those of material_plugin.py: Mitsuba's `si.wi` is the viewer (our wo), its `wo` the light (our wi), its
 eval includes the cosine; a thin two-sided sheet (unless the table has a back of its own) without refraction; the
@@ -45,12 +45,12 @@ def table_dict(
 ) -> dict[str, Any]:
     """The dictionary for `mi.load_dict`; registers the plugin. Pass a lookup to use one table in several scenes.
 
-    `shape` is that of the grid, where the table needs one.
+    `shape` is the grid's, if the table needs one.
 
     Raises
     ------
     UserError
-        Where no engine of Mitsuba works here.
+        If no engine of Mitsuba works on this machine.
     """
     register_table_plugin()
     lookup = table if isinstance(table, Lookup) else lookup_of(table, shape, progress)
@@ -60,17 +60,17 @@ def table_dict(
 
 
 def _key(name: str) -> str:
-    """Mitsuba's name of an array; its own may not hold dots."""
+    """Mitsuba's name of an array; it must not contain dots."""
     return name.replace(".", "_")
 
 
 @once_per_variant
 def register_table_plugin() -> None:
-    """Choose the engine and make `lambent_table` known to it; further calls cost nothing."""
+    """Select the engine and register `lambent_table` with it; further calls cost nothing."""
     ops = array_ops()
 
     class TableBSDF(mi.BSDF):  # type: ignore[misc]
-        """Component 0 reflects; component 1, where the table has it, transmits."""
+        """Component 0 reflects; component 1, if the table has it, transmits."""
 
         def __init__(self, props: Any) -> None:
             mi.BSDF.__init__(self, props)
@@ -120,7 +120,7 @@ def register_table_plugin() -> None:
             return f"{PLUGIN}[{type(self.lookup).__name__}, sizes {self.lookup.sizes}]"
 
         def _enabled(self, ctx: Any, across: Any) -> Any:
-            """Whether `ctx` has the side; a component left out keeps its share of the samples and is black."""
+            """Whether `ctx` includes the side; an excluded component keeps its share of the samples and is black."""
             on = [ctx.is_enabled(kind, i) for i, kind in enumerate(self.kinds)]
             return mi.Bool(on[0]) & ~across | mi.Bool(on[-1]) & across
 

@@ -1,7 +1,7 @@
-"""Textures in the path tracer: the parameters of a material and its shading frame where a ray hits.
+"""Textures in the path tracer: a material's parameters and shading frame at ray hits.
 
-Texels are interpolated bilinearly and not filtered further: many paths per pixel do that. The interpolated quantities
-are the renderer's (scenes.textures): slopes for normals, doubled angles for directions.
+Texels are interpolated bilinearly without further filtering, which many paths per pixel replace. The interpolated
+quantities are the renderer's (scenes.textures): slopes for normals, doubled angles for directions.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from lambent.materials.document import Lobe, Material
 from lambent.scenes.scene import MaterialTextures
 from lambent.scenes.textures import doubled_angle, parts, slopes
 
-INTERPOLATED = {"normal": slopes, "direction": doubled_angle}  # other parts as they are
+INTERPOLATED = {"normal": slopes, "direction": doubled_angle}  # other parts are interpolated directly
 LAYOUT = "textures"
 IMAGE = "picture_"
-GRAZING = 0.1  # least cos_o of a normal, as in realtime/shaders/shade.wgsl: one that faces away is bent to the viewer
+GRAZING = 0.1  # least cos_o of a normal, as in realtime/shaders/shade.wgsl: others are bent to the viewer
 SMALLEST_M, LARGEST_M = 0.001, 4.0  # of materials.document
 
 
@@ -36,7 +36,7 @@ def textures_dict(textures: MaterialTextures) -> dict[str, Any]:
 
 
 class SurfaceTextures:
-    """The textures of one material on the device; `part in textures` is whether there is one for a part."""
+    """The textures of one material on the device; `part in textures` tests for a part's texture."""
 
     def __init__(self, props: Any) -> None:
         said: dict[str, Any] = json.loads(str(props[LAYOUT])) if LAYOUT in props else {"cutoff": 0.5, "parts": {}}
@@ -67,7 +67,7 @@ class SurfaceTextures:
         return self._colour("specular", si, active)
 
     def roughness(self, material: Material, si: Any, active: Any) -> Any:
-        """Factor (mi.Float) of mx and my of every lobe, within what materials may have."""
+        """Factor (mi.Float) of mx and my of every lobe, clamped to the range that materials allow."""
         if "roughness" not in self or not material.lobes:
             return mi.Float(1.0)
         widths = [m for lobe in material.lobes for m in (lobe.mx, lobe.my)]
@@ -119,7 +119,7 @@ def _lobe(lobe: Lobe, colour: list[Any], rough: Any) -> Lobe:
 
 
 def _half_angle(cos2: Any, sin2: Any) -> tuple[Any, Any]:
-    """Cosine and sine of half the angle of (cos2, sin2), a vector that interpolation has shortened."""
+    """Cosine and sine of half the angle of (cos2, sin2), a vector shortened by interpolation."""
     length = dr.sqrt(cos2 * cos2 + sin2 * sin2)
     c2 = dr.select(length > 1e-6, cos2 / dr.maximum(length, 1e-6), 1.0)
     c, s = dr.safe_sqrt((1 + c2) / 2), dr.safe_sqrt((1 - c2) / 2)
@@ -127,9 +127,10 @@ def _half_angle(cos2: Any, sin2: Any) -> tuple[Any, Any]:
 
 
 def faced_side(si: Any) -> tuple[Any, Any]:
-    """Which side of its triangle the viewer sees, 1 or -1, and the least cosine of a normal to him.
+    """The side of its triangle that the viewer sees, 1 or -1, and the least cosine of a normal to the viewer.
 
-    That is GRAZING as in the renderer, or that of the triangle itself where it is less: a flat mesh stays as it is.
+    The least cosine is the renderer's GRAZING, or the triangle's own if that is smaller, which keeps flat meshes
+    unchanged.
     """
     towards = dr.dot(si.n, si.to_world(si.wi)) * dr.sign(dr.dot(si.n, si.sh_frame.n))
     seen = dr.select(towards == 0, si.wi.z, towards)
@@ -137,13 +138,13 @@ def faced_side(si: Any) -> tuple[Any, Any]:
 
 
 def bent(n: Any, wo: Any, side: Any, least: Any) -> Any:
-    """A normal n on the +z side; on the side of the viewer wo it is bent to a cosine of at least `least` to him."""
+    """A normal n on the +z side, bent to a cosine of at least `least` to the viewer wo, on the viewer's side."""
     n = n * side
     return dr.normalize(n + dr.maximum(least - dr.dot(n, wo), 0.0) * wo) * side
 
 
 def facing_frame(tangent: tuple[Any, Any], si: Any) -> Any:
-    """mi.Frame3f (t, b, n) within `si.sh_frame`, bent where a smooth normal turns from a viewer whom its face sees."""
+    """mi.Frame3f (t, b, n) within `si.sh_frame`, bent if a smooth normal faces away from a viewer in front."""
     c, s = tangent
     t, b, up = mi.Vector3f(c, s, 0.0), mi.Vector3f(-s, c, 0.0), mi.Vector3f(0.0, 0.0, 1.0)
     side, least = faced_side(si)

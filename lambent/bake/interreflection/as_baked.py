@@ -1,9 +1,9 @@
-"""What surfaces beyond the first scatter by: their BRDF as it is baked, over its equivalent albedo.
+"""Scattering at surfaces beyond the first: the baked BRDF over its equivalent albedo.
 
     f(wi, wo) / d    in place of the 1/pi of    Ben-Artzi 2007, section 5.2.4
 
-Pictures multiply by the albedo d of the edited material. Those of the materials as they are baked are thus exact, and
-edits change the strength of what a further surface reflects, not its shape. Materials that are Lambertian keep 1/pi.
+Pictures multiply by the albedo d of the edited material. With unedited materials they are therefore exact; edits change
+the amount of light that a further surface reflects, not its shape. Lambertian materials keep 1/pi.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from lambent.materials.factored.terms import Editable, Term
 from lambent.scenes.scene import Scene
 
 SIDES = ("reflection", "transmission")
-OTHER = 0.01  # share of the albedo, in any channel, that a Lambertian material may scatter otherwise
-BLACK = 0.01  # of the brightest channel: less has no shape of its own that paths would find
+OTHER = 0.01  # largest share of the albedo, in any channel, that a Lambertian material may scatter directionally
+BLACK = 0.01  # relative to the brightest channel: darker channels have no shape that paths could find
 SCATTERING_TEXTURES = ("diffuse", "specular", "roughness", "normal", "direction")
 
 
 def over_albedo(editable: Editable) -> Floats:
-    """(2 sides, 2, 3) factors that make f / d of f: of each channel, and those of which channels without one get a sum.
+    """(2 sides, 2, 3) factors that convert f to f / d: one per channel, then weights whose sum serves channels without.
 
-    A channel that is black as baked has the shape of the brightest one: a first row of 0, and a second that is 0 but
-    for that channel. A material with a black side has no shape there, and zeros throughout.
+    A channel that is black as baked takes the shape of the brightest one: its first row is 0, and the second is 0
+    except for that channel. A material with a black side has no shape there, and zeros throughout.
     """
     found = np.zeros((2, 2, 3))
     for side in editable.sides:
@@ -43,7 +43,7 @@ def over_albedo(editable: Editable) -> Floats:
 
 
 def is_lambertian(editable: Editable) -> bool:
-    """Whether all but `OTHER` of what a material scatters, to each side, is the same in all directions."""
+    """Whether a material scatters all light but the share `OTHER`, to each side, equally in all directions."""
     for side in editable.sides:
         mine = [term for term in editable.terms if (term.side == "transmission") == (side == "transmission")]
         each = np.array([term_albedo(term, editable.curves) for term in mine])
@@ -54,7 +54,7 @@ def is_lambertian(editable: Editable) -> bool:
 
 
 def _is_even(editable: Editable, term: Term) -> bool:
-    """Whether f of a term is d / pi, at pairs of directions drawn at random."""
+    """Whether f of a term is d / pi, tested at random pairs of directions."""
     rng = np.random.default_rng(0)
     z, phi = rng.uniform(0.02, 1, (2, 256)), rng.uniform(0, 2 * np.pi, (2, 256))
     wi, wo = np.stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z], axis=-1)
@@ -64,13 +64,13 @@ def _is_even(editable: Editable, term: Term) -> bool:
 
 
 def state_of(editable: Editable) -> str:
-    """A digest of all that a material scatters by, its name left out."""
+    """A digest of all scattering properties of a material, without its name."""
     curves = [part for name in sorted(editable.curves) for part in (name, editable.curves[name].values)]
     return key_of("editable", 1, repr(editable.terms), *curves)
 
 
 def unlike_documents(scene: Scene, editables: Mapping[str, Editable]) -> dict[str, Editable]:
-    """Those that scatter otherwise than the scene's documents of these names."""
+    """Editables that scatter differently from the scene's documents of the same names."""
     documents = scene.materials
     return {
         name: one
@@ -80,7 +80,7 @@ def unlike_documents(scene: Scene, editables: Mapping[str, Editable]) -> dict[st
 
 
 def shapes_of(scene: Scene, editables: Mapping[str, Editable]) -> dict[str, Floats]:
-    """`over_albedo` of the materials that have a shape: all but those that are Lambertian, or black."""
+    """`over_albedo` of the materials with a shape, that is, neither Lambertian nor black."""
     found = {
         name: over_albedo(one) for name, one in editables.items() if is_textured(scene, name) or not is_lambertian(one)
     }
@@ -88,6 +88,6 @@ def shapes_of(scene: Scene, editables: Mapping[str, Editable]) -> dict[str, Floa
 
 
 def is_textured(scene: Scene, material: str) -> bool:
-    """Whether a texture changes how a material scatters, from place to place."""
+    """Whether a texture changes a material's scattering from place to place."""
     textures = scene.textures.get(material)
     return textures is not None and any(getattr(textures, part) is not None for part in SCATTERING_TEXTURES)

@@ -1,4 +1,4 @@
-"""Paths sorted into the bands of a term, and those of second surfaces (Ben-Artzi 2007, eqs 6.2, 6.4)."""
+"""Sorting of paths into the bands of a term and of second surfaces (Ben-Artzi 2007, eqs 6.2, 6.4)."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ from lambent.store.tails import Tails
 
 @dataclass(frozen=True)
 class SecondTerm:
-    """A term of the material of that number at second surfaces; no term where it is not edited: paths know it."""
+    """A term of material number `material` at second surfaces; None for an uneditable one, whose BRDF the paths use."""
 
     material: int
     term: Term | None
     bands: tuple[Bands, ...]
 
     def evaluate(self, wi: Any, wo: Any, ops: Any) -> tuple[Any, Any]:
-        """Factor of the path's light, and its band."""
+        """Factor on the path's light, and its band."""
         if self.term is None:
             return mi.Vector3f(1.0), mi.UInt32(0)
         return by_bands(self.term, self.bands, wi, wo, ops)
 
 
 class Sorting:
-    """Sorts the paths of some points; what all terms of a material share is made once."""
+    """Sorts the paths of some points; shares the work common to all terms of a material."""
 
     def __init__(self, paths: Paths, points: ViewPoints, tails: Tails, seconds: Sequence[SecondTerm] = ()) -> None:
         self._paths, self._points, self._ops = paths, points, array_ops()
@@ -53,7 +53,7 @@ class Sorting:
             self._second = _second_surfaces(paths, tails, seconds, self._ops)
 
     def by_term(self, term: Term, bands: Sequence[Bands]) -> Sorted:
-        """By the bands of a term's curves, numbered first curve first."""
+        """Sort by the bands of a term's curves, first curve first."""
         texture = self._gathered(self._points.diffuse if term.is_diffuse else self._points.specular)
         rough = None
         if varies(term) and (self._points.roughness != 1).any():
@@ -62,7 +62,7 @@ class Sorting:
         return self._sorted(value * texture, band)
 
     def whole(self, material: Editable) -> Sorted:
-        """Into the one band of a material whose curves stay as they are."""
+        """Sort into the single band of an uneditable material."""
         width = dr.width(self._paths.wi)
         textures = (self._gathered(texture) for texture in (self._points.diffuse, self._points.specular))
         value = Curves(material, self._ops).evaluate(self._paths.wi, self._wo, *textures)
@@ -80,9 +80,9 @@ class Sorting:
 
 
 def by_bands(term: Term, bands: Sequence[Bands], wi: Any, wo: Any, ops: Any, rough: Any = None) -> tuple[Any, Any]:
-    """rho_q |cos| of directions in the local frame, and the band, of all curves together, that they are in.
+    """rho_q |cos| of directions in the local frame, and their band over all curves together.
 
-    `rough` is what a texture multiplies slopes by.
+    `rough` is the texture's factor on slopes.
     """
     (light, viewer), seen = upper_pair(tuple(wi), tuple(wo), term.side, ops)
     band = mi.UInt32(0)
@@ -96,7 +96,7 @@ def by_bands(term: Term, bands: Sequence[Bands], wi: Any, wo: Any, ops: Any, rou
 
 
 def _second_surfaces(paths: Paths, tails: Tails, seconds: Sequence[SecondTerm], ops: Any) -> np.ndarray:
-    """(terms, 2, n, 4) factors and bands of the terms that the second surface of each path has, as of `Sorted`."""
+    """(terms, 2, n, 4) factors and bands of the terms at each path's second surface, in the layout of `Sorted`."""
     second, begin, turn = paths.second, 0, dict[int, int]()
     assert second is not None
     width = dr.width(paths.wi)
@@ -113,7 +113,7 @@ def _second_surfaces(paths: Paths, tails: Tails, seconds: Sequence[SecondTerm], 
             way[1] = dr.select(here, band + begin, way[1])
         begin += size
     together = dr.empty(mi.Float, 4 * 2 * len(found) * width)
-    index, stride = dr.arange(mi.UInt32, width), dr.opaque(mi.UInt32, width)  # kernels do not depend on it
+    index, stride = dr.arange(mi.UInt32, width), dr.opaque(mi.UInt32, width)  # keeps the width out of the kernel
     for k, (value, band) in enumerate(way for term in found for way in term):
         put(together, value, band, k * stride + index)
     return np.asarray(together.numpy().reshape(len(found), 2, width, 4))

@@ -1,7 +1,7 @@
-"""Directions of the first bounce, for BRDFs that are not known yet: a broad and a narrow lobe (Ben-Artzi 2007, 6.1.1).
+"""First-bounce directions for BRDFs not yet known: a broad and a narrow lobe (Ben-Artzi 2007, 6.1.1).
 
-Seven in ten are cosine distributed; the others follow a Blinn lobe about the mirror direction. A term that transmits,
-or reflects back, has both lobes on its own side.
+Seven in ten are cosine distributed; the others follow a Blinn lobe about the mirror direction. For a term that
+transmits or retro-reflects, both lobes are on its own side.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ NARROW, EXPONENT = 0.3, 200.0  # share and exponent of the Blinn lobe
 
 @dataclass
 class Sides:
-    """Shares of the directions of each point that go through the surface, and back to where they came from."""
+    """Shares of each point's directions that pass through the surface, and that return to the viewer."""
 
     through: Any
     back: Any
 
 
 def shares_of(editable: Editable) -> np.ndarray:
-    """(2,) shares of first directions that go through a surface, and back to the viewer."""
+    """(2,) shares of first directions that pass through the surface, and that return to the viewer."""
     sides = {term.side for term in editable.terms}
     if sides == {"transmission"}:
         return np.array([1.0, 0.0])
@@ -35,7 +35,7 @@ def shares_of(editable: Editable) -> np.ndarray:
 
 
 def sampled(wo: Any, sides: Sides, u_side: Any, u_lobe: Any, u: Any) -> tuple[Any, Any]:
-    """A direction in the local frame of wo (above), and its density in 1/sr: 0 where it is to be left out."""
+    """A direction in the local frame of wo (above), and its density in 1/sr; density 0 marks one to ignore."""
     upper = _upper(wo, u_lobe, u)
     through = u_side < sides.through
     back = ~through & (u_side < sides.through + sides.back)

@@ -1,4 +1,4 @@
-"""Terms with their curves on the device: f of a material as it is edited."""
+"""Evaluation of terms and curves on the device: f of an edited material."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from lambent.materials.factored.terms import Editable, Term, upper_pair
 
 
 class Curves:
-    """A material whose curves are tables on the device."""
+    """A material with its curves as tables on the device."""
 
     def __init__(self, material: Editable, ops: Any) -> None:
         self.material, self._ops = material, ops
         self._tables = {name: [mi.Float(c) for c in curve.values.T] for name, curve in material.curves.items()}
 
     def evaluate(self, wi: Any, wo: Any, diffuse: Any, specular: Any) -> Any:
-        """f (mi.Vector3f) in 1/sr without the cosine; `diffuse`, `specular` are what textures multiply terms by."""
+        """f (mi.Vector3f) in 1/sr without the cosine; textures multiply terms by `diffuse` and `specular`."""
         total = mi.Vector3f(0.0)
         for term in self.material.terms:
             (light, viewer), seen = upper_pair(tuple(wi), tuple(wo), term.side, self._ops)

@@ -1,9 +1,9 @@
-"""Paths that do not know the edits: what light they bring to the pixel's surface, and over which tail.
+"""Paths independent of edits: the light they bring to the pixel's surface, and its tail.
 
-A path leaves the point that a pixel shows and meets surfaces that count by their equivalent albedos. Lambertian ones
-scatter by the cosine, which cancels, so the path carries 1 until a light is seen; others by their BRDF as it is baked
-over its albedo (`as_baked`). Lights are sampled at every surface and met by the path as well, balanced (Veach 1997).
-Surfaces that are not edited scatter by their own BRDF, in a slot of albedo 1.
+A path leaves the point that a pixel shows and hits surfaces that contribute their equivalent albedos. Lambertian
+surfaces scatter by the cosine, which cancels, so the path carries 1 until it sees a light; others scatter by their
+baked BRDF over its albedo (`as_baked`). Lights are sampled at every surface and also hit by the path itself, combined
+by the balance heuristic (Veach 1997). Uneditable surfaces scatter by their own BRDF, in a slot of albedo 1.
 """
 
 from __future__ import annotations
@@ -25,27 +25,27 @@ from lambent.core.arrays import Floats
 from lambent.store.tails import FIXED, Tails
 
 NONE = 255  # slot of a side that scatters nothing
-COSINE, BAKED, FIXED_BRDF = 0, 1, 2  # what a surface scatters by: 1/pi, its BRDF as baked over its albedo, its BRDF
-WAYS = 2  # in which a path gets its light: from a light that was sampled, and from one that it met
+COSINE, BAKED, FIXED_BRDF = 0, 1, 2  # how a surface scatters: 1/pi, its baked BRDF over its albedo, its BRDF
+WAYS = 2  # a path gets light in two ways: from a sampled light, and from one that it hits
 
 
 @dataclass(frozen=True)
 class Surfaces:
-    """What the objects of a scene are to a path.
+    """The objects of a scene as seen by a path.
 
     Attributes
     ----------
     scene : mi.Scene
     object_numbers : mi.UInt32
-        Number of the object by that of Mitsuba's shape.
+        Object number by Mitsuba's shape number.
     slots : (objects, 2) int
-        Slot of each object for light that is reflected and that is transmitted, or NONE.
+        Slot of each object for reflected and for transmitted light, or NONE.
     scatters : (objects,) uint32
         COSINE, BAKED or FIXED_BRDF.
     factors : (objects, 2 sides, 2, 3) float32
-        `as_baked.over_albedo` of each object; of one that is not edited, such that f stays.
+        `as_baked.over_albedo` of each object; for an uneditable one, factors that leave f unchanged.
     worn, material : tuple of str, (objects,) int
-        Names of the materials, and which of them each object has.
+        Names of the materials, and the index of each object's material.
     """
 
     scene: Any
@@ -60,7 +60,7 @@ class Surfaces:
     def of(
         cls, scene: Any, object_numbers: Any, worn: Sequence[str], tails: Tails, shapes: Mapping[str, Floats]
     ) -> Surfaces:
-        """Of objects by their materials; `shapes` as of `as_baked.shapes_of`."""
+        """Describe objects by their materials; `shapes` as from `as_baked.shapes_of`."""
         number = {slot: k for k, slot in enumerate(tails.slots)}
         edited = {material for material, side in tails.slots if side != FIXED}
         fixed = number.get(("", FIXED), NONE)
@@ -85,14 +85,14 @@ class Surfaces:
 
 @dataclass
 class Second:
-    """The second surfaces of paths, where they count by bands.
+    """The second surfaces of paths, if these contribute by bands.
 
     Attributes
     ----------
     material : mi.UInt32
-        Number of the material among those of `Surfaces.worn`.
+        Index of the material in `Surfaces.worn`.
     wo, wi_lit, wi : mi.Vector3f
-        In the surface's frame: where the path came from, the light that was sampled, and where the path goes on.
+        In the surface's frame: directions to the path's origin, to the sampled light, and of the path's continuation.
     """
 
     material: Any
@@ -103,7 +103,7 @@ class Second:
 
 @dataclass
 class Paths:
-    """Samples of so many points, point after point: sample s of point p has the number p * samples + s.
+    """Samples of some points, point after point: sample s of point p has the index p * samples + s.
 
     Attributes
     ----------
@@ -112,12 +112,12 @@ class Paths:
     wi : mi.Vector3f
         Direction in the point's frame.
     weight : mi.Float
-        1 / density of the direction; 0 where it is left out.
+        1 / density of the direction; 0 if it is to be ignored.
     light : mi.Float
-        (entries, n, 4): red, green and blue that arrive by paths that meet 2, 3, ... surfaces, in WAYS each, and
-        the bits of the tail; where the second surface counts by bands, that of its first band.
+        (entries, n, 4): red, green and blue of paths with 2, 3, ... surfaces, for each of the WAYS, and the bits of the
+        tail; if the second surface contributes by bands, of the tail of its first band.
     arrived : mi.UInt32
-        Bit e is set where light arrived at entry e; `light` has nothing where it is not.
+        Bit e is set if light arrived at entry e; otherwise `light` is undefined there.
     second : Second or None
     """
 
@@ -132,12 +132,12 @@ class Paths:
 
 
 def trace(surfaces: Surfaces, points: ViewPoints, sides: np.ndarray, tails: Tails, samples: int, seed: int) -> Paths:
-    """`samples` paths of each point.
+    """Trace `samples` paths from each point.
 
     Parameters
     ----------
     sides : (2,)
-        Shares of the directions that go through the surface, and back.
+        Shares of the directions that pass through the surface, and that return to the viewer.
     seed
         The same seed gives the same paths.
     """
@@ -152,7 +152,7 @@ def trace(surfaces: Surfaces, points: ViewPoints, sides: np.ndarray, tails: Tail
     shares = directions.Sides(*(dr.opaque(mi.Float, float(share)) for share in sides))
     wi, pdf = directions.sampled(wo, shares, sampler.next_1d(), sampler.next_1d(), sampler.next_2d())
     ray = rays.leaving(surfaces.scene, p, flat, wi.x * t + wi.y * b + wi.z * n)
-    # Normals that lean may send a direction through the surface that it should leave.
+    # A bent normal can send a direction through the surface that it should leave.
     meant = dr.dot(flat, t * wo.x + b * wo.y + n * wo.z) * wo.z
     passes = dr.dot(flat, ray.d) * meant * wi.z <= 0
     lights = WAYS * (tails.most_hits - 1)
@@ -185,7 +185,7 @@ def _follow(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Write the light of all path lengths, entry WAYS (hits - 2) + way of each sample. Returns bits of what arrived."""
     width = dr.width(ray.o)
-    index, stride = dr.arange(mi.UInt32, width), dr.opaque(mi.UInt32, width)  # kernels do not depend on it
+    index, stride = dr.arange(mi.UInt32, width), dr.opaque(mi.UInt32, width)  # keeps the width out of the kernel
     throughput = mi.Color3f(1.0)
     depth, order, arrived = mi.UInt32(1), mi.UInt32(0), mi.UInt32(0)
     origin, pdf, direct = dr.zeros(mi.SurfaceInteraction3f, width), mi.Float(0), mi.Bool(False)
@@ -209,7 +209,7 @@ def _follow(  # type: ignore[no-untyped-def]
         if dr.hint(sheets, mode="scalar"):
             slot_through = dr.gather(mi.UInt32, transmit, shape, active)
         at = mi.SurfaceInteraction3f(si)
-        at.n = dr.select(dr.dot(si.n, ray.d) > 0, -si.n, si.n)  # by which a guided sky is sampled
+        at.n = dr.select(dr.dot(si.n, ray.d) > 0, -si.n, si.n)  # orientation used by a guided sky's sampling
         up = mi.Vector3f(si.sh_frame.n)
         up = dr.select(dr.dot(up, ray.d) > 0, -up, up)
         both = (slot != NONE) & (slot_through != NONE)
@@ -226,7 +226,7 @@ def _follow(  # type: ignore[no-untyped-def]
             sides = directions.Sides(dr.select(both, 0.5, dr.select(slot == NONE, 1.0, 0.0)), mi.Float(0.0))
         by_own = (how != COSINE) & ~by_bands
 
-        # A light that is sampled.
+        # A sampled light.
         lit, value = scene.sample_emitter_direction(at, sampler.next_2d(active), False, active)
         cosine = dr.dot(lit.d, up)
         behind = cosine < 0
@@ -256,7 +256,7 @@ def _follow(  # type: ignore[no-untyped-def]
         put(light, value, number, (entry + 1) * stride + index, shines)
         arrived |= dr.select(shines, 1 << (entry + 1), 0)
 
-        # Where the path goes on.
+        # The path's continuation.
         local = mi.warp.square_to_cosine_hemisphere(sampler.next_2d(active))
         pdf = local.z / dr.pi * dr.select(both, 0.5, 1.0)
         down = dr.select(through, -1.0, 1.0)
@@ -296,20 +296,20 @@ def _follow(  # type: ignore[no-untyped-def]
 
 
 def _and(order: Any, slot: Any, members: Any, depth: Any, slow: bool) -> Any:
-    """The order with one slot more; a second surface that counts by bands has none."""
+    """Append a slot to the order; a second surface that contributes by bands adds none."""
     longer = order * members + slot
     return dr.select(depth == 1, order, longer) if slow else longer
 
 
 def _over_albedo(value: Any, factors: Any, shape: Any, below: Any, active: Any) -> Any:
-    """f / d of f, or 0 where it is not `active`: `as_baked.over_albedo`."""
+    """f / d from f, or 0 where not `active`: `as_baked.over_albedo`."""
     at = 4 * shape + dr.select(below, mi.UInt32(2), mi.UInt32(0))
     own, brightest = (dr.gather(mi.Color3f, factors, at + k, active) for k in (0, 1))
     return dr.select(own > 0, value * own, dr.sum(value * brightest))
 
 
 def _brushed(si: Any, up: Any, active: Any) -> Any:
-    """The shading frame of interactions, turned to the viewer's side."""
+    """The shading frame of interactions, on the viewer's side."""
     t = si.bsdf().eval_attribute_3(TANGENT_ATTRIBUTE, si, active)
     t = mi.Vector3f(t.x, t.y, t.z)
     t -= up * dr.dot(up, t)
@@ -320,11 +320,11 @@ def _brushed(si: Any, up: Any, active: Any) -> Any:
 
 
 def _number(numbers: Any, begins: Any, met: Any, order: Any, active: Any) -> Any:
-    """Number of the tail that met so many surfaces in this order."""
+    """Number of the tail for this number of surfaces in this order."""
     return dr.gather(mi.UInt32, numbers, dr.gather(mi.UInt32, begins, met - 1, active) + order, active)
 
 
 def put(numbers: Any, value: Any, bits: Any, at: Any, active: Any = True) -> None:
-    """Write rows of three numbers and 32 bits, which take one store, into (n, 4) `numbers`."""
+    """Write rows of three numbers and 32 bits, with one store each, into (n, 4) `numbers`."""
     bits = dr.reinterpret_array(mi.Float, mi.UInt32(bits))
     dr.scatter(numbers, mi.Vector4f(value[0], value[1], value[2], bits), at, active)

@@ -1,4 +1,4 @@
-"""What to edit, to fix and to merge in a view with interreflections, and what that will cost, before it is baked.
+"""Propose which materials to edit, fix and merge in a view with interreflections, with the cost of the bake.
 
     proposal = propose(scene, View(scene.cameras[0], 512, 512), Bounces((64, 1, 1, 1), samples=4096))
     print("\\n".join(proposal.lines()))
@@ -32,13 +32,13 @@ from lambent.store.tails import FIXED, Tails
 if TYPE_CHECKING:
     from lambent.bake.interreflection.trial import Cost
 
-SMALL = 0.01  # share of the view, and of the light that is passed on, below which a material is fixed
-MOST_BYTES = 2 << 30  # of a store, before compression
+SMALL = 0.01  # share of the view, and of reflected light, below which a material is fixed
+MOST_BYTES = 2 << 30  # of a store, uncompressed
 ENTRY_BYTES = (
     6  # of an entry that is edited: its light, and a step of one byte or two (editing.interreflection.entries)
 )
-LISTED = 10  # materials that are fixed, in a table
-MOST_CELLS = 1 << 22  # bands times tails of a point: each thread has a row of them
+LISTED = 10  # fixed materials listed in a table
+MOST_CELLS = 1 << 22  # bands times tails per point: each thread has a row of them
 
 
 @dataclass(frozen=True)
@@ -53,11 +53,11 @@ class Row:
     points : int
         Pixels that show it.
     in_view : float
-        Their share.
+        Their share of the view.
     passed_on : float
-        Share of the light of two surfaces whose second surface it is.
+        Share of the light over two surfaces whose second surface is of this material.
     cells, entries : int, float
-        Bands times tails, and how many of these a point will have on average.
+        Bands times tails, and the expected number of nonzero ones per point.
     disk_bytes : int
     seconds : float
     """
@@ -75,7 +75,7 @@ class Row:
 
     @property
     def weight(self) -> float:
-        """How much an edit of it changes."""
+        """Visual effect of an edit of the material."""
         return self.in_view + self.passed_on
 
 
@@ -88,13 +88,13 @@ class Proposal:
     bounces : Bounces
         With the materials to fix.
     rows : tuple of Row
-        The materials that stay, the most important first.
+        The remaining materials, most important first.
     same, alike : mapping of str to str
-        Materials to merge with the one that looks the same, and those that might be.
+        Materials to merge with one that looks the same, and candidates for that.
     bake_bytes, edit_bytes : int
-        Memory of the bake besides the scene's, and of the tiles while they are edited.
+        Memory of the bake beyond the scene's, and of the tiles during editing.
     begin_s : float
-        Until the first path.
+        Seconds until the first path.
     reasons : tuple of str
         Why materials are fixed that are not small.
     """
@@ -119,7 +119,7 @@ class Proposal:
 
     @property
     def seconds(self) -> float:
-        """Of the bake, on one machine."""
+        """Seconds of the bake on one machine."""
         return self.begin_s + sum(row.seconds for row in self.rows)
 
     @property
@@ -127,7 +127,7 @@ class Proposal:
         return sum(row.points for row in self.rows) * self.bounces.samples / max(self.seconds, 1e-9)
 
     def merged(self, scene: Scene) -> Scene:
-        """The scene with the materials that are merged."""
+        """The scene after merging materials."""
         return scene.merged(self.same)
 
     def said(self) -> dict[str, Any]:
@@ -142,7 +142,7 @@ class Proposal:
         return cls(**{**own, "bounces": Bounces.of(said["bounces"]), "rows": rows, "reasons": reasons})
 
     def lines(self) -> list[str]:
-        """A table of the materials, and the sums."""
+        """A table of the materials, and the totals."""
         heads = ("material", "role", "in view", "passes on", "bands", "entries", "disk", "time")
         left_out = [row for row in self.rows if row.role == "fixed"][LISTED:]
         table = [
@@ -183,29 +183,29 @@ def propose(
     most_bytes: int = MOST_BYTES,
     progress: Progress = silent,
 ) -> Proposal:
-    """Which materials to edit, fix and merge, with the costs of the bake.
+    """Propose which materials to edit, fix and merge, with the costs of the bake.
 
-    Fixed are those that `bounces` fixes, and those that are small in the view and in the light that they pass on. Where
-    the store would not fit into `most_bytes`, materials that look the same are merged, and then the least important are
-    fixed until it fits.
+    Materials are fixed if `bounces` fixes them, or if they are small in both the view and reflected light. If the store
+    would exceed `most_bytes`, materials that look the same are merged, then the least important ones are fixed until it
+    fits.
 
     Parameters
     ----------
     scene
         Lit as in the bake.
     editables
-        As of `bake`: materials that are edited as something else than their documents say. They are not merged.
+        As in `bake`: terms and curves that replace those of documents. Such materials are not merged.
     kept
-        Materials that are edited whatever it costs.
+        Materials to edit at any cost.
     merging
         Whether materials may be merged.
     most_bytes
-        Of a store before compression.
+        Of a store, uncompressed.
 
     Raises
     ------
     UserError
-        Where the view shows nothing, or no path tracing engine works.
+        If the view shows nothing, or no path tracing engine works.
     """
     engine()  # before Mitsuba is imported
     bounces, given = bounces or Bounces(), editables or {}
@@ -226,9 +226,9 @@ def propose_all(
     merging: bool = True,
     **more: Any,
 ) -> list[Proposal]:
-    """A proposal for each view, in which the same materials are edited: those of any of them. See `propose`.
+    """One proposal per view, all with the same edited materials: those edited in any of them. See `propose`.
 
-    Materials are merged for a single view alone.
+    Materials are merged only for a single view.
     """
     alone = len(views) == 1
     found = [propose(scene, view, bounces, kept=kept, merging=merging and alone, **more) for view in views]
@@ -241,18 +241,18 @@ def propose_all(
 
 @dataclass(frozen=True)
 class Held:
-    """What a store's interreflections edit, and which materials were merged for them."""
+    """The edited materials of a store's interreflections, and the merged ones."""
 
     edited: frozenset[str]
     same: Mapping[str, str]
 
     def merged(self, scene: Scene) -> Scene:
-        """The scene with the materials that are merged."""
+        """The scene after merging materials."""
         return scene.merged(self.same)
 
 
 def held_by(folder: Path, scene: Scene, view: View, series: Sequence[int]) -> Held | None:
-    """What a store has of a view; None where it has no interreflections of this series."""
+    """The edited and merged materials of a stored view; None without interreflections of this series."""
     name = view.name("interreflection", "tails")
     if not (folder / MANIFEST).exists():
         return None
@@ -286,7 +286,7 @@ def _proposal(
     rows = [Row(name, "edited", trial.shown[name], trial.shown[name] / total, passed[name]) for name in known]
     rows.sort(key=lambda row: -row.weight)
     free = [row for row in rows if row.material not in bounces.fixed]
-    free.sort(key=lambda row: row.material not in kept)  # the rest stays in its order
+    free.sort(key=lambda row: row.material not in kept)  # otherwise the order is unchanged
     edited = [row.material for row in free if row.material in kept or max(row.in_view, row.passed_on) >= SMALL]
     edited = edited or [row.material for row in free[:1]]
     least = max(1, len({row.material for row in free} & {*kept}))
@@ -307,7 +307,7 @@ def _proposal(
         before, left = cells(), 1.0
         while len(edited) > least and _raw(costs, trial.shown) * left > most_bytes:
             reasons.append(f"{edited.pop()} is fixed: the store would have more than {bytes_said(most_bytes)}")
-            left = sum(cells().values()) / sum(before.values())  # a guess: entries in proportion
+            left = sum(cells().values()) / sum(before.values())  # an estimate: entries in proportion
         progress(2, 3, f"time and memory, {len(edited)} materials edited")
         costs = trial.costs(fixing())
     progress(3, 3, "time and memory")
@@ -326,17 +326,17 @@ def _proposal(
 
 
 def _raw(costs: Mapping[str, Cost], points: Mapping[str, int]) -> float:
-    """Bytes of a store before compression."""
+    """Bytes of a store, uncompressed."""
     return sum(cost.raw_bytes * points[name] for name, cost in costs.items())
 
 
 def _held(costs: Mapping[str, Cost], points: Mapping[str, int]) -> float:
-    """Bytes of the entries while they are edited."""
+    """Bytes of the entries during editing."""
     return sum(ENTRY_BYTES * cost.entries * points[name] for name, cost in costs.items())
 
 
 def same_materials(scene: Scene, keep: Collection[str] = ()) -> dict[str, str]:
-    """Materials that scatter light like an earlier one of the scene, with that one's name; `keep` stay themselves."""
+    """Map each material that scatters light like an earlier one of the scene to that one; `keep` is never mapped."""
     looks: Any = material_inputs(scene)
     look = dict(zip([o.material for o in scene.objects], (repr(one[1]) for one in looks), strict=True))
     first: dict[str, str] = {}
@@ -350,13 +350,13 @@ def same_materials(scene: Scene, keep: Collection[str] = ()) -> dict[str, str]:
 
 
 def bytes_said(count: float) -> str:
-    """Bytes in words."""
+    """Bytes as text."""
     unit, size = next((one for one in (("GB", 1e9), ("MB", 1e6)) if count >= one[1]), ("kB", 1e3))
     return f"{count / size:.{1 if count < 10 * size else 0}f} {unit}"
 
 
 def time_said(seconds: float) -> str:
-    """Seconds in words."""
+    """Seconds as text."""
     if seconds < 100:
         return f"{seconds:.0f} s" if seconds >= 1 else "< 1 s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"

@@ -1,4 +1,4 @@
-"""Which bands and tails the materials of a scene have in a series of bounces."""
+"""Bands and tails of a scene's materials for a series of bounces."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ SMOOTH_ANGLES = ("theta_i", "theta_o", "theta_d")
 
 @dataclass(frozen=True)
 class Bins:
-    """What the light of a material's points is sorted by.
+    """Bins for the light of a material's points.
 
-    `terms` are those of its first surface with the bands of their curves; none where the material is not edited.
+    `terms` are those of its first surface with the bands of their curves; empty for an uneditable material.
     """
 
     editable: Editable
@@ -28,17 +28,17 @@ class Bins:
 
     @property
     def bands(self) -> list[int]:
-        """Of each term; of a material that is not edited, one."""
+        """Numbers of bands per term; for an uneditable material, one."""
         return [int(np.prod([n for _, n in factors], dtype=int)) for _, factors in self.terms] or [1]
 
 
 def worn(scene: Scene) -> list[str]:
-    """Names of the materials that objects have."""
+    """Names of the materials that objects use."""
     return list(dict.fromkeys(o.material for o in scene.objects))
 
 
 def bins_of(editables: Mapping[str, Editable], bounces: Bounces) -> dict[str, Bins]:
-    """Of materials by their names."""
+    """Bins of materials, by name."""
     sharp = bounces.series[0]
     return {
         name: Bins(one, () if name in bounces.fixed else tuple((t, _factors(t, sharp)) for t in one.terms))
@@ -47,7 +47,7 @@ def bins_of(editables: Mapping[str, Editable], bounces: Bounces) -> dict[str, Bi
 
 
 def tails_of(editables: Mapping[str, Editable], bounces: Bounces) -> Tails:
-    """The tails of materials: a slot for each side of those that are edited, and one for all others."""
+    """The tails of materials: one slot per side of editable ones, and one for all others."""
     edited = {name: one for name, one in editables.items() if name not in bounces.fixed}
     slots = []
     for name, one in edited.items():

@@ -1,6 +1,7 @@
-"""Sums of paths by bands and tails, sparse: most of what a point could have, it has not (Ben-Artzi 2007, eq. 6.1).
+"""Sparse sums of paths by bands and tails: most of a point's possible entries are 0 (Ben-Artzi 2007, eq. 6.1).
 
-Threads take points. Each adds up a point's samples in one dense row, which stays in the cache, and keeps what is not 0.
+Threads work on points. Each sums a point's samples in one dense row, which stays in the cache, and keeps the nonzero
+entries.
 """
 
 from __future__ import annotations
@@ -11,29 +12,29 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-TOGETHER = 16  # points that use one dense row, one after another; fewer where there would be fewer SHARES of work
+TOGETHER = 16  # points that share a dense row in turn; fewer if that would leave fewer than SHARES pieces of work
 SHARES = 64
 
 
 @dataclass(frozen=True)
 class Sorted:
-    """Samples of points, sorted into the bands of a term: sample s of point p has the number p * samples + s.
+    """Samples of points, sorted into the bands of a term: sample s of point p has the index p * samples + s.
 
     Each row of four has a colour, and the bits of a number.
 
     Attributes
     ----------
     first : (n, 4) float32
-        Factor of the light that arrives, and the band.
+        Factor on the arriving light, and the band.
     light : (entries, n, 4) float32
-        What arrives, and its tail without the second surface's bands.
+        Arriving light, and its tail without the second surface's bands.
     arrived : (n,) uint32
-        Bit e is set where entry e has light.
+        Bit e is set if entry e has light.
     second : (terms, 2, n, 4) float32
-        Factor and band of the second surface's terms, for the light that was sampled there and for where the path went
-        on. Without second surfaces that count by bands, there are no terms.
+        Factor and band of the second surface's terms, for the light sampled there and for the path's continuation.
+        There are no terms if second surfaces do not contribute by bands.
     widths : (entries,) int64
-        Tails of each of these bands.
+        Number of tails per band.
     """
 
     first: NDArray[np.float32]
@@ -45,7 +46,7 @@ class Sorted:
 
 @dataclass(frozen=True)
 class Sums:
-    """Sums over samples: of each point, entries ends[p] to ends[p + 1], by rising code.
+    """Sums over samples: point p has entries ends[p] to ends[p + 1], by ascending code.
 
     Attributes
     ----------
@@ -64,7 +65,7 @@ class Sums:
         return cls(np.zeros(points + 1, np.int64), np.zeros(0, np.uint32), np.zeros((0, 3), np.float32))
 
     def and_of(self, samples: Sorted, bands: int, tails: int) -> Sums:
-        """These sums and those of more samples."""
+        """Add the sums of more samples."""
         points = len(self.ends) - 1
         each = len(samples.first) // points * len(samples.light) * max(1, len(samples.second))
         room = np.concatenate([[0], np.cumsum(np.minimum(np.diff(self.ends) + each, bands * tails))])
@@ -83,7 +84,7 @@ def _bits(rows: NDArray[np.float32]) -> NDArray[np.uint32]:
 
 
 def compile_sums(by_second: bool) -> None:
-    """Compile what `Sums.and_of` calls, for arrays like those of paths: seconds, where numba's cache is empty."""
+    """Compile everything that `Sums.and_of` calls for arrays of paths; takes seconds if numba's cache is empty."""
     rows = [np.zeros((*shape, 4), np.float32) for shape in ((2,), (2, 2), (int(by_second), 2, 2))]
     first, light, second = rows
     nothing = Sorted(first, light, np.zeros(2, np.uint32), second, np.ones(2, np.int64))
@@ -148,7 +149,7 @@ def _add(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _closed_up(codes, light, room, ends):  # type: ignore[no-untyped-def]
-    """Entries without the room between points."""
+    """Entries without gaps between points."""
     out, sums = np.empty(ends[-1], np.uint32), np.empty((ends[-1], 3), np.float32)
     for p in range(len(ends) - 1):
         for k in range(ends[p + 1] - ends[p]):

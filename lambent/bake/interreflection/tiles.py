@@ -1,4 +1,4 @@
-"""More samples of a tile of points: a function of its job alone, which any process can do."""
+"""More samples for a tile of points: a function of its job alone, so that any process can run it."""
 
 from __future__ import annotations
 
@@ -27,19 +27,20 @@ if TYPE_CHECKING:
     from lambent.bake.transport.view_points import ViewPoints
     from lambent.bake.transport.view_tracer import ViewTracer
 
-PATHS = 1 << 20  # at once
+PATHS = 1 << 20  # traced at a time
 
 
 @dataclass(frozen=True)
 class Tile:
-    """The mean light of a term at P points, as it is stored.
+    """The stored mean light of a term at P points.
 
     Attributes
     ----------
     array : (P + 2 N,) uint32
-        Entries of each point; their numbers tail * bands + band, rising within a point; their light (`packed_rgb`).
+        Number of entries of each point; their numbers tail * bands + band, ascending within a point; their light
+        (`packed_rgb`).
     unit : float
-        What the packed light is multiplied by, in W/(sr m^2).
+        Factor on the packed light, in W/(sr m^2).
     points : int
     """
 
@@ -49,7 +50,7 @@ class Tile:
 
     @classmethod
     def of(cls, parts: Sequence[Sums], samples: int) -> Tile:
-        """Of all points, some after others."""
+        """Concatenate parts of the points."""
         largest = max(float(part.light.max(initial=0.0)) for part in parts) / samples
         unit = 2.0 ** np.ceil(np.log2(max(largest, 1e-30) / (LARGEST / 4)))
         counts = np.concatenate([np.diff(part.ends).astype(np.uint32) for part in parts])
@@ -69,23 +70,23 @@ class Tile:
 def unpacked(
     array: NDArray[np.uint32], points: int
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32]]:
-    """Entries of each point (P,), numbers tail * bands + band (N,) and light (N, 3) of a stored tile."""
+    """Number of entries per point (P,), numbers tail * bands + band (N,) and light (N, 3) of a stored tile."""
     counts, rest = array[:points], array[points:]
     half = len(rest) // 2
     return counts, rest[:half], unpacked_rgb(rest[half:])
 
 
 def paths_at_once(by_second: bool) -> int:
-    """Paths that are traced together; fewer where second surfaces count by bands, which takes arrays of their own."""
+    """Paths traced at a time; fewer if second surfaces contribute by bands, which needs additional arrays."""
     return PATHS >> 2 if by_second else PATHS
 
 
 @dataclass(frozen=True)
 class Job:
-    """Points of a material, to be brought to so many samples.
+    """Points of a material to bring to a number of samples.
 
-    `name` tells their seeds from those of other points; `held` are the tiles of the material's terms with the samples
-    that they have, none where they have none.
+    `name` distinguishes their seeds from those of other points; `held` has the existing tiles of the material's terms
+    with their samples, or is empty.
     """
 
     material: str
@@ -97,9 +98,9 @@ class Job:
 
 
 class TileTracer:
-    """Traces jobs, in this process or, pickled, in another: Mitsuba's scene is made where it is called first.
+    """Traces jobs in this process or, pickled, in another, which builds Mitsuba's scene at the first call.
 
-    A `tracer` that is given has the materials of `bins`; `diffuse_seen` is that of `Bounces`.
+    A given `tracer` must have the materials of `bins`; `diffuse_seen` is that of `Bounces`.
     """
 
     def __init__(
@@ -120,22 +121,23 @@ class TileTracer:
     def __call__(self, job: Job) -> tuple[Tile, ...]:
         """The tiles of the terms of the job's material."""
         engine()  # before Mitsuba is imported
-        # Before the thread: imports and numba's compiler parse Python, and CPython 3.11 fails where two threads do.
+        # Before the thread starts: imports and numba's compiler parse Python, which CPython 3.11 cannot do in two
+        # threads.
         from lambent.bake.interreflection import binning, paths  # noqa: F401
         from lambent.bake.interreflection.sums import compile_sums
 
         adding: list[Future[list[Sums]]] = []
-        with ThreadPoolExecutor(1) as adder:  # beside the next paths, and the compilation of those
+        with ThreadPoolExecutor(1) as adder:  # sums while the next paths are traced and compiled
             adder.submit(compile_sums, bool(self.tails.second))
             for some in self._at_once(len(job.points), job.samples - job.before):
                 new = self._traced(job, some)
                 if adding:
-                    adding[-1].result()  # so that the paths of two blocks are in memory, not more
+                    adding[-1].result()  # limits memory to the paths of two blocks
                 adding.append(adder.submit(self._added, job, some, new))
         return tuple(Tile.of(term, job.samples) for term in zip(*(block.result() for block in adding), strict=True))
 
     def _at_once(self, points: int, samples: int) -> list[slice]:
-        """Points whose new samples are traced together: a point's sums are written once, however many there are."""
+        """Points whose new samples are traced together; a point's sums are written once, however many there are."""
         most = max(1, paths_at_once(by_second=bool(self._seconds)) // samples)
         return slices(points, -(-points // -(-points // most)))
 
@@ -168,7 +170,7 @@ class TileTracer:
         from lambent.bake.transport.view_tracer import ViewTracer
 
         editables = {name: bins.editable for name, bins in self.bins.items()}
-        tracer = self._tracer = self._tracer or ViewTracer(self.scene, editables)  # which its scene needs
+        tracer = self._tracer = self._tracer or ViewTracer(self.scene, editables)  # created on demand, for its scene
         worn = [o.material for o in self.scene.objects]
         shapes = {} if self._diffuse_seen else shapes_of(self.scene, editables)
         return Surfaces.of(tracer.scene, tracer.object_numbers, worn, self.tails, shapes)

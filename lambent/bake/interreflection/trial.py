@@ -1,4 +1,4 @@
-"""Small parts of a bake with interreflections, traced to measure what all of it will take."""
+"""Trials: small parts of a bake with interreflections, traced to estimate the cost of the whole."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
 from lambent.store.store import Store
 
-TIMED = 1 << 10  # points of a batch
-FEW, MANY = 8, 256  # points that get all samples
-PER_MATERIAL = 1 << 18  # paths of these
-MOST_OF_VIEW = 0.95  # that is traced to see which materials pass light on
-LEAST_SHARE = 0.01  # of a view: materials that are not edited and show less are all measured by one of them
-MOST_SAMPLES = 1 << 14  # of these; entries of more are extrapolated
+TIMED = 1 << 10  # per batch
+FEW, MANY = 8, 256  # numbers of points that get all samples
+PER_MATERIAL = 1 << 18  # paths for these points
+MOST_OF_VIEW = 0.95  # share of a view traced to find which materials reflect light on
+LEAST_SHARE = 0.01  # of a view: uneditable materials with a smaller share are represented by one of them
+MOST_SAMPLES = 1 << 14  # for these points; entries of more samples are extrapolated
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Of a material.
+    """Cost of a material.
 
     Attributes
     ----------
     entries, raw_bytes, disk_bytes : float
-        Of a point with all samples; bytes before and after compression.
+        Per point with all samples; bytes before and after compression.
     path_s, call_s : float
-        Seconds of a path, and of a call that traces many, besides.
+        Seconds per path, and the overhead of a call that traces many.
     kept_s, tile_s : float
-        Seconds to read, pack and write a point in a pass, and a tile besides.
+        Seconds to read, pack and write a point in a pass, and the overhead of a tile.
     """
 
     entries: float = 0.0
@@ -56,7 +56,7 @@ class Cost:
     tile_s: float = 0.0
 
     def seconds(self, points: int, bounces: Bounces) -> float:
-        """Of so many points, all passes."""
+        """Seconds for this number of points, over all passes."""
         done = passes(bounces.samples)
         added = [after - before for before, after in zip((0, *done), done, strict=False)]
         found = points * (bounces.samples * self.path_s + len(done) * self.kept_s)
@@ -68,7 +68,7 @@ class Cost:
 
 
 class Trial:
-    """Measures a view. `shown` are the points of each material; the scene is read and seen in `begin_s` seconds."""
+    """Measures a view. `shown` has the points of each material; building the scene and its points takes `begin_s`."""
 
     def __init__(self, scene: Scene, view: View, editables: Mapping[str, Editable]) -> None:
         start = time.perf_counter()
@@ -80,7 +80,7 @@ class Trial:
         self.shown = {name: len(at) for name, at in self._at.items()}
 
     def passed_on(self) -> dict[str, float]:
-        """Share of the light of paths over two surfaces, whose second surface is of each material, as it looks now."""
+        """By material, its share as second surface of the light of paths over two surfaces, with current materials."""
         bounces = Bounces((1, 1), samples=64)
         work, tails = self._work(bounces), tails_of(self.editables, bounces)
         weights = tails.weights(np.array([albedo(self.editables[name], side) for name, side in tails.slots]))
@@ -101,7 +101,7 @@ class Trial:
         return found
 
     def costs(self, bounces: Bounces) -> dict[str, Cost]:
-        """By material."""
+        """Costs by material."""
         work, least = self._work(bounces), LEAST_SHARE * len(self._points)
         alike = [name for name in bounces.fixed if name in self.shown and self.shown[name] < least]
         found = {name: self._cost(work, name, bounces) for name in self.editables if name not in alike}
@@ -127,7 +127,7 @@ class Trial:
         growth = (bounces.samples / samples) ** log2(max(after, 1) / max(before, 1))
         entries = min(after / len(points) * growth, cells)
 
-        # Of few points and one sample, and of many: what a call and a tile take, and what is in proportion.
+        # Few points with one sample, and many: separates the overhead of calls and tiles from proportional costs.
         few, many = self._some(name, FEW), self._some(name, TIMED)
         batch = max(2, paths_at_once(bounces.series[1] > 1) // len(many))
         call_s, tile_s, _ = _timed(work, name, few, tiles, samples, 1)
@@ -137,13 +137,13 @@ class Trial:
         return Cost(entries, raw, raw * smaller, path_s, call_s, kept_s, tile_s)
 
     def _most_of_view(self) -> list[str]:
-        """The materials that show most, so many that they have `MOST_OF_VIEW` of it."""
+        """The most visible materials, enough to cover `MOST_OF_VIEW`."""
         names = sorted(self.shown, key=lambda name: -self.shown[name])
         before = np.cumsum([0, *(self.shown[name] for name in names)])[:-1]
         return [name for name, points in zip(names, before, strict=True) if points < MOST_OF_VIEW * len(self._points)]
 
     def _some(self, name: str, count: int) -> ViewPoints:
-        """So many points that show a material, or all."""
+        """At most `count` points that show a material."""
         return self._points.where(np.sort(self._at[name][:count]))
 
     def _work(self, bounces: Bounces) -> TileTracer:
@@ -154,12 +154,12 @@ class Trial:
 def _timed(
     work: TileTracer, name: str, points: ViewPoints, tiles: tuple[Tile, ...], samples: int, batch: int
 ) -> tuple[float, float, float]:
-    """Seconds to trace a batch for points that hold as many entries, and to keep it; share of bytes when compressed."""
+    """Seconds to trace a batch for points with as many entries, and to store it; compression ratio in bytes."""
     held = tuple(_repeated(tile, len(points)) for tile in tiles)
     start = time.perf_counter()
     more = work(Job(name, points, name, samples + batch, samples, held))
     traced = time.perf_counter()
-    for tile in more:  # as the call did, too
+    for tile in more:  # as in the call
         Tile.of([tile.sums(samples)], samples)
     packed_s = time.perf_counter() - traced
     disk, writing_s = _written(more)
@@ -168,7 +168,7 @@ def _timed(
 
 
 def _repeated(tile: Tile, points: int) -> Tile:
-    """A tile of more points, which have the entries of these in turn."""
+    """A tile of more points, which repeat the entries of this one's."""
     counts, codes, _ = unpacked(tile.array, tile.points)
     packed = tile.array[tile.points + len(codes) :]
     turn = np.arange(points) % tile.points

@@ -1,4 +1,4 @@
-"""The light map as a radiance cache: paths end at diffuse surfaces, which show their baked light."""
+"""The light map as a radiance cache: paths end at diffuse surfaces and take their baked light."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from lambent.materials.document import Material
 
 
 class LightMapCache:
-    """Diffuse radiance of surfaces, from baked irradiance: kd/pi E of this side plus kt_d/pi E of the other.
+    """Diffuse radiance of surfaces from baked irradiance: kd/pi E of this side plus kt_d/pi E of the other.
 
-    A coupled kd falls with the viewer's cosine, t(cos_o); over the light's cosines its mean is taken, which is exact
-    under uniform light. The `sun` that the light map leaves out is added by shadow rays.
+    A coupled kd falls with the viewer's cosine, t(cos_o); its mean over the light's cosines is used, which is exact for
+    uniform light. Shadow rays add the `sun` that the light map leaves out.
     """
 
     def __init__(
         self, builder: SceneBuilder, irradiance: Floats, irradiance_back: Floats | None, sun: SunRays | None = None
     ) -> None:
         self._sun = sun
-        # A measured table is traced whole: its object has no diffuse term of its own.
+        # A measured table is traced without the cache: its object has no diffuse term.
         looks = dict(builder.scene.materials) | dict.fromkeys(builder.measured, Material())
         materials = [looks[o.material] for o in builder.scene.objects]
         self._numbers = builder.object_numbers()
@@ -48,7 +48,7 @@ class LightMapCache:
         return self._shown(si, active, [(front, back)])[0]
 
     def _shown(self, si: Any, active: Any, irradiance: list[tuple[Any, Any]]) -> list[Any]:
-        """Diffuse radiance (mi.Color3f) of surfaces by each irradiance on the normal's side and the other."""
+        """Diffuse radiance (mi.Color3f) of surfaces for each pair of irradiances on the normal's side and the other."""
         number = dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, si.shape), active)
         outside = mi.Frame3f.cos_theta(si.wi) > 0
         reflected = dr.gather(mi.Color3f, self._reflected, number, active)
@@ -64,7 +64,7 @@ class LightMapCache:
     def irradiance(self, si: Any, active: Any, *, sun: bool = True) -> Any:
         """Irradiance on the side that a ray came from, with or without the `sun` that the light map leaves out.
 
-        On backs without a light map it is that of the front.
+        A back without a light map takes the front's.
         """
         outside, uv2 = mi.Frame3f.cos_theta(si.wi) > 0, light_map_uv(si, active)
         found = mi.Color3f(self._front.eval(uv2, active))
@@ -77,9 +77,9 @@ class LightMapCache:
 
 
 class GroupedCache(LightMapCache):
-    """The same by group of emitters: light maps (n, H, W, 3) of n groups, the sun's shadow rays in the group `of_sun`.
+    """Likewise by group of emitters: light maps (n, H, W, 3) of n groups, the sun's shadow rays in the group `of_sun`.
 
-    `groups` is called as a cache is, and returns a list.
+    `groups` is called like a cache and returns a list.
     """
 
     def __init__(

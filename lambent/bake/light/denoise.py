@@ -1,4 +1,4 @@
-"""Filling and denoising of a light map."""
+"""Filling and denoising of light maps."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.colour import luminance
 
-RINGS = 16  # texels grown into gutters; farther from any chart nothing is looked up
-CONTRAST = 8.0  # times as bright: from such a neighbour the filter carries light across a gutter
-NEAR = 6  # texels that it reaches
+RINGS = 16  # texels grown into gutters; look-ups reach no farther
+CONTRAST = 8.0  # brightness ratio at which the filter carries a neighbour's light across a gutter
+NEAR = 6  # texels that the filter reaches
 LAYERS = 4
-BLOCK = 64  # texels: regions to denoise are cut out in blocks, with the blocks around them
-MOST = 0.7  # share of a map, above which it is denoised whole
-RIM = 32  # texels mirrored at the borders, where the filter is off by up to 20 % otherwise
+BLOCK = 64  # texels: size of the blocks in which regions are cut out for denoising, with neighbouring blocks
+MOST = 0.7  # share of a map above which it is denoised whole
+RIM = 32  # texels mirrored at the borders, where the filter otherwise errs by up to 20 %
 
 
 def fill(values: Floats, known: Flags, labels: Indices, *, smooth: int = 0) -> Floats:
-    """Grow known texels into unknown ones: (H, W, C) with no black left.
+    """Grow known texels into unknown ones: (H, W, C) without black texels.
 
     Parameters
     ----------
     known : (H, W) bool
-        Texels whose value counts.
+        Texels with a valid value.
     labels : (H, W) int
-        Chart of each texel, -1 in gutters. An unknown texel within a chart takes values from its own chart first:
-        the wall behind a cupboard is not filled from its neighbours in the map.
+        Chart of each texel, -1 in gutters. An unknown texel within a chart takes values from its own chart first: the
+        wall behind a cupboard is not filled from its neighbours in the map.
     smooth : int
-        Times that texels are averaged with their neighbours before they grow: grown noise becomes streaks, which no
-        denoiser takes for noise.
+        Rounds of averaging with neighbours before texels grow: noise that has grown becomes streaks, which no denoiser
+        recognises as noise.
     """
     if not known.any():
         return np.zeros_like(values)
@@ -52,7 +52,7 @@ def fill(values: Floats, known: Flags, labels: Indices, *, smooth: int = 0) -> F
 
 
 class _Grown:
-    """A map with a border of one, as flat arrays, that grows ring by ring from its known texels."""
+    """A map with a border of one texel, as flat arrays, that grows ring by ring from its known texels."""
 
     def __init__(self, values: Floats, known: Flags) -> None:
         height, width = known.shape
@@ -64,11 +64,11 @@ class _Grown:
         self.start()
 
     def start(self) -> None:
-        """Grow from all that is known, after the charts in `ring` have changed."""
+        """Restart growth from all known texels, after the charts passed to `ring` have changed."""
         self._front = np.flatnonzero(self.known)
 
     def smooth(self, chart: Indices, times: int) -> None:
-        """Every known texel takes the mean of itself and the known texels of its chart around it."""
+        """Replace every known texel by the mean of itself and the known texels of its chart around it."""
         from scipy.sparse import csr_matrix
 
         target = np.flatnonzero(self.known)
@@ -89,7 +89,7 @@ class _Grown:
         self.values[target] = mean
 
     def ring(self, chart: Indices | None) -> bool:
-        """Unknown texels next to known ones (of their own chart, where charts are given) take the mean of those."""
+        """Fill unknown texels next to known ones (of their own chart, if charts are given) with the mean of those."""
         reached = np.zeros(len(self.known), bool)
         reached[self._front[:, None] + self.steps] = True
         target = np.flatnonzero(reached & self.inner & ~self.known & (True if chart is None else chart >= 0))
@@ -107,18 +107,18 @@ class _Grown:
 
 
 def denoise(irradiance: Floats) -> Floats:
-    """A noisy light map (H, W, 3) without gutters, denoised by Open Image Denoise's light map filter."""
+    """Denoise a light map (H, W, 3) without gutters by Open Image Denoise's light map filter."""
     import pyoidn
 
     if not irradiance.any():
-        return irradiance  # the filter would scale up its own rounding
+        return irradiance  # the filter would amplify its own rounding errors
     rim = ((RIM, RIM), (RIM, RIM), (0, 0))
     noisy = np.pad(irradiance, rim, mode="symmetric")
     return _filtered(pyoidn.OIDN_FILTER_TYPE_RT_LIGHTMAP, {pyoidn.OIDN_IMAGE_COLOR: noisy})[RIM:-RIM, RIM:-RIM]
 
 
 def denoise_image(radiance: Floats, albedo: Floats, normal: Floats) -> Floats:
-    """A noisy image (H, W, 3) of radiance, denoised by Open Image Denoise with albedo and normals to guide it."""
+    """Denoise an image (H, W, 3) of radiance by Open Image Denoise, guided by albedo and normals."""
     import pyoidn
 
     images = {
@@ -130,7 +130,7 @@ def denoise_image(radiance: Floats, albedo: Floats, normal: Floats) -> Floats:
 
 
 def _filtered(kind: str, images: Mapping[str, Floats], **options: bool) -> Floats:
-    """The output (H, W, 3) of a filter of Open Image Denoise; not negative."""
+    """The output (H, W, 3) of an Open Image Denoise filter, clamped at 0."""
     import pyoidn
 
     given = {name: np.ascontiguousarray(image, np.float32) for name, image in images.items()}
@@ -151,7 +151,7 @@ def _filtered(kind: str, images: Mapping[str, Floats], **options: bool) -> Float
 
 
 def _denoise_around(irradiance: Floats, wanted: Flags) -> Floats:
-    """`denoise` the wanted texels (H, W), with their surroundings; the rest stays as it is."""
+    """`denoise` the wanted texels (H, W) together with their surroundings; all others are unchanged."""
     from scipy.ndimage import binary_dilation, find_objects, label
 
     height, width = wanted.shape
@@ -173,10 +173,10 @@ def _denoise_around(irradiance: Floats, wanted: Flags) -> Floats:
 
 
 def denoise_charts(irradiance: Floats, known: Flags, labels: Indices, *, smooth: int = 0) -> Floats:
-    """A noisy light map, filled and denoised, without light of one chart in another: (H, W, 3).
+    """Fill and denoise a light map (H, W, 3) without carrying light from one chart into another.
 
-    The filter does not know of charts: light CONTRAST times as bright reaches across the gutter. Charts next to such
-    light are denoised in another layer, each layer filled as if the others were not there.
+    The filter ignores charts: light CONTRAST times as bright reaches across the gutter. Charts next to such light are
+    denoised in separate layers, each filled as if the other charts did not exist.
     """
     layer = layers_of(irradiance, known, labels)
     clean = np.zeros_like(irradiance)
@@ -188,9 +188,9 @@ def denoise_charts(irradiance: Floats, known: Flags, labels: Indices, *, smooth:
 
 
 def layers_of(irradiance: Floats, known: Flags, labels: Indices) -> Indices:
-    """Layer (H, W) of each texel, -1 in gutters: charts close to each other whose light differs much lie in two layers.
+    """Layer (H, W) of each texel, -1 in gutters: nearby charts whose light differs much are in different layers.
 
-    The light of two charts is compared as means over those of their texels that lie within NEAR texels of each other.
+    The light of two charts is compared as means over their texels within NEAR texels of each other.
     """
     light = np.where(known, luminance(irradiance), 0.0)
     pairs, totals = [], []
@@ -211,14 +211,14 @@ def layers_of(irradiance: Floats, known: Flags, labels: Indices) -> Indices:
 
 
 def _shifted(array: NDArray[Any], rows: int, columns: int) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Two views of equal shape: each texel, and the one (rows, columns) further on."""
+    """Two views of equal shape: each texel, and the texel offset by (rows, columns)."""
     height, width = array.shape
     here = array[: height - rows, max(0, -columns) : width - max(0, columns)]
     return here, array[rows:, max(0, columns) : width + min(0, columns)]
 
 
 def _coloured(labels: Indices, apart: Indices) -> Indices:
-    """Layers such that no pair of charts `apart` (n, 2) shares one, as far as LAYERS suffice."""
+    """Layers in which no pair of charts `apart` (n, 2) shares one, as far as LAYERS suffice."""
     others: dict[int, list[int]] = {}
     for a, b in apart.tolist():
         others.setdefault(a, []).append(b)

@@ -1,8 +1,8 @@
-"""The direct part of a light map, from samples of the same paths: its share of the light is denoised, not the light.
+"""The direct part of a light map from the same paths: the direct share is denoised, not the direct light.
 
-Both parts of a path's light have much of their noise in common, so that shares are smoother than light; and a share of
-the finished map follows it along edges of shadows and seams. The mean of quotients is not the quotient of means: shares
-are scaled so that some texels together have the direct light of their samples.
+Much of the noise of direct and total light is common to both, so shares are smoother than light, and a share of the
+finished map follows it along shadow edges and seams. The mean of quotients is not the quotient of means, so shares are
+scaled to give groups of texels the direct light of their samples.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ from lambent.bake.light.denoise import denoise_charts, fill
 from lambent.bake.light.noise import chart_means
 from lambent.core.arrays import Flags, Floats, Indices
 
-MOST_BIAS = 1.5  # of a share, that is mended
+MOST_BIAS = 1.5  # largest correction factor of a share
 
 
 def direct_part(
     direct: Floats, whole: Floats, light: NDArray[np.float16], known: Flags, labels: Indices, smooth: int
 ) -> NDArray[np.float16]:
-    """Direct light (H, W, 3) of a finished light map `light` (H, W, 3), nowhere more than that.
+    """Direct light (H, W, 3) of a finished light map `light` (H, W, 3), never above that.
 
     Parameters
     ----------
     direct, whole : (H, W, 3)
-        Samples of direct and of all light, where `known` (H, W).
+        Samples of direct and of all light, valid where `known` (H, W).
     labels : (H, W) int
         Chart of each texel.
     smooth : int
-        As `fill` takes it.
+        As in `fill`.
     """
     if not direct.any():
         return np.zeros(light.shape, np.float16)

@@ -1,10 +1,11 @@
-"""The dominant direction of the light at a texel, from which the renderer shades normals that a normal map bends.
+"""The dominant light direction at a texel, by which the renderer shades with normal maps.
 
 It is the mean of the directions w of incident light, weighted by their luminous share of the irradiance E:
 
     D = integral of L(w) cos w dw / E
 
-2/3 n under a uniform sky, of length 1 from a single lamp. It is baked where materials have normal maps, in world space.
+It is 2/3 n under a uniform sky and has length 1 for a single lamp. It is baked for materials with normal maps, in world
+space.
 """
 
 from __future__ import annotations
@@ -19,19 +20,19 @@ from lambent.bake.tracing import path_tracer
 from lambent.core.arrays import Floats, Indices
 from lambent.core.colour import luminance
 
-SAMPLES = 64  # per texel, then averaged with its neighbours
+SAMPLES = 64  # per texel, before averaging with neighbours
 
 
 def moments(cache: path_tracer.Cache, max_depth: int) -> Sampling:
-    """First moments of incident light, sampled like irradiance; surfaces show the finished light map."""
+    """Sampling of first moments of incident light, like irradiance; surfaces show the finished light map."""
     return Sampling((SAMPLES, SAMPLES), 0.0, max_depth, SAMPLES // 2, cache, path_tracer.moment)
 
 
 def dominant_direction(raw: Floats, irradiance: Floats, labels: Indices) -> NDArray[np.float16]:
     """(H, W, 3) D from sums of moments (2, H, W, 4) and irradiance (H, W, 3); 0 on charts without moments.
 
-    Moments and irradiance are averaged over the same texels of a chart, then divided: a gradient of the light across
-    the texels does not tilt the direction.
+    Moments and irradiance are averaged over the same texels of a chart before division, so that a gradient of the light
+    across texels does not tilt the direction.
     """
     count = raw[..., 3].sum(axis=0)
     known = count > 0

@@ -1,4 +1,4 @@
-"""Regions of the light map that are finished before the others, denoised for those who watch the bake."""
+"""Early light: finished regions of an unfinished light map, denoised for observers of the bake."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from lambent.store.store import Store
 
 
 class EarlyLight:
-    """Tells a watch the light of the tiles that are written, not more often than it wants to know.
+    """Sends the light of written tiles to a watch, no more often than it requests.
 
     Parameters
     ----------
     whole, parts : str
         Names of the arrays of samples, (2, H, W, 4), and by group (1, H, W, 3 n or more).
     groups : int
-        Count of light groups; 0 where light is not sorted.
+        Number of light groups; 0 if light is not separated.
     surface : tuple
-        Texels, their charts (H, W) and their cuts, as `sampling.cleaned` takes them.
+        Texels, their charts (H, W) and their cuts, as for `sampling.cleaned`.
     """
 
     def __init__(
@@ -36,13 +36,13 @@ class EarlyLight:
         self._next_s = -np.inf
 
     def wrote(self) -> None:
-        """A tile was written."""
+        """To be called after each written tile."""
         began_s, pause = time.monotonic(), self._watch.region_pause
         if pause is None or began_s < self._next_s:
             return
         raw, written = self._store.read_partial(self._whole)
         if written.all():
-            return  # the light map itself follows
+            return  # the complete light map follows
         halves, known = sampled_halves(raw)
         light = [halves.mean(axis=0)]
         if self._groups:

@@ -1,7 +1,7 @@
-"""Light maps by group of emitters: their samples beside those of the whole, and the finished maps.
+"""Light maps by group of emitters: their samples, taken with those of the whole, and the finished maps.
 
-Every group is denoised, filled and stitched by itself, as light of one lamp is easier to tell from noise than that of
-all; the whole is the sum of the finished groups.
+Every group is denoised, filled and stitched separately, because light of one lamp is easier to tell from noise than the
+sum; the whole is the sum of the finished groups.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from lambent.core.colour import HALF_MAX, luminance
 from lambent.core.progress import Progress
 from lambent.store.store import Array, Artefact, Chunk, Writer
 
-DROPPED_BITS = 11  # of the 23 of a mean's fraction, which are noise, and which files cannot pack
+DROPPED_BITS = 11  # of the 23 fraction bits of a mean: they are noise, which compresses badly
 
 
 def rounded(means: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Means with 12 bits of fraction, within 2^-13 of their value: files pack the zeros of their last bits."""
+    """Means with 12 fraction bits, within 2^-13 of their value: trailing zeros compress well."""
     half, kept = np.uint32(1 << (DROPPED_BITS - 1)), np.uint32(0xFFFFFFFF << DROPPED_BITS & 0xFFFFFFFF)
     return ((np.ascontiguousarray(means).view(np.uint32) + half) & kept).view(np.float32)
 
 
 class BothWriters:
-    """Writes tiles (2, h, w, 4 + c) of samples as two arrays: (2, H, W, 4), and the means of both halves (1, H, W, c).
+    """Writes tiles (2, h, w, 4 + c) of samples to two arrays: (2, H, W, 4), and the means of both halves (1, H, W, c).
 
-    The parts are written first: where the whole has a tile, its parts are there.
+    The parts are written first, so that a tile of the whole always has its parts.
     """
 
     def __init__(self, whole: Writer, parts: Writer) -> None:
@@ -49,17 +49,17 @@ class BothWriters:
 
     @property
     def artefact(self) -> Artefact:
-        """Of the whole, whose chunks the parts have too."""
+        """Artefact of the whole, whose chunks are also those of the parts."""
         return self._whole.artefact
 
     @property
     def missing(self) -> Sequence[Chunk]:
-        """Chunks that one of both lacks."""
+        """Chunks that are missing from either array."""
         lacking = {*self._whole.missing, *self._parts.missing}
         return [chunk for chunk in self.artefact.chunk_grid if chunk in lacking]
 
     def write(self, chunk: Chunk, data: Array) -> None:
-        """Write what is missing of a tile."""
+        """Write the missing arrays of a tile."""
         if chunk in self._parts.missing:
             count = data[..., 3].sum(axis=0)
             means = data[..., 4:].sum(axis=0) / np.maximum(count, 1)[..., None]
@@ -68,16 +68,16 @@ class BothWriters:
             self._whole.write(chunk, np.ascontiguousarray(data[..., :4]))
 
     def finish(self) -> None:
-        """Mark both complete."""
+        """Mark both arrays complete."""
         self._parts.finish()
         self._whole.finish()
 
 
 @dataclass(frozen=True, eq=False)
 class GroupMaps:
-    """A side of the light map, float16: `whole` (H, W, 3), `light` and `direct` by group (n, H, W, 3); its notes.
+    """A side of the light map, float16: `whole` (H, W, 3), `light` and `direct` by group (n, H, W, 3), and its meta.
 
-    Direct light is nowhere more than all light of its group.
+    Direct light never exceeds all light of its group.
     """
 
     whole: NDArray[np.float16]
@@ -91,7 +91,7 @@ def finished_groups(
 ) -> GroupMaps:
     """The maps of `count` groups from samples of the whole (2, H, W, 4) and of parts (H, W, 3 count or 6 count).
 
-    Maps without direct light only light the next ones: their seams are left as they are.
+    Maps without direct light only light the next maps; their seams are not treated.
     """
     halves, known = sampled_halves(raw)
     samples = float(raw[..., 3].sum(axis=0)[known].mean()) if known.any() else 0.0
@@ -117,7 +117,7 @@ def finished_groups(
 
 
 def _filled(clean: Floats, known: Flags, labels: Indices) -> NDArray[np.float16]:
-    """Maps (n, H, W, 3), filled where they are unknown."""
+    """Maps (n, H, W, 3) with unknown texels filled."""
     if not len(clean) or not known.any():
         return np.zeros(clean.shape, np.float16)
     filled = fill(np.concatenate(list(clean), axis=-1), known, labels)
@@ -125,7 +125,7 @@ def _filled(clean: Floats, known: Flags, labels: Indices) -> NDArray[np.float16]
 
 
 def group_notes(traced: TracedScene, light: Floats) -> list[dict[str, Any]]:
-    """LightGroupRecords of the groups, whose maps (n, H, W, 3) are `light`, for JSON."""
+    """LightGroupRecords of the groups as JSON, from their maps `light` (n, H, W, 3)."""
     sides, lights = traced.lit_sides(1.0), traced.sorted_lights
     index, area = sides.texels.index, sides.texels.spacing**2
     lit = sides.valid.any(axis=1)
@@ -141,7 +141,7 @@ def group_notes(traced: TracedScene, light: Floats) -> list[dict[str, Any]]:
 
 
 def _sun_on(traced: TracedScene, texels: Texels) -> Floats:
-    """Direct irradiance (K, 3) of the sun on the first point of each texel, on the normal's side."""
+    """Direct irradiance (K, 3) of the sun at the first point of each texel, on the normal's side."""
     kind = {"diffuse": False}
     p, n, flat = (vectors(mi.Vector3f, v[:, 0]) for v in (texels.positions, texels.normals, texels.flat))
     si = dr.zeros(mi.SurfaceInteraction3f, len(texels.index))

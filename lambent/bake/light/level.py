@@ -1,11 +1,11 @@
-"""The level of denoised light: regions of a light map keep the light of their samples.
+"""Level correction: regions of a denoised light map keep the light of their samples.
 
-Samples of a room lit through windows are skewed, many dark and few very bright ones. The denoiser takes the bright ones
-for outliers in part: it returns the less light, the noisier a region is. Sums over hundreds of texels have little
-noise left, so each texel is scaled by the quotient of two sums around it, of samples and of denoised light.
+Samples of a room lit through windows are skewed: many are dark, few very bright. The denoiser treats some bright ones
+as outliers, and darkens a region the more, the noisier it is. Sums over hundreds of texels have little noise, so each
+texel is scaled by the quotient of two sums around it: of samples, and of denoised light.
 
-A quotient of a small chart still has noise. It is drawn towards 1 by the share of its variance: the mean of a normal
-distribution of quotients after one measurement.
+In a small chart the quotient is still noisy. It is shrunk towards 1 by the share of noise in its variance: the
+posterior mean for normally distributed quotients.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ SPREAD = 0.3  # standard deviation of true quotients about 1
 
 
 def with_level(clean: Floats, noisy: Floats, known: Flags, labels: Indices) -> Floats:
-    """Denoised light (H, W, 3), scaled to the level of its samples `noisy` (H, W, 3), by the luminance of both.
+    """Scale denoised light (H, W, 3) to the level of its samples `noisy` (H, W, 3), by luminance.
 
     Parameters
     ----------
     known : (H, W) bool
-        Texels that were sampled.
+        Sampled texels.
     labels : (H, W) int
-        Chart of each texel, -1 in gutters, which stay as they are.
+        Chart of each texel, -1 in gutters, which are unchanged.
     """
     denoised, sampled = (luminance(np.asarray(light, np.float32)) for light in (clean, noisy))
     parts = np.stack([sampled, denoised, (sampled - denoised) ** 2], axis=-1)

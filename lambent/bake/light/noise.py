@@ -1,8 +1,8 @@
 """Noise of the light map: the relative standard error of each texel's irradiance, before denoising.
 
-Both halves of a texel's samples are estimates of the same irradiance E, so that |E_0 - E_1|/2 estimates the standard
-error of their mean. A single difference is a poor estimate (with a deviation of 70 %), so squares are averaged over
-nearby texels of the same chart: with 25 of them the deviation is some 14 %.
+The two halves of a texel's samples estimate the same irradiance E, so |E_0 - E_1|/2 estimates the standard error of
+their mean. A single difference is a poor estimate (70 % deviation), so squares are averaged over nearby texels of the
+same chart: with 25 of them the deviation is about 14 %.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def noise_map(halves: Floats, known: Flags, labels: Indices) -> NDArray[np.float
     Parameters
     ----------
     known : (H, W) bool
-        Texels that were sampled; others take the noise of their neighbours. Black ones have none: 0.
+        Sampled texels; others take the noise of their neighbours. Black texels have noise 0.
     labels : (H, W) int
         Chart of each texel, -1 in gutters.
     """
@@ -38,7 +38,7 @@ def noise_map(halves: Floats, known: Flags, labels: Indices) -> NDArray[np.float
 
 
 def chart_means(values: Floats, known: Flags, labels: Indices, reach: int = REACH) -> tuple[Floats, Floats]:
-    """Means of values (H, W, C) over the known texels of the same chart within `reach`, and their numbers (H, W)."""
+    """Means of values (H, W, C) over the known texels of the same chart within `reach`, and their counts (H, W)."""
     means, count = _chart_means(np.ascontiguousarray(values), known, np.ascontiguousarray(labels), reach)
     return np.asarray(means), np.asarray(count)
 

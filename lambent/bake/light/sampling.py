@@ -1,7 +1,7 @@
-"""Irradiance at every texel of the light map, path traced through the true materials.
+"""Irradiance at every texel of the light map, path traced with the actual materials.
 
-A tile is sampled in pairs of passes, traced at once and summed apart: half their difference is an estimate of the
-noise. The raw sums stay in the store, and a bake continues from them after any interruption.
+A tile is sampled in pairs of passes, traced together but summed separately: half their difference estimates the noise.
+The raw sums stay in the store, and a bake resumes from them after any interruption.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.colour import HALF_MAX, luminance
 from lambent.core.sequences import hammersley, r2
 
-GATHER_PASS = 64  # samples of a texel that are stratified among themselves
-SMOOTH = 8  # rounds of averaging before texels grow into gutters: some 4 texels wide
+GATHER_PASS = 64  # samples of a texel that are stratified together
+SMOOTH = 8  # rounds of averaging before texels grow into gutters: about 4 texels wide
 
 
-Estimate = Callable[..., Any]  # one sample of three numbers at each point, called as `path_tracer.irradiance` is
+Estimate = Callable[..., Any]  # one sample of three numbers per point, like `path_tracer.irradiance`
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """How texels are sampled: `samples` (at least, at most) times, until the relative noise is reached.
+    """How to sample texels: `samples` (least, most) times, until the relative noise is reached.
 
-    With a `cache` (`path_tracer.radiance`), paths end at diffuse surfaces, and the scene must be without diffuse terms.
-    Direct light of the sun `unseen` is left out. A `tally` sums parts of the light, of which the last `parts` are kept
-    beside the whole; the cache is then one that it takes.
+    With a `cache` (`path_tracer.radiance`), paths end at diffuse surfaces, and the scene must have no diffuse terms.
+    Direct light of the sun `unseen` is left out. A `tally` sums parts of the light, the last `parts` of which are
+    stored in addition to the whole; the cache must then suit the tally.
     """
 
     samples: tuple[int, int]
@@ -55,18 +55,18 @@ class Sampling:
 
 
 def path_traced(samples: tuple[int, int], noise: float, max_depth: int) -> Sampling:
-    """All bounces, for the whole scene."""
+    """All bounces, in the whole scene."""
     return Sampling(samples, noise, max_depth, min(32, max(1, samples[0] // 2)))
 
 
 def gathered(samples: int, noise: float, max_depth: int, cache: Any) -> Sampling:
-    """One diffuse bounce onto cached light, mirrors in between followed (final gathering, Reichert 1992)."""
+    """One diffuse bounce onto cached light, through any mirrors in between (final gathering, Reichert 1992)."""
     per_pass = max(1, min(GATHER_PASS, samples // 2))
     return Sampling((2 * per_pass, samples), noise, max_depth, per_pass, cache)
 
 
 def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int, how: Sampling) -> Floats:
-    """Raw content of one tile: (2, h, w, 4 + 3 parts) float32, the two halves' sums, of each part too.
+    """Raw content of one tile: (2, h, w, 4 + 3 parts) float32, the sums of both halves, of the whole and of each part.
 
     The fourth channel has the sample counts.
     """
@@ -96,9 +96,9 @@ def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int,
 
 
 def relative_noise(halves: Floats, share: Floats | None = None) -> float:
-    """Root mean square error of the mean of two estimates (2, ..., 3), over its mean; 0 for black, or nothing.
+    """Root mean square error of the mean of two estimates (2, ..., 3), relative to its mean; 0 if black or empty.
 
-    All count the same, or by their `share` (...), such as their areas.
+    Estimates are weighted equally, or by `share` (...), for example by area.
     """
     if not halves.size:
         return 0.0
@@ -111,9 +111,9 @@ def relative_noise(halves: Floats, share: Floats | None = None) -> float:
 
 
 def points_of(sides: Sides, mine: Indices) -> path_tracer.Points:
-    """POINTS of each of some texels on the device, invalid ones replaced by valid ones of the same texel."""
+    """POINTS of some texels on the device; invalid points are replaced by valid ones of the same texel."""
     valid = sides.valid[mine]
-    ranked = np.argsort(~valid, axis=1, kind="stable")  # valid points first, taken in turn
+    ranked = np.argsort(~valid, axis=1, kind="stable")  # valid points first, used in turn
     turn = np.arange(POINTS) % valid.sum(axis=1)[:, None]
     choice = np.where(valid, np.arange(POINTS), np.take_along_axis(ranked, turn, axis=1))[..., None]
     t = sides.texels
@@ -125,9 +125,9 @@ def points_of(sides: Sides, mine: Indices) -> path_tracer.Points:
 
 
 def _sums_of_pass(scene: Any, points: path_tracer.Points, count: int, seed: tuple[int, int], how: Sampling) -> Floats:
-    """Sums (2, n, 3 + 3 parts) of the irradiance samples of a pair of passes per texel, and of each part of them.
+    """Sums (2, n, 3 + 3 parts) of a pair of passes' irradiance samples per texel, of the whole and of each part.
 
-    In both, every texel takes the same two stratified point sets, shifted by random offsets of its own (Cranley &
+    In both passes every texel uses the same two stratified point sets, shifted by its own random offsets (Cranley &
     Patterson 1976).
     """
     n, samples = 2 * count, how.per_pass
@@ -136,7 +136,7 @@ def _sums_of_pass(scene: Any, points: path_tracer.Points, count: int, seed: tupl
     thread = dr.arange(mi.UInt32, n * samples)
     texel, k = thread // samples, thread % samples  # texels of the first pass, then of the second
     first = dr.gather(mi.UInt32, mi.UInt32(rng.integers(POINTS, size=n, dtype=np.uint32)), texel)
-    # the low bit already steers the azimuth of Hammersley points; a constant count would compile every tile anew
+    # the low bit already determines the azimuth of Hammersley points; a constant count would recompile for every tile
     point = texel % dr.opaque(mi.UInt32, count) * POINTS + (k // 2 + first) % POINTS
     at = path_tracer.Points(*(dr.gather(mi.Vector3f, v, point) for v in (points.position, points.normal, points.flat)))
     u_bsdf = _shifted(hammersley(samples), shifts[:2], k, texel)
@@ -152,7 +152,7 @@ def _sums_of_pass(scene: Any, points: path_tracer.Points, count: int, seed: tupl
 def _estimates(
     scene: Any, sampler: Any, at: path_tracer.Points, u_bsdf: Any, u_emitter: Any, how: Sampling
 ) -> list[Any]:
-    """A sample (mi.Color3f) of each point: the whole, then the parts that are kept."""
+    """A sample (mi.Color3f) of each point: the whole, then the stored parts."""
     if how.tally is None:
         return [how.estimate(scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache, how.unseen)]
     sums = path_tracer.irradiance_sums(
@@ -168,7 +168,7 @@ def _shifted(points: Floats, shifts: Floats, k: Any, texel: Any) -> Any:
 
 
 def finished(raw: Floats, texels: Texels, labels: Indices, cuts: Cuts) -> tuple[Floats, dict[str, float]]:
-    """The light map (H, W, 3) float16 from its raw sums (2, H, W, 4), and its noise and samples, to note."""
+    """The light map (H, W, 3) float16 from its raw sums (2, H, W, 4), and its noise and samples as meta."""
     halves, known = sampled_halves(raw)
     samples = float(raw[..., 3].sum(axis=0)[known].mean()) if known.any() else 0.0
     meta = {"noise": relative_noise(halves[:, known]), "samples": samples}
@@ -176,13 +176,13 @@ def finished(raw: Floats, texels: Texels, labels: Indices, cuts: Cuts) -> tuple[
 
 
 def sampled_halves(raw: Floats) -> tuple[Floats, Flags]:
-    """Irradiance (2, H, W, 3) of both halves of path traced sums (2, H, W, 4), and where there is any (H, W)."""
+    """Irradiance (2, H, W, 3) of both halves of path traced sums (2, H, W, 4), and flags of sampled texels (H, W)."""
     count = raw[..., 3:]
     return raw[..., :3] / np.maximum(count, 1), count[0, ..., 0] > 0
 
 
 def cleaned(irradiance: Floats, known: Flags, texels: Texels, labels: Indices, cuts: Cuts) -> NDArray[np.float16]:
-    """A noisy light map (H, W, 3), denoised, filled where it is unknown, its seams blended and closed."""
+    """Denoise a light map (H, W, 3), fill unknown texels, blend and close its seams."""
     if not known.any():
         return np.zeros(irradiance.shape, np.float16)
     clean = with_level(denoise_charts(irradiance, known, labels, smooth=SMOOTH), irradiance, known, labels)
@@ -190,7 +190,7 @@ def cleaned(irradiance: Floats, known: Flags, texels: Texels, labels: Indices, c
 
 
 def closed(clean: Floats, known: Flags, texels: Texels, labels: Indices, cuts: Cuts) -> NDArray[np.float16]:
-    """Denoised light maps (n, H, W, 3), filled where they are unknown, their seams blended and closed."""
+    """Fill unknown texels of denoised light maps (n, H, W, 3), and blend and close their seams."""
     together = np.concatenate(list(clean), axis=-1)
     together = fill(blend_seams(together, known, texels, labels, cuts), known, labels)
     each = np.split(together, len(clean), axis=-1)

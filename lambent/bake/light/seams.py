@@ -1,10 +1,10 @@
-"""Seams of the light map: where charts meet in the scene, their texels are averaged across.
+"""Seams of the light map: texels are averaged across charts that meet in the scene.
 
-Charts are denoised apart, so two that share an edge in the scene disagree a little along it. Near the border of its
-chart a texel therefore takes the mean of the texels around it in the scene, whichever chart they belong to: both sides
-of a seam take the same mean. Texels count by the area of the surface in them: the chamfer of a tile has as many texels
-along an edge as the tile, and hardly any area. Only charts that a cut of a smooth surface parts are averaged: mouldings
-of a frame, a texel apart and facing the same way, have light of their own.
+Charts are denoised separately, so two that share an edge in the scene differ slightly along it. Near the border of its
+chart a texel is therefore replaced by the mean of the texels around it in the scene, regardless of chart: both sides of
+a seam get the same mean. Texels are weighted by surface area: the chamfer of a tile has as many texels along an edge as
+the tile, but hardly any area. Only charts separated by a cut of a smooth surface are averaged: mouldings of a frame, a
+texel apart and facing the same way, have their own light.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from lambent.bake.surfaces.texels import BEYOND, Texels
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import normalize
 
-BORDER = 4.0  # texels from the border, beyond which nothing is averaged
+BORDER = 4.0  # texels from the border beyond which nothing is averaged
 RADIUS = 1.0  # texels: standard deviation of the weight along the surface
-LIFT = 0.3  # texels: standard deviation off the surface, so that a rug does not light the floor below
+LIFT = 0.3  # texels: standard deviation perpendicular to the surface, so that a rug does not light the floor below
 NEIGHBOURS = 24
 
 
 def blend_seams(irradiance: Floats, known: Flags, texels: Texels, labels: Indices, cuts: Cuts) -> Floats:
-    """Irradiance (H, W, C) with seams at `cuts` blended; hidden parts of charts (`BEYOND`) only among themselves.
+    """Blend seams of irradiance (H, W, C) at `cuts`; hidden parts of charts (`BEYOND`) only blend with each other.
 
-    `known` (H, W) are the texels that were sampled.
+    `known` (H, W) are the sampled texels.
     """
     from scipy.ndimage import distance_transform_edt
     from scipy.spatial import cKDTree
@@ -34,7 +34,7 @@ def blend_seams(irradiance: Floats, known: Flags, texels: Texels, labels: Indice
     index, position = texels.index[lit], texels.positions[lit].mean(axis=1).astype(float)
     normal = normalize(texels.normals[lit].mean(axis=1).astype(float))
     share = np.clip(1 - distance_transform_edt(~_borders(labels)).reshape(-1)[index] / BORDER, 0, 1)
-    # a triangle without area, in the scene or in the map, has no metres per texel, and its neighbours no distance
+    # triangles degenerate in the scene or in the map have no metres per texel, and no distances to neighbours
     near = np.flatnonzero((share > 0) & (texels.spacing[lit] > 0))
     if len(index) < NEIGHBOURS or not len(near):
         return irradiance
@@ -53,7 +53,7 @@ def blend_seams(irradiance: Floats, known: Flags, texels: Texels, labels: Indice
     weight[row, column] *= _parted(chart[near[row]], chart[others[row, column]], labels, cuts)
     beyond = chart >= BEYOND
     weight *= beyond[others] == beyond[near][:, None]
-    weight[:, 0] += 1e-6  # the texel itself, or its twin at the same place: never a sum of nothing
+    weight[:, 0] += 1e-6  # the texel itself, or its twin at the same place: the sum is never empty
     mean = np.einsum("nk,nkx->nx", weight, values[others]) / weight.sum(axis=1, keepdims=True)
     blended = irradiance.reshape(-1, channels).copy()
     blended[index[near]] += share[near, None] * (mean - values[near])
@@ -61,7 +61,7 @@ def blend_seams(irradiance: Floats, known: Flags, texels: Texels, labels: Indice
 
 
 def _parted(one: Indices, other: Indices, labels: Indices, cuts: Cuts) -> Flags:
-    """Whether a cut parts charts `one` and `other` (n,) of a map of `labels` (H, W)."""
+    """Whether a cut separates charts `one` and `other` (n,) of a map of `labels` (H, W)."""
     height, width = labels.shape
     sides = []
     for uv in (cuts.here, cuts.there):

@@ -1,12 +1,12 @@
-"""Seams of the light map, closed: where a smooth surface is cut, both sides of the cut look up the same light.
+"""Closed seams of the light map: both sides of a cut through a smooth surface look up the same light.
 
-Charts of a few texels differ along their cuts whatever their texels hold, because each side interpolates its own. The
-texels that look-ups along cuts touch are moved as little as possible, relative to their light, so that the look-ups
-agree: linear least squares (Iwanicki 2013, "Lighting technology of The Last of Us", has the same for light maps).
-Texels hold on to their own light the more, the more of them is surface: what is moved shows on all of that.
+Charts of a few texels differ along their cuts whatever their texels' values, because each side interpolates its own.
+The texels used by look-ups along cuts are changed as little as possible, relative to their light, to make the look-ups
+agree: linear least squares (used for light maps by Iwanicki 2013, "Lighting technology of The Last of Us"). Texels keep
+their light more firmly the more surface they hold, because a change shows on all of it.
 
-Where one side is a sliver, such as the chamfer of a tile, it follows the broad side: a chamfer's texels hold the dark
-of the joint as well, which the broad side would show as a line.
+If one side is a sliver, such as the chamfer of a tile, it follows the broad side: a chamfer's texels include the dark
+joint, which would appear as a line on the broad side.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from lambent.bake.surfaces.texels import BEYOND
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.colour import luminance
 
-SMOOTH = 0.98  # least cosine between the normals on both sides of a cut: elsewhere light may change abruptly
+SMOOTH = 0.98  # least cosine between the normals on both sides of a cut; at sharper cuts light may change abruptly
 PER_TEXEL = 2.0  # samples along a cut
-MOST_SAMPLES = 64  # of one edge
-AGREE = 30.0  # weight of a sample's agreement, over that of a texel's own light
+MOST_SAMPLES = 64  # per edge
+AGREE = 30.0  # weight of agreement at a sample, relative to that of a texel's own light
 FILLED, COVERED = (
     0.05,
     5.0,
 )  # weight of the light of texels that hold none of their own; more for a whole texel of surface
-NARROW = 0.25  # a side whose texels hold less than this share of the other side's area follows that
-DARK = 0.01  # of the mean light: differences below it do not matter
+NARROW = 0.25  # a side with less than this share of the other side's area follows that
+DARK = 0.01  # relative to the mean light: smaller differences are ignored
 STEPS, RESIDUE = 100, 1e-3  # of conjugate gradients
 
 
@@ -43,7 +43,7 @@ class Cuts:
 
 
 def cuts_of(geometry: dict[str, Floats], width: int, height: int) -> Cuts:
-    """The cuts of all surfaces on a map of such a size; `geometry` as in `atlas.merged`."""
+    """The cuts of all surfaces on a map of this size; `geometry` as in `atlas.merged`."""
     faces, size = geometry["faces"].astype(np.int64), np.array([width, height])
     _, place = np.unique(geometry["positions"], axis=0, return_inverse=True)
     edges = np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)])
@@ -66,10 +66,10 @@ def cuts_of(geometry: dict[str, Floats], width: int, height: int) -> Cuts:
 
 
 def stitched(irradiance: Floats, cuts: Cuts, labels: Indices, area_m2: Floats, covered: Floats) -> Floats:
-    """(H, W, 3) light map whose look-ups agree along cuts; parts of charts that no viewer sees (BEYOND) stay.
+    """(H, W, 3) light map whose look-ups agree along cuts; parts of charts that no viewer sees (BEYOND) are unchanged.
 
-    `area_m2` (H, W) is the surface in each texel, `covered` (H, W) the share of its square that has any. Sides alike
-    meet half-way; then slivers follow the sides beside them, which stay.
+    `area_m2` (H, W) is the surface in each texel, `covered` (H, W) the covered share of its square. Similar sides meet
+    half-way first; then slivers follow the fixed sides next to them.
     """
     height, width = irradiance.shape[:2]
     here, there = (_footprint(uv, width, height) for uv in (cuts.here, cuts.there))
@@ -90,7 +90,7 @@ def stitched(irradiance: Floats, cuts: Cuts, labels: Indices, area_m2: Floats, c
 
 
 def _close(irradiance: Floats, texel: NDArray[Any], share: Floats, own: Floats, moving: Flags) -> Floats:
-    """The light map (H, W, 3) with its sums of `share` times `texel`, both (n, 8), brought to 0 by `moving` texels.
+    """Bring the sums of `share` times `texel`, both (n, 8), of a light map (H, W, 3) to 0 by changing `moving` texels.
 
     `own` (H W,) is the weight of a texel's own light, `moving` (H W,) whether it may change.
     """
@@ -106,7 +106,7 @@ def _close(irradiance: Floats, texel: NDArray[Any], share: Floats, own: Floats, 
     least = DARK * max(float(luminance(irradiance).mean()), 1e-12)
     relative = 1 / np.maximum(luminance(values), least) ** 2
     of_row = relative[number].min(axis=1)
-    np.minimum.at(relative, number, of_row[:, None])  # darkness beside light is no reason to stay dark
+    np.minimum.at(relative, number, of_row[:, None])  # dark texels next to light ones may change
     weight = np.sqrt(AGREE * of_row)[:, None] * share
     rows = np.arange(0, weight.size + 1, weight.shape[1])
     apart = csr_matrix((weight.ravel(), number.ravel(), rows), shape=(len(weight), len(touched)))
@@ -126,9 +126,9 @@ def _close(irradiance: Floats, texel: NDArray[Any], share: Floats, own: Floats, 
 
 
 def _ranges(values: Floats, number: NDArray[Any], share: Floats) -> tuple[Floats, Floats]:
-    """Least and greatest `values` (m, 3) that each texel meets in its look-ups: beyond them the fit would swing.
+    """Range of `values` (m, 3) among each texel's look-ups; beyond it the fit would oscillate.
 
-    `number` and `share` (n, 8) are the texels of the look-ups on both sides, and what they count.
+    `number` and `share` (n, 8) are the texels of the look-ups on both sides, and their weights.
     """
     low, high, counts = values.copy(), values.copy(), share != 0
     met, row = values[number], np.nonzero(counts)[0]
@@ -138,7 +138,7 @@ def _ranges(values: Floats, number: NDArray[Any], share: Floats) -> tuple[Floats
 
 
 def _footprint(uv: Floats, width: int, height: int) -> tuple[NDArray[Any], Floats]:
-    """Texels (n, 4) that bilinear look-ups (n, 2) touch, and their shares."""
+    """Texels (n, 4) of bilinear look-ups (n, 2), and their weights."""
     x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
     column, row = np.floor(x), np.floor(y)
     right, down = x - column, y - row

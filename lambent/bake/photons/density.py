@@ -1,8 +1,8 @@
-"""From photons per texel to irradiance: flux over area, averaged over neighbours on the same surface.
+"""Photons per texel to irradiance: flux over area, averaged over neighbours on the same surface.
 
-Areas are exactly those of the surface within a texel's square: no border is darker than its middle, and no energy is
-lost. The kernel is the same for flux and area, so that uniform light stays uniform beside gaps. It is narrow, because
-the denoiser cannot tell noise that neighbours share from light.
+Areas are exactly those of the surface within a texel's square, so borders are not darkened and energy is preserved.
+Flux and area use the same kernel, so uniform light stays uniform next to gaps. The kernel is narrow, because the
+denoiser cannot tell noise shared by neighbours from light.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from lambent.bake.surfaces.texels import Texels
 from lambent.core.arrays import Flags, Floats
 from lambent.core.directions import normalize
 
-KERNEL, WIDE = 0.3, 0.7  # texels: standard deviation along the surface; WIDE for texels that are mostly off it
-LIFT = 0.3  # texels: standard deviation off the surface
+KERNEL, WIDE = 0.3, 0.7  # texels: standard deviation along the surface; WIDE for texels mostly off it
+LIFT = 0.3  # texels: standard deviation perpendicular to the surface
 NEIGHBOURS = 21
-NEIGHBOURS_OF_FINE = 192  # where the kernel is wider than WIDE texels
+NEIGHBOURS_OF_FINE = 192  # for kernels wider than WIDE texels
 NEGLIGIBLE = 1e-4  # weight
 ROUNDS, BALANCED = 200, 1e-6
-SMALLEST = 0.05  # share of the gathered texels that lies on the surface, below which a texel's light is unknown
+SMALLEST = 0.05  # share of the gathered texels on the surface below which a texel's light is unknown
 TEXELS_AT_ONCE = 1 << 18
 
 
 class Kernel:
     """Averages over the texels around each texel, on the same surface.
 
-    Weights given and taken are balanced (`_balanced`): the energy on the map is that of the photons, and uniform light
-    stays uniform. `areas` (H, W) are `coverage.texel_areas`; only the share of a texel's area that light can reach
+    Given and received weights are balanced (`_balanced`): the map preserves the photons' energy, and uniform light
+    stays uniform. `areas` (H, W) are `coverage.texel_areas`; only the part of a texel's area that light can reach
     counts, `lit_share` (K,), 0 within a solid.
     """
 
@@ -47,13 +47,13 @@ class Kernel:
 
     @property
     def known(self) -> Flags:
-        """(H, W): where irradiance is known."""
+        """(H, W): whether irradiance is known."""
         known = np.zeros(self._shape[0] * self._shape[1], bool)
         known[self._index[self._enough]] = True
         return known.reshape(self._shape)
 
     def irradiance(self, flux: Floats) -> Floats:
-        """(H, W, 3) in W/m^2 from flux (H, W, 3) in W per texel; 0 where it is unknown."""
+        """(H, W, 3) in W/m^2 from flux (H, W, 3) in W per texel; 0 where unknown."""
         factor = self._factor[:, None]
         found = factor * (self._weights @ (factor * flux.reshape(-1, 3)[self._index].astype(float)))
         result = np.zeros((self._shape[0] * self._shape[1], 3))
@@ -62,9 +62,9 @@ class Kernel:
 
 
 def shares(areas: Floats, texels: Texels) -> Floats:
-    """(H, W) weight of each texel in the noise of the map: its area, at most that of a usual texel.
+    """(H, W) weight of each texel in the noise of the map: its area, at most that of a typical texel.
 
-    Slivers always have few photons, and nobody sees them; nor should the large texels of outer walls decide.
+    Slivers have few photons but are invisible, and the large texels of outer walls should not dominate.
     """
     return np.asarray(np.minimum(areas, usual_spacing(texels) ** 2))
 
@@ -75,7 +75,7 @@ def usual_spacing(texels: Texels) -> float:
 
 
 def _balanced(weights: Any, area: Floats) -> Floats:
-    """(K,) factors d with which d_i weights_ij d_j area_j adds up to 1 over j, for every i (Sinkhorn, symmetric)."""
+    """(K,) factors d for which d_i weights_ij d_j area_j sums to 1 over j, for every i (Sinkhorn, symmetric)."""
     with np.errstate(divide="ignore"):
         d = np.where(weights @ area > 0, 1 / np.sqrt(weights @ area), 0.0)
     for _ in range(ROUNDS):
@@ -87,7 +87,7 @@ def _balanced(weights: Any, area: Floats) -> Floats:
 
 
 def _weights(texels: Texels, lit: Flags, reach: Floats) -> Any:
-    """Sparse symmetric (K, K) weights of the lit texels for each other.
+    """Sparse symmetric (K, K) weights between the lit texels.
 
     `reach` (K,) in metres is the kernel's standard deviation along the surface.
     """

@@ -1,7 +1,7 @@
-"""The light map by photons: batches of photons in the store, and the irradiance from all of them.
+"""The light map by photons: stored batches of photons, and irradiance from all of them.
 
-Every batch is an estimate of the whole map with a seed of its own, `light_map/photons[batch]`, in W per texel: a bake
-continues from the finished ones after any interruption. The difference of their halves is an estimate of the noise.
+Every batch is an independent estimate of the whole map, `light_map/photons[batch]`, in W per texel: a bake resumes
+after the finished ones. The difference of two halves of the batches estimates the noise.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from lambent.core.progress import Progress
 from lambent.scenes.scene import Scene
 from lambent.store.store import Writer
 
-BATCHES, FEWEST = 16, 4  # FEWEST: batches from which the noise is estimated
-SMALL = 0.5  # of the median size of a texel
+BATCHES, FEWEST = 16, 4  # FEWEST: least number of batches to estimate the noise from
+SMALL = 0.5  # relative to the median size of a texel
 
 
 class PhotonMap:
@@ -71,13 +71,13 @@ class PhotonMap:
         run_tiles(writer, batch, seed=seed, progress=progress, what="light map, photons")
 
     def _noise(self, flux: Floats) -> float:
-        """The larger relative noise, by area, of the sides, from halves (2, sides, H, W, 3) of the photons."""
+        """The larger relative noise, weighted by area, of the sides, from halves (2, sides, H, W, 3) of the photons."""
         halves = (np.stack([kernel.irradiance(half[i]) for half in flux]) for i, kernel in enumerate(self._kernels))
         known = [kernel.known for kernel in self._kernels]
         return max(relative_noise(both[:, k], self._shares[k]) for both, k in zip(halves, known, strict=True))
 
     def halves(self, batches: Floats) -> Iterator[tuple[Floats, Flags]]:
-        """Per side irradiance (2, H, W, 3) of both halves of the batches, and where there is any (H, W)."""
+        """Per side, irradiance (2, H, W, 3) of both halves of the batches, and flags of known texels (H, W)."""
         shot = shot_of(batches)
         for i, kernel in enumerate(self._kernels):
             yield np.stack([kernel.irradiance(shot[half::2, i].mean(axis=0)) for half in (0, 1)]), kernel.known
@@ -85,7 +85,7 @@ class PhotonMap:
     def finished(
         self, batches: Floats, labels: Indices, cuts: Cuts
     ) -> list[tuple[NDArray[np.float16], dict[str, float]]]:
-        """Per side the light map (H, W, 3), and its noise before denoising, of texels counted equally and by area."""
+        """Per side, the light map (H, W, 3), and its noise before denoising, both unweighted and weighted by area."""
         maps = []
         for halves, known in self.halves(batches):
             noise = relative_noise(halves[:, known]), relative_noise(halves[:, known], self._shares[known])
@@ -95,13 +95,13 @@ class PhotonMap:
 
 
 def _over_area(texels: Texels) -> Floats:
-    """(H, W) 1/area of a texel, m^-2, 0 in the gutters; bounded, lest the smallest decide where photons go."""
+    """(H, W) 1/area of a texel, m^-2, 0 in gutters; bounded, so that tiny texels do not attract all photons."""
     found = np.zeros(texels.height * texels.width)
     found[texels.index] = 1 / np.maximum(texels.spacing, SMALL * np.median(texels.spacing)) ** 2
     return found.reshape(texels.height, texels.width)
 
 
 def shot_of(batches: Floats) -> Floats:
-    """The batches that were shot until the noise was reached; the rest are black."""
+    """The batches shot before the noise was reached; the rest are black."""
     last = np.flatnonzero(batches.any(axis=(1, 2, 3, 4)))
     return batches[: last[-1] + 1 + (last[-1] + 1) % 2] if len(last) else batches

@@ -1,17 +1,17 @@
-"""Photons: light followed from its sources through the scene, counted where it falls on the light map.
+"""Photons: light followed from its sources through the scene, counted where it lands on the light map.
 
-Photons leave every emitter in proportion to its power, scatter by the materials and are counted at each surface they
-meet, in W per texel; divided by the texel's area, that is irradiance (Jensen 1996, with texels for discs). All samples
-are independent: the lattices of low-discrepancy sequences show as stripes, which no denoiser takes for noise.
+Photons leave emitters in proportion to power, scatter by the materials and are counted at each surface they hit, in W
+per texel; divided by the texel's area, this is irradiance (Jensen 1996, with texels for discs). All samples are
+independent: the lattices of low-discrepancy sequences show as stripes, which no denoiser recognises as noise.
 
 A photon is absorbed with probability 1 - (r + t) for the direction it came from (thesis M, 3.1): it survives with a
 probability equal to its scattered weight, whose mean over the scattered directions is r + t.
 
-Light runs the other way round than in `path_tracer`: `si.wi` is the direction the photon came from. Materials are
-reciprocal; measured tables stand in the scene with light and viewer exchanged (`TracedScene`). Irradiance is that of
-the shading normal, as in `path_tracer.irradiance`; smooth shading needs the factors of Veach 1997, 5.3.
+Light runs in the opposite direction to `path_tracer`: `si.wi` is the direction the photon came from. Materials are
+reciprocal; measured tables are used with light and viewer swapped (`TracedScene`). Irradiance refers to the shading
+normal, as in `path_tracer.irradiance`; smooth shading needs the factors of Veach 1997, 5.3.
 
-Sums are integers, so that they do not depend on the order in which threads add: the same bits every time.
+Sums are integers and independent of the order in which threads add: results are bitwise identical.
 """
 
 from __future__ import annotations
@@ -33,31 +33,33 @@ from lambent.core.arrays import Floats
 from lambent.scenes.scene import Scene
 
 PHOTONS_AT_ONCE = 1 << 19
-UNIT = 1 << 20  # integers in a photon of mean power
-POWER_PHOTONS = 1 << 14  # of the pre-pass that finds the mean power
-IMPORTANCE_PHOTONS = 1 << 20  # of the pre-pass that finds where the light map wants photons
+UNIT = 1 << 20  # integers per photon of mean power
+POWER_PHOTONS = 1 << 14  # of the pre-pass that estimates the mean power
+IMPORTANCE_PHOTONS = 1 << 20  # of the pre-pass that estimates where the light map needs photons
 SAME = 2e-4  # metres, and share of the largest coordinate: twice the offset of Mitsuba's `sample_ray` from a surface
-STEEPEST = 20.0  # largest ratio of the cosines to shading and true normal: beyond, at grazing, it is noise
+STEEPEST = 20.0  # largest ratio of the cosines to shading and true normal; larger ones, at grazing, are noise
 
 
 def shoot(
     scene: Any, shape: tuple[int, int, int], photons: int, max_bounces: int, seed: int, sky: SkyPhotons | None = None,
     unseen: Sun | None = None,
 ) -> Floats:  # fmt: skip
-    """Flux (sides, H, W, 3) float64 in W that falls on each texel, from so many photons.
+    """Flux (sides, H, W, 3) float64 in W on each texel, from `photons` photons.
 
     Parameters
     ----------
     scene : mi.Scene
-        Its meshes carry light map coordinates.
+        Its meshes have light map coordinates.
     shape : (sides, H, W)
         Of the light map, for the normal's side or both.
     max_bounces : int
-        Photons are counted up to the surface they meet after so many.
+        Photons are counted up to and including the surface they hit after this many bounces.
+    seed : int
+        The same seed gives the same flux.
     sky : SkyPhotons, optional
-        Draws the environment's photons; without, they start on a disc as large as the scene.
+        Draws the environment's photons; otherwise they start on a disc as large as the scene.
     unseen : Sun, optional
-        Whose photons count from their second surface on, clear glass that they pass straight through not counted.
+        Its photons count only from their second surface on, not counting clear glass that they pass straight through.
     """
     sums = dr.zeros(mi.UInt64, int(np.prod(shape)) * 3)
     rng = np.random.default_rng(seed)
@@ -75,14 +77,14 @@ def shoot(
 
 
 def learnt_sky(scene: Scene, whole: Any, over_area: Floats, max_bounces: int) -> SkyPhotons | None:
-    """How the environment's photons are drawn, found by a pre-pass; None without an environment. Deterministic.
+    """Learn in a pre-pass how to draw the environment's photons; None without an environment or a guide. Deterministic.
 
-    over_area (H, W) is 1 over the area of a light map's texel in m^2, 0 where there is none.
+    over_area (H, W) is 1 over the area of a light map's texel in m^2, 0 without surface.
     """
     environment = whole.environment()
     if environment is None:
         return None
-    emitter = getattr(environment, "sky", environment)  # of a guided one, the one that it holds
+    emitter = getattr(environment, "sky", environment)  # the one inside a guided sky
     guide = learn(scene, whole, emitter, keep_open=True)
     if guide is None:
         return None
@@ -96,14 +98,14 @@ def learnt_sky(scene: Scene, whole: Any, over_area: Floats, max_bounces: int) ->
 
 
 def _units_per_watt(scene: Any, sky: SkyPhotons | None) -> float:
-    """Integers per W, 0 where nothing is emitted."""
+    """Integers per W; 0 if nothing is emitted."""
     _, power, _ = _emitted(scene, independent(0, POWER_PHOTONS), sky, None)
     mean = float(np.array(power, np.float64).mean())
     return UNIT / mean if mean > 0 else 0.0
 
 
 def _emitted(scene: Any, sampler: Any, by_landing: SkyPhotons | None, unseen: Sun | None) -> tuple[Any, Any, Any]:
-    """Rays of photons, their power (mi.Color3f) in W times their number, and the share that counts where they land."""
+    """Rays of photons, power (mi.Color3f) in W times number of photons, and the share that counts where they land."""
     u, place, direction = sampler.next_1d(), sampler.next_2d(), sampler.next_2d()
     number, weight, _ = scene.sample_emitter(u)
     emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), number)
@@ -126,7 +128,7 @@ def _emitted(scene: Any, sampler: Any, by_landing: SkyPhotons | None, unseen: Su
 
 
 def _nearer(scene: Any, emitter: Any, ray: Any, place: Any) -> Any:
-    """Origins of rays that Mitsuba has sampled on emitters; those on surfaces with the offset of `rays.leaving`."""
+    """Origins of rays that Mitsuba sampled on emitters, with the offset of `rays.leaving` on surfaces."""
     shape = emitter.get_shape()
     on = shape.sample_position(0.0, place, shape != None)  # noqa: E711 (an array of pointers)
     same = (on.pdf > 0) & (dr.norm(on.p - ray.o) < SAME * (1 + dr.max(dr.abs(ray.o))))
@@ -154,7 +156,7 @@ def _trace(scene, sampler, ray, power, count, max_bounces, holes, first=1.0, uns
     ray = mi.Ray3f(ray)
     power = mi.Color3f(power)
     bounces = dr.zeros(mi.UInt32, width)
-    straight = dr.full(mi.Bool, True, width)  # through clear glass alone, from the light
+    straight = dr.full(mi.Bool, True, width)  # so far only through clear glass
     active = dr.full(mi.Bool, True, width) & (dr.mean(power) > 0)
     ctx = mi.BSDFContext(mi.TransportMode.Importance)
     while active:

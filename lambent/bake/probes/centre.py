@@ -1,10 +1,10 @@
-"""Where an object's probe stands.
+"""Position of an object's probe.
 
-- Where the scene says so; else
-- above a flat object (floor, mirror, table top), on the side that faces the middle of the scene: half the object's
-  length, half the free distance and EYE_HEIGHT_M are upper bounds of the height. Over its middle, or, where something
-  hides from there much of the scene that viewers see mirrored, over another point (`places_above`, `ProbeSet`); else
-- in the middle of the object's bounds, moved out by the shortest way where that is within another solid.
+- As given by the scene; else
+- for a flat object (floor, mirror, table top), above it on the side that faces the scene's centre. Half the object's
+  length, half the free distance and EYE_HEIGHT_M bound the height. It is above the object's centre, or, if much of the
+  scene that viewers see mirrored is hidden from there, above another point (`places_above`, `ProbeSet`); else
+- at the centre of the object's bounds, moved out by the shortest way if it is within another solid.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from lambent.core.directions import basis, normalize
 from lambent.core.geometry import triangle_areas, triangle_normals
 from lambent.scenes.scene import EYE_HEIGHT_M, Mesh
 
-GRID = 5  # points along each side of a flat object that a probe may stand over
-FLAT_SHARE = 0.8  # of an object's area with normals along one axis: a slab an eighth as thick as it is long
-CONTACT_M = 1e-3  # over a flat object: things closer to it do not limit the height of its probe
-CLEARANCE_M = 0.02  # beyond the surface of the solid that a centre is moved out of
+GRID = 5  # per side of a flat object: candidate points to place a probe above
+FLAT_SHARE = 0.8  # share of an object's area with normals along one axis: a slab an eighth as thick as it is long
+CONTACT_M = 1e-3  # things closer to a flat object do not limit the height of its probe
+CLEARANCE_M = 0.02  # beyond the surface of a solid that a centre is moved out of
 MOVES = 4
 ENCLOSING_SHARE = 0.5  # of the other objects, and of the directions that see the object's own outer sides
 
 
 def probe_centre(builder: SceneBuilder, name: str, without: Any, solids: SolidTest | None = None) -> Floats:
-    """(3,) float64 world position; `without` is the Mitsuba scene without the object, `solids` its own if given."""
+    """(3,) float64 world position; `without` is the Mitsuba scene without the object, `solids` its own, if given."""
     scene = builder.scene
     if name in scene.probe_centres:
         return np.asarray(scene.probe_centres[name], float)
@@ -42,12 +42,12 @@ def probe_centre(builder: SceneBuilder, name: str, without: Any, solids: SolidTe
 
 
 def centre_of(mesh: Mesh, middle: Floats, solids: SolidTest, without: Any) -> Floats:
-    """The centre for a mesh of a scene with this middle, or for a part of one; `solids` are those of `without`."""
+    """The centre for a mesh, or a part of one, in a scene with centre `middle`; `solids` are those of `without`."""
     return _centre(mesh.positions, flat_axis(mesh), middle, solids, without)
 
 
 def centre_among(points: Floats, normals: Floats, middle: Floats, solids: SolidTest | None, without: Any) -> Floats:
-    """The same for points (n, 3), even over a surface of unit normals (n, 3); not moved out of solids without any."""
+    """Likewise for points (n, 3), uniform over a surface of unit normals (n, 3); without `solids`, never moved out."""
     return _centre(points, _axis_of(normals, np.full(len(points), 1 / len(points))), middle, solids, without)
 
 
@@ -59,7 +59,7 @@ def _centre(points: Floats, axis: Floats | None, middle: Floats, solids: SolidTe
 
 
 def outside(mesh: Mesh, middle: Floats, whole: Any) -> Floats:
-    """About where the probe of a mesh will stand, in the whole scene."""
+    """Approximate position of a mesh's probe, from the whole scene."""
     axis = flat_axis(mesh)
     centre = _middle(mesh.positions)
     return centre if axis is None else _above(mesh.positions, centre, axis, middle, whole)
@@ -70,7 +70,7 @@ def _middle(points: Floats) -> Floats:
 
 
 def flat_axis(mesh: Mesh) -> Floats | None:
-    """Unit normal of a flat object, None of any other."""
+    """Unit normal of a flat object; None for others."""
     corners = mesh.corners
     area = triangle_areas(corners)
     if area.sum() <= 0:
@@ -79,7 +79,7 @@ def flat_axis(mesh: Mesh) -> Floats | None:
 
 
 def _axis_of(n: Floats, weights: Floats) -> Floats | None:
-    """Unit axis that most of the normals (k, 3), of these weights (k,), are along; None where there is none."""
+    """Unit axis of most of the normals (k, 3), weighted by (k,); None if there is none."""
     values, vectors = np.linalg.eigh(n.T @ (weights[:, None] * n))
     return np.asarray(vectors[:, 2]) if values[2] > FLAT_SHARE else None
 
@@ -93,7 +93,7 @@ def _above(points: Floats, centre: Floats, axis: Floats, middle: Floats, without
 
 
 def places_above(mesh: Mesh, middle: Floats, without: Any) -> Floats:
-    """(n, 3) where the probe of a flat object may stand: over its middle, then over points all over it."""
+    """(n, 3) candidate positions of a flat object's probe: above its centre, then above points all over it."""
     axis, centre = flat_axis(mesh), _middle(mesh.positions)
     if axis is None:
         return np.asarray(centre[None])
@@ -118,7 +118,7 @@ def _moved_out(centre: Floats, solids: SolidTest, without: Any) -> Floats:
 
 
 def encloses(builder: SceneBuilder, name: str, centre: Floats, whole: Any) -> bool:
-    """Whether the object surrounds its probe and most of the scene, as a room of one mesh does: then it stays in."""
+    """Whether the object surrounds its probe and most of the scene, like a one-mesh room: its probe keeps it."""
     low, high = builder.scene.object(name).mesh.bounds
     others = [np.mean(o.mesh.bounds, axis=0) for o in builder.scene.objects if o.name != name]
     within = [bool(((middle > low) & (middle < high)).all()) for middle in others]

@@ -1,6 +1,6 @@
-"""Look-ups in a probe on the device: `core.probe_lookups` in Dr.Jit, for many rays at once.
+"""Probe look-ups on the device: `core.probe_lookups` in Dr.Jit, for many rays at once.
 
-Sizes and numbers of planes are data or padded, so that all probes share their kernels.
+Sizes and plane counts are passed as data or padded, so that all probes share their kernels.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ PADDED = 6  # planes are padded to multiples of this
 
 
 class DeviceProbe:
-    """Luminance that rays find in a probe of radiance (6, N, N, 3), by planes (P, 4) about its centre, or distances.
+    """Luminance that rays find in a probe of radiance (6, N, N, 3), by planes (P, 4) about its centre or by distance.
 
     Parameters
     ----------
     distance : (6, N, N), optional
-        Where given, rays are looked up by it instead of by the planes.
+        If given, rays are looked up by it instead of by the planes.
     """
 
     def __init__(self, centre: Floats, radiance: Floats, planes: Floats, distance: Floats | None) -> None:
@@ -81,7 +81,7 @@ class DeviceProbe:
 
 
 class _Cube:
-    """A cube map of numbers (6, N, N), bilinear within each face as `core.cubemap.sample`."""
+    """A scalar cube map (6, N, N), bilinear within each face like `core.cubemap.sample`."""
 
     def __init__(self, values: Floats) -> None:
         self._values = mi.Float(np.asarray(values, np.float32).ravel())

@@ -1,11 +1,11 @@
-"""Objects that one probe cannot stand for, cut into parts that have a probe each.
+"""Division of objects that one probe cannot represent into parts with their own probes.
 
-The surface of an object sees points that are hidden from its probe. Where their share is above HIDDEN, the object is
-halved across the axis that leaves the least hidden, and so are its parts, if that lowers the share to WORTH of it.
-Faces are cut along with it. Where viewers see the object, a cut is made only if it pays (`worth`): most of what one
-probe misses is not seen, or blurred. Near a cut the renderer mixes the light of both probes: parts carry their borders.
+An object's surface sees points that are hidden from its probe. If their share exceeds HIDDEN, the object is halved
+across the axis that leaves the smallest share, as are its parts, provided the share falls to WORTH of its value. Faces
+are cut as well. If viewers see the object, a cut must also pay off (`worth`): most of a probe's misses are out of sight
+or blurred. Near a cut the renderer blends the light of both probes, by the borders of the parts.
 
-Flat objects are left whole: planar reflectors show them. So are objects with a light field.
+Flat objects stay whole, because planar reflectors show them, as do objects with a light field.
 """
 
 from __future__ import annotations
@@ -34,29 +34,29 @@ if TYPE_CHECKING:
     from lambent.bake.tracing.scene_builder import SceneBuilder
     from lambent.bake.tracing.solids import SolidTest
 
-Cut = list[tuple[Border, ...]]  # the borders of each part, as `store.contract` has them
-PARTS = "parts"  # document: the cuts, and the key of everything they depend on
-HIDDEN = 0.2  # share above which one probe does not do
-WORTH = 0.85  # times the share: a cut that leaves more is not made
-SOFT = 0.5  # of the distance of the halves' middles: the width over which their probes are mixed
-DEPTH = 2  # cuts of cuts: at most four parts
-FACES = 24  # an object of fewer is left whole
-RAYS, LEAST_RAYS = 8192, 256  # from an object, and from each of its parts
-BURIED = 0.9  # share above which a centre may lie in a solid: of what is looked for from there, nothing is seen
-LEAST_RAD = 0.06  # that an object measures for the median viewer: smaller ones are left whole
-CERTAIN = 0.75  # of HIDDEN by few rays: of an object with less, too little is hidden
-SCREENED = 4096  # objects that are looked at more closely, the largest...
-MOST = 24  # ...and those that cuts are tried on
+Cut = list[tuple[Border, ...]]  # the borders of each part, as in `store.contract`
+PARTS = "parts"  # document: the cuts, and the key of all their inputs
+HIDDEN = 0.2  # share above which one probe is insufficient
+WORTH = 0.85  # factor to which a cut must lower the share
+SOFT = 0.5  # relative to the distance of the halves' centres: width over which their probes are blended
+DEPTH = 2  # levels of cuts: at most four parts
+FACES = 24  # objects with fewer stay whole
+RAYS, LEAST_RAYS = 8192, 256  # from an object, and at least from each of its parts
+BURIED = 0.9  # share above which a centre may lie in a solid, from where the target points are not visible
+LEAST_RAD = 0.06  # angular size for the median viewer; smaller objects stay whole
+CERTAIN = 0.75  # times HIDDEN, by few rays: objects below hide too little
+SCREENED = 4096  # the largest objects, which are screened more closely
+MOST = 24  # the largest of them, for which cuts are tried
 
 
 def divided(sight: Sight, store: Store, progress: Progress, timed: Timed = untimed) -> Sight:
-    """The scene with its objects in parts; the cuts are found again only where geometry has changed."""
+    """The scene with its objects divided; the cuts are recomputed only if geometry has changed."""
     scene = sight.scene
     centres = sorted(scene.probe_centres.items())
     shiny = sorted(name for name, material in scene.materials.items() if needs_probe(material))
     clear = sorted(n for n, m in scene.materials.items() if m.transmits or n in scene.textures)
     worn = [o.material for o in scene.objects]
-    whole = [sorted(scene.light_fields)] if scene.light_fields else []  # keys of stores without any stay as they were
+    whole = [sorted(scene.light_fields)] if scene.light_fields else []  # stores without light fields keep their keys
     looks = [centres, shiny, clear, worn, *whole]
     key = key_of("geometry", REVISION, "parts with borders", *geometry_inputs(scene), *looks)
     found = store.documents.get(PARTS)
@@ -69,7 +69,7 @@ def divided(sight: Sight, store: Store, progress: Progress, timed: Timed = untim
 
 
 def cuts_of(sight: Sight, progress: Progress = silent) -> dict[str, Cut]:
-    """By name of the objects that are cut, the borders of each of their parts. Deterministic."""
+    """By name of divided object, the borders of each part. Deterministic."""
     scene = sight.scene
     mirrors = {name for name, material in scene.materials.items() if needs_probe(material)}
     shiny = [o for o in scene.objects if o.material in mirrors and o.name not in scene.probe_centres]
@@ -97,7 +97,7 @@ def cuts_of(sight: Sight, progress: Progress = silent) -> dict[str, Cut]:
 
 
 def _worth_trying(sight: Sight, objects: list[SceneObject], places: Floats) -> list[SceneObject]:
-    """Those not flat that look large and of which much seems hidden from one probe, the MOST largest, in order."""
+    """The MOST largest objects, in order, that are not flat, look large and seem to need more than one probe."""
     from lambent.bake.probes.centre import flat_axis
     from lambent.bake.probes.screening import hidden_shares, median_distances, widths
 
@@ -117,7 +117,7 @@ def _worth_trying(sight: Sight, objects: list[SceneObject], places: Floats) -> l
 
 
 def _cut_of(builder: SceneBuilder, o: SceneObject, anywhere: SolidTest, whole: Any, places: Floats) -> Cut:
-    """The borders of the object's parts; of one where it stays whole. Viewers are at `places`, if there are any."""
+    """The borders of the object's parts, one part if it stays whole. Viewers are at `places`, if there are any."""
     from lambent.bake.probes.centre import centre_among, centre_of
     from lambent.bake.probes.hidden import hidden_share, seen_from, spread
     from lambent.bake.probes.worth import POINTS, pays, seen_in, small_probes
@@ -128,7 +128,7 @@ def _cut_of(builder: SceneBuilder, o: SceneObject, anywhere: SolidTest, whole: A
     surface = seen_from(points, normals, without)
 
     def share(mine: Flags) -> float:
-        """From the middle, or, where that seems to lie in a solid, from where it is moved out to."""
+        """Hidden share from the centre, or, if that seems to lie in a solid, from where it is moved out to."""
         seen, part = surface.among(mine), (points[mine], normals[mine], middle)
         hidden = hidden_share(seen, centre_among(*part, None, without), without)
         return hidden if hidden < BURIED else hidden_share(seen, centre_among(*part, solids, without), without)
@@ -152,9 +152,9 @@ def _cut_of(builder: SceneBuilder, o: SceneObject, anywhere: SolidTest, whole: A
 def _cut(
     points: Floats, mine: Flags, borders: tuple[Border, ...], share: Callable[[Flags], float], depth: int
 ) -> tuple[Cut, float]:
-    """The part of a surface within `borders`, which has `mine` (n,) of its points (n, 3), in parts, and what they miss.
+    """Divide the part of a surface within `borders`, `mine` (n,) of its points (n, 3); returns parts and hidden share.
 
-    The cuts are those that leave the least `share` hidden.
+    Chooses the cuts with the smallest hidden `share`.
     """
     hidden = share(mine)
     if depth == 0 or hidden <= HIDDEN:
@@ -175,7 +175,7 @@ def _cut(
 
 
 def split(scene: Scene, cuts: Mapping[str, Cut]) -> Scene:
-    """The scene with objects in the parts of `cuts_of`; `Scene.parts` maps each to its whole."""
+    """The scene with objects divided by `cuts_of`; `Scene.parts` maps each part to its whole."""
     if not cuts:
         return scene
     cut = {o.name: _objects_of(o, cuts[o.name]) for o in scene.objects if o.name in cuts}
@@ -196,7 +196,7 @@ def _objects_of(o: SceneObject, cut: Cut) -> tuple[SceneObject, ...]:
 
 
 def parts_of(mesh: Mesh, cut: Cut) -> list[Mesh]:
-    """The mesh cut along the borders of its parts, which leaves no faces that belong to two of them."""
+    """The mesh cut along the borders of its parts, so that no face belongs to two of them."""
     for plane in dict.fromkeys(max(border, quad(-x for x in border)) for borders in cut for border in borders):
         mesh = cut_across(mesh, plane)
     middles = np.concatenate([mesh.corners.mean(axis=1), np.ones((len(mesh.faces), 1))], axis=1)
@@ -206,13 +206,13 @@ def parts_of(mesh: Mesh, cut: Cut) -> list[Mesh]:
 
 
 def family(parts: Mapping[str, str], name: str) -> set[str]:
-    """The object and all other parts of its whole: a probe leaves them all out."""
+    """The object and all other parts of its whole: a probe leaves all of them out."""
     owner = parts.get(name)
     return {name} if owner is None else {part for part, other in parts.items() if other == owner}
 
 
 def sub_mesh(mesh: Mesh, faces: Indices) -> Mesh:
-    """The mesh of some faces alone."""
+    """The mesh restricted to some faces."""
     vertices, renumbered = np.unique(mesh.faces[faces], return_inverse=True)
     positions, normals, tangents, uv = (a[vertices] for a in (mesh.positions, mesh.normals, mesh.tangents, mesh.uv))
     return Mesh(positions, normals, tangents, uv, renumbered.reshape(-1, 3).astype(np.uint32))

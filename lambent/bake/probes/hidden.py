@@ -1,6 +1,6 @@
-"""The points that a surface sees, and the share of them that is hidden from its probe.
+"""The share of points seen by a surface that is hidden from its probe.
 
-A probe shows what its centre sees; a surface mirrors what it sees itself. Rays from points all over an object, which is
+A probe shows the view from its centre; a surface mirrors its own view. Rays from points all over an object, which is
 left out as in its probe, find what its surface sees; other things hide a share of these hits from the centre.
 """
 
@@ -20,12 +20,12 @@ from lambent.scenes.scene import Mesh
 
 RAYS = 4096  # per object
 OFTEN = 0.9
-SHORT = 1e-3  # metres, and share of the distance, by which a hit may be missed: it hides nothing
+SHORT = 1e-3  # metres, and share of the distance: rays that end this close to a hit are unoccluded
 
 
 @dataclass(frozen=True)
 class Seen:
-    """Rays from a surface: origins, unit directions, hits (n, 3), and whether there is a hit (n,)."""
+    """Rays from a surface: origins, unit directions, hits (n, 3), and hit flags (n,)."""
 
     origins: Floats
     directions: Floats
@@ -33,12 +33,12 @@ class Seen:
     valid: Flags
 
     def among(self, mine: Flags) -> Seen:
-        """Those of them that are `mine` (n,)."""
+        """The subset `mine` (n,)."""
         return Seen(self.origins[mine], self.directions[mine], self.hits[mine], self.valid[mine])
 
 
 def seen_from(points: Floats, normals: Floats, without: Any) -> Seen:
-    """Cosine distributed rays from points (n, 3) of unit normals (n, 3), all over a surface that `without` lacks."""
+    """Cosine-distributed rays from points (n, 3), of unit normals (n, 3), of a surface that `without` leaves out."""
     directions = cosine_directions(normals)
     return seen_along(array_of(leaving(without, points, normals, directions).o).astype(float), directions, without)
 
@@ -51,7 +51,7 @@ def seen_along(origins: Floats, directions: Floats, without: Any) -> Seen:
 
 
 def hidden_share(seen: Seen, centre: Floats, without: Any) -> float:
-    """Share of the hits that something hides from the centre; 0 where nothing is hit."""
+    """Share of the hits that are occluded from the centre; 0 without hits."""
     if not seen.valid.any():
         return 0.0
     offset = seen.hits[seen.valid] - centre
@@ -61,9 +61,9 @@ def hidden_share(seen: Seen, centre: Floats, without: Any) -> float:
 
 
 def parallax_deg(seen: Seen, centre: Floats, planes: Floats) -> float:
-    """Angle in degrees, not exceeded by OFTEN of the rays, from the hit as the centre sees it to the look-up.
+    """Angle in degrees from the hit, as seen from the centre, to the look-up; the OFTEN quantile over the rays.
 
-    `planes` (P, 4) are about the centre.
+    `planes` (P, 4) are relative to the centre.
     """
     if not seen.valid.any():
         return 0.0
@@ -73,11 +73,11 @@ def parallax_deg(seen: Seen, centre: Floats, planes: Floats) -> float:
 
 
 def spread(mesh: Mesh, count: int) -> tuple[Floats, Floats]:
-    """Points and normals (count, 3), evenly over the area."""
+    """Points and normals (count, 3), uniform over the area."""
     corners = mesh.corners
     up_to = np.cumsum(triangle_areas(corners))
     rng = np.random.default_rng(0)
     face = np.searchsorted(up_to, (np.arange(count) + 0.5) / count * up_to[-1]).clip(0, len(corners) - 1)
     points = points_on_triangles(corners, face, rng)
-    order = rng.permutation(count)  # so that a point's place on the object says nothing of its ray's direction
+    order = rng.permutation(count)  # decorrelates a point's place on the object from its ray's direction
     return points[order], triangle_normals(corners)[face][order]

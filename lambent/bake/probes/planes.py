@@ -1,8 +1,8 @@
-"""Bounding planes of a probe: a few planes in place of the surfaces it sees (thesis M, 4.4.1).
+"""Bounding planes of a probe: a few planes approximate the surfaces it sees (thesis M, 4.4.1).
 
-A look-up from a point away from the probe's centre is corrected by the distance to these planes. A displacement of
-delta turns the look-up by about delta |1/t_planes - 1/t|, so the planes are chosen, one after another, to lower the
-mean of |1/t_planes - 1/t| over the sphere. Candidates are the planes of the surfaces seen, and the box around them.
+The distance to these planes corrects look-ups from points away from the probe's centre. A displacement of delta turns
+the look-up by about delta |1/t_planes - 1/t|, so planes are added one by one to minimise the mean of
+|1/t_planes - 1/t| over the sphere. Candidates are the planes of visible surfaces, and the box around them.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from lambent.core.directions import normalize
 from lambent.store.contract import FAR
 
 FEWEST, MOST = 4, 8
-WORTH = 0.02  # of the remaining error: a further plane must lower it by this share
+WORTH = 0.02  # of the remaining error: an additional plane must remove this share
 ANGLE_BINS = 12  # per cube axis, for the histogram of normals
 CANDIDATES = 24
-CLEARANCE = 0.02  # metres from the centre: nearer planes would make look-ups turn wildly
+CLEARANCE = 0.02  # metres from the centre: nearer planes would turn look-ups wildly
 
 
 def bounding_planes(distance: Floats, normals: Floats) -> NDArray[np.float32]:
-    """Planes (P, 4) (n, d) with n.x + d = 0 in coordinates whose origin is the probe's centre, n towards it.
+    """Planes (P, 4) (n, d) with n.x + d = 0 relative to the probe's centre, n towards it.
 
     Parameters
     ----------
     distance : (6, N, N)
-        Metres to the surface hit, FAR where none is.
+        Metres to the hit surface, FAR without a hit.
     normals : (6, N, N, 3)
         Unit normals there, on the side of the centre.
     """
@@ -41,7 +41,7 @@ def bounding_planes(distance: Floats, normals: Floats) -> NDArray[np.float32]:
         return np.zeros((0, 4), np.float32)
     points = w[hit] * t[hit, None]
     candidates = np.concatenate([_dominant(points, normal[hit], omega[hit]), _box(points)])
-    inverse = [np.maximum(-(w @ plane[:3]) / plane[3], 0.0) for plane in candidates]  # 1/t, 0 where none is met
+    inverse = [np.maximum(-(w @ plane[:3]) / plane[3], 0.0) for plane in candidates]  # 1/t, 0 without a hit
     wanted = np.where(hit, 1 / t, 0.0)
     chosen: list[int] = []
     seen = np.zeros_like(wanted)
@@ -63,7 +63,7 @@ def _error(inverse: Floats, wanted: Floats, omega: Floats) -> float:
 
 
 def _dominant(points: Floats, normals: Floats, omega: Floats) -> Floats:
-    """Planes of the surfaces that cover the most solid angle, by a histogram over normal and offset, refined."""
+    """Planes of the surfaces with the largest solid angles, by a histogram over normal and offset, refined."""
     offset = -(points * normals).sum(axis=1)
     major = np.abs(normals).max(axis=1, keepdims=True)
     normal_bin = np.round(normals / major * ANGLE_BINS / 2).astype(int)
@@ -82,7 +82,7 @@ def _dominant(points: Floats, normals: Floats, omega: Floats) -> Floats:
 
 
 def _packed(normal_bin: Indices, step: Indices) -> Indices:
-    """One number per bin, in the order of the bins: a single key sorts many times faster than rows of four."""
+    """One number per bin, in the order of the bins: one key sorts many times faster than rows of four."""
     packed = np.zeros(len(step), np.int64)
     for column in normal_bin.T:
         packed = packed * (ANGLE_BINS + 1) + column + ANGLE_BINS // 2

@@ -1,8 +1,8 @@
 """Probes: the surroundings of an object as cube maps of radiance and distance from one point.
 
-Rays from the centre pass the object; the surfaces they meet are lit by the whole scene, and mirror it. With the light
-map as radiance cache, a diffuse surface shows its baked light and a glossy one is traced on through its lobes, so that
-mirrors in mirrors are right. Without it everything is path traced, with more noise.
+Rays from the centre pass through the object; the surfaces they hit are lit by, and mirror, the whole scene. With the
+light map as radiance cache, a diffuse surface shows its baked light and a glossy one is traced on through its lobes, so
+that mirrors in mirrors are right. Without it everything is path traced, with more noise.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from lambent.core.directions import normalize
 from lambent.store.contract import FAR
 
 PATHS_AT_ONCE = 1 << 22
-BLOCKS = (16, 4, 1)  # paths through a texel that are stratified among themselves: the largest that fits is taken
-# Noise of a texel is judged as if its paths were independent. Stratified, they have about .65 of it.
-NOISE, MOST = 0.14, 16  # relative standard error that ends a texel, and times `samples` that end it at the latest
+BLOCKS = (16, 4, 1)  # paths through a texel that are stratified together: the largest that fits
+# Noise of a texel is estimated as for independent paths; stratified paths have about .65 of it.
+NOISE, MOST = 0.14, 16  # relative standard error that ends a texel, and the limit as a multiple of `samples`
 MIRROR_DEPTH = 6  # glossy surfaces in a row
 
 
@@ -36,7 +36,7 @@ MIRROR_DEPTH = 6  # glossy surfaces in a row
 class Probe:
     """radiance (6, N, N, 3) float32, distance (6, N, N) float32, normals (6, N, N, 3) float32 on the probe's side.
 
-    Radiance is rounded as `in_halves` stores it. `groups` (n, 6, N, N, 3) float32 has it by light group, not rounded.
+    Radiance is rounded as by `in_halves`. `groups` (n, 6, N, N, 3) float32 has it by light group, not rounded.
     """
 
     radiance: NDArray[np.float32]
@@ -47,11 +47,11 @@ class Probe:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """Scenes that a probe is traced in.
+    """Scenes for tracing a probe.
 
-    `first` is the scene that the probe sees itself, mostly without its object; `whole` is the scene that lights and is
-    mirrored by the surfaces seen. With a `cache` both are without diffuse terms; without, paths are traced whole. A
-    path meets at most `depth` surfaces. A `tally` sorts light by group, with a cache that it takes.
+    `first` is the scene that the probe itself sees, usually without its object; `whole` is the scene that lights, and
+    is mirrored by, the visible surfaces. With a `cache`, both have no diffuse terms; without, paths are traced whole. A
+    path has at most `depth` surfaces. A `tally` separates light by group, together with a suitable cache.
     """
 
     first: Any
@@ -64,8 +64,8 @@ class Surroundings:
 def bake_probe(scene: Surroundings, centre: Floats, n: int, samples: int, seed: int, noise: float = NOISE) -> Probe:
     """Trace a probe.
 
-    Every texel gets `samples` paths. Texels that are noisy still, mostly of glossy surfaces, get as many more as they
-    need to come down to `noise`, at most MOST times as many in all.
+    Every texel gets `samples` paths. Texels that are still noisy, mostly of glossy surfaces, get as many more as they
+    need to reach `noise`, at most MOST times `samples` in total.
     """
     rng = np.random.default_rng(seed)
     block = _block(samples)
@@ -87,10 +87,10 @@ def bake_probe(scene: Surroundings, centre: Floats, n: int, samples: int, seed: 
 
 
 def bake_small(scene: Surroundings, centres: Floats, n: int, samples: int, seed: int) -> list[Probe]:
-    """Probes at all `centres` (k, 3), each texel of `samples` paths.
+    """Probes at all `centres` (k, 3), with `samples` paths per texel.
 
-    They are traced together, since a launch costs as much as its paths. They have no light by group, and noisy texels
-    get no more paths.
+    They are traced together, since a launch costs as much as its paths. They have no light by group, and no additional
+    paths for noisy texels.
     """
     block = _block(samples)
     texels, base = np.arange(len(centres) * 6 * n * n), -(-samples // block)
@@ -107,13 +107,13 @@ def _block(samples: int) -> int:
 
 
 def _blocks_needed(total: Floats, squares: Floats, samples: int, noise: float) -> Floats:
-    """Times as many paths as texels have had, for their relative standard error to be `noise`; in [1, MOST].
+    """Factor on the number of paths for a relative standard error of `noise` per texel; in [1, MOST].
 
-    Relative to the texel, or to the median of all where that is brighter: in the dark less accuracy will do.
+    The error is relative to the texel, or to the median of all if that is brighter: dark texels need less accuracy.
     """
     mean = luminance(total / samples)
     variance = np.maximum(luminance(squares / samples) - mean**2, 0) / samples
-    allowed = noise * np.maximum(mean, max(float(np.median(mean)), 1e-12))  # also of black texels and infinite noise
+    allowed = noise * np.maximum(mean, max(float(np.median(mean)), 1e-12))  # handles black texels and infinite noise
     return np.asarray(np.clip(variance / allowed**2, 1, MOST))
 
 
@@ -122,7 +122,7 @@ def _sums(
 ) -> tuple[Floats, Floats]:
     """Sums over `samples` paths through each of the texels, of radiance and of its squares (k, 3).
 
-    Texels are counted through the probes at all `centres` (m, 3).
+    Texels are numbered consecutively over the probes at all `centres` (m, 3).
 
     Radiance is (k, 3 + 3 n), the whole and each of n groups.
     """
@@ -159,12 +159,12 @@ def _pass(
 
 
 def _origins(centres: Floats, number: Any) -> Any:
-    """The centres (m, 3) of these numbers, as data, not as constants: all probes share their kernels then."""
+    """The centres (m, 3) of these numbers, passed as data, not constants, so that all probes share their kernels."""
     return dr.gather(mi.Point3f, vectors(mi.Point3f, np.asarray(centres, float)), number)
 
 
 def _distance(scene: Any, ray: Any) -> tuple[Any, Any]:
-    """Metres to the first surface behind all holes, FAR where there is none, and the interaction."""
+    """Metres to the first surface behind all holes, FAR without one, and the interaction."""
     si = rays.intersect(scene, ray, mi.Bool(True), rays.has_holes(scene))
     return dr.select(si.is_valid(), dr.minimum(dr.norm(si.p - ray.o), FAR), FAR), si
 
@@ -178,7 +178,7 @@ def _direction(face: Any, s: Any, t: Any) -> Any:
 
 
 def _geometry(scene: Any, centres: Floats, n: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Distances (m, 6, n, n) and normals (m, 6, n, n, 3) at the texels' centres, of probes at all `centres` (m, 3)."""
+    """Distances (m, 6, n, n) and normals (m, 6, n, n, 3) at the texels' centres, for probes at `centres` (m, 3)."""
     count = 6 * n * n
     thread = dr.arange(mi.UInt32, count * len(centres))
     directions = vectors(mi.Vector3f, normalize(face_directions(n)))

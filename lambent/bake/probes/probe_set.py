@@ -1,4 +1,4 @@
-"""All probes of a scene: one after another with its object left out, sharing meshes and light map."""
+"""All probes of a scene, baked one by one with their objects left out, sharing meshes and light map."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
 from lambent.core.colour import halves, in_halves
 
-LEAST_POINTS = 512  # on each of the objects that share a probe, from which rays are mirrored...
-MOST_POINTS = 16384  # ...as long as all have no more
+LEAST_POINTS = 512  # least number of mirrored rays per object that shares a probe...
+MOST_POINTS = 16384  # ...as long as the total does not exceed this
 
 
 class ProbeSet:
-    """Bakes the probes of a scene from its light map (H, W, 3), or, where that is None, path traced whole.
+    """Bakes the probes of a scene from its light map (H, W, 3), or, if that is None, by whole path traced paths.
 
-    With the light map a path ends at the first diffuse surface; mirrors in mirrors are traced either way. Without it,
-    paths have at most `max_depth` vertices. `backs` are the opaque objects that are seen from behind, too, and `held`
-    those that stay in every probe (`sharing`).
+    With the light map, a path ends at the first diffuse surface; mirrors in mirrors are traced either way. Without it,
+    paths have at most `max_depth` vertices. `backs` are the opaque objects that are seen from behind too, and `held`
+    are those that stay in every probe (`sharing`).
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class ProbeSet:
         self._sorting: tuple[Tally, GroupedCache | None] | None = None
 
     def sort_light(self, groups: Floats | None, groups_back: Floats | None) -> None:
-        """Keep probes by light group too: from its light maps (n, H, W, 3), where whole paths are not traced."""
+        """Store probes by light group too, from the groups' light maps (n, H, W, 3), unless whole paths are traced."""
         whole_paths = self._cache is None
         cache = None if groups is None else self._traced.grouped_cache(groups, groups_back)
         self._sorting = self._traced.tally(diffuse=whole_paths, direct=None), cache
@@ -68,7 +68,7 @@ class ProbeSet:
         return SolidTest(self._builder, self._whole)
 
     def _without(self, names: frozenset[str]) -> Any:
-        """The scene without these objects, kept until others are left out: parts of one object share it."""
+        """The scene without these objects, cached until other ones are left out: parts of one object share it."""
         if not names:
             return self._whole
         if self._left_out is None or self._left_out[0] != names:
@@ -77,7 +77,7 @@ class ProbeSet:
         return self._left_out[1]
 
     def _mirrored(self, names: tuple[str, ...], seed: int) -> Mirrored | None:
-        """Rays that viewers see mirrored in objects, or through them; None where there are too few."""
+        """Rays that viewers see mirrored in objects, or through them; None if there are too few."""
         if self._cache is None:
             return None
         own = [self._builder.shape_number(part) for part in self._own(names)]
@@ -97,7 +97,7 @@ class ProbeSet:
         )
 
     def _own(self, names: tuple[str, ...]) -> frozenset[str]:
-        """The objects and all other parts of each one's whole: what a probe leaves out."""
+        """The objects and all other parts of their wholes, which a probe leaves out."""
         return frozenset().union(*(family(self._scene.parts, name) for name in names))
 
     def _error(self, rays: Mirrored, first: Any, centre: Floats, seed: int) -> float:
@@ -106,9 +106,9 @@ class ProbeSet:
         return judged(rays, bake_probe(around, centre, TRIAL_TEXELS, TRIAL_SAMPLES, seed), centre).best
 
     def _centre(self, name: str, without: Any, rays: Mirrored | None, seed: int) -> Floats:
-        """Where the probe stands: over the middle of a flat object if little is hidden from there.
+        """Position of the probe: above the centre of a flat object if little is hidden from there.
 
-        Else it stands at the place, among those that see more, with the least error in viewers' mirrored rays.
+        Otherwise, among the places that see more, the one with the smallest error in viewers' mirrored rays.
         """
         scene, mesh = self._scene, self._scene.object(name).mesh
         if name in scene.probe_centres or rays is None or self._transmits(name) or flat_axis(mesh) is None:
@@ -129,13 +129,13 @@ class ProbeSet:
     def bake(
         self, name: str, texels: int, samples: int, noise: float, seed: int, sharing: tuple[str, ...] = ()
     ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Arrays radiance, distance and planes of one object's probe, which others are `sharing`, and its notes.
+        """Arrays radiance, distance and planes of one object's probe, shared by the objects `sharing`, and its meta.
 
-        Noted are the centre, whether the object was left out, and how well one centre stands for the whole surface:
-        `hidden_share` and `parallax_deg` (`hidden`), `mirror_error`, `seen_irradiance`,
-        `occlusion_gain` and `even_niches` (`selection`).
+        The meta has the centre, whether the object was left out, and how well one centre represents the whole surface:
+        `hidden_share` and `parallax_deg` (`hidden`), `mirror_error`, `seen_irradiance`, `occlusion_gain` and
+        `even_niches` (`selection`).
 
-        Planes that the scene gives are taken as they are; others are found from the probe itself.
+        Planes given by the scene are used as they are; otherwise they are found from the probe itself.
         """
         names = (name, *sharing)
         without = self._without(self._own(tuple(one for one in names if one not in self._held)))

@@ -1,7 +1,7 @@
-"""Which objects one probe may not do for, found for all of them at once in one scene of bare triangles.
+"""Screening of all objects for those that may need more than one probe, in one scene of bare triangles.
 
-Coarser than `hidden`, and much cheaper where a scene has very many objects: few rays for each, no scene of its own
-without it (rays go through the object instead), and a centre that is not moved out of solids.
+Coarser than `hidden`, and much cheaper for very many objects: few rays for each, no separate scene without it (rays
+pass through the object instead), and no moving of centres out of solids.
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ from lambent.core.arrays import Floats, Indices
 from lambent.scenes.mesh import Mesh, areas_of, boxes_of
 
 RAYS = 512  # per object
-CROSSINGS = 8  # of an object's own surface; rays that cross it more often meet nothing
+CROSSINGS = 8  # of an object's own surface; rays with more crossings count as misses
 AT_ONCE = 1 << 20
 
 
 def widths(meshes: Sequence[Mesh]) -> Floats:
-    """(N,) metres: the roots of objects' mean shadows, a quarter of their areas (Cauchy)."""
+    """(N,) metres: square roots of objects' mean shadows, a quarter of their areas (Cauchy)."""
     return np.asarray(np.sqrt(areas_of(meshes) / 4))
 
 
 def median_distances(meshes: Sequence[Mesh], places: Floats) -> Floats:
-    """(N,) metres of the middles of objects from the median of the viewers at `places` (m, 3)."""
+    """(N,) median distances in metres of the objects' centres from the viewers at `places` (m, 3)."""
     middles, step = boxes_of(meshes).mean(axis=1), max(1, AT_ONCE // len(places))
     some = (middles[first : first + step] for first in range(0, len(middles), step))
     return np.concatenate([np.median(np.linalg.norm(places - m[:, None], axis=2), axis=1) for m in some])
 
 
 def hidden_shares(bare: Any, owner: Indices, meshes: Sequence[Mesh], numbers: Sequence[int]) -> Floats:
-    """Share of what each object's surface sees that something hides from its middle (N,).
+    """Share of each object's view that is hidden from its centre (N,).
 
-    `bare` is a scene of all triangles, `owner` (F,) the number of the object of each; `numbers` (N,) are those of the
-    objects, and `meshes` theirs.
+    `bare` is a scene of all triangles, `owner` (F,) the object number of each; `numbers` (N,) and `meshes` are those of
+    the tested objects.
     """
     per_pass, shares = AT_ONCE // RAYS, []
     for mine in (slice(first, first + per_pass) for first in range(0, len(meshes), per_pass)):
@@ -59,7 +59,7 @@ def hidden_shares(bare: Any, owner: Indices, meshes: Sequence[Mesh], numbers: Se
 
 
 def _distances(bare: Any, owner: Indices, origins: Floats, directions: Floats, own: Indices) -> Floats:
-    """Distances (n,) to the first hits of rays that pass through the objects of the numbers `own` (n,)."""
+    """Distances (n,) to the first hits of rays that pass through the objects `own` (n,)."""
     found, start = np.full(len(origins), np.inf), np.zeros(len(origins))
     left = np.arange(len(origins))
     for _ in range(CROSSINGS):

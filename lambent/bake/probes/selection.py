@@ -1,19 +1,19 @@
-"""How a probe is best taken and looked up, measured by rays that viewers see mirrored in its object.
+"""Choices for taking and looking up a probe, judged by rays that viewers see mirrored in its object.
 
-Rays leave points that viewers see along the mirror direction, and are path traced; the same rays are looked up in the
-probe. The error decides three things, each where a choice lowers it to WORTH of the error without:
+Rays leave visible points along the mirror direction and are path traced; the same rays are looked up in the probe. The
+error decides the following choices, each made if it lowers the error to WORTH:
 
-- A probe leaves its object out, as convex objects need it, or holds it, as hollow ones may, whose surfaces mirror each
-  other (a window reveal, a frame). Tried where OWN of the rays meet the object itself.
-- Look-ups go by bounding planes, or by the distance map, which costs more, where planes turn them wrongly (a glass
-  beside a bottle).
-- Light from the probe is scaled by a specular occlusion: the ratio of the light map's irradiance to the irradiance of
-  the probe alone, at most 1 (Lazarov 2013, "Getting more physical in Call of Duty: Black Ops II"). Near things hide
-  from a surface within a niche most of the probe's light. Sharp mirrors do not gain by it and are left as they are.
-  Where only some places are niches (shelves under a table of metal), twice the ratio leaves the rest its light.
-- What a niche does not see of the probe, it sees of its own walls, about as bright everywhere (`even`): where the open
-  share is the square of that ratio r, the walls shine with (1 - r)/(1 - r^2) E/pi, and the light along a ray is the
-  mean of both, r^2 L + (1 - r) E/pi. Its irradiance is the light map's, and so is its colour.
+- A probe leaves its object out, as convex objects need it, or keeps it, as hollow ones may, whose surfaces mirror each
+  other (a window reveal, a frame). Tried if a share OWN of the rays hits the object itself.
+- Look-ups use bounding planes, or the more expensive distance map if planes turn them wrongly (a glass beside a
+  bottle).
+- Specular occlusion scales the probe's light by the ratio of the light map's irradiance to the irradiance of the probe
+  alone, at most 1 (Lazarov 2013, "Getting more physical in Call of Duty: Black Ops II"). Within a niche, nearby things
+  hide most of the probe's light. Sharp mirrors do not benefit and stay unscaled. If only some places are niches
+  (shelves under a metal table), twice the ratio preserves the light elsewhere.
+- A niche sees its own walls, about equally bright everywhere, where they hide the probe (`even`): if the open share is
+  the square of the ratio r, the walls' radiance is (1 - r)/(1 - r^2) E/pi, and the light along a ray is the mean of
+  both, r^2 L + (1 - r) E/pi. Its irradiance, and its colour, are those of the light map.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ from lambent.materials.document import Material
 from lambent.materials.lobes import fresnel
 
 RAYS = 2048
-LEAST_RAYS = 64  # fewer say nothing
+LEAST_RAYS = 64  # fewer are not significant
 TRIAL_TEXELS, TRIAL_SAMPLES = 32, 8
-TRIES = 8  # viewers that are tried for each point
-GRAZING = 0.05  # least cosine of a viewer
+TRIES = 8  # viewers tried per point
+GRAZING = 0.05  # least cosine towards a viewer
 OWN = 0.15
 WORTH = 0.85
 
@@ -52,8 +52,8 @@ WORTH = 0.85
 class Mirrored:
     """Rays that viewers see mirrored: origins, unit directions and normals (n, 3), radiance (n, 3).
 
-    `irradiance` (n,) is the light map's luminance there, without the sun, `fresnel` (n,) Schlick's term, and `own` (n,)
-    bool whether the ray meets the object itself.
+    `irradiance` (n,) is the light map's luminance there, without the sun, `fresnel` (n,) is Schlick's term, and `own`
+    (n,) whether the ray hits the object itself.
     """
 
     origins: Floats
@@ -69,10 +69,10 @@ def mirrored(
     points: Floats, normals: Floats, clear: Flags, r0: Floats, places: Floats, scene: Any, cache: LightMapCache,
     depth: int, family: list[int], seed: int,
 ) -> Mirrored | None:  # fmt: skip
-    """Rays that viewers at `places` (m, 3) see mirrored in points (n, 3) of unit normals (n, 3), one viewer a point.
+    """Rays that viewers at `places` (m, 3) see mirrored in points (n, 3) of unit normals (n, 3), one viewer per point.
 
-    Where the material is `clear` (n,) rays go straight on; `r0` (n,) is its reflectance at normal incidence. None where
-    too few points are in view. `family` are the numbers of the Mitsuba shapes of the objects and of their other parts.
+    At `clear` (n,) materials rays continue straight; `r0` (n,) is the reflectance at normal incidence. None if too few
+    points are in view. `family` has the Mitsuba shape numbers of the objects and of their other parts.
     """
     found, eyes = viewers_of(points, normals, places, scene, np.random.default_rng(seed))
     if found.sum() < LEAST_RAYS:
@@ -92,7 +92,7 @@ def mirrored(
 
 
 def largest_r0(material: Material) -> float:
-    """Reflectance at normal incidence of a material's brightest lobe, the mean of its channels; 1 without lobes."""
+    """Reflectance at normal incidence of a material's brightest lobe, averaged over channels; 1 without lobes."""
     return max((float(np.mean(lobe.r0)) for lobe in material.lobes), default=1.0)
 
 
@@ -102,7 +102,7 @@ def widest_lobe(material: Material) -> float:
 
 
 def spread_mirrored(view: Floats, n: Floats, roughness: float, spread: int, rng: np.random.Generator) -> Floats:
-    """(k, spread, 3) directions above surfaces of normals n (k, 3), mirrored in facets of Beckmann slopes."""
+    """(k, spread, 3) directions above surfaces of normals n (k, 3), mirrored at facets with Beckmann slopes."""
     t, b = basis(n)
     slope = roughness / np.sqrt(2) * rng.standard_normal((2, len(n), spread, 1))
     facet = normalize(n[:, None] + slope[0] * t[:, None] + slope[1] * b[:, None])
@@ -112,7 +112,7 @@ def spread_mirrored(view: Floats, n: Floats, roughness: float, spread: int, rng:
 
 
 def light_along(scene: Any, ray: Any, depth: int, cache: LightMapCache | None, seed: int) -> Floats:
-    """Radiance (k, 3) of one path along each ray; one that is not finite counts as black."""
+    """Radiance (k, 3) of one path along each ray; nonfinite values become black."""
     sampler = independent(seed & 0xFFFFFFFF, dr.width(ray.o))
     value = path_tracer.radiance(scene, sampler, path_tracer.camera_start(ray), depth, cache)
     return array_of(dr.select(dr.all(dr.isfinite(value)), value, 0.0)).astype(float)
@@ -121,7 +121,7 @@ def light_along(scene: Any, ray: Any, depth: int, cache: LightMapCache | None, s
 def viewers_of(
     points: Floats, normals: Floats, places: Floats, scene: Any, rng: np.random.Generator
 ) -> tuple[Flags, Floats]:
-    """Which points (n, 3) of unit normals (n, 3) are seen from `places` (m, 3), as far as is tried, and from where."""
+    """Flags of points (n, 3), of unit normals (n, 3), seen from one of the tried `places` (m, 3), and that place."""
     found, eyes = np.zeros(len(points), bool), np.zeros((len(points), 3))
     for _ in range(TRIES if len(places) else 0):
         left = np.flatnonzero(~found)
@@ -134,25 +134,25 @@ def viewers_of(
 
 
 def _free(scene: Any, points: Floats, normals: Floats, eyes: Floats) -> Flags:
-    """Whether nothing stands between points and eyes, on the side of the normals."""
+    """Whether points and eyes see each other, on the side of the normals."""
     offset = eyes - points
     in_front = (offset * normals).sum(axis=1) > GRAZING * np.linalg.norm(offset, axis=1)
     return np.asarray(in_front & ~np.array(scene.ray_test(towards(scene, points, normals, eyes))))
 
 
 def error(rays: Mirrored, looked_up: Floats) -> float:
-    """Mean difference of luminances (n,) to those of the rays."""
+    """Mean difference between luminances (n,) and those of the rays."""
     return float(difference(looked_up * rays.fresnel, luminance(rays.radiance) * rays.fresnel).mean())
 
 
 def difference(shown: Floats, true: Floats) -> Floats:
-    """Differences (n,) of luminances (n,) in log(1 + L/m), m the median of the true ones, as the eye sees them."""
+    """Differences (n,) of luminances (n,) in log(1 + L/m), m the median of the true ones, as perceived."""
     m = max(float(np.median(true)), 1e-6)
     return np.asarray(np.abs(np.log1p(shown / m) - np.log1p(true / m)))
 
 
 def by_planes(rays: Mirrored, radiance: Floats, centre: Floats, planes: Floats) -> Floats:
-    """Luminance (n,) that rays find in a probe by planes (P, 4) about its centre."""
+    """Luminance (n,) that rays find in a probe by planes (P, 4) relative to its centre."""
     return _found(radiance, planes_lookup(rays.origins - centre, rays.directions, planes))
 
 
@@ -173,9 +173,9 @@ def specular_occlusion(lit: Floats, normals: Floats, irradiance: Floats) -> Floa
 
 @dataclass(frozen=True)
 class Scaling:
-    """How the light map scales a probe's light: by `gain` times `specular_occlusion`; `even` adds niches' walls.
+    """Scaling of a probe's light by the light map: `gain` times `specular_occlusion`; `even` adds the walls of niches.
 
-    A gain of 0 leaves light as it is.
+    A gain of 0 leaves light unscaled.
     """
 
     gain: float
@@ -184,7 +184,7 @@ class Scaling:
     def shown(self, light: Floats, lit: Floats, normals: Floats, irradiance: Floats) -> Floats:
         """Light (n, ...) along rays that find `light` (n, ...) in a probe of `irradiance` (9,).
 
-        The rays begin where surfaces have `normals` (n, 3) and the light map has the luminance `lit` (n,).
+        The rays begin at surfaces of `normals` (n, 3), with light map luminance `lit` (n,).
         """
         if self.gain == 0:
             return light
@@ -196,7 +196,7 @@ class Scaling:
 
 
 UNSCALED, PLAIN = Scaling(0.0), Scaling(1.0)
-SCALINGS = {  # what each must lower the error to
+SCALINGS = {  # factor to which each must lower the error
     PLAIN: WORTH,
     Scaling(2.0): 0.95,
     Scaling(1.0, even=True): 0.95,
@@ -206,7 +206,7 @@ SCALINGS = {  # what each must lower the error to
 
 @dataclass(frozen=True)
 class Judged:
-    """Errors of a probe: looked up by planes, and by the distance map, with the `scaling`.
+    """Errors of a probe, looked up by planes and by the distance map, with the `scaling`.
 
     `irradiance` (9,) is the probe's.
     """
@@ -228,7 +228,7 @@ class Judged:
 def judged(
     rays: Mirrored, probe: Probe, centre: Floats, planes: Floats | None = None, *, through: bool = False
 ) -> Judged:
-    """Errors of a probe in mirrored rays, by `planes` (P, 4) about its centre, or those that are found for it.
+    """Errors of a probe in mirrored rays, by `planes` (P, 4) relative to its centre, or by planes found for it.
 
     Light seen `through` an object is not scaled.
     """
@@ -241,7 +241,7 @@ def judged(
         found = error(rays, scaling.shown(light, rays.irradiance, rays.normals, irradiance))
         if found < most * errors[UNSCALED]:
             errors[scaling] = found
-    best = min(errors, key=lambda one: round(errors[one], 4))  # of equals the simplest
+    best = min(errors, key=lambda one: round(errors[one], 4))  # of equal ones, the simplest
     marched = by_distance(rays, probe.radiance, centre, probe.distance.astype(float))
     by_distances = error(rays, best.shown(marched, rays.irradiance, rays.normals, irradiance))
     return Judged(errors[best], best, irradiance, by_distances)

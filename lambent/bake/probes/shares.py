@@ -1,19 +1,19 @@
-"""Which share of a probe's light arrives at each texel of the light map, by direction.
+"""The share of a probe's light that arrives at each texel of the light map, by direction.
 
-A probe is seen from one place. At a texel things nearby hide some of what it sees, and show other light instead. Rays
-from the texel are path traced, and looked up in the probe as the renderer does. With L the light that arrives along w
-and P that of the probe (luminances), the texel keeps the four numbers of the share
+A probe is seen from one place. At a texel, nearby things hide some of its light and show other light instead. Rays from
+the texel are path traced, and looked up in the probe as in the renderer. With L the arriving light along w and P the
+probe's (luminances), the texel stores the four coefficients of the share
 
     r(w) = a + b . w
 
-for which the sum of g (L - r P)^2 over the rays is least, g = F / (m + P). Fresnel's term F gives grazing directions
-their part in what viewers see mirrored, and m, the median of L, keeps bright windows from counting alone. A small
-penalty draws r to the same share in all directions. Equations of texels are averaged over their charts before they are
-solved: numbers that are averaged afterwards would be those of the noise.
+that minimise the sum of g (L - r P)^2 over the rays, g = F / (m + P). Fresnel's term F weights grazing directions as
+viewers see them mirrored, and m, the median of L, keeps bright windows from dominating. A small penalty favours equal
+shares in all directions. The equations of texels are averaged over their charts before they are solved: averaging
+solutions would average their noise.
 
-An object takes its shares only where they lower the error of the rays below that of the specular occlusion that its
-probe has otherwise (`selection`). Lobes wider than WIDE blur the rays, so that their squared errors count: of white
-rays between black ones, a grey mean is right there, and wrong in a mirror.
+An object uses its shares only if they lower the error of the rays below that of its probe's specular occlusion
+(`selection`). Lobes wider than WIDE blur the rays, so for them squared errors count: among white and black rays, a grey
+mean is right for a wide lobe, and wrong for a mirror.
 """
 
 from __future__ import annotations
@@ -43,23 +43,23 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.lobes import fresnel
 from lambent.store.occlusion import MOST_SHARE
 
-RAYS = 64  # from each texel, a multiple of POINTS
+RAYS = 64  # per texel, a multiple of POINTS
 SMOOTH = 12  # rounds of averaging the texels' equations over their charts
-PENALTY = 0.01  # of a share that changes with the direction, relative to the mean of the equations' diagonal
+PENALTY = 0.01  # of a share's dependence on direction, relative to the mean of the equations' diagonal
 WIDE = 0.1  # roughness of a lobe
-WORTH = 0.95  # times the error without, that shares must lower it to
-JUDGED = 1 << 16  # rays of an object by which its shares are judged
+WORTH = 0.95  # factor to which shares must lower the error
+JUDGED = 1 << 16  # rays per object that judge its shares
 RAYS_AT_ONCE = 1 << 21
-GOLDEN = math.pi * (3 - math.sqrt(5))  # radians between rays that follow each other
+GOLDEN = math.pi * (3 - math.sqrt(5))  # radians between consecutive rays
 UPPER = np.triu_indices(4)
-EQUATIONS = len(UPPER[0]) + 4  # of a texel: upper triangle of the matrix, right side
+EQUATIONS = len(UPPER[0]) + 4  # per texel: upper triangle of the matrix, right side
 
 
 @dataclass(frozen=True)
 class Shown:
     """An object, by number, its reflectance at normal incidence, its widest lobe's roughness, and the probe it shows.
 
-    Without shares, `scaling` scales the probe's light by the light map and the probe's own `irradiance` (9,).
+    Without shares, `scaling` scales the probe's light by the light map and by the probe's own `irradiance` (9,).
     """
 
     number: int
@@ -72,7 +72,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class _Rays:
-    """Rays of texels, by row: unit directions w (n, 3), light and that of the probe (n,), Fresnel's term (n,)."""
+    """Rays of texels, by row: unit directions w (n, 3), traced and probe light (n,), Fresnel's term (n,)."""
 
     row: Indices
     w: NDArray[np.float32]
@@ -98,7 +98,7 @@ class ShareTracer:
     def shares(
         self, shown: list[Shown], labels: Indices, seed: int, progress: Progress = silent
     ) -> tuple[NDArray[np.float16], list[int]]:
-        """Shares (H, W, 4), a before b, and the numbers of the objects that are to take theirs."""
+        """Shares (H, W, 4), a before b, and the numbers of the objects that should use them."""
         texels = self._sides.texels
         sums = np.zeros((texels.height * texels.width, EQUATIONS), np.float32)
         kept: list[_Rays] = []
@@ -125,7 +125,7 @@ class ShareTracer:
         at = thread // RAYS * POINTS + thread % POINTS
         p, n, flat = (dr.gather(mi.Vector3f, v, at) for v in (points.position, points.normal, points.flat))
         sampler = independent(seed & 0xFFFFFFFF, count)
-        k = mi.Float(thread % RAYS)  # the same spiral at every texel: other rays at its neighbour would show as mottle
+        k = mi.Float(thread % RAYS)  # one spiral for all texels: different rays in neighbours would show as mottle
         cosine, phi = (k + 0.5) / RAYS, GOLDEN * k
         sine, (sin_phi, cos_phi) = dr.safe_sqrt(1 - cosine * cosine), dr.sincos(phi)
         w = mi.Frame3f(n).to_world(mi.Vector3f(sine * cos_phi, sine * sin_phi, cosine))
@@ -155,12 +155,12 @@ class ShareTracer:
 
 
 def share_along(shares: Floats, w: Floats) -> Floats:
-    """Shares (n,) of a probe's light along unit w (n, 3), of numbers (n, 4), as the renderer takes them."""
+    """Shares (n,) of a probe's light along unit w (n, 3), from coefficients (n, 4), as in the renderer."""
     return np.asarray((shares[:, 0] + (shares[:, 1:] * w).sum(axis=1)).clip(0, MOST_SHARE))
 
 
 def solved(sums: Floats) -> Floats:
-    """(..., 4) numbers of shares, of the sums (..., EQUATIONS) of their equations; 1 and 0 where there are none."""
+    """(..., 4) coefficients of shares from the sums (..., EQUATIONS) of their equations; 1 and 0 without equations."""
     matrix = np.zeros((*sums.shape[:-1], 4, 4))
     matrix[..., UPPER[0], UPPER[1]] = matrix[..., UPPER[1], UPPER[0]] = sums[..., : len(UPPER[0])]
     right = sums[..., len(UPPER[0]) :].astype(float)
@@ -172,21 +172,21 @@ def solved(sums: Floats) -> Floats:
     matrix += weight[..., None, None] * np.eye(4)
     right[..., 0] = np.where(sums[..., 0] > 0, right[..., 0], 1.0)
     found = np.linalg.solve(matrix, right[..., None])[..., 0]
-    return np.asarray(found.clip(-2 * MOST_SHARE, 2 * MOST_SHARE))  # where the probe is black, its share is any number
+    return np.asarray(found.clip(-2 * MOST_SHARE, 2 * MOST_SHARE))  # for a black probe, the share is arbitrary
 
 
 def _equations(traced: _Rays, m: float) -> NDArray[np.float32]:
-    """(k, EQUATIONS) of the texels of rays, RAYS of each, one texel after the other."""
+    """Equations (k, EQUATIONS) of texels from consecutive blocks of RAYS rays."""
     basis = np.concatenate([np.ones((len(traced.w), 1), np.float32), traced.w], axis=1) * traced.probe[:, None]
     g = (traced.fresnel / (m + traced.probe))[:, None]
     matrix = basis[:, UPPER[0]] * basis[:, UPPER[1]] * g
     right = basis * (g * traced.light[:, None])
-    rows = np.concatenate([matrix, right], axis=1) / (m * RAYS)  # numbers about 1, whatever the unit of the light
+    rows = np.concatenate([matrix, right], axis=1) / (m * RAYS)  # numbers about 1, in any unit of light
     return np.asarray(rows.reshape(-1, RAYS, EQUATIONS).sum(axis=1), np.float32)
 
 
 def _some(traced: list[_Rays], rng: np.random.Generator) -> _Rays:
-    """JUDGED rays at random, at most."""
+    """At most JUDGED random rays."""
     if not traced:
         empty = np.zeros(0, np.float32)
         return _Rays(np.zeros(0, np.int64), np.zeros((0, 3), np.float32), empty, empty, empty)

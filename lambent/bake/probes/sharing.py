@@ -1,20 +1,20 @@
-"""Objects that show the probe of a neighbour, because viewers would hardly tell.
+"""Sharing of probes between neighbouring objects, where viewers would hardly notice.
 
-A probe serves another object as far as its centre sees what viewers see mirrored there. Rays from viewers are mirrored
-in points all over each object, and two shares of them are wrong in a neighbour's probe: those whose hits other things
-hide from its centre, and those that meet an object that the probe leaves out. An object is served where both together
-stay below a limit: HIDDEN at MEDIUM size, as the median viewer sees it, and with the inverse root of the size above and
-below. Of what is left out, no more than OPEN may have nothing behind it: a small thing would mirror the sky. No object
-larger than SMALL and its lobe's roughness, which blurs as much, shares another's probe, nor one whose centre is further
-off than NEAR of what is mirrored, or less for narrow lobes: look-ups from far away are turned wrongly. Groups are found
-greedily, the largest first.
+A probe suits another object as far as its centre sees what viewers see mirrored in that object. Viewers' rays are
+mirrored at points all over each object, and two shares of them are wrong in a neighbour's probe: rays whose hits are
+hidden from its centre, and rays that hit an object that the probe leaves out. A probe suits if both together stay below
+a limit: HIDDEN at MEDIUM size as seen by the median viewer, scaled by the inverse root of the size. Of the left out
+hits, at most OPEN may have nothing behind them, because even a small thing would then mirror the sky. An object does
+not share a probe if it is larger than SMALL plus its lobe's roughness, which blurs as much, or if the probe's centre is
+farther away than NEAR of the mirrored distance, or less for narrow lobes: distant look-ups are turned wrongly. Groups
+are found greedily, the largest first.
 
-Objects that fill a few pixels from nearby, or that nobody sees, have no probe: they show the nearest. So do the groups
-that fill least of the view where a scene has very many (leaves, say): there are MOST probes.
+Objects that fill only a few pixels when close, or that nobody sees, have no probe and show the nearest, as do the
+groups that fill least of the view if a scene has very many (leaves, for example): there are MOST probes.
 
-A probe leaves out its objects but those that are `held`: flat ones that viewers see from one side, on which it stands,
-and those that have none because nobody sees them. Without its ceiling, a probe of it would see the sky, which wide
-lobes and all that share the probe would bring into the room.
+A probe leaves out its objects except `held` ones: flat ones that viewers see from one side, on which it stands, and
+those without a probe because nobody sees them. Without its ceiling, a probe would see the sky, which wide lobes and all
+objects that share the probe would bring into the room.
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ from lambent.core.directions import normalize, reflect
 from lambent.core.geometry import triangle_areas
 from lambent.scenes.scene import Mesh
 
-POINTS = 256  # on each object
-NEIGHBOURS = 12  # whose probes are tried for it
-MOST = 64  # probes of a scene, some two CPU seconds each at `preview`; more only where it places more itself
+POINTS = 256  # per object
+NEIGHBOURS = 12  # candidates per object for sharing a probe
+MOST = 64  # probes per scene, about two CPU seconds each at `preview`; exceeded only if the scene places more
 MEDIUM, SMALL = 0.1, 0.06  # radians
-NEAR, REACH = 0.5, 0.75  # of the distance of what is mirrored, for wide lobes, and the quantile of that
-NEAR_MIRROR, PER_BLUR = 0.2, 2.0  # for mirrors, and how much more by a lobe's roughness: what it blurs may be turned
-OPEN = 0.04  # share of what an object mirrors that may be left out with nothing behind it
-CROSSINGS = 4  # of what is left out, after which something is behind it
+NEAR, REACH = 0.5, 0.75  # limit relative to the mirrored distance, for wide lobes, and the quantile of that distance
+NEAR_MIRROR, PER_BLUR = 0.2, 2.0  # limit for mirrors, and its increase by a lobe's roughness, which blurs errors
+OPEN = 0.04  # share of an object's mirrored rays that may hit left out objects with nothing behind
+CROSSINGS = 4  # of left out objects, after which something counts as behind
 ONE_SIDE = 0.95  # share of a flat object's mirrored rays that leave on one side of it
 FEW = 0.006  # radians: six pixels of a picture of 60 degrees and 1080 rows
-SEEN = 4  # of the points, from anywhere: with fewer, nobody sees the object
+SEEN = 4  # of the points, from anywhere: below this, nobody sees the object
 CLOSEST = 0.05  # quantile of the distances of viewers
-SKY = 10.0  # diagonals of the scene, that far is what rays miss
+SKY = 10.0  # diagonals of the scene: distance assumed for misses
 NOTHING = -1
 
 
@@ -59,10 +59,10 @@ NOTHING = -1
 class Looked:
     """What viewers see mirrored in N objects, at POINTS points of each.
 
-    `ways` (N, POINTS, 3) are unit directions, `hits` (N, POINTS, 3) what they lead to, with the object met there, `met`
-    (N, POINTS), NOTHING where there is none, and whether nothing is behind that object, `open` (N, POINTS); `valid`
-    (N, POINTS) where a viewer sees the point; `size` and `largest` (N,) of the objects in radians, for the median
-    viewer and for close ones; `reach` (N,) metres to far hits.
+    `ways` (N, POINTS, 3) are unit directions, `hits` (N, POINTS, 3) their hits, `met` (N, POINTS) the object hit, or
+    NOTHING, and `open` (N, POINTS) whether nothing is behind that object. `valid` (N, POINTS) marks points seen by a
+    viewer. `size` and `largest` (N,) are the objects' angular sizes in radians, for the median viewer and for close
+    ones; `reach` (N,) is the distance in metres to far hits.
     """
 
     ways: Floats
@@ -77,17 +77,17 @@ class Looked:
 
 @dataclass(frozen=True)
 class Sharing:
-    """By each object that goes without a probe, the one whose probe it shows, and objects that no probe leaves out."""
+    """The owner of the shown probe, by object without its own, and the objects that no probe leaves out."""
 
     owners: dict[str, str]
     held: frozenset[str]
 
 
 def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[str]) -> Sharing:
-    """Who of the objects `names` shares whose probe.
+    """Assign shared probes to the objects `names`.
 
-    `whole` is the Mitsuba scene of the builder, `places` (m, 3) are those of viewers; without any, none is shared.
-    Objects whose probe the scene places keep theirs.
+    `whole` is the Mitsuba scene of the builder, `places` (m, 3) are the viewers'; without viewers, no probe is shared.
+    Objects whose probe the scene places keep their own.
     """
     scene, names = builder.scene, list(names)
     if not names or not len(places):
@@ -104,7 +104,7 @@ def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[
     near = np.argsort(np.linalg.norm(centres[worth, None] - centres[worth], axis=2), axis=1)[:, : NEIGHBOURS + 1]
     pairs = np.stack([np.repeat(worth, near.shape[1]), worth[near].ravel()], axis=1)
     clear = np.array([scene.materials[scene.object(name).material].transmits for name in names])
-    alone = np.array([any(scene.object(name).emission) for name in names])  # left out, a lamp would be missed
+    alone = np.array([any(scene.object(name).emission) for name in names])  # a lamp that is left out would be missed
     pairs = pairs[(clear[pairs[:, 0]] == clear[pairs[:, 1]]) & ~given[pairs[:, 0]] & ~alone[pairs].any(axis=1)]
     blur = np.array([widest_lobe(scene.materials[scene.object(name).material]) for name in names])
     one, other = pairs.T
@@ -125,7 +125,7 @@ def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[
 
 
 def _is_seen_from_one_side(mesh: Mesh, ways: Floats, valid: NDArray[np.bool_]) -> bool:
-    """Whether a mesh is flat, and mirrored rays `ways` (POINTS, 3), those that are `valid`, leave on one side of it."""
+    """Whether a mesh is flat, and its `valid` mirrored rays `ways` (POINTS, 3) leave on one side of it."""
     axis = flat_axis(mesh)
     if axis is None or not valid.any():
         return False
@@ -174,7 +174,7 @@ def _looked(builder: SceneBuilder, whole: Any, places: Floats, names: list[str])
 def _nothing_behind(
     whole: Any, points: Floats, ways: Floats, t: Floats, met: NDArray[np.int64], numbers: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
-    """Whether rays (n,) from points along `ways` (n, 3), which `met` an object after `t`, meet no other beyond it."""
+    """Whether rays (n,) along `ways` (n, 3), which `met` an object after `t`, hit no other object beyond it."""
     found, at, left = np.zeros(len(points), bool), t.copy(), np.flatnonzero(met != NOTHING)
     for _ in range(CROSSINGS):
         if not len(left):
@@ -189,7 +189,7 @@ def _nothing_behind(
 
 
 def _numbers(builder: SceneBuilder, names: list[str]) -> NDArray[np.int64]:
-    """By Mitsuba's number of a shape, its place in `names`, NOTHING for others."""
+    """Index in `names` by Mitsuba's shape number, NOTHING for other shapes."""
     shapes = [builder.shape_number(name) for name in names]
     table = np.full(max(shapes) + 1, NOTHING)
     table[shapes] = np.arange(len(names))
@@ -197,7 +197,7 @@ def _numbers(builder: SceneBuilder, names: list[str]) -> NDArray[np.int64]:
 
 
 def _first(whole: Any, ray: Any, numbers: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
-    """Distances (n,) of the first hits, and the places in `names` of what is met."""
+    """Distances (n,) of the first hits, and the hit objects' indices in `names`."""
     found = whole.ray_intersect_preliminary(ray)
     shape = np.array(dr.reinterpret_array(mi.UInt32, found.shape)).astype(np.int64)
     known = shape < len(numbers)
@@ -205,7 +205,7 @@ def _first(whole: Any, ray: Any, numbers: NDArray[np.int64]) -> tuple[Floats, ND
 
 
 def _lost(looked: Looked, rays: NDArray[np.bool_], held: NDArray[np.bool_]) -> Floats:
-    """(N, N): share of an object's rays that are among `rays` (N, POINTS) and meet another that is not `held` (N,)."""
+    """(N, N): share of an object's rays that are among `rays` (N, POINTS) and hit another that is not `held` (N,)."""
     count = len(held)
     own = np.arange(count)[:, None]
     seen = rays & (looked.met != NOTHING) & (looked.met != own) & ~held[looked.met]
@@ -222,9 +222,9 @@ def _wrong(
     pairs: NDArray[np.int64],
     held: NDArray[np.bool_],
 ) -> Floats:
-    """(P,): share of what is mirrored in the first object of each pair that something hides from the other's centre.
+    """(P,): share of what the first object of each pair mirrors that is hidden from the second's centre.
 
-    Neither of the two hides anything where it is not `held` (N,), nor does what is met count that is one of them.
+    Neither of the two occludes unless `held` (N,), and hits on them do not count.
     """
     if not len(pairs):
         return np.zeros(0)
@@ -245,7 +245,7 @@ def _wrong(
 def _grouped(
     worth: NDArray[np.int64], pairs: NDArray[np.int64], wrong: Floats, lost: Floats, bare: Floats, limits: Floats
 ) -> NDArray[np.int64]:
-    """(N,): whose probe each object shows. `lost`, `bare` (N, N) and `limits` (N,) are of objects, `wrong` of pairs."""
+    """(N,) owner of each object's probe. `lost`, `bare` (N, N) and `limits` (N,) are by object, `wrong` by pair."""
     owner = np.arange(len(limits))
     served: dict[int, list[tuple[float, int]]] = {int(i): [] for i in worth}
     for (one, other), share in zip(pairs, wrong, strict=True):

@@ -1,8 +1,8 @@
-"""Whether an object's pieces, with a probe each, show viewers so much less error than one probe that a cut pays.
+"""Whether dividing an object into pieces with their own probes lowers viewers' error enough to pay for a cut.
 
-A cut is seen as a seam, and each piece costs a probe. So both are tried, before there is a light map: small probes are
-path traced whole, and the light that viewers see mirrored is compared with what they find. Directions are spread as its
-widest lobe spreads them, and light is compared as means over them: a rough surface blurs what probes confuse.
+A cut is visible as a seam, and each piece costs a probe. So both are tried, before there is a light map: small probes
+are path traced whole, and compared with the light that viewers see mirrored. Directions are spread by the object's
+widest lobe, and light is compared as means over them: rough surfaces blur the errors of probes.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ from lambent.core.directions import normalize
 from lambent.core.probe_lookups import distance_lookup, inverse_depth, planes_lookup
 from lambent.materials.document import Material
 
-POINTS = 512  # all over the object
-SPREAD = 16  # directions from each
-LEAST = 16  # points in view: with fewer, nothing is known
+POINTS = 512  # per object
+SPREAD = 16  # directions per point
+LEAST = 16  # points in view; with fewer, the result is unknown
 DEPTH = 4  # surfaces on a path
-SAMPLES = 4  # paths per texel of a probe: what is seen has fewer of its own
+SAMPLES = 4  # per texel of a probe; the reference has fewer
 
 
 @dataclass(frozen=True)
 class Seen:
-    """Light seen mirrored in n points: origins and directions (n, SPREAD, 3), luminance (n,) of the mean over them."""
+    """Light seen mirrored in n points: origins and directions (n, SPREAD, 3), mean luminance (n,) over directions."""
 
     origins: Floats
     directions: Floats
@@ -48,7 +48,7 @@ class Seen:
 
 
 def seen_in(surfaces: list[tuple[Floats, Floats]], places: Floats, material: Material, whole: Any) -> list[Seen | None]:
-    """What viewers at `places` (m, 3) see in each surface, points and unit normals (n, 3); None in too few points."""
+    """What viewers at `places` (m, 3) see in each surface, points and unit normals (n, 3); None for too few points."""
     rng = np.random.default_rng(0)
     points, normals = (np.concatenate(one) for one in zip(*surfaces, strict=True))
     found, eyes = viewers_of(points, normals, places, whole, rng)
@@ -74,7 +74,7 @@ def small_probes(first: Any, whole: Any, centres: Floats) -> list[Probe]:
 
 
 def differences(seen: Seen, probe: Probe, centre: Floats) -> Floats:
-    """(n,) in log(1 + L/median), by bounding planes or the distance map, whichever is better in the mean."""
+    """(n,) in log(1 + L/median), by bounding planes or the distance map, whichever is better on average."""
     origins, w = (seen.origins - centre).reshape(-1, 3), seen.directions.reshape(-1, 3)
     planes = bounding_planes(probe.distance, probe.normals).astype(float)
     ways = planes_lookup(origins, w, planes), distance_lookup(origins, w, inverse_depth(probe.distance.astype(float)))
@@ -86,6 +86,6 @@ def differences(seen: Seen, probe: Probe, centre: Floats) -> Floats:
 
 
 def pays(seen: list[Seen], pieces: list[tuple[Probe, Floats]], one: tuple[Probe, Floats]) -> bool:
-    """Whether probes of pieces, each with its centre, lower the error of one to WORTH in what is seen in each piece."""
+    """Whether probes of pieces, each with its centre, lower the error of one to WORTH in every piece's view."""
     cut = np.concatenate([differences(s, *own) for s, own in zip(seen, pieces, strict=True)])
     return bool(cut.mean() < WORTH * np.concatenate([differences(s, *one) for s in seen]).mean())

@@ -1,4 +1,4 @@
-"""Irradiance at some texels of a light map, path traced with other materials: what edited light is compared with."""
+"""Irradiance at some texels of a light map, path traced with other materials: the reference for edited light."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
 
 DEPTH = 24
-AT_ONCE = 1024  # texels: a tile of theirs is traced at once
+AT_ONCE = 1024  # texels traced together
 
 
 @dataclass(frozen=True, eq=False)
 class Retraced:
-    """irradiance (n, 3) W/m^2 without direct sun, and halves (2, n, 3), whose difference is its noise."""
+    """irradiance (n, 3) W/m^2 without direct sun, and halves (2, n, 3), whose difference is the noise."""
 
     irradiance: Floats
     halves: Floats
 
     @property
     def noise(self) -> float:
-        """Root mean square error over the mean."""
+        """Root mean square error relative to the mean."""
         error = np.sqrt(((self.halves[0] - self.halves[1]) ** 2).mean()) / 2
         return float(error / self.irradiance.mean())
 
@@ -36,9 +36,9 @@ def retraced(
     traced: TracedScene, sides: Sides, chosen: Indices, materials: dict[str, Material], paths: int, seed: int,
     progress: Progress = silent,
 ) -> Retraced:  # fmt: skip
-    """Irradiance at texels `chosen` (n,) of a side, with these materials in place of the scene's of the same names.
+    """Irradiance at texels `chosen` (n,) of a side, with `materials` replacing the scene's of the same names.
 
-    `paths` is a multiple of 128. Points of texels are those that the light map's samples have.
+    `paths` must be a multiple of 128. Points within texels are those of the light map's samples.
     """
     edited = _with_materials(traced, materials)
     scene, unseen = edited.whole(diffuse=True), edited.unseen(diffuse=True)
@@ -57,7 +57,7 @@ def retraced(
 
 
 def _with_materials(traced: TracedScene, materials: dict[str, Material]) -> TracedScene:
-    """The same texels of a scene with other materials."""
+    """The same texels, with other materials in the scene."""
     if not materials:
         return traced
     scene = replace(traced.scene, materials={**traced.scene.materials, **materials})
@@ -65,7 +65,7 @@ def _with_materials(traced: TracedScene, materials: dict[str, Material]) -> Trac
 
 
 def _in_a_line(sides: Sides, chosen: Indices) -> Sides:
-    """Some texels as a map of one row."""
+    """Some texels as a map with one row."""
     t = sides.texels
     line = Texels(
         len(chosen), 1, np.arange(len(chosen)), t.face[chosen], t.positions[chosen], t.normals[chosen], t.flat[chosen],

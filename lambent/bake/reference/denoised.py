@@ -1,4 +1,4 @@
-"""A view path traced and denoised: the other way to see an edit soon."""
+"""A view path traced and denoised: the alternative way to show an edit early."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from lambent.materials.factored.albedo import term_albedo
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
 
-GUIDING = 16  # samples a pixel of albedo and normals
+GUIDING = 16  # samples per pixel of albedo and normals
 
 
 class DenoisedView:
-    """A scene in one view by path tracing; the scene is built once.
+    """One view of a scene by path tracing; the scene is built once.
 
     Parameters
     ----------
     max_depth
         Surfaces on the longest path; 1 is direct light alone.
     edited
-        Terms and curves by material name, by which surfaces scatter instead of by their documents.
+        By material name, terms and curves that replace those of documents.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class DenoisedView:
         self._diffuse, self._specular = (mi.Color3f(np.ascontiguousarray(column.T)) for column in worn.swapaxes(0, 1))
 
     def image(self, spp: int, seed: int = 0) -> NDArray[np.float32]:
-        """(H, W, 3) radiance of `spp` samples a pixel, at least 2; pixels filtered by a box."""
+        """(H, W, 3) radiance with `spp` samples per pixel, at least 2; box filter."""
         image, _ = traced(self._scene, self._camera, *self._size, spp, seed, max_depth=self._max_depth)
         return image
 
@@ -60,7 +60,7 @@ class DenoisedView:
         return denoise_image(self.image(spp, seed), *self._guides(min(spp, GUIDING), seed))
 
     def _guides(self, samples: int, seed: int) -> tuple[Floats, Floats]:
-        """Albedo and normals (H, W, 3); 0 where no surface is."""
+        """Albedo and normals (H, W, 3); 0 without a surface."""
         sampler = independent(seed, self._size[0] * self._size[1] * samples)
         ray = camera_rays(self._camera, self._size, samples, sampler)
         si = intersect(self._scene, ray, mi.Bool(True), has_holes(self._scene))
@@ -77,7 +77,7 @@ class DenoisedView:
 
 
 def _look(material: Material, edited: Editable | None) -> Floats:
-    """(2, 3) what the diffuse term and all others reflect, about: of lobes, light from straight above."""
+    """(2, 3) approximate reflectance of the diffuse term and of all others; for lobes, at normal incidence."""
     if edited is None:
         specular = sum((np.multiply(lobe.k, lobe.r0) for lobe in material.lobes), np.zeros(3))
         return np.stack([np.broadcast_to(material.kd, 3), specular])

@@ -1,7 +1,7 @@
-"""Virtual gonio-photometer: measures BSDFs of the path tracer as a device would measure a specimen.
+"""Virtual gonio-photometer: measures BSDFs of the path tracer like a device with a specimen.
 
 Mitsuba's `eval(si, wo)` is f |cos| towards the light `wo` for the viewer `si.wi`; so our wo becomes si.wi and our wi
-its wo. The specimen is measured at one point (uv = 0), lit and seen as a flat sheet with n = +z.
+its wo. The specimen is measured at one point (uv = 0), as a flat sheet with n = +z.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ SPECIMENS: dict[str, dict[str, Any]] = {
     "rough copper": {**_METAL, "material": "Cu", "alpha": 0.15},
     "brushed aluminium": {**_METAL, "material": "Al", "alpha_u": 0.05, "alpha_v": 0.25},
     "varnished wood": {"type": "roughplastic", "distribution": "beckmann", "alpha": 0.1, "diffuse_reflectance": _BROWN},
-    # A pane is two rough interfaces; the thin-sheet model of Burley 2015 is the only one of Mitsuba's that treats both
-    # at once: light goes straight on, spread by both, without a refraction. Known fault: at oblique incidence it cuts
-    # off the far tail of its transmission lobe, where wo.h changes sign; here that is below a thousandth of the peak.
+    # A pane is two rough interfaces; the thin-sheet model of Burley 2015 is Mitsuba's only one that treats both at
+    # once: light goes straight on, spread by both, without refraction. Known fault: at oblique incidence it cuts off
+    # the far tail of its transmission lobe, where wo.h changes sign; here that is below a thousandth of the peak.
     "frosted glass": {"type": "principledthin", "base_color": _PANE, **_THIN},
 }
 """Built-in specimens by name. The aluminium is brushed along x: its highlight is wide along y."""
@@ -52,11 +52,11 @@ def measure(
     Parameters
     ----------
     specimen : str, dict or Material
-        Name in `SPECIMENS`, `{"type": ..., ...}` as Mitsuba takes it, or a material document.
+        Name in `SPECIMENS`, `{"type": ..., ...}` for Mitsuba, or a material document.
     incident : Setup, optional
-        The device's grids and faults; where None, the thesis's grid for the specimen's symmetry.
+        The device's grids and faults; by default, the thesis's grid for the specimen's symmetry.
     noise : float
-        Standard deviation of a reading as a share of it; replaces that of `incident`.
+        Relative standard deviation of a reading; replaces that of `incident`.
     seed : int
         Of the noise; replaces that of `incident`.
     name : str, optional
@@ -65,7 +65,7 @@ def measure(
     Raises
     ------
     UserError
-        Where the specimen is unknown, broken, or scatters into single directions, which no device can measure.
+        If the specimen is unknown, broken, or scatters into single directions, which no device can measure.
     """
     if isinstance(specimen, Material):
         anisotropic = any(lobe.mx != lobe.my for lobe in specimen.lobes)

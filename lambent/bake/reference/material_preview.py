@@ -1,8 +1,8 @@
-"""A ball with a measured table for its BSDF, and the same ball with the material fitted to it, side by side.
+"""Preview of a fit: a ball with the measured table as BSDF, and the same ball with the fitted material.
 
 The ball is brushed along its circles of latitude, its axis tilted towards the viewer and to the side, so that brushed
-highlights show. Where the table transmits, only the front half of the ball is there, with a lamp behind it, whose light
-passes the sheet. Figures are those of the ball's pixels alone: a shared background would flatter them.
+highlights show. For a table that transmits, only the front half of the ball is rendered, with a lamp behind it whose
+light passes through the sheet. Figures cover the ball's pixels alone: a shared background would flatter them.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from lambent.scenes.scene import Environment, Mesh, SceneObject, SunSky
 
 DAYLIGHT = SunSky(sun_direction=tuple(normalize(np.array([-0.55, 0.62, 0.56])).tolist()))
 SIZE_PX, SPP = 320, 49
-GRIDS = {True: ISOTROPIC, False: GridShape(32, 24, 64, 64)}  # by isotropy; at this size finer ones show no more
-MAX_DEPTH = {False: 2, True: 3}  # without a lamp light meets the ball once: it is convex
+GRIDS = {True: ISOTROPIC, False: GridShape(32, 24, 64, 64)}  # by isotropy; finer grids look the same
+MAX_DEPTH = {False: 2, True: 3}  # without a lamp, light hits the ball once, because it is convex
 DISTANCE, FOV_DEG = 6.0, 19.4  # of the camera; the ball has radius 1 and nearly fills the image
 LAMP_AT, LAMP_RADIUS = (0.25, -0.2, 0.1), 0.12
-LAMP_RADIANCE = (300.0, 230.0, 150.0)  # in multiples of the environment's mean
-OPEN_BEHIND = -0.15  # z in the camera's direction up to which the half ball reaches, a little behind its silhouette
-MEAN_SHOWN = 0.3  # of the ball that wears the table, as a display shows it
+LAMP_RADIANCE = (300.0, 230.0, 150.0)  # multiples of the environment's mean
+OPEN_BEHIND = -0.15  # z in the camera's direction up to which the half ball reaches, slightly behind its silhouette
+MEAN_SHOWN = 0.3  # displayed mean of the ball with the table
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,13 @@ class Preview:
     Attributes
     ----------
     measured, model : (H, W, 3) float64
-        As shown by a display, encoded, black beside the ball: clip(e L)^(1/2.2), one e for both.
+        Displayed values, encoded, black outside the ball: clip(e L)^(1/2.2), one e for both.
     difference : (H, W, 3)
         FLIP error in false colour, encoded.
     ball : (H, W) bool
-        Pixels that see nothing but the ball.
+        Pixels that show nothing but the ball.
     figures : dict
-        Over the ball: `psnr_db`, `flip_mean`, `flip_worst_tile` (16x16 tiles that lie on it).
+        Over the ball: `psnr_db`, `flip_mean`, `flip_worst_tile` (16x16 tiles within it).
     spp : int
     lamp : bool
         Whether a lamp hangs behind the front half.
@@ -81,7 +81,7 @@ def preview(
     Raises
     ------
     UserError
-        Where no path tracing engine works, or the environment's image cannot be read.
+        If no path tracing engine works, or the environment's image cannot be read.
     """
     register_material_plugin()
     lamp = table.info.transmits or material.transmits
@@ -142,7 +142,7 @@ def _render(bsdf: Mapping[str, Any], environment: Environment, lamp: bool, size_
 
 
 def _ball_pixels(size_px: int) -> Flags:
-    """(H, W) pixels that see nothing but the ball: all four corners meet it, its facets a hair within radius 1."""
+    """(H, W) pixels that show nothing but the ball: all four corners hit it; its facets lie a hair within radius 1."""
     edge = (np.arange(size_px + 1) / size_px * 2 - 1) * np.tan(np.radians(FOV_DEG / 2))
     x, y = np.meshgrid(edge, edge)
     slope2 = x * x + y * y
@@ -151,7 +151,7 @@ def _ball_pixels(size_px: int) -> Flags:
 
 
 def ball_mesh(half: bool = False) -> Mesh:
-    """The ball, radius 1, or its half that faces the camera."""
+    """The ball, radius 1, or the half that faces the camera."""
     tilt = np.eye(4)
     tilt[:3, :3] = turn("z", -28.0) @ turn("x", 32.0)
     ball = transformed(sphere(1.0, around=192, rows=96), tilt)

@@ -1,7 +1,7 @@
-"""What one object mirrors in a view, traced: the truth that its light field is compared with.
+"""Traced reflections of one object in a view: the reference for its light field.
 
-The object itself shows its diffuse light alone, as in a light field of one level: the maps and the truth are of the
-same scene, and differ by how they are looked up.
+The object itself shows its diffuse light alone, as in a light field of one level: maps and reference are of the same
+scene and differ only in their look-up.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ Halves = NDArray[np.float16]
 
 @dataclass(frozen=True)
 class Shown:
-    """Pixels (k,) that show an object, by number, and what is there, float64.
+    """Pixels (k,) that show an object, by number, and its surface there, float64.
 
-    x, n, flat, wo (k, 3): place, shading normal, that of the triangle, direction to the viewer. uv2 (k, 2) is the light
-    map's. Pixels whose mirrored direction goes into the object's triangles are left out.
+    x, n, flat, wo (k, 3): position, shading normal, triangle normal, direction to the viewer. uv2 (k, 2) is the light
+    map's. Pixels whose mirror direction points into the object's triangles are left out.
     """
 
     pixel: Indices
@@ -47,12 +47,12 @@ class Shown:
 
     @property
     def w(self) -> Floats:
-        """The mirrored directions (k, 3)."""
+        """The mirror directions (k, 3)."""
         return reflect(self.wo, self.n)
 
 
 class MirrorTracer:
-    """Traces what an object of a baked scene mirrors, and maps of the same surroundings, without the sun's disc."""
+    """Traces reflections in an object of a baked scene, and maps of the same surroundings, without the sun's disc."""
 
     def __init__(self, traced: TracedScene, maps: Maps, name: str) -> None:
         self._builder, self._scene = traced.builder(diffuse=False), traced.whole(diffuse=False)
@@ -61,7 +61,7 @@ class MirrorTracer:
         self._around = around(traced, maps, DEPTH, (name,))
 
     def shown(self, camera: Camera, width: int, height: int, samples: int, seed: int = 0) -> Shown:
-        """What pixels show of the object at `samples` random places of each; a pixel is named as often as it does."""
+        """Surface points of the object at `samples` random places per pixel; a pixel appears once per hit."""
         rng, eye = np.random.default_rng(seed), np.asarray(camera.position, float)
         row, column = np.divmod(np.arange(width * height), width)
         found = []
@@ -71,16 +71,16 @@ class MirrorTracer:
         return Shown(*(np.concatenate([getattr(part, f.name) for part in found]) for f in fields(Shown)))
 
     def mirrored(self, shown: Shown, seed: int = 0) -> Floats:
-        """Radiance (k, 3) of the mirrored directions, by one path each."""
+        """Radiance (k, 3) from the mirror directions, by one path each."""
         return self._along(shown.x, shown.flat, shown.w, seed)
 
     def surface(self, shown: Shown) -> Floats:
-        """Radiance (k, 3) of the object itself towards the viewer: its light map's."""
+        """Radiance (k, 3) of the object itself towards the viewer, from its light map."""
         near = shown.x + 10 * rays.APPROACH * shown.wo
         return self._along(near, shown.wo, -shown.wo, 0)
 
     def distance_m(self, shown: Shown) -> Floats:
-        """Length (k,) of the mirrored rays, infinite where they meet nothing."""
+        """Length (k,) of the mirrored rays, infinite without a hit."""
         return rays.distances(self._scene, rays.leaving(self._scene, shown.x, shown.flat, shown.w))
 
     def maps(self, points: Floats, texels: int, strata: int, seed: int = 0) -> tuple[Halves, Halves, NDArray[np.uint8]]:
@@ -88,7 +88,7 @@ class MirrorTracer:
         return _maps(self._around, points, texels, strata, seed)
 
     def map_from_middle(self, texels: int, strata: int, seed: int = 0) -> tuple[Floats, Halves, Halves]:
-        """The middle (1, 3) of the object, and one map from there with the object left out: reflection mapping's."""
+        """The object's centre (1, 3), and one map from there without the object, for reflection mapping."""
         middle = np.mean(self._mesh.bounds, axis=0, keepdims=True).astype(float)
         scene = self._builder.build(leave_out=(self._name,))
         without = Around(scene, self._cache, DEPTH, self._around.sun)
@@ -96,7 +96,7 @@ class MirrorTracer:
         return middle, halves(light, 1.0), inverse_distances(without.scene, middle, texels)
 
     def _seen(self, eye: Floats, w: Floats) -> Shown:
-        """Of rays (r, 3) from the eye, those that meet the object."""
+        """The rays (r, 3) from the eye that hit the object."""
         si = self._scene.ray_intersect(rays_from(eye, w))
         number = self._builder.shape_number(self._name)
         mine = si.is_valid() & (dr.reinterpret_array(mi.UInt32, si.shape) == number)
@@ -108,7 +108,7 @@ class MirrorTracer:
         return Shown(np.flatnonzero(use), array_of(si.p).astype(float)[use], n[use], flat[use], -w[use], uv[use])
 
     def _along(self, x: Floats, flat: Floats, w: Floats, seed: int) -> Floats:
-        """Radiance (k, 3) that leaves towards surface points along w, by one path each."""
+        """Radiance (k, 3) arriving at surface points along w, by one path each."""
         scene, sampler = self._around.scene, rays.independent(seed, len(w))
         ray = rays.leaving(scene, x, flat, w)
         start = path_tracer.camera_start(ray)

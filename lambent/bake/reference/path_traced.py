@@ -1,4 +1,4 @@
-"""Path traced images of a scene, with their variance: the reference for the renderer's."""
+"""Path traced images of a scene, with variance: the reference for the renderer."""
 
 from __future__ import annotations
 
@@ -39,10 +39,12 @@ def render_reference(
     max_depth: int = MAX_DEPTH,
     edited: Mapping[str, Editable] | None = None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Path trace the view of a pinhole camera, pixels filtered by a box.
+    """Path trace the view of a pinhole camera, with a box filter.
 
     Parameters
     ----------
+    width, height : int
+        Size of the image in pixels.
     spp : int
         Samples per pixel, at least 2; rounded up to whole passes.
     seed : int
@@ -50,19 +52,19 @@ def render_reference(
     max_depth : int
         Surfaces on the longest path.
     edited : mapping, optional
-        Terms and curves by material name, by which surfaces scatter instead of by their documents.
+        By material name, terms and curves that replace those of documents.
 
     Returns
     -------
     image, variance : (height, width, 3) float32
-        Radiance in W/(sr m^2), row 0 on top; variance of each pixel's mean, in its square.
+        Radiance in W/(sr m^2), row 0 on top; variance of each pixel's mean, in that unit squared.
     """
     _, whole = built(scene, edited)
     return traced(whole, camera, width, height, spp, seed, progress, max_depth=max_depth)
 
 
 def built(scene: Scene, edited: Mapping[str, Editable] | None = None) -> tuple[SceneBuilder, Any]:
-    """A scene for `traced`, and its builder."""
+    """A scene for `traced`, with its builder."""
     builder = SceneBuilder(replace(scene, textures=prepared(scene.textures)), edited=edited)
     balance_emitters(builder)
     return builder, builder.build()
@@ -79,7 +81,7 @@ def traced(
     *,
     max_depth: int = MAX_DEPTH,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """`render_reference` of a scene that is `built`."""
+    """`render_reference` for a scene from `built`."""
     per_pass = max(1, min(spp, PATHS_AT_ONCE // (width * height)))
     passes = -(-spp // per_pass)
     total, squares = np.zeros((2, width * height, 3))
@@ -107,7 +109,7 @@ def _pass(scene: object, camera: Camera, size: tuple[int, int], samples: int, se
 def camera_rays(camera: Camera, size: tuple[int, int], samples: int, sampler: Any) -> Any:
     """mi.Ray3f through random places of the pixels, `samples` for each, pixel after pixel.
 
-    The camera is no constant of the kernel: another view of the same size needs no other one.
+    The camera is not a constant of the kernel: another view of the same size reuses it.
     """
     width, height = size
     count = width * height * samples

@@ -1,6 +1,6 @@
 """Reflections of a lobe on a horizontal plane, every ray cast at the triangles: the reference for planar reflectors.
 
-Surfaces send the light of the light map and their emission, equal in all directions; beyond them is a uniform sky.
+Surfaces emit the light map's light and their emission equally in all directions; the background is a uniform sky.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from lambent.materials.document import Lobe
 from lambent.materials.lobes import fresnel
 from lambent.scenes.scene import Scene
 
-RAYS_AT_ONCE = 1 << 21  # a few hundred MiB, and progress every second or so
-WIDE = 1e-3  # mx my of a lobe from which on rays to lamps are worth theirs
+RAYS_AT_ONCE = 1 << 21  # a few hundred MiB, with progress about every second
+WIDE = 1e-3  # mx my of a lobe above which rays to lamps pay off
 
 
 class ReflectionTracer:
@@ -43,7 +43,7 @@ class ReflectionTracer:
         self._sky = mi.Color3f(*sky)
 
     def distance(self, origin: Floats, directions: Floats) -> Floats:
-        """Distance (k,) from a point (3,) along unit directions (k, 3), infinite where nothing is hit."""
+        """Distance (k,) from a point (3,) along unit directions (k, 3), infinite without a hit."""
         start = mi.Point3f(*map(float, origin)) + dr.zeros(mi.Point3f, len(directions))
         rays = mi.Ray3f(start, mi.Vector3f(np.ascontiguousarray(directions.T, np.float32)))
         met = self._scene.ray_intersect(rays, mi.RayFlags.Minimal, True)
@@ -52,7 +52,7 @@ class ReflectionTracer:
     def reflected(self, lobe: Lobe, points: Floats, wo: Floats, spp: int, progress: Progress = silent) -> Floats:
         """Radiance (k, 3) that points (k, 3) of the plane reflect towards wo (k, 3), from `spp` rays each.
 
-        Where the lobe is wide, as many go to every lamp: few of its own would find one.
+        For a wide lobe, as many rays go to every lamp: few of its own would find one.
         """
         light = np.zeros((len(points), 3))
         at_once = max(1, RAYS_AT_ONCE // spp)
@@ -83,7 +83,7 @@ class ReflectionTracer:
     def _arrived(
         self, lobe: Lobe, origin: mi.Point3f, view: mi.Vector3f, wi: mi.Vector3f
     ) -> tuple[mi.Color3f, mi.Float]:
-        """Light along wi times f cos/p of the lobe's own sampling, and the density p of that, 1/sr."""
+        """Light along wi times f cos/p of the lobe's own sampling, and its density p, 1/sr."""
         h = dr.normalize(wi + view)
         cos_d = dr.dot(view, h)
         valid = (cos_d > 1e-4) & (wi.y > 1e-4)
@@ -106,7 +106,7 @@ def _ball_around(vertices: Floats) -> tuple[Floats, float]:
 
 
 def _cone(origin: mi.Point3f, ball: tuple[Floats, float]) -> tuple[mi.Vector3f, mi.Float]:
-    """Axis of the cone in which a ball is seen, and 1 less the cosine of its half angle; all of it from inside."""
+    """Axis of the cone that contains a ball, and 1 minus the cosine of its half angle; the full sphere from inside."""
     to = mi.Point3f(*map(float, ball[0])) - origin
     sin2 = ball[1] ** 2 / dr.maximum(dr.squared_norm(to), 1e-12)
     return dr.normalize(to), dr.select(sin2 < 1, sin2 / (1 + dr.sqrt(dr.maximum(1 - sin2, 0))), 2)  # no cancellation
@@ -125,7 +125,7 @@ def _cone_density(cone: tuple[mi.Vector3f, mi.Float], w: mi.Vector3f) -> mi.Floa
 
 
 def _half_vectors(lobe: Lobe, at: mi.UInt32, k: mi.UInt32, starts: NDArray[np.uint64]) -> mi.Vector3f:
-    """World half vectors of sample k at point `at`: an additive sequence (Roberts 2018) that begins at `starts`."""
+    """World half vectors of sample k at point `at`: an additive sequence (Roberts 2018) starting at `starts`."""
     u, v = _uniform(at, k, starts)
     r = dr.sqrt(u / (1 - u)) if lobe.distribution == "ggx" else dr.sqrt(-dr.log(1 - u))
     phi = 2 * dr.pi * v

@@ -1,4 +1,4 @@
-"""How far away the surfaces of a scene are: all its triangles in one mesh, without materials or lights."""
+"""Distances to the surfaces of a scene: all its triangles in one mesh, without materials or lights."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Surfaces:
         parameters["vertex_positions"] = mi.Float(np.asarray(positions, np.float32).ravel())
         parameters["faces"] = mi.UInt32(np.asarray(faces, np.uint32).ravel())
         parameters.update()
-        dark = {"type": "point", "position": [0.0, 0.0, 0.0], "intensity": 0.0}  # without, Mitsuba warns
+        dark = {"type": "point", "position": [0.0, 0.0, 0.0], "intensity": 0.0}  # Mitsuba warns without a light
         self._scene = mi.load_dict({"type": "scene", "all": mesh, "dark": dark})
 
     def distance(self, origin: Floats, directions: Floats) -> Floats:
-        """Metres (n,) from a point (3,) along unit directions (n, 3), FAR where there is nothing."""
+        """Metres (n,) from a point (3,) along unit directions (n, 3), FAR without a hit."""
         return np.minimum(distances(self._scene, rays_from(origin, directions)), FAR)

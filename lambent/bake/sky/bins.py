@@ -1,9 +1,9 @@
-"""Directions in bins of equal solid angle, and the light of an environment in them.
+"""Bins of directions of equal solid angle, with the light of an environment in them.
 
-There are ROWS x COLUMNS coarse bins: rows of equal height along an axis, columns about it. The axis is an unusual one,
-since bins at its poles are slender wedges. Each bin is cut into SUB x SUB parts; bins with something small and bright
-in them, a sun or a lamp, into FINE x FINE. The caller chooses a bin (`sky.guide`); within it a row of parts and then a
-part of the row are drawn in proportion to their luminance by alias tables (Walker 1977), and a direction uniformly.
+There are ROWS x COLUMNS coarse bins: rows of equal height along an axis, columns about it. The axis is an uncommon one,
+because bins at its poles are slender wedges. Each bin is divided into SUB x SUB parts; bins with something small and
+bright, a sun or a lamp, into FINE x FINE. The caller chooses a bin (`sky.guide`). Within it a row of parts, then a part
+of the row, is drawn in proportion to luminance by alias tables (Walker 1977), and a direction uniformly.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ ROWS, COLUMNS = 16, 32
 BINS = ROWS * COLUMNS
 BIN_SR = 4 * np.pi / BINS
 SUB, FINE = 16, 128  # parts along each side of a bin
-MOST_FINE, SPIKY = 16, 0.02  # number of fine bins, and share of the variance from which on a bin becomes one
+MOST_FINE, SPIKY = 16, 0.02  # number of fine bins, and share of the variance above which a bin becomes one
 SUPERSAMPLES = 4  # per part and axis
 AXES = np.array([[0.6, 0.48, 0.64], [0.0, 0.8, -0.6], [-0.8, 0.36, 0.48]])  # of the grid, in its own order; orthonormal
-FLOOR = 0.05  # of a bin's mean: no part is left out
+FLOOR = 0.05  # relative to a bin's mean: no part is left out
 
 
 class SkyBins:
@@ -68,7 +68,7 @@ class SkyBins:
         return _turned((across * cosine, y, across * sine), AXES.T)
 
     def find(self, w: Any) -> tuple[Any, Any]:
-        """The bins (mi.UInt32) that unit directions w lie in, and the density of `direction` there, sr^-1."""
+        """The bins (mi.UInt32) of unit directions w, and the density of `direction` there, sr^-1."""
         w = _turned((w.x, w.y, w.z), AXES)
         turn = dr.atan2(w.z, w.x) / (2 * dr.pi)
         turn = dr.select(turn < 0, turn + 1, turn)
@@ -84,7 +84,7 @@ class SkyBins:
 
 
 class _Alias:
-    """Alias tables of many distributions, one after another in one array."""
+    """Alias tables of many distributions, concatenated in one array."""
 
     def __init__(self, groups: list[Floats]) -> None:
         tables = [alias_tables(shares) for shares in groups]
@@ -92,7 +92,7 @@ class _Alias:
         self._other = mi.UInt32(np.concatenate([other.ravel() for _, other in tables]))
 
     def draw(self, first: Any, size: Any, u: Any) -> tuple[Any, Any]:
-        """A place of the distribution of `size` places that begins at `first`, and the rest of u, in [0, 1)."""
+        """A place of the distribution of `size` places that begins at `first`, and u rescaled to [0, 1)."""
         scaled = u * mi.Float(size)
         place = dr.minimum(mi.UInt32(scaled), size - 1)
         rest = scaled - mi.Float(place)
@@ -104,13 +104,13 @@ class _Alias:
 
 
 def alias_tables(shares: Floats) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
-    """Alias tables (B, K) of B distributions (B, K): the share that each place keeps, and the place of the rest."""
+    """Alias tables (B, K) of B distributions (B, K): the share each place keeps, and the place that gets the rest."""
     count, size = shares.shape
     left = shares * size
     keep, other = np.ones((count, size)), np.tile(np.arange(size), (count, 1))
     every = np.arange(count)
     waiting = np.ones((count, size), bool)
-    for _ in range(size - 1):  # the greatest place left fills the least, which is done then
+    for _ in range(size - 1):  # the largest remaining place fills the smallest, which is then done
         low = np.where(waiting, left, np.inf).argmin(axis=1)
         high = np.where(waiting, left, -np.inf).argmax(axis=1)
         keep[every, low] = np.minimum(left[every, low], 1)
@@ -121,7 +121,7 @@ def alias_tables(shares: Floats) -> tuple[NDArray[np.float32], NDArray[np.uint32
 
 
 def middles() -> Floats:
-    """(BINS, 3) unit directions of the middles of the bins."""
+    """(BINS, 3) unit directions of the bins' centres."""
     return _directions(np.arange(BINS), 1, 0.5, 0.5).reshape(-1, 3)
 
 
@@ -139,7 +139,7 @@ def _turned(w: tuple[Any, Any, Any], axes: Floats) -> Any:
 
 
 def _moments_of_parts(emitter: Any, bins: Indices, side: int) -> tuple[Floats, Floats]:
-    """(n, side * side) mean luminance of the parts of bins, and mean of its square."""
+    """(n, side * side) mean luminance of the parts of bins, and mean squared luminance."""
     mean, square = np.zeros((2, len(bins), side * side))
     offsets = (np.arange(SUPERSAMPLES) + 0.5) / SUPERSAMPLES
     for r in offsets:
@@ -151,13 +151,13 @@ def _moments_of_parts(emitter: Any, bins: Indices, side: int) -> tuple[Floats, F
 
 
 def _shares(luminances: Floats) -> Floats:
-    """Share of a bin's samples for each of its parts."""
+    """Share of a bin's samples per part."""
     raised = luminances + FLOOR * luminances.mean()
     return raised / raised.sum() if raised.any() else np.full(len(raised), 1 / len(raised))
 
 
 def _spiky(mean: Floats, square: Floats) -> Indices:
-    """Bins with light smaller than a part: sampling their parts uniformly would cost the most."""
+    """Bins with light smaller than a part, for which uniform sampling of parts would cost most."""
     cost = np.divide(square, mean, out=np.zeros_like(mean), where=mean > 0).sum(axis=1) - mean.sum(axis=1)
     cost /= max(float(mean.sum()), 1e-30)
     worst = np.argsort(-cost, kind="stable")[:MOST_FINE]

@@ -15,7 +15,7 @@ from lambent.core.cubemap import directions_at, face_directions
 from lambent.core.directions import normalize
 from lambent.scenes.scene import Environment, SunSky
 
-GRID, FINE_GRID = 4, 64  # samples per texel and axis; the fine one where the sun may be
+GRID, FINE_GRID = 4, 64  # samples per texel and axis; the fine grid covers texels that may show the sun
 TEXELS_AT_ONCE = 1 << 16
 
 
@@ -30,7 +30,7 @@ def environment_cube(environment: Environment | None, n: int) -> NDArray[np.floa
             cube[texels] = _means(emitter, texels, n, GRID)
         if isinstance(environment, SunSky):
             sun = normalize(np.array(environment.sun_direction, float))
-            near = np.cos(np.radians(environment.sun_radius_deg) + 2 * np.sqrt(2) / n)  # texels that the disc may touch
+            near = np.cos(np.radians(environment.sun_radius_deg) + 2 * np.sqrt(2) / n)  # texels that may show the disc
             sunny = np.flatnonzero(normalize(face_directions(n)).reshape(-1, 3) @ sun > near)
             cube[sunny] = _means(emitter, sunny, n, FINE_GRID)
     return cube.reshape(6, n, n, 3).astype(np.float32)

@@ -1,13 +1,13 @@
 """Daylight for the path tracer: sky and sun in W/(sr m^2), as one image.
 
-Mitsuba's `sunsky` (Hosek & Wilkie 2012, 2013) gives colours and the sky's distribution of light. In RGB it is in
-W/(sr m^2 nm), which 683 lm/W x 106.856 nm, the integral of V(lambda), turns into cd/m^2. So scaled its sun dims too
-little with turbidity: 81 klx at 45 degrees and turbidity 6, where published models have 57 to 59. Sky and sun are
+Mitsuba's `sunsky` (Hosek & Wilkie 2012, 2013) gives colours and the sky's distribution of light. Its RGB is in
+W/(sr m^2 nm), which 683 lm/W x 106.856 nm, the integral of V(lambda), converts to cd/m^2. With that scale its sun dims
+too little with turbidity: 81 klx at 45 degrees and turbidity 6, where published models have 57 to 59. Sky and sun are
 therefore scaled to the illuminances of `scenes.clear_sky`.
 
-Evaluating the sky model at every path vertex costs several times the ray itself; an image costs next to nothing and is
-sampled as well. The smooth sky is evaluated coarsely; around the sun radiance is averaged over each pixel, so that the
-disc keeps its power. Interpolation between pixels widens it from .53 to about .7 degrees.
+Evaluating the sky model at every path vertex costs several times the ray itself; an image costs almost nothing and can
+be importance sampled. The smooth sky is evaluated coarsely; around the sun, radiance is averaged over each pixel, so
+that the disc keeps its power. Interpolation between pixels widens the disc from .53 to about .7 degrees.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ from lambent.scenes.clear_sky import sky_illuminance, sun_illuminance
 from lambent.scenes.scene import SunSky
 
 WIDTH, HEIGHT, COARSE = 2048, 1024, 4
-LIMB_DARKENING = 0.6  # of the sun's edge against its middle, at 550 nm
+LIMB_DARKENING = 0.6  # of the sun's edge relative to its centre, at 550 nm
 DIRECTIONS = 1 << 14
 SUPERSAMPLES = 16  # per pixel and axis, near the sun
 PIXELS_AT_ONCE = 1 << 12
-LOWEST_SINE = 0.005  # of the sun's height: Mitsuba's sky is black where it is on the horizon
+LOWEST_SINE = 0.005  # of the sun's elevation: Mitsuba's sky is black with the sun on the horizon
 
 
 @dataclass(frozen=True)
 class SunDisc:
     """The sun: unit direction towards it, irradiance (3,) in W/m^2 on a surface that faces it, angular radius.
 
-    Its irradiance does not depend on its radius. Of a disc that the horizon cuts, the rest is seen.
+    Its irradiance does not depend on its radius. If the horizon cuts the disc, the part above is visible.
     """
 
     direction: Floats
@@ -52,8 +52,8 @@ class SunDisc:
     radius_rad: float
 
     def radiance(self, w: Floats) -> Floats:
-        """Radiance (n, 3), W/(sr m^2), from unit world directions w (n, 3): darker towards the edge, linear in cos."""
-        chord = np.linalg.norm(w - self.direction, axis=-1)  # of small angles, exact where a cosine is not
+        """Radiance (n, 3), W/(sr m^2), from unit world directions w (n, 3): limb darkening is linear in cos."""
+        chord = np.linalg.norm(w - self.direction, axis=-1)  # accurate for small angles, unlike the cosine
         share = np.sin(np.minimum(2 * np.arcsin(np.minimum(chord / 2, 1)), np.pi / 2)) / np.sin(self.radius_rad)
         edge = 1 - LIMB_DARKENING * (1 - np.sqrt(np.maximum(1 - share**2, 0)))
         inside = (share <= 1) & (w @ self.direction > 0)
@@ -80,7 +80,7 @@ def sunsky_radiance(sky: SunSky, w: Floats, *, sun: bool = True) -> Floats:
 
 @lru_cache(maxsize=4)
 def _sky_scale(sky: SunSky) -> float:
-    """Factor on Mitsuba's sky by which it has the illuminance of `scenes.clear_sky`."""
+    """Factor that gives Mitsuba's sky the illuminance of `scenes.clear_sky`."""
     y = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS  # a spiral of equal solid angles
     around, across = np.pi * (1 + 5**0.5) * np.arange(DIRECTIONS), np.sqrt(1 - y**2)
     w = np.stack([across * np.cos(around), y, across * np.sin(around)], axis=-1)
@@ -91,7 +91,7 @@ def _sky_scale(sky: SunSky) -> float:
 
 
 def _raised(sun_direction: Floats) -> Floats:
-    """A direction to the sun for which Mitsuba's model is not black."""
+    """A direction to the sun, raised until Mitsuba's model is not black."""
     return normalize(np.maximum(sun_direction, (-np.inf, LOWEST_SINE, -np.inf)))
 
 
@@ -108,14 +108,14 @@ def _model(sky: SunSky, w: Floats, *, sun: bool) -> NDArray[np.float32]:
 
 
 def lone_emitter(description: Mapping[str, Any]) -> Any:
-    """mi.Emitter of a dictionary of Mitsuba's, in an empty scene."""
+    """mi.Emitter from a Mitsuba dictionary, in an empty scene."""
     emitter = mi.load_dict(dict(description))
     emitter.set_scene(mi.load_dict({"type": "scene", "environment": emitter}))
     return emitter
 
 
 def radiance_from(environment: Any, w: Floats) -> NDArray[np.float32]:
-    """Radiance (n, 3) that arrives from unit directions w (n, 3) of an environment (mi.Emitter), W/(sr m^2)."""
+    """Radiance (n, 3), W/(sr m^2), that arrives from an environment (mi.Emitter) along unit directions w (n, 3)."""
     si = dr.zeros(mi.SurfaceInteraction3f, len(w))
     si.wi = vectors(mi.Vector3f, -w)
     return array_of(environment.eval(si))
@@ -125,8 +125,8 @@ def radiance_from(environment: Any, w: Floats) -> NDArray[np.float32]:
 def sky_image(sky: SunSky) -> NDArray[np.float32]:
     """(HEIGHT, WIDTH, 3) lat-long image, oriented as an `ImageEnvironment`.
 
-    The model is black below the horizon; the image has a diffuse ground of the sky's own albedo there, lit by it,
-    unless `sky.ground` is black.
+    The model is black below the horizon; the image shows a diffuse ground there with the sky's own albedo and lit by
+    it, unless `sky.ground` is black.
     """
     rows, columns = np.arange(HEIGHT, step=COARSE), np.arange(WIDTH, step=COARSE)
     r, c = np.meshgrid(rows + (COARSE - 1) / 2, columns + (COARSE - 1) / 2, indexing="ij")
@@ -155,4 +155,4 @@ def _directions(row: Floats, column: Floats) -> Floats:
     """World directions of pixel positions; Mitsuba puts the first and the last row onto the poles."""
     theta = np.clip(row * (np.pi / (HEIGHT - 1)), 0, np.pi)
     phi = (column + 0.5) * (2 * np.pi / WIDTH)
-    return lat_long_direction(theta, phi) * (-1.0, 1.0, -1.0)  # half a turn: phi counts from the left edge
+    return lat_long_direction(theta, phi) * (-1.0, 1.0, -1.0)  # half a turn: phi starts at the left edge

@@ -1,13 +1,13 @@
-"""Where the sky is visible from: rooms lit through windows are sampled by the windows.
+"""Sampling guided by visibility of the sky: rooms lit through windows are sampled through the windows.
 
-A cheap pre-pass sorts surfaces by place (a regular grid) and by the side that they face (six of them), so that both
-sides of a wall keep apart; each side of a sheet that light crosses knows the light of both. From points of each group
-rays find how much light each bin of directions (`sky.bins`) brings, the cosine included; the group's table draws bins
-in proportion to the root mean square, which has the least variance. Groups that see nearly all of their sky, or none,
-share one table: there the environment is sampled by its luminance alone.
+A cheap pre-pass groups surfaces by place (a regular grid) and by the side they face (six of them), so that both sides
+of a wall are separate; each side of a sheet that light crosses knows the light of both. Rays from points of each group
+measure how much light each bin of directions (`sky.bins`) brings, cosine included. The group's table draws bins in
+proportion to the root mean square, which minimises variance. Groups that see nearly all of their sky, or none, share
+one table: there the environment is sampled by luminance alone.
 
-`guided_sky` replaces the environment that it holds, so that everything that samples the emitters of a scene, or
-computes the density of a direction, is guided.
+`guided_sky` replaces the environment that it wraps, so that every sampler of the scene's emitters, and every density of
+a direction, is guided.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from lambent.scenes.scene import Scene
 
 CELL_M, MOST_CELLS, MOST_TABLES = 0.5, 1 << 16, 4096
 SURFACE_POINTS = 1 << 18
-POINTS = 128  # of a group, that rays start from
-FIRST, KEPT = 1, 16  # rays per bin to see which groups need a table, and which are lit at all
-RAYS, LEAST = 4096, 16  # for a table: shared out by the light of the bins, and at least for each bin
-OPEN = 0.9  # share of the light of its hemisphere that a group sees: from here on it needs no table
-FEW = 0.2  # of the groups that see any sky: where fewer need a table, there is no guide
-DEFENSIVE = 0.15  # of a table's samples go by luminance alone: light that the pre-pass has missed is not lost
-EVERYWHERE = 0.01  # of these go anywhere: no direction is left out
-SPREAD = 0.4  # share of a bin's light that is that of the eight bins around it
+POINTS = 128  # ray origins per group
+FIRST, KEPT = 1, 16  # rays per bin to decide which groups need a table, and which are lit at all
+RAYS, LEAST = 4096, 16  # rays for a table: distributed by the light of the bins, and at least this many per bin
+OPEN = 0.9  # visible share of its hemisphere's light above which a group needs no table
+FEW = 0.2  # of the groups that see any sky: if fewer need a table, there is no guide
+DEFENSIVE = 0.15  # of a table's samples, drawn by luminance alone: light missed by the pre-pass is not lost
+EVERYWHERE = 0.01  # of these, drawn uniformly: no direction is left out
+SPREAD = 0.4  # share of a bin's light taken from its eight neighbours
 RAYS_AT_ONCE = 1 << 20
 
 
@@ -51,7 +51,7 @@ class Groups:
     shape: tuple[int, int, int]
 
     def of(self, position: Any, normal: Any) -> Any:
-        """Number (mi.UInt32) of the group that points (mi.Point3f) with normals belong to."""
+        """Group number (mi.UInt32) of points (mi.Point3f) with normals."""
         cell = [
             dr.clip(mi.Int32(dr.floor((p - float(low)) * (1 / self.size_m))), 0, n - 1)
             for p, low, n in zip((position.x, position.y, position.z), self.low, self.shape, strict=True)
@@ -69,7 +69,7 @@ class Groups:
 
 
 def groups_of(scene: Scene, size_m: float = CELL_M) -> Groups:
-    """The grid over a scene's bounds; its cells are of `size_m`, or as small as MOST_CELLS allow."""
+    """The grid over a scene's bounds, with cells of `size_m`, or larger if MOST_CELLS requires it."""
     low, high = (np.asarray(corner, float) for corner in scene.bounds)
     size_m = max(size_m, float(np.prod(np.maximum(high - low, size_m)) / MOST_CELLS) ** (1 / 3))
     while True:
@@ -80,17 +80,17 @@ def groups_of(scene: Scene, size_m: float = CELL_M) -> Groups:
 
 
 class SkyGuide:
-    """A table of bins for each group that needs one; table 0 serves all groups that need none.
+    """A table of bins for each group that needs one; table 0 serves all other groups.
 
-    table (groups,) int: number of a group's table; shares (tables, BINS) of each table's samples; brought (groups,):
-    irradiance, roughly, W/m^2 of luminance.
+    table (groups,) int: number of a group's table; shares (tables, BINS): of each table's samples; brought (groups,):
+    approximate irradiance, W/m^2 of luminance.
     """
 
     def __init__(self, bins: SkyBins, groups: Groups, table: Indices, shares: Floats, brought: Floats) -> None:
         self.bins, self.groups, self.shares, self.brought = bins, groups, shares, brought
         self._table = mi.UInt32(table.astype(np.uint32))
         cumulative = np.cumsum(shares, axis=1)
-        cumulative[:, -1] = 2  # rounding must not lead beyond the last
+        cumulative[:, -1] = 2  # rounding must not lead past the end
         self._cumulative = mi.Float(cumulative.astype(np.float32).ravel())
         self._share = mi.Float(shares.astype(np.float32).ravel())
 
@@ -99,7 +99,7 @@ class SkyGuide:
         return dr.gather(mi.UInt32, self._table, self.groups.of(position, normal), active)
 
     def sample(self, table: Any, u: Any, active: Any = True) -> Any:
-        """Unit directions by tables."""
+        """Draw unit directions from tables."""
         first = table * BINS
         number = dr.binary_search(
             0, BINS - 1, lambda i: dr.gather(mi.Float, self._cumulative, first + mi.UInt32(i), active) <= u.x
@@ -117,10 +117,10 @@ class SkyGuide:
 
 
 def learn(scene: Scene, whole: Any, sky: Any, *, keep_open: bool = False, panes: bool = False) -> SkyGuide | None:
-    """The guide of a scene, None where no group needs a table. Deterministic.
+    """Learn the guide of a scene; None if no group needs a table. Deterministic.
 
-    `whole` is the scene as it is traced (mi.Scene), `sky` its environment (mi.Emitter). With `keep_open`, groups that
-    see most of their sky have tables, too; with `panes`, clear glass passes the sky straight on.
+    `whole` is the traced scene (mi.Scene), `sky` its environment (mi.Emitter). With `keep_open`, groups that see most
+    of their sky have tables too; with `panes`, clear glass transmits the sky undeviated.
     """
     bins = SkyBins(sky)
     if not bins.luminance.any():
@@ -163,15 +163,15 @@ class _PrePass:
         order = np.argsort(number, kind="stable")
         self.group, start, count = np.unique(number[order], return_index=True, return_counts=True)
         which = start[:, None] + np.arange(POINTS) * count[:, None] // POINTS
-        chosen = order[which]  # (groups, POINTS), spread evenly over those of the group
+        chosen = order[which]  # (groups, POINTS), spread evenly over the group's points
         self._position, self._normal, self._crossed = position[chosen], normal[chosen], crossed[chosen]
 
     def brought(self, which: Indices, counts: Indices, what: str) -> tuple[Floats, Floats]:
-        """Means (n, BINS) over rays, `counts` (BINS,) of them, of the cosine where the sky is seen, and its square."""
+        """Means (n, BINS) over `counts` (BINS,) rays of the cosine where the sky is visible, and of its square."""
         means, squares = np.zeros((2, len(which), BINS))
         number = np.repeat(np.arange(BINS), counts)
         first = np.cumsum(counts) - counts
-        turn = np.arange(len(number)) - first[number]  # of a ray among those of its bin
+        turn = np.arange(len(number)) - first[number]  # index of a ray among those of its bin
         point = (turn * POINTS // np.maximum(counts[number], POINTS) + turn + 7 * number) % POINTS
         at_once = max(1, RAYS_AT_ONCE // len(number))
         for mine in slices(len(which), at_once):
@@ -181,7 +181,7 @@ class _PrePass:
         return means, squares
 
     def _cosines(self, which: Indices, number: Indices, point: Indices, seed: int) -> Floats:
-        """(n, rays) of rays in bins `number` from the groups' `point`s; 0 where the sky is hidden."""
+        """(n, rays) cosines of rays in bins `number` from the groups' `point`s; 0 where the sky is hidden."""
         count, width = len(number), len(which) * len(number)
         sampler = independent(seed, width)
         thread = dr.arange(mi.UInt32, width)
@@ -201,18 +201,18 @@ class _PrePass:
         return np.array(seen * cosine).reshape(len(which), count)
 
     def sees_most(self, brought: Floats) -> Flags:
-        """Groups that see most of the light of the hemisphere that they face."""
+        """Groups that see most of the light of the hemisphere they face."""
         light = self._bins.luminance
         cosine = np.maximum(normalize(self._normal.mean(axis=1)) @ middles().T, 0)
         return np.asarray((np.where(cosine > 0, brought, 0) @ light) >= OPEN * (cosine @ light))
 
 
 def _points_and_normals(scene: Scene, count: int) -> tuple[Floats, Floats, Flags]:
-    """Points (count, 3) on a scene's surfaces, normals of their triangles, and whether light crosses there."""
+    """Points (count, 3) on a scene's surfaces, their triangles' normals, and whether light crosses there."""
     rng = np.random.default_rng(0)
     corners = scene.corners
     area = triangle_areas(corners)
-    share = np.sqrt(area / area.sum())  # between area and number: small things are not forgotten
+    share = np.sqrt(area / area.sum())  # geometric mean of area and uniform: small things are not forgotten
     face = np.sort(rng.choice(len(area), size=count, p=share / share.sum()))
     position, normal = points_on_triangles(corners, face, rng), triangle_normals(corners[face])
     crossed = [o.material in scene.measured or scene.materials[o.material].transmits for o in scene.objects]
@@ -221,7 +221,7 @@ def _points_and_normals(scene: Scene, count: int) -> tuple[Floats, Floats, Flags
 
 
 def _both_sides(whole: Any, position: Floats, normal: Floats, crossed: Flags) -> tuple[Floats, Floats, Flags]:
-    """The points, and, turned round, all points again whose other side is not within a solid."""
+    """The points, followed by all points flipped whose other side is not within a solid."""
     behind = whole.ray_intersect(leaving(whole, position, normal, -normal))
     inside = behind.is_valid() & (dr.dot(behind.n, vectors(mi.Vector3f, normal)) < 0)
     sheet = np.flatnonzero(~np.array(inside))

@@ -1,14 +1,13 @@
-"""Photons of an environment, drawn by where they land first.
+"""Photons of an environment, drawn by their first landing place.
 
-Rays from the sky and pairs of (point of a surface, direction in which it sees the sky) are one to one, so a photon is
-drawn by the place where it lands first, and none misses the scene or the window. The power from dw onto dA is L cos dA
-dw, whatever density it is drawn with: the weight is exact, and a pair in shadow carries nothing.
+Rays from the sky correspond one to one to pairs of a surface point and a direction in which it sees the sky. A photon
+can therefore be drawn by the place of its first landing, and none misses the scene or the window. The power from dw
+onto dA is L cos dA dw, whatever the density: the weight is exact, and a pair in shadow carries nothing.
 
 Directions come from the tables of `sky.guide`, with tables for open surfaces too. Places are patches of all surfaces,
-on both sides, drawn in proportion to area x E x sqrt(I): E is the sky's irradiance found by the guide's pre-pass, I the
-sum over all later landings of (share of the power / area of the texel)^2, found by a pre-pass of photons. That density
-has the least sum of the texels' variances: the outer walls, whose texels are large, give way to the floor behind the
-window.
+on both sides, drawn in proportion to area x E x sqrt(I): E is the sky's irradiance from the guide's pre-pass, I the sum
+over all later landings of (share of the power / area of the texel)^2, from a pre-pass of photons. This density
+minimises the sum of the texels' variances: the outer walls, with large texels, give way to the floor behind the window.
 """
 
 from __future__ import annotations
@@ -28,13 +27,13 @@ from lambent.core.geometry import triangle_areas, triangle_normals
 from lambent.scenes.scene import Scene
 
 MOST_PATCHES = 1 << 18
-BLOCK = 4  # groups along each axis that share an estimate of I, where their own photons are too few
-PRIOR, OWN = 0.5, 64.0  # photons' worth of the mean of all in a block's I, and of the block's in a group's
-LEAST = 0.2  # of the photons land without regard to E: the pre-pass may have missed some sky
+BLOCK = 4  # groups along each axis that share an estimate of I if their own photons are too few
+PRIOR, OWN = 0.5, 64.0  # prior weights in photons: of the mean of all in a block's I, and of the block's in a group's
+LEAST = 0.2  # of the photons land independently of E: the pre-pass may have missed some sky
 
 
 class SkyPhotons:
-    """Draws photons of an environment (mi.Emitter) of a scene, by a guide of it with tables for open surfaces."""
+    """Draws photons of a scene's environment (mi.Emitter), by a guide for it with tables for open surfaces."""
 
     def __init__(self, scene: Scene, whole: Any, sky: Any, guide: SkyGuide) -> None:
         self._whole, self._holes = whole, rays.has_holes(whole)
@@ -58,7 +57,7 @@ class SkyPhotons:
         self._over_density = mi.Float((self._area / share).astype(np.float32))
 
     def weigh(self, sums: Floats, counts: Floats) -> None:
-        """Take sums of I and numbers of photons by group; photons are drawn by these from now on."""
+        """Set sums of I and numbers of photons by group, which determine how further photons are drawn."""
         mean = sums.sum() / max(counts.sum(), 1)
         if mean > 0:
             block = self._blocks()
@@ -68,14 +67,14 @@ class SkyPhotons:
             self._draw_by_importance()
 
     def _blocks(self) -> Indices:
-        """(groups,) number of the block of cells, and of the side, that each group belongs to."""
+        """(groups,) block number, by cells and side, of each group."""
         *cell, side = np.unravel_index(np.arange(self.guide.groups.count), (*self.guide.groups.shape, 6))
         across = [-(-n // BLOCK) for n in self.guide.groups.shape]
         place = ((cell[0] // BLOCK * across[1]) + cell[1] // BLOCK) * across[2] + cell[2] // BLOCK
         return np.asarray(place * 6 + side)
 
     def emit(self, u: Any, place: Any, direction: Any) -> tuple[Any, Any, Any]:
-        """Rays that fall onto the first surface, power (mi.Color3f) in W times their number, groups they land in."""
+        """Rays towards the first surface, power (mi.Color3f) in W times the number of photons, groups they land in."""
         number = self._places.sample(u)
         patches = dr.width(self._normal)
         second = number >= patches
@@ -97,14 +96,14 @@ class SkyPhotons:
         power = self._sky.eval(si) * (cosine / density * dr.gather(mi.Float, self._over_density, number))
         reach = rays.APPROACH * (1 + dr.max(dr.abs(p)))
         ray = mi.Ray3f(p + w * reach, -w)
-        if self._holes:  # a photon that passes a hole at p belongs to the place where it lands
+        if self._holes:  # a photon through a hole at p belongs to the place where it lands
             met = rays.intersect(self._whole, ray, lit, True)
             lit &= met.is_valid() & (dr.norm(met.p - p) < reach)
         return ray, dr.select(lit, power, 0.0), group
 
 
 def find_importance(photons: SkyPhotons, trace: Any, over_area: Floats, sampler: Any) -> None:
-    """Find I with a pre-pass of photons; `over_area` (H, W) is 1/area of the light map's texels, m^-2, or 0.
+    """Estimate I by a pre-pass of photons; `over_area` (H, W) is 1/area of the light map's texels, m^-2, or 0.
 
     trace(ray, power, count) follows photons and calls count(si, power, far_side, active) at each landing.
     """
@@ -127,7 +126,7 @@ def find_importance(photons: SkyPhotons, trace: Any, over_area: Floats, sampler:
 
 
 def _patches(scene: Scene, size_m: float) -> Floats:
-    """Triangles (P, 3, 3) of all surfaces, halved along their longest edges until none is longer than `size_m`."""
+    """Triangles (P, 3, 3) of all surfaces, halved along their longest edges to at most `size_m`."""
     corners = scene.corners
     while True:
         edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)  # of corners k and k + 1

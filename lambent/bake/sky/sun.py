@@ -1,7 +1,7 @@
-"""The sun of a scene, which leaves the light map: a directional light, or a compact bright spot of the environment.
+"""The sun of a scene, removed from the light map: a directional light, or a compact bright spot of the environment.
 
-The sun's picture is what it adds to the environment's: both are interpolated alike, so that the light that is left out
-of the light map is exactly the light that the renderer adds again, whatever disc stands for it.
+The sun's picture is its part of the environment's picture. Both are interpolated identically, so that the light removed
+from the light map is exactly the light that the renderer adds, whatever disc represents it.
 """
 
 from __future__ import annotations
@@ -21,19 +21,20 @@ from lambent.scenes.panes import panes_of
 from lambent.scenes.scene import DirectionalLight, Environment, Light, Scene
 from lambent.store.contract import SunRecord
 
-BRIGHT = 8.0  # times the mean radiance: less is no sun
-SHARE = 0.05  # of the light from all around that a sun brings: with less, its shadow hardly shows
+BRIGHT = 8.0  # times the mean radiance: a sun is brighter
+SHARE = 0.05  # of all incident light that a sun must bring: otherwise its shadow hardly shows
 LARGEST_RAD = np.radians(5.0)
-HALO = 3.0  # times the radius that holds half of the light: beyond it lies a halo, which is left in the sky
-ALIGNED = 1e-6  # of 1 - cos: directional lights from there are one sun
-RING_PX = 3.0  # around the sun, whose median is the sky behind it
+HALO = 3.0  # times the radius that holds half of the light: the halo beyond stays in the sky
+ALIGNED = 1e-6  # of 1 - cos: directional lights this well aligned are one sun
+RING_PX = 3.0  # width of the ring around the sun whose median is the sky behind it
 
 
 @dataclass(frozen=True, eq=False)
 class SunPicture:
-    """What a sun adds to a picture of `size` (H, W): `pixels` (h, w, 3) from `corner` (row, column) on.
+    """A sun's part of a picture of `size` (H, W): `pixels` (h, w, 3) from `corner` (row, column) on.
 
-    Rows and columns are those of Mitsuba's `envmap`; columns go round. `turn` (3, 3) takes its directions to the world.
+    Rows and columns are those of Mitsuba's `envmap`; columns wrap around. `turn` (3, 3) rotates its directions to the
+    world.
     """
 
     pixels: Image
@@ -44,14 +45,14 @@ class SunPicture:
 
 @dataclass(frozen=True, eq=False)
 class FoundSun:
-    """A sun, and its picture where it is a part of the environment."""
+    """A sun, with its picture if it is part of the environment."""
 
     record: SunRecord
     picture: SunPicture | None = None
 
 
 def sun_of(scene: Scene) -> FoundSun | None:
-    """The sun that brings a scene the most light; None where there is none. Others stay in the light map."""
+    """The sun that brings most light to a scene, or None. Other suns stay in the light map."""
     lights = [light for light in scene.lights if isinstance(light, DirectionalLight) and any(light.irradiance)]
     suns = [FoundSun(_of_lights(light, lights)) for light in lights]
     if scene.environment is not None and (found := _of_environment(scene.environment)) is not None:
@@ -63,7 +64,7 @@ def sun_of(scene: Scene) -> FoundSun | None:
 
 
 def _of_lights(light: DirectionalLight, lights: list[DirectionalLight]) -> SunRecord:
-    """The sun that a light is, with all that shine along it."""
+    """The sun of a light, combined with all lights aligned with it."""
     towards = -normalize(np.asarray(light.direction, float))
     along = [one for one in lights if _is_along(one, towards)]
     irradiance = np.sum([one.irradiance for one in along], axis=0)
@@ -71,7 +72,7 @@ def _of_lights(light: DirectionalLight, lights: list[DirectionalLight]) -> SunRe
 
 
 def is_sun(light: Light, found: FoundSun) -> bool:
-    """Whether a light of the scene is a part of its sun."""
+    """Whether a light of the scene is part of its sun."""
     if found.picture is not None or not isinstance(light, DirectionalLight):
         return False
     return _is_along(light, np.array(found.record.direction))
@@ -89,10 +90,10 @@ def _of_environment(environment: Environment) -> FoundSun | None:
 
 
 def sun_in(picture: Image, turn: Floats) -> FoundSun | None:
-    """The sun of a lat-long picture (H, W, 3) as Mitsuba reads it, turned by `turn` (3, 3); None where there is none.
+    """Find the sun of a lat-long picture (H, W, 3) as read by Mitsuba, rotated by `turn` (3, 3); None without one.
 
-    Rows reach from pole to pole, so the first and the last are at the poles themselves. A sun is the connected spot
-    over BRIGHT times the mean that holds the most light, as far as HALO reaches.
+    Rows reach from pole to pole, with the first and the last at the poles themselves. A sun is the connected spot
+    brighter than BRIGHT times the mean that holds the most light, as far as HALO reaches.
     """
     height, width = picture.shape[:2]
     light = luminance(np.asarray(picture, float)) * _solid_angles(height, width)[:, None]
@@ -114,7 +115,7 @@ def sun_in(picture: Image, turn: Floats) -> FoundSun | None:
     if left_out.sum() < SHARE * total:
         return None
     about = normalize(left_out @ w)
-    # of a disc with the second moment of the pixels, each of which is spread by its interpolation
+    # of a disc with the second moment of the pixels, each spread by its interpolation
     spread = (np.pi / height) ** 2 * (1 + (2 * np.sin(row * np.pi / height) * height / width) ** 2) / 6
     radius_rad = float(np.sqrt(2 * (left_out @ (_angles(w, about) ** 2 + spread)) / left_out.sum()))
     if radius_rad > LARGEST_RAD:
@@ -125,7 +126,7 @@ def sun_in(picture: Image, turn: Floats) -> FoundSun | None:
 
 
 def _brightest_spot(picture: Image, light: Floats, least: float) -> tuple[Indices, Indices]:
-    """Rows and columns of the connected pixels over `least` that hold the most `light` (H, W); none where none is."""
+    """Rows and columns of the connected pixels above `least` with the most `light` (H, W); empty without any."""
     from scipy.ndimage import label
 
     bright = luminance(picture) > least
@@ -134,14 +135,14 @@ def _brightest_spot(picture: Image, light: Floats, least: float) -> tuple[Indice
         return np.zeros(0, int), np.zeros(0, int)
     strongest = 1 + int(np.argmax(np.bincount(names.ravel(), light.ravel())[1:]))
     peak = np.unravel_index(np.argmax(np.where(names == strongest, light, -1)), light.shape)
-    shift = light.shape[1] // 2 - int(peak[1])  # the spot may lie across the edge of the picture
+    shift = light.shape[1] // 2 - int(peak[1])  # the spot may cross the edge of the picture
     names, _ = label(np.roll(bright, shift, axis=1), np.ones((3, 3)))
     row, column = np.nonzero(names == names[peak[0], light.shape[1] // 2])
     return row, (column - shift) % light.shape[1]
 
 
 def _behind(picture: Image, row: Indices, column: Indices, about: Floats) -> Floats:
-    """(3,) median of what lies RING_PX around a spot about a direction."""
+    """(3,) median of the pixels RING_PX around a spot at direction `about`."""
     height, width = picture.shape[:2]
     pixel = np.pi / height
     near = np.arange(max(0, int(row.min() - 2 * RING_PX)), min(height, int(row.max() + 2 * RING_PX + 1)))
@@ -156,9 +157,9 @@ def _behind(picture: Image, row: Indices, column: Indices, about: Floats) -> Flo
 
 
 def _cut_out(row: Indices, column: Indices, added: Image, size: tuple[int, int], turn: Floats) -> SunPicture:
-    """The picture of the pixels `added` (n, 3), with a black rim."""
+    """The picture of the pixels `added` (n, 3), with a black border."""
     first = (int(column[np.argmax(luminance(added))]) - size[1] // 2) % size[1]
-    columns = (column - first) % size[1]  # the spot in the middle
+    columns = (column - first) % size[1]  # centred on the spot
     top, left = int(row.min()) - 1, int(columns.min()) - 1
     pixels = np.zeros((int(row.max()) - top + 2, int(columns.max()) - left + 2, 3), np.float32)
     pixels[row - top, columns - left] = added
@@ -166,7 +167,7 @@ def _cut_out(row: Indices, column: Indices, added: Image, size: tuple[int, int],
 
 
 def _solid_angles(height: int, width: int) -> Floats:
-    """(H,) integral over the sphere of what a pixel of a row is interpolated with."""
+    """(H,) integral over the sphere of the interpolation kernel of a pixel in each row."""
     step = np.pi / (height - 1)
     band = 2 * np.sin(np.arange(height) * step) * (1 - np.cos(step)) / step
     band[[0, -1]] = 1 - np.sin(step) / step
@@ -179,5 +180,5 @@ def _directions(row: Indices, column: Indices, height: int, width: int) -> Float
 
 
 def _angles(w: Floats, about: Floats) -> Floats:
-    """Angles (n,) in radians between unit vectors; exact for small ones."""
+    """Angles (n,) in radians between unit vectors; accurate for small ones."""
     return np.asarray(2 * np.arcsin(np.clip(np.linalg.norm(w - about, axis=-1) / 2, 0, 1)))

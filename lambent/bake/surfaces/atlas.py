@@ -1,4 +1,4 @@
-"""Second texture coordinates: every triangle of a scene gets a place of its own in one light map."""
+"""Second texture coordinates: every triangle of a scene gets its own place in one light map."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from lambent.scenes.scene import Mesh, Scene
 from lambent.scenes.variants import documents_of
 from lambent.store.contract import ObjectRecord, needs_probe
 
-Sizes = Callable[[list[Piece], int], Floats]  # of texels on pieces, in metres, for a number of texels
+Sizes = Callable[[list[Piece], int], Floats]  # texel sizes on pieces, in metres, for a number of texels
 
 
 @dataclass(frozen=True)
 class Atlas:
     """A scene whose vertices are split along the light map's seams.
 
-    `scene` is the scene with split meshes, `uv2` per object name (V, 2) float32 in [0, 1], `width` and `height` the
-    size in texels that the packing was made for.
+    `scene` has the split meshes, `uv2` by object name is (V, 2) float32 in [0, 1], `width` and `height` are the size in
+    texels for which the map was packed.
     """
 
     scene: Scene
@@ -46,9 +46,9 @@ def unwrap(
 ) -> Atlas:
     """Parametrise all objects of a scene into one light map.
 
-    Its surface takes about `resolution` x `resolution` texels, the map some more. Texels have the `sizes` that a
-    function finds, of equal size on all objects without one, over their `light_map_scale`. The size changes from one
-    part of an object to the next, none of which is longer than `longest_m`. The result is deterministic.
+    Its surface takes about `resolution` x `resolution` texels, and the map slightly more. The function `sizes` chooses
+    the texel sizes; by default they are equal on all objects. They are divided by `light_map_scale`. The size can
+    change between parts of an object, which are no longer than `longest_m`. The result is deterministic.
     """
     progress(0, 1, "unwrapping")
     copies = copies_of([o.mesh for o in scene.objects])
@@ -75,7 +75,7 @@ def unwrap(
 
 
 def areas_of(scene: Scene, pieces: list[Piece]) -> Floats:
-    """(N,) square metres of pieces."""
+    """(N,) areas of pieces in m^2."""
     first = np.cumsum([0] + [len(o.mesh.faces) for o in scene.objects])
     areas = areas_of_faces([o.mesh for o in scene.objects])
     return np.array([areas[first[piece.owner] + piece.faces].sum() for piece in pieces])
@@ -87,16 +87,16 @@ def scales_of(scene: Scene, pieces: list[Piece]) -> Floats:
 
 
 def even(scene: Scene, pieces: list[Piece], texels: int) -> Floats:
-    """Texels of one size on all pieces (N,), over the `light_map_scale` of their objects."""
+    """Equal texel sizes on all pieces (N,), divided by the `light_map_scale` of their objects."""
     areas, scales = areas_of(scene, pieces), scales_of(scene, pieces)
     return np.asarray(np.sqrt((areas * scales**2).sum() / texels) / scales)
 
 
 def _seams(charts: list[Chart], corners: list[Floats]) -> tuple[Indices, NDArray[np.uint32], Indices, Floats]:
-    """Vertices of a mesh that is split along its charts, whose `corners` (K, 3, 2) are in texels.
+    """Vertices of a mesh split along its charts, whose `corners` (K, 3, 2) are in texels.
 
-    The corner (V,) of the mesh's faces, counted through, that each vertex is; faces (F, 3) uint32 in their old order;
-    the chart of each vertex (V,), and its place there (V, 2).
+    Returns, per vertex, its corner (V,) of the mesh's faces, numbered consecutively; faces (F, 3) uint32 in their
+    original order; and the chart of each vertex (V,), with its place there (V, 2).
     """
     count = sum(len(chart.faces) for chart in charts)
     number, place = np.zeros((count, 3), np.int64), np.zeros((count, 3, 2))
@@ -108,13 +108,13 @@ def _seams(charts: list[Chart], corners: list[Floats]) -> tuple[Indices, NDArray
 
 
 def _split(mesh: Mesh, corner: Indices, faces: NDArray[np.uint32]) -> Mesh:
-    """The mesh with a vertex for each of these corners (V,) of its faces, counted through."""
+    """The mesh with a vertex for each of these corners (V,) of its faces, numbered consecutively."""
     source = mesh.faces.reshape(-1)[corner]
     return Mesh(mesh.positions[source], mesh.normals[source], mesh.tangents[source], mesh.uv[source], faces)
 
 
 def merged(atlas: Atlas) -> dict[str, Floats]:
-    """The arrays geometry/* of the store contract: all objects one after another."""
+    """The arrays geometry/* of the store contract: all objects concatenated."""
     meshes = [o.mesh for o in atlas.scene.objects]
     first = np.cumsum([0] + [len(mesh.positions) for mesh in meshes])
     arrays = {
@@ -127,7 +127,7 @@ def merged(atlas: Atlas) -> dict[str, Floats]:
 
 
 def separated(scene: Scene, arrays: dict[str, Floats], width: int, height: int) -> Atlas:
-    """The atlas that `merged` arrays were made from."""
+    """The atlas from which `merged` arrays were made."""
     objects, uv2, first_face = [], {}, 0
     for o in scene.objects:
         faces = arrays["faces"][first_face : first_face + len(o.mesh.faces)]

@@ -1,10 +1,10 @@
-"""Charts: parts of objects that lie flat in the light map.
+"""Charts: parts of objects laid flat in the light map.
 
 xatlas parametrises. Its time is quadratic in the size of a smooth chart, and it overruns its memory on a chart of
-80,000 triangles: large meshes are cut into pieces first. A cut costs a seam, nothing else.
+80,000 triangles, so large meshes are first cut into pieces. A cut costs nothing but a seam.
 
-Charts of a few texels are mostly border. Flat ones of one object are merged by the six directions that faces look
-to, projected along them: faces of one merged chart share texels where one lies behind another.
+Charts of a few texels are mostly border. Flat ones of one object are merged by the six directions that faces point to
+and projected along them; faces of a merged chart share texels if one lies behind another.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from lambent.core.geometry import area_vectors, cross_2d, triangle_areas, triang
 from lambent.core.progress import Progress, silent
 from lambent.scenes.scene import Mesh, SceneObject
 
-PIECE_FACES = 1500  # more per piece is slower, fewer cost seams
-SMALL = 12.0  # texels: a smaller chart may be merged with others
-FLAT_DEG = 25.0  # between its normals and their mean, as long as a chart is merged
-SLIM = 0.35  # share of the texels it takes that a chart lies on, below which it may be merged, too
-ANGLES = np.arange(8) * np.pi / 16  # that charts are turned by, to take fewer texels
-STRETCH = 2.5  # texels of surface that one of a chart by xatlas is long at most
+PIECE_FACES = 1500  # larger pieces are slower, smaller ones cost seams
+SMALL = 12.0  # texels: smaller charts may be merged with others
+FLAT_DEG = 25.0  # largest angle between a chart's normals and their mean for merging
+SLIM = 0.35  # covered share of its texels below which a chart may be merged too
+ANGLES = np.arange(8) * np.pi / 16  # rotations tried for charts, to take fewer texels
+STRETCH = 2.5  # texels of surface along one texel of a chart by xatlas, at most
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Some faces (K,) of the object with this number, near each other."""
+    """Some faces (K,), near each other, of the object with this number."""
 
     owner: int
     faces: Indices
@@ -42,9 +42,9 @@ class Piece:
 
 @dataclass(frozen=True)
 class Chart:
-    """Faces (K,) of an object, their corners on the chart (K, 3, 2) in texels, and which corners are one vertex (K, 3).
+    """Faces (K,) of an object, their corners on the chart (K, 3, 2) in texels, and the vertex of each corner (K, 3).
 
-    Vertices are counted within the object's charts of one kind; no two charts share one.
+    Vertices are numbered within the object's charts of one kind; no two charts share one.
     """
 
     faces: Indices
@@ -55,8 +55,8 @@ class Chart:
 def pieces_of(objects: tuple[SceneObject, ...], copies: Copies, longest_m: float = np.inf) -> list[Piece]:
     """All faces in spatially compact pieces of at most PIECE_FACES (halved at the median of the longest side).
 
-    The middles of a piece's faces are no further apart than `longest_m`. Copies have the pieces of their first, the
-    same arrays, where none is longer than that.
+    The centres of a piece's faces are at most `longest_m` apart. Copies share the pieces of their original, as the same
+    arrays, if none of them is longer than that.
     """
     pieces: list[Piece] = []
     of_first: dict[int, list[Indices]] = {}
@@ -96,9 +96,9 @@ def charts_of(
     copies: Copies,
     progress: Progress = silent,
 ) -> list[list[Chart]]:
-    """Charts of all faces, by object; `sizes_m` (N,) is the size of a texel on each piece, in metres.
+    """Charts of all faces, by object; `sizes_m` (N,) is the texel size on each piece, in metres.
 
-    Copies with the same pieces, and texels that are as large beside them, have the same list.
+    Copies with the same pieces, and texels of equal relative size, share the same list.
     """
     unwrapped = _unwrapped(objects, pieces, copies)
     of_object: list[list[int]] = [[] for _ in objects]
@@ -123,7 +123,7 @@ def charts_of(
 def _unwrapped(
     objects: tuple[SceneObject, ...], pieces: list[Piece], copies: Copies
 ) -> list[tuple[Floats, Indices, Floats]]:
-    """By piece as xatlas has it: the vertex of each of its vertices, faces, and coordinates. Copies share them.
+    """Output of xatlas by piece: original vertex of each vertex, faces, and coordinates. Copies share it.
 
     Pieces are scaled to one size: xatlas ignores triangles below 1.2e-7 of its units squared.
     """
@@ -151,7 +151,7 @@ def _unwrapped(
 
 
 def _charts(mesh: Mesh, faces: Indices, pieces: list[tuple[Floats, Indices, Floats]], size_m: Floats) -> list[Chart]:
-    """The charts of an object's `pieces` as xatlas has them, of faces (K,) with texels of `size_m` (K,).
+    """The charts of an object from xatlas's `pieces`, of faces (K,) with texels of `size_m` (K,).
 
     Faces without area in the map, stretched ones, and those that pass others of their chart within a texel have no
     corners (K, 0, 2).
@@ -178,7 +178,7 @@ def _charts(mesh: Mesh, faces: Indices, pieces: list[tuple[Floats, Indices, Floa
         if not lost[mine[0]]:
             kept = mine
             while not flat[label[mine[0]]] and not (inside := in_first_layer(corners[kept], world[kept])).all():
-                kept = kept[inside]  # a smaller chart lies anew
+                kept = kept[inside]  # a smaller chart is laid out again
             lost[np.setdiff1d(mine, kept, assume_unique=True) if len(kept) < len(mine) else []] = True
             charts.append(Chart(faces[kept], corners[kept], indices[kept]))
     charts.append(Chart(faces[lost], np.zeros((lost.sum(), 0, 2)), indices[lost]))
@@ -186,15 +186,15 @@ def _charts(mesh: Mesh, faces: Indices, pieces: list[tuple[Floats, Indices, Floa
 
 
 def _groups(label: Indices) -> list[Indices]:
-    """Numbers of the faces of each label (F,)."""
+    """Face numbers by label (F,)."""
     order = np.argsort(label, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
 
 
 def _in_texels(world: Floats, uv: Floats, label: Indices) -> Floats:
-    """Corners (F, 3, 2) of charts as long as the triangles (F, 3, 3) are, by least squares; NaN where that fails.
+    """Corners (F, 3, 2) of charts scaled to the lengths of the triangles (F, 3, 3), by least squares; NaN on failure.
 
-    xatlas fits small charts into whole texels of its own, each axis by itself: lengths^2 = a du^2 + b dv^2.
+    xatlas fits small charts to whole texels, each axis separately: lengths^2 = a du^2 + b dv^2.
     """
     edge = np.roll(world, -1, axis=1) - world
     run = (np.roll(uv, -1, axis=1) - uv) ** 2
@@ -220,18 +220,18 @@ def _in_texels(world: Floats, uv: Floats, label: Indices) -> Floats:
 
 
 def _is_stretched(world: Floats, corners: Floats) -> Flags:
-    """Which triangles (F, 3, 3) have an edge much longer than on the chart (F, 3, 2), both in texels."""
+    """Flags of triangles (F, 3, 3) with an edge much longer than on the chart (F, 3, 2), both in texels."""
     length, on_chart = (np.linalg.norm(np.roll(a, -1, axis=1) - a, axis=2) for a in (world, corners))
     return np.asarray(((length > 1) & (length > STRETCH * on_chart)).any(axis=1))
 
 
 def texels_taken(extents: Floats) -> Floats:
-    """Texels of rectangles (..., 2) as they are packed: sides are a texel long at least."""
+    """Texels of rectangles (..., 2) when packed: each side is at least one texel."""
     return np.asarray((np.maximum(extents, 1) + 1).prod(axis=-1))
 
 
 def upright(corners: Floats) -> Floats:
-    """A chart (K, 3, 2) turned so that the rectangle around it takes fewest texels, of ANGLES and its longest edge."""
+    """A chart (K, 3, 2) rotated to minimise the texels of its bounding rectangle, by ANGLES and its longest edge."""
     edges = (np.roll(corners, -1, axis=1) - corners).reshape(-1, 2)
     longest = edges[(edges**2).sum(axis=1).argmax()]
     turns = _turns(np.append(ANGLES, np.arctan2(longest[1], longest[0])))
@@ -240,13 +240,13 @@ def upright(corners: Floats) -> Floats:
 
 
 def _turns(angles: Floats) -> Floats:
-    """(N, 2, 2) rotations by -angles, of rows from the left."""
+    """(N, 2, 2) rotations by -angles, applied to rows from the left."""
     c, s = np.cos(angles), np.sin(angles)
     return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
 
 
 def _merged(mesh: Mesh, charts: list[Chart], size_m: Floats) -> list[Chart]:
-    """Charts of an object, small ones merged where that takes fewer texels."""
+    """Charts of an object, with small ones merged if that takes fewer texels."""
     lost = np.concatenate([chart.faces for chart in charts if not chart.corners.size])
     kept = [chart for chart in charts if chart.corners.size]
     is_small, taken = _small(mesh, kept)
@@ -260,9 +260,9 @@ def _merged(mesh: Mesh, charts: list[Chart], size_m: Floats) -> list[Chart]:
 
 
 def _small(mesh: Mesh, charts: list[Chart]) -> tuple[Flags, float]:
-    """Which charts are better merged (N,), and the texels that these take.
+    """Flags of charts to merge (N,), and the texels they take.
 
-    All faces of one look almost one way: on rounded things, seams along six directions would be seen.
+    All faces of such a chart point almost one way: on round objects, seams along six directions would be visible.
     """
     if not charts:
         return np.zeros(0, bool), 0.0
@@ -281,7 +281,7 @@ def _small(mesh: Mesh, charts: list[Chart]) -> tuple[Flags, float]:
 
 
 def _by_direction(mesh: Mesh, faces: Indices, size_m: Floats, first: int) -> list[Chart]:
-    """Merged charts of some faces; vertices of different `first` differ. `size_m` (F,) is of all faces."""
+    """Merged charts of some faces; corners of different `first` are different vertices. `size_m` (F,): of all faces."""
     corners, size_m = mesh.corners_of(faces).astype(float), size_m[faces]
     normals, areas = triangle_normals(corners), triangle_areas(corners)
     axis = np.where(areas > 0, np.abs(normals).argmax(axis=1), np.ptp(corners, axis=1).argmin(axis=1))
@@ -300,7 +300,7 @@ def _by_direction(mesh: Mesh, faces: Indices, size_m: Floats, first: int) -> lis
                     left += [mine[layer] for layer in layers]
                     continue
                 number = mesh.faces[faces[mine]].astype(np.int64) + len(mesh.positions) * (first + len(charts))
-                charts.append(Chart(faces[mine], flat, -number))  # negative: none of a chart by xatlas
+                charts.append(Chart(faces[mine], flat, -number))  # negative: distinct from charts by xatlas
     return charts
 
 

@@ -1,7 +1,7 @@
-"""Faces in groups that lie close together, so that merged charts of a light map take few texels.
+"""Groups of nearby faces, for merged charts that take few texels of the light map.
 
-A group costs the texels of the rectangle around it, in the best of some turns, and MIXED texels for each texel of its
-surface and of its depth: faces of one group share texels where one lies behind another.
+A group costs the texels of its bounding rectangle, in the best of several rotations, plus MIXED texels per texel of its
+surface and of its depth, because its faces share texels if one lies behind another.
 """
 
 from __future__ import annotations
@@ -11,22 +11,22 @@ import numpy as np
 
 from lambent.core.arrays import Floats, Indices
 
-LONGEST = 24.0  # texels: a group with a longer side is halved even where that takes a little more...
-TRIED = 1.03  # ...up to this, because halves of halves may take less
-MANY = 4096  # faces of a group that is not turned to find what it costs: it will be halved anyway
-FEWEST = 4.0  # texels that a chart takes at least
-MIXED = 0.1  # texels that one texel is worth whose faces are mixed over a depth of one texel
+LONGEST = 24.0  # texels: a group with a longer side is halved even if that costs slightly more...
+TRIED = 1.03  # ...up to this factor, because further halving may cost less
+MANY = 4096  # faces above which a group's cost is estimated without rotation: it will be halved anyway
+FEWEST = 4.0  # least number of texels of a chart
+MIXED = 0.1  # cost of one texel with faces mixed over a depth of one texel
 
 
 def clusters_of(corners: Floats, areas: Floats, size_m: Floats, depth: int, turns: Floats) -> list[Indices]:
-    """Numbers of faces (F,) in groups, each halved as long as that costs less.
+    """Face numbers (F,) in groups, each halved as long as that lowers the cost.
 
     Parameters
     ----------
     corners : (F, 3, 3) of the faces, in metres.
-    areas, size_m : (F,) of the faces in m^2, and of their texels in metres.
+    areas, size_m : (F,) areas of the faces in m^2, and their texel sizes in metres.
     depth : the axis along which they are projected.
-    turns : (N, 2, 2) rotations from the right that are tried, the first of them none.
+    turns : (N, 2, 2) rotations to try, applied from the right, the first being none.
     """
     flat = np.ascontiguousarray(np.delete(corners, depth, axis=2))
     depths = np.ascontiguousarray(corners[:, :, depth])
@@ -39,7 +39,7 @@ def clusters_of(corners: Floats, areas: Floats, size_m: Floats, depth: int, turn
 def _cost(
     flat: Floats, depths: Floats, areas: Floats, size_m: Floats, turns: Floats, mine: Indices
 ) -> tuple[float, float]:
-    """What a group costs, in texels, and its longer side without a turn."""
+    """A group's cost in texels, and its longer side without rotation."""
     area = weighted = plain = 0.0
     for face in mine:
         area += areas[face]
@@ -69,7 +69,7 @@ def _cost(
 def _halved(
     flat: Floats, depths: Floats, middles: Floats, areas: Floats, size_m: Floats, turns: Floats
 ) -> tuple[Indices, Indices]:
-    """All faces (F,) group by group, and where each group ends."""
+    """All faces (F,) group by group, and the end of each group."""
     count = len(areas)
     order, kept, ends, done = np.arange(count), np.empty(count, np.int64), [0][:0], 0
     price, side = _cost(flat, depths, areas, size_m, turns, order)

@@ -1,8 +1,8 @@
 """The surface within a texel of the light map: areas, and points spread over them.
 
-A cell is an axis-parallel square of the map, and of each triangle that crosses it the part within counts. Points are
-placed by inverting that part's own distribution over x, then over y at that x: equal shares of the unit square become
-equal shares of its area, and neighbours stay neighbours, so that stratified samples stay stratified.
+A cell is an axis-aligned square of the map; of each triangle that crosses it, the part inside counts. Points are placed
+by inverting that part's distribution over x, then over y at that x: equal shares of the unit square become equal shares
+of its area, and neighbours stay neighbours, which preserves stratification.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from lambent.bake.tiles import slices
 from lambent.core.arrays import Floats, Indices
 from lambent.core.geometry import cross_2d, triangle_areas
 
-CANDIDATES_AT_ONCE = 1 << 20  # (triangle, texel) pairs tested in one go: some 200 MB
+CANDIDATES_AT_ONCE = 1 << 20  # (triangle, texel) pairs tested at a time: about 200 MB
 PLACED_AT_ONCE = 1 << 16
-FLAT = 1e-12  # texels: an edge that runs no further in x is upright
+FLAT = 1e-12  # texels: an edge with a smaller extent in x counts as vertical
 
 
 @dataclass(frozen=True)
 class Pieces:
-    """Parts of triangles in cells, in the order of the cells: cell (N,), face (N,), area (N,) in m^2."""
+    """Parts of triangles in cells, sorted by cell: cell (N,), face (N,), area (N,) in m^2."""
 
     cell: Indices
     face: Indices
@@ -38,14 +38,14 @@ def corners_of(geometry: dict[str, Floats], width: int, height: int) -> Floats:
 
 
 def density_of(geometry: dict[str, Floats], corners: Floats) -> Floats:
-    """Square metres per texel (T,) of triangles, 0 where one has no area in the map."""
+    """Square metres per texel (T,) of triangles, 0 for one without area in the map."""
     world = triangle_areas(geometry["positions"][geometry["faces"]].astype(float))
     in_map = np.abs(cross_2d(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])) / 2
     return np.divide(world, in_map, out=np.zeros(len(world)), where=in_map > 0)
 
 
 def pieces_of(geometry: dict[str, Floats], width: int, height: int, *, reach: float = 0.0) -> Pieces:
-    """Parts of all triangles in all texels, or in cells that are larger by `reach` texels on every side."""
+    """Parts of all triangles in all texels, or in cells enlarged by `reach` texels on every side."""
     corners = corners_of(geometry, width, height)
     density = density_of(geometry, corners)
     found: list[tuple[NDArray[Any], ...]] = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))]
@@ -61,18 +61,18 @@ def pieces_of(geometry: dict[str, Floats], width: int, height: int, *, reach: fl
 
 
 def texel_areas(geometry: dict[str, Floats], width: int, height: int) -> Floats:
-    """(H, W) float64: area in m^2 of the surface in each texel's square; `geometry` as in `atlas.merged`."""
+    """(H, W) float64: surface area in m^2 in each texel's square; `geometry` as in `atlas.merged`."""
     pieces = pieces_of(geometry, width, height)
     return np.asarray(np.bincount(pieces.cell, pieces.area, minlength=width * height).reshape(height, width))
 
 
 def in_cell(triangles: Floats, x: Indices, y: Indices, reach: float) -> Floats:
-    """Triangles (n, 3, 2) in texels, in the coordinates of cells: there a cell is the unit square."""
+    """Triangles (n, 3, 2) in texels, transformed so that their cell is the unit square."""
     return np.asarray((triangles - np.stack([x, y], axis=-1)[:, None] + reach) / (1 + 2 * reach))
 
 
 def _pairs(corners: Floats, width: int, height: int, reach: float) -> Iterator[tuple[Indices, Indices, Indices]]:
-    """Triangles and the texels (column, row) whose cells they may cross, some at a time."""
+    """Yield triangles with the texels (column, row) whose cells they may cross, in batches."""
     low = np.floor(corners.min(axis=1) - reach).astype(int).clip(0, (width - 1, height - 1))
     high = np.floor(corners.max(axis=1) + reach).astype(int).clip(0, (width - 1, height - 1))
     counts = high - low + 1
@@ -106,12 +106,12 @@ def _overlap(triangles: Floats) -> Floats:
 
 
 def _integral(y: Floats) -> Floats:
-    """Of y clamped to [0, 1]."""
+    """Integral of y clamped to [0, 1]."""
     return np.where(y <= 0, 0.0, np.where(y >= 1, y - 0.5, y * y / 2))
 
 
 def placed(triangles: Floats, u: Floats) -> Floats:
-    """Points (n, 2) in the part of triangles (n, 3, 2) within the unit square, uniform by area where u (n, 2) is.
+    """Points (n, 2) in the part of triangles (n, 3, 2) within the unit square, uniform by area if u (n, 2) is uniform.
 
     u is in [0, 1]^2. A triangle that only touches the square gives a point on its border.
     """
@@ -122,7 +122,7 @@ def placed(triangles: Floats, u: Floats) -> Floats:
 
 
 def _placed(triangles: Floats, u: Floats) -> Floats:
-    """Between breaks, the height of the part is linear in x: its integral is inverted there."""
+    """Between breaks, the part's height is linear in x, and its integral can be inverted."""
     breaks = _breaks(triangles)
     low, high = _extent(triangles, breaks)
     height, rows = high - low, np.arange(len(breaks))
@@ -140,7 +140,7 @@ def _placed(triangles: Floats, u: Floats) -> Floats:
 
 
 def _breaks(triangles: Floats) -> Floats:
-    """(n, 11) sorted x, between which the borders of the part in the unit square are straight."""
+    """(n, 11) sorted x between which the borders of the part in the unit square are straight."""
     ends = triangles[..., 0].min(axis=1).clip(0, 1), triangles[..., 0].max(axis=1).clip(0, 1)
     found = [*ends, *triangles[..., 0].T]
     for i in range(3):

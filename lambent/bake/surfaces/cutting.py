@@ -1,8 +1,8 @@
-"""Very large triangles, cut so that the part near viewers is apart from the rest: only then can it have finer texels.
+"""Cutting of very large triangles, to separate the part near viewers, which then can have finer texels.
 
-A floor that is a plain of two triangles is halved along longest edges (Rivara 1984), until no triangle near viewers is
-longer than they see, and none far away longer than its distance. Neighbours are cut along with it: there are no
-T-junctions.
+A ground plane of two triangles, for example, is halved along longest edges (Rivara 1984), until no triangle near
+viewers is longer than their view reaches, and no distant one longer than its distance. Neighbours are cut as well, to
+avoid T-junctions.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import normalize
 from lambent.scenes.mesh import Mesh, boxes_of
 
-LEAST_M = 10.0  # a shorter triangle is never cut
-TIMES = 4.0  # as long as viewers see, from where on an object's triangles are cut
-MOST_FACES = 20_000  # of an object, after which nothing more is cut
+LEAST_M = 10.0  # shorter triangles are never cut
+TIMES = 4.0  # multiple of the viewers' reach from which on an object's triangles are cut
+MOST_FACES = 20_000  # per object, after which nothing more is cut
 ROUNDS = 64
-ON_PLANE = 1e-6  # metres, and share of the largest coordinate: a closer vertex lies on a plane
+ON_PLANE = 1e-6  # metres, and share of the largest coordinate: closer vertices count as on a plane
 
 
 def lengths_of(corners: Floats) -> Floats:
@@ -29,7 +29,7 @@ def lengths_of(corners: Floats) -> Floats:
 
 
 def too_long(meshes: Sequence[Mesh], reach_m: float = 0.0) -> Indices:
-    """Numbers of the meshes with triangles so long that they are cut where viewers see `reach_m` far."""
+    """Indices of the meshes with triangles long enough to be cut for viewers who see `reach_m` far."""
     longest = max(LEAST_M, TIMES * reach_m)
     boxes = boxes_of(meshes).astype(float)
     large = np.flatnonzero(np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) > longest)
@@ -38,7 +38,7 @@ def too_long(meshes: Sequence[Mesh], reach_m: float = 0.0) -> Indices:
 
 
 def cut(mesh: Mesh, eyes: Floats, reach_m: float) -> Mesh:
-    """The mesh with no triangle longer than `reach_m` and its distance from the nearest of the eyes (E, 3)."""
+    """The mesh with no triangle longer than the larger of `reach_m` and its distance from the nearest eye (E, 3)."""
     for _ in range(ROUNDS):
         corners = mesh.corners.astype(float)
         middles = corners.mean(axis=1)
@@ -54,12 +54,12 @@ def cut(mesh: Mesh, eyes: Floats, reach_m: float) -> Mesh:
 
 
 def _halved(mesh: Mesh, wanted: Flags) -> Mesh:
-    """Triangles `wanted` (F,) halved across their longest edge, and others as often as keeps edges whole."""
+    """Halve triangles `wanted` (F,) across their longest edge, and others as needed to avoid T-junctions."""
     _, place = np.unique(mesh.positions, axis=0, return_inverse=True)
     place = place.reshape(-1).astype(np.int64)
 
     def edges(faces: Indices) -> Indices:
-        """(F, 3) numbers of the edges opposite to corner 2, 0, 1, whatever vertices they have."""
+        """(F, 3) edge numbers opposite to corners 2, 0, 1, independent of how vertices are split."""
         ends = np.sort(np.stack([place[faces], place[np.roll(faces, -1, axis=1)]], axis=-1), axis=-1)
         return np.asarray((ends[..., 0] << 32) + ends[..., 1])
 
@@ -75,7 +75,7 @@ def _halved(mesh: Mesh, wanted: Flags) -> Mesh:
             break
         marked = np.union1d(marked, more)
     faces = np.take_along_axis(faces, (longest[:, None] + np.arange(3)) % 3, axis=1)[rows]  # longest edge first
-    for _ in range(2):  # first the longest edge, then what is left of the others
+    for _ in range(2):  # first the longest edge, then the rest of the others
         hit = np.isin(edges(faces), marked)
         first = hit.argmax(axis=1)
         faces = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
@@ -88,15 +88,15 @@ def _halved(mesh: Mesh, wanted: Flags) -> Mesh:
 
 
 def cut_across(mesh: Mesh, plane: tuple[float, float, float, float]) -> Mesh:
-    """The mesh with new vertices where a plane (n, d), n.x + d = 0, crosses its edges: no triangle has two sides of it.
+    """The mesh with new vertices where a plane (n, d), n.x + d = 0, crosses its edges: no triangle lies on both sides.
 
-    Triangles on both sides of an edge that vertices are shared by, or lie in one place, get the same vertex.
+    Triangles on both sides of an edge get the same vertex if they share its vertices, or their vertices coincide.
     """
     n, d = np.array(plane[:3], float), plane[3]
     height = (mesh.positions.astype(float) @ n + d) / np.linalg.norm(n)
     height[np.abs(height) < ON_PLANE * (1 + np.abs(mesh.positions).max(axis=1))] = 0
     faces = mesh.faces.astype(np.int64)
-    for _ in range(2):  # first one of the edges that cross, then the other
+    for _ in range(2):  # first one of the crossing edges, then the other
         ends = height[faces] * height[np.roll(faces, -1, axis=1)]
         crossed = (ends < 0).any(axis=1)
         if not crossed.any():
@@ -111,16 +111,16 @@ def cut_across(mesh: Mesh, plane: tuple[float, float, float, float]) -> Mesh:
 
 
 def _with_vertices(mesh: Mesh, a: Indices, b: Indices, height: Floats | None = None) -> tuple[Mesh, Indices]:
-    """The mesh with vertices between vertices a and b (N,), one for each pair, and their numbers (N,).
+    """The mesh with new vertices between vertices a and b (N,), one per distinct pair, and their numbers (N,).
 
-    They lie in the middle, or where `height` (V,), of opposite signs at both ends, is 0.
+    They are at the midpoint, or where `height` (V,), of opposite signs at both ends, is 0.
     """
     pairs, index = np.unique(np.sort(np.stack([a, b], axis=1), axis=1), axis=0, return_inverse=True)
     ends = np.ones((len(pairs), 2)) * (1, -1) if height is None else height[pairs]
     low, high = ends[:, :1], ends[:, 1:]
 
     def between(values: Floats) -> Floats:
-        """The same to the bit from both ends."""
+        """Bitwise equal from both ends."""
         start, end = values.astype(float)[pairs.T]
         return np.asarray((start * high - end * low) / (high - low))
 

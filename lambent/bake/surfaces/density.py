@@ -1,10 +1,10 @@
-"""How large the texels of each part of a scene are, from where viewers see it.
+"""Texel sizes of the parts of a scene, chosen by viewers' distance.
 
-A texel of size s at the distance d covers s/d of a view. With A_i the area of a part, s_i the size of its texels and
-W_i the integral of 1/d over the directions in which viewers see it, the mean of s/d over all views is proportional to
-the sum of s_i W_i. For a given number of texels, the sum of A_i / s_i^2, it is least where 1 / s_i^2 is proportional to
-(W_i / A_i)^(2/3). Rooms would get most of it, and the furniture that casts their shadows little: SOFTER lies between
-that and even texels. No part takes much more than its share of what viewers see, as a plain to the horizon would.
+A texel of size s at distance d covers s/d of a view. With A_i the area of a part, s_i its texel size and W_i the
+integral of 1/d over the directions in which viewers see it, the mean of s/d over all views is proportional to the sum
+of s_i W_i. For a given number of texels, the sum of A_i / s_i^2, it is minimal if 1 / s_i^2 is proportional to
+(W_i / A_i)^(2/3). That would favour rooms, and give little to the furniture that casts their shadows, so SOFTER lies
+between it and equal texels. No part takes much more than its visible share, as a plain to the horizon would.
 """
 
 from __future__ import annotations
@@ -16,25 +16,25 @@ import numpy as np
 from lambent.core.arrays import Floats, Indices
 from lambent.scenes.scene import Scene
 
-SOFTER = 1 / 3  # in place of 2/3
-SPREAD = 2.5  # times the size of a typical texel that texels of unseen parts have, and seen ones at most and at least
-AT_MOST = 1.5  # times a part's share of all that is seen: its share of texels
-UNSEEN = 0.1  # share of the texels that parts which are hardly seen may take, by area
-COARSE = 4.0  # times as large as a texel should be: what is worth a warning
-NOTABLE = 0.01  # share of all that is seen, below which an object gets no warning
+SOFTER = 1 / 3  # replaces 2/3
+SPREAD = 2.5  # size of texels of unseen parts relative to a typical texel, and bound for seen ones either way
+AT_MOST = 1.5  # a part's share of texels relative to its visible share, at most
+UNSEEN = 0.1  # share of the texels for parts that are hardly seen, by area
+COARSE = 4.0  # ratio to the target size of a texel that is worth a warning
+NOTABLE = 0.01  # visible share below which an object gets no warning
 WARNINGS = 5
 
 
 @dataclass(frozen=True)
 class Views:
-    """What viewers see of N parts: `weight` is W/A in 1/m^3, `share` that of all that is seen, both (N,)."""
+    """What viewers see of N parts: `weight` is W/A in 1/m^3, `share` the visible share, both (N,)."""
 
     weight: Floats
     share: Floats
 
 
 def sizes_seen(areas_m2: Floats, scales: Floats, views: Views, texels: int) -> Floats:
-    """Size of the texels of each part in metres (N,), for so many texels in all; `scales` are `light_map_scale`."""
+    """Texel size of each part in metres (N,), for `texels` texels in total; `scales` are `light_map_scale`."""
     density = views.weight**SOFTER
     order = np.argsort(density)
     middle = order[np.searchsorted(np.cumsum(views.share[order]), views.share.sum() / 2).clip(0, len(order) - 1)]
@@ -49,10 +49,10 @@ def sizes_seen(areas_m2: Floats, scales: Floats, views: Views, texels: int) -> F
 
 
 def coarse_objects(scene: Scene, owner: Indices, size_m: Floats, distance_m: Floats) -> list[str]:
-    """Warnings of objects most looks at which meet much larger texels, for where they are seen from, than other looks.
+    """Warnings for objects on which most looks meet much larger texels, for their distance, than other looks.
 
-    `owner` (M,) is the number of the object that each look of a viewer meets, `size_m` that of its texels there, and
-    `distance_m` how far away it is.
+    For each look of a viewer, `owner` (M,) is the number of the object it meets, `size_m` the texel size there, and
+    `distance_m` the distance.
     """
     if not len(owner):
         return []

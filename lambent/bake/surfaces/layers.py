@@ -1,8 +1,8 @@
-"""Layers of a chart: no texel of one is touched by places of the surface that are far apart.
+"""Layers of a chart: within a layer, distant places of the surface never touch the same texel.
 
-Faces are projected onto a merged chart, so that what lies behind another face lands in the same texels. Parts of a
-chart by xatlas may pass each other at less than a texel. Layers are peeled off: the first has the first face in each
-texel and all that lie close to it, the next the same of those that are left.
+Faces projected onto a merged chart land in the same texels if one lies behind another. Parts of a chart by xatlas may
+pass each other at less than a texel. Layers are peeled off: the first takes the first face in each texel and all faces
+close to it, the next does the same with the rest.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ import numpy as np
 from lambent.bake.surfaces.packing import meets, near, snapped
 from lambent.core.arrays import Flags, Floats, Indices
 
-BEHIND = 2.0  # texels between the depths of projected faces that share a texel, at most
-REACH = 3.6  # texels between places from which look-ups touch one texel, at most, and some more
-APART = 4.0  # texels between places of one surface that share a texel, along each axis, at most
+BEHIND = 2.0  # largest difference in depth, in texels, of projected faces that share a texel
+REACH = 3.6  # largest distance in texels, with margin, between places from which look-ups touch one texel
+APART = 4.0  # largest distance in texels, along each axis, between places of one surface that share a texel
 
 
 def layers_of(corners: Floats, depths: Floats) -> list[Indices]:
-    """Faces projected onto a chart in layers, the nearest first.
+    """Faces projected onto a chart, in layers, nearest first.
 
     Parameters
     ----------
     corners : (F, 3, 2) of triangles on the chart, in texels.
     depths : (F, 3) of the same corners along the projection, in texels.
     """
-    if np.ptp(depths) <= BEHIND:  # nothing lies far behind anything
+    if np.ptp(depths) <= BEHIND:  # no face lies far behind another
         return [np.arange(len(depths))]
     left = np.argsort(depths.min(axis=1), kind="stable")
     found = []
@@ -38,11 +38,11 @@ def layers_of(corners: Floats, depths: Floats) -> list[Indices]:
 
 
 def lie_flat(corners: Floats, places: Floats, chart: Indices) -> Flags:
-    """Which charts (max + 1,) are one layer for certain, because an affine map takes them to the surface.
+    """Flags of charts (max + 1,) that are certainly one layer, because an affine map takes them to the surface.
 
-    `chart` (F,) is the number of the chart of each face; `corners` (F, 3, 2) and `places` (F, 3, 3) are in texels.
-    Look-ups touch a texel from within REACH of each other, so places of one texel are no further apart than |A| REACH
-    and twice what the map A, found by least squares, leaves.
+    `chart` (F,) is the chart of each face; `corners` (F, 3, 2) and `places` (F, 3, 3) are in texels. Look-ups touch a
+    texel from within REACH of each other, so places in one texel are at most |A| REACH plus twice the residual apart,
+    for the least squares map A.
     """
     if not len(chart):
         return np.zeros(0, bool)
@@ -68,9 +68,9 @@ def lie_flat(corners: Floats, places: Floats, chart: Indices) -> Flags:
 
 
 def in_first_layer(corners: Floats, places: Floats, most: float = APART) -> Flags:
-    """Which faces (F,) of a chart touch no texel that one before touches from more than `most` away.
+    """Flags of faces (F,) of a chart that touch no texel that an earlier face touches from more than `most` away.
 
-    `corners` (F, 3, 2) and `places` (F, 3, D), along D axes, are in texels. The first face always does.
+    `corners` (F, 3, 2) and `places` (F, 3, D), along D axes, are in texels. The first face is always included.
     """
     local, (columns, rows) = snapped(corners)
     return np.asarray(_first(local, np.ascontiguousarray(places, dtype=float), columns, rows, most))
@@ -101,7 +101,7 @@ def _first(corners: Floats, places: Floats, width: int, height: int, most: float
 
 @numba.njit(cache=True)
 def _nearest(t: Floats, x: float, y: float) -> Floats:
-    """(3,) barycentric weights of the place on a triangle (3, 2) that is nearest to (x, y)."""
+    """(3,) barycentric weights of the point on a triangle (3, 2) nearest to (x, y)."""
     weights = np.zeros(3)
     for i in range(3):
         b, c = t[(i + 1) % 3], t[(i + 2) % 3]

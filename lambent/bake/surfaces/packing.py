@@ -1,8 +1,8 @@
-"""Packing of a light map: charts as sets of texels, each in the first place where it fits.
+"""Packing of a light map: charts as sets of texels, each at the first place where it fits.
 
-A chart takes the texels that bilinear look-ups on it touch, and no others: texels of two charts may be neighbours, and
-never the same. Its sides are whole numbers of texels long and run through the middles of texels, so that w x h texels
-of surface take (w + 1) x (h + 1).
+A chart occupies exactly the texels that bilinear look-ups on it touch: texels of two charts may be adjacent, but never
+shared. Its sides are whole numbers of texels long and pass through texel centres, so that w x h texels of surface take
+(w + 1) x (h + 1).
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats, Indices
 
-INSET = 1 / 512  # texels, from the middles of the outermost texels: rounding must not reach the ones beyond
-FULL = 0.94  # share of a map that charts fill, about, from which its width follows
-SEARCHES = 3  # heights that are tried, each twice the one before
+INSET = 1 / 512  # texels, from the centres of the outermost texels: rounding must not reach beyond them
+FULL = 0.94  # approximate share of a map that charts fill, which determines its width
+SEARCHES = 3  # heights tried, each twice the previous
 
 
 def snapped(corners: Floats) -> tuple[Floats, tuple[int, int]]:
-    """A chart's triangles (F, 3, 2) in texels, in whole texels, wider than high, and its size (columns, rows).
+    """A chart's triangles (F, 3, 2), scaled to whole texels and wider than high, and its size (columns, rows).
 
-    Its least corner lies in the middle of texel (0, 0).
+    Its lowest corner is at the centre of texel (0, 0).
     """
     low = corners.reshape(-1, 2).min(axis=0)
     extent = corners.reshape(-1, 2).max(axis=0) - low
@@ -34,9 +34,9 @@ def snapped(corners: Floats) -> tuple[Floats, tuple[int, int]]:
 
 
 def packed(shapes: list[tuple[Floats, tuple[int, int]]], shape: Indices) -> tuple[Indices, tuple[int, int]]:
-    """Texel (column, row) at which each chart begins (N, 2), and the map's size (width, height).
+    """Origin texel (column, row) of each chart (N, 2), and the map's size (width, height).
 
-    `shapes` are those of `snapped`, and `shape` (N,) is the number of each chart's.
+    `shapes` come from `snapped`; `shape` (N,) is the index of each chart's shape.
     """
     columns, rows = np.array([size for _, size in shapes], np.int64).reshape(-1, 2).T
     starts = np.append(0, np.cumsum(columns * rows))
@@ -57,7 +57,7 @@ def packed(shapes: list[tuple[Floats, tuple[int, int]]], shape: Indices) -> tupl
 
 @numba.njit(cache=True)
 def _touched(corners: Floats, width: int, height: int, taken: NDArray[np.uint8]) -> None:
-    """Mark cells less than a texel from a triangle (F, 3, 2), along rows and columns: it meets their 2 x 2 squares."""
+    """Mark cells less than a texel from a triangle (F, 3, 2), along rows and columns: their 2 x 2 squares meet it."""
     for f in range(len(corners)):
         t = corners[f]
         rows, columns = near(t, width, height)
@@ -69,7 +69,7 @@ def _touched(corners: Floats, width: int, height: int, taken: NDArray[np.uint8])
 
 @numba.njit(cache=True)
 def near(t: Floats, width: int, height: int) -> tuple[tuple[int, int], tuple[int, int]]:
-    """First and end of the rows, and of the columns, less than a texel from the rectangle around a triangle (3, 2)."""
+    """First and past-last row, and column, less than a texel from the bounding rectangle of a triangle (3, 2)."""
     low_x, high_x = min(t[0, 0], t[1, 0], t[2, 0]), max(t[0, 0], t[1, 0], t[2, 0])
     low_y, high_y = min(t[0, 1], t[1, 1], t[2, 1]), max(t[0, 1], t[1, 1], t[2, 1])
     rows = max(0, int(np.floor(low_y - 0.5))), min(height, int(np.floor(high_y + 0.5)) + 1)
@@ -78,8 +78,8 @@ def near(t: Floats, width: int, height: int) -> tuple[tuple[int, int], tuple[int
 
 @numba.njit(cache=True)
 def meets(t: Floats, x: float, y: float) -> bool:
-    """Whether a triangle (3, 2) meets the square of 2 x 2 texels around (x, y), which lies near it."""
-    for i in range(3):  # the normals of the edges as separating axes
+    """Whether a triangle (3, 2) meets the square of 2 x 2 texels around a nearby (x, y)."""
+    for i in range(3):  # separating axis test with the edges' normals
         a, b, c = t[i], t[(i + 1) % 3], t[(i + 2) % 3]
         nx, ny = b[1] - a[1], a[0] - b[0]
         inner = nx * (c[0] - a[0]) + ny * (c[1] - a[1])
@@ -101,10 +101,10 @@ def _placed(
     width: int,
     height: int,
 ) -> tuple[Indices, int]:
-    """First fit from the top, row by row. 0 rows are used where the height does not suffice.
+    """First fit from the top, row by row; returns 0 rows if the height does not suffice.
 
-    `busy` is the first taken column at or after each, `free` the first that is not: a chart that does not fit jumps
-    past what is in its way. Where a chart did not fit, the next of the same texels does not either.
+    `busy` is the first occupied column at or after each, `free` the first free one: a chart that does not fit jumps
+    past the obstacle. After a failure, further charts with the same texels are not tried there.
     """
     places = np.zeros((len(order), 2), np.int64)
     busy = np.full((height, width + 1), width, np.int32)
@@ -153,7 +153,7 @@ def _placed(
 
 @numba.njit(cache=True)
 def _runs(mask: NDArray[np.uint8]) -> Indices:
-    """(N, 3) row, first column, and column after the last, of what is taken; the longest first."""
+    """(N, 3) row, first column, and past-last column of occupied runs; longest first."""
     found = [(0, 0, 0)]
     for row in range(mask.shape[0]):
         start = -1
@@ -181,6 +181,6 @@ def _take(busy: NDArray[np.int32], free: NDArray[np.int32], runs: Indices, x: in
             busy[row, column] = first
             column -= 1
         column = first - 1
-        while column >= 0 and busy[row, column] == column:  # taken up to here
+        while column >= 0 and busy[row, column] == column:  # occupied up to here
             free[row, column] = after
             column -= 1

@@ -1,11 +1,11 @@
 """Surface points of the light map's texels.
 
 Texel (row, column) is the square from (column/W, row/H) to ((column + 1)/W, (row + 1)/H), and holds the mean over the
-surface in it. Its points are spread over that by area, each at random in a stratum of its own, so that irradiance that
-varies within a texel is neither over- nor underestimated. A texel that bilinear look-ups touch, although hardly any
-surface lies in it, has points wherever those look-ups come from: in its own square and half a texel around.
+surface in it. Its points are spread over that by area, each at random in its own stratum, so that irradiance that
+varies within a texel is unbiased. A texel that bilinear look-ups touch although it has hardly any surface gets points
+from the whole footprint of those look-ups: its own square and half a texel around.
 
-Points are stored, not drawn anew for each sample, because each is tested for lying within a solid and for being seen:
+Points are stored, not drawn again for each sample, because each is tested for lying within a solid and for visibility:
 one side of a texel across a wall may be a thousand times as bright as the other.
 """
 
@@ -21,21 +21,21 @@ from lambent.core.directions import normalize
 from lambent.core.geometry import area_vectors, cross_2d, triangle_areas
 
 POINTS = 4  # per texel, an even number
-SLIVER = 0.02  # share of a texel that lies on the surface, below which it has points around itself
-FOOTPRINT = 0.5  # texels around a texel from where bilinear look-ups touch it
+SLIVER = 0.02  # covered share of a texel below which its points also come from around it
+FOOTPRINT = 0.5  # texels around a texel from which bilinear look-ups touch it
 MARGIN = 2e-6  # metres, and share of the largest coordinate, from the border of a triangle
-MOST = 0.2  # share of a triangle's height that is margin
-BEYOND = 1 << 40  # added to the label of a chart, for texels that no viewer sees (tracing/visibility.py)
+MOST = 0.2  # largest share of a triangle's height that is margin
+BEYOND = 1 << 40  # added to a texel's chart label if no viewer sees it (tracing/visibility.py)
 
 
 @dataclass(frozen=True)
 class Texels:
     """Surface points of the covered texels, in row-major order of the texels.
 
-    index (K,) int64 is row * width + column; face (K, POINTS) int64 counts through the merged geometry; positions,
-    normals (shading) and flat (of the triangle) are (K, POINTS, 3) float32. Each point stands for an equal share of
-    area. spacing (K,) is the size of a texel in metres, area_m2 (K,) the surface in the texel's square: less than
-    spacing^2 at borders of charts, 0 where a texel is only touched by look-ups.
+    index (K,) int64 is row * width + column; face (K, POINTS) int64 indexes the merged geometry; positions, normals
+    (shading) and flat (of the triangle) are (K, POINTS, 3) float32. Each point represents an equal share of area.
+    spacing (K,) is the texel size in metres, area_m2 (K,) the surface in the texel's square: less than spacing^2 at
+    borders of charts, 0 for a texel only touched by look-ups.
     """
 
     width: int
@@ -80,14 +80,14 @@ def texels_of(geometry: dict[str, Floats], width: int, height: int) -> Texels:
 
 
 def area_of_texels(texels: Texels) -> Floats:
-    """(H, W) area in m^2 of the surface in each texel's square."""
+    """(H, W) surface area in m^2 in each texel's square."""
     found = np.zeros(texels.width * texels.height)
     found[texels.index] = texels.area_m2
     return found.reshape(texels.height, texels.width)
 
 
 def covered_share(texels: Texels) -> Floats:
-    """(H, W) share of each texel's square that surface covers, 0 to 1."""
+    """(H, W) share, 0 to 1, of each texel's square that is covered by surface."""
     found = np.zeros(texels.width * texels.height)
     found[texels.index] = np.minimum(texels.area_m2 / np.maximum(texels.spacing, 1e-12) ** 2, 1)
     return found.reshape(texels.height, texels.width)
@@ -96,7 +96,7 @@ def covered_share(texels: Texels) -> Floats:
 def _points(
     pieces: Pieces, corners: Floats, width: int, reach: float, chosen: Flags
 ) -> tuple[Indices, Indices, Floats]:
-    """Chosen cells (K,) that have pieces, and POINTS in each: faces (K, POINTS), weights (K, POINTS, 3)."""
+    """Chosen cells (K,) with pieces, and POINTS in each: faces (K, POINTS), weights (K, POINTS, 3)."""
     mine = chosen[pieces.cell]
     cell, face, area = pieces.cell[mine], pieces.face[mine], pieces.area[mine]
     index, first, count = np.unique(cell, return_index=True, return_counts=True)
@@ -117,10 +117,10 @@ def _points(
 
 
 def _strata(count: int) -> Floats:
-    """(count, POINTS, 2) points of the unit square, each at random in a row and a column of its own.
+    """(count, POINTS, 2) points of the unit square, each at random in its own row and column.
 
-    Rows and columns are paired at random, so that every place has a chance. Opposite points are mirror images of each
-    other: linear variation has no noise (antithetic variates).
+    Rows and columns are paired at random, so that every place can occur. Opposite points are mirror images, which
+    cancels the noise of linear variation (antithetic variates).
     """
     rng, half = np.random.default_rng(0), POINTS // 2
     pair = np.argsort(rng.random((count, half)), axis=1)
@@ -131,12 +131,12 @@ def _strata(count: int) -> Floats:
 
 
 def _off_borders(geometry: dict[str, Floats], face: Indices, weights: Floats) -> Floats:
-    """Weights that put all points MARGIN off the borders of their triangles, as far as those are wide enough.
+    """Weights that move points MARGIN off the borders of their triangles, as far as the triangle's width allows.
 
     On the border itself a ray would start in the plane of the neighbouring wall, and might miss it.
     """
     p = geometry["positions"][geometry["faces"]].astype(float)
-    edges = np.linalg.norm(p[:, [1, 2, 0]] - p[:, [2, 0, 1]], axis=2)  # opposite to the corners
+    edges = np.linalg.norm(p[:, [1, 2, 0]] - p[:, [2, 0, 1]], axis=2)  # opposite the corners
     twice = 2 * triangle_areas(p)[:, None]
     heights = np.divide(twice, edges, out=np.zeros_like(edges), where=edges > 0)
     margin = MARGIN * (1 + np.abs(p).max(axis=(1, 2)))[:, None]
@@ -166,7 +166,7 @@ def _surface(geometry: dict[str, Floats], face: Indices, weights: Floats) -> tup
 
 
 def chart_labels(geometry: dict[str, Floats], texels: Texels) -> Indices:
-    """(H, W) number of the chart each texel belongs to, -1 in the gutters."""
+    """(H, W) number of each texel's chart, -1 in gutters."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 

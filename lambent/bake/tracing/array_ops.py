@@ -1,4 +1,4 @@
-"""The path tracer's array functions, for code that is written once for numpy and for it."""
+"""The path tracer's array functions, for code shared with numpy."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from lambent.materials.lobes import ArrayOps
 
 
 def array_ops() -> ArrayOps:
-    """Functions of the current variant; numpy tables are uploaded when first looked up, and kept as long as these."""
-    uploaded: dict[int, tuple[Any, Any]] = {}  # with the table itself, so that no other gets its number
+    """Functions of the current variant; numpy tables are uploaded at the first look-up, and cached with this object."""
+    uploaded: dict[int, tuple[Any, Any]] = {}  # includes the table itself, so that its id is not reused
 
     def gather(table: Any, index: Any) -> Any:
         if isinstance(table, np.ndarray):

@@ -1,4 +1,4 @@
-"""Intensities of luminaires on the device: linear between the angles of their photometry, 0 beyond them."""
+"""Intensities of luminaires on the device: linear between the angles of their photometry, 0 beyond."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.scenes.ies import Photometry
 
-EDGE_RAD = 1e-6  # beyond the first and the last vertical angle
+EDGE_RAD = 1e-6  # tolerance beyond the first and the last vertical angle
 
 
 class Candela:
-    """Of luminaires by their number.
+    """Intensities by luminaire number.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Candela:
         return dr.select(active & inside, found, 0.0)
 
     def _place(self, nodes: Any, at: Any, luminaire: Any, x: Any, active: Any) -> tuple[Any, Any, list[Any], Any]:
-        """The interval of a luminaire's rising nodes that x lies in, where in it; its end nodes, and their number."""
+        """The interval of a luminaire's ascending nodes with x, the position in it, its end nodes, and their count."""
         first, count = (dr.gather(mi.UInt32, one, luminaire, active) for one in at)
 
         def node(k: Any) -> Any:
@@ -59,7 +59,7 @@ class Candela:
 
 
 def _packed(arrays: Sequence[Floats]) -> tuple[Any, tuple[Any, Any]]:
-    """Arrays one after another; where each begins, and its length."""
+    """Concatenated arrays; the start and length of each."""
     lengths = np.array([len(one) for one in arrays], np.uint32)
     first = np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.uint32)
     return mi.Float(np.concatenate(arrays).astype(np.float32)), (mi.UInt32(first), mi.UInt32(lengths))

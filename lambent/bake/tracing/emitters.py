@@ -1,8 +1,8 @@
-"""How often each emitter is sampled: in proportion to the light it brings to the scene's surfaces.
+"""Sampling weights of emitters, by the light they bring to the scene's surfaces.
 
-Mitsuba chooses emitters with equal probability, so that the sun of a room with ten lamps gets one sample in eleven.
-The variance of choosing emitter i with probability p_i is least for p_i in proportion to the root mean square of its
-contribution when chosen; a short pre-pass measures that, shadows included.
+Mitsuba chooses emitters with equal probability, so that the sun of a room with ten lamps gets one sample in eleven. To
+minimise variance, the probability p_i of emitter i must be proportional to the root mean square of its contribution
+when chosen; a short pre-pass measures that, shadows included.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from lambent.core.geometry import points_on_triangles, triangle_areas, triangle_
 from lambent.scenes.scene import Scene
 
 POINTS, SAMPLES = 8192, 16
-FLOOR = 0.1  # of the mean weight: light that the pre-pass has missed costs noise, and is not lost
+FLOOR = 0.1  # relative to the mean weight: light missed by the pre-pass costs noise, but is not lost
 
 
 def balance_emitters(builder: SceneBuilder) -> None:
-    """Set the sampling weights of a builder's emitters, for the scenes it builds from now on. Deterministic.
+    """Set the sampling weights of a builder's emitters, for all scenes it builds from now on. Deterministic.
 
-    The environment is guided first (`sky.guide`): its contribution depends on how it is sampled.
+    The environment is guided first (`sky.guide`), because its contribution depends on its sampling.
     """
     if builder.environment is not None:
         whole = builder.build()
@@ -49,14 +49,14 @@ def balance_emitters(builder: SceneBuilder) -> None:
 
 
 def brought_by(emitter: Any, scene: Scene, whole: Any) -> float:
-    """Root mean square of what samples of one mi.Emitter bring to the surfaces of a scene; `whole` is its mi.Scene."""
+    """Root mean square of the light that samples of one mi.Emitter bring to a scene's surfaces in `whole`."""
     alone = mi.load_dict({"type": "scene", "emitter": emitter}, optimize=False)
     emitter.set_scene(whole)
     return float(np.sqrt(np.mean(_brought(scene, whole, alone)[0] ** 2)))
 
 
 def _brought(scene: Scene, whole: Any, lights: Any) -> tuple[Floats, Indices]:
-    """Light that samples of the emitters of the mi.Scene `lights` bring, and Mitsuba's numbers of the emitters."""
+    """Light brought by samples of the emitters of the mi.Scene `lights`, and Mitsuba's emitter numbers."""
     position, normal = _points_and_normals(scene, POINTS)
     width = POINTS * SAMPLES
     sampler = independent(0, width)
@@ -72,7 +72,7 @@ def _brought(scene: Scene, whole: Any, lights: Any) -> tuple[Floats, Indices]:
 
 
 def _points_and_normals(scene: Scene, count: int) -> tuple[Floats, Floats]:
-    """Points (count, 3) and normals, spread over all surfaces as the light map's texels are."""
+    """Points (count, 3) and normals, distributed over all surfaces like the light map's texels."""
     rng = np.random.default_rng(0)
     corners = scene.corners
     scale = np.concatenate([np.full(len(o.mesh.faces), o.light_map_scale) for o in scene.objects])

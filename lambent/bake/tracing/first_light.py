@@ -1,7 +1,7 @@
-"""Emitters without the sun, as points of the light map sample them: its direct light is drawn elsewhere.
+"""Emitters without the sun, for sampling at points of the light map; the renderer draws the sun's direct light.
 
-A sky is the same picture without the sun's, with a guide of its own: samples that aimed at the sun would count nothing.
-Later surfaces on a path see the sun, and sample all emitters.
+A sky is the same picture without the sun's part, with its own guide: samples aimed at the sun would be wasted. Later
+surfaces on a path see the sun, and sample all emitters.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
 
 
 class FirstLight:
-    """The emitters of a builder but the sun; `environment` as `sky_without` has it, for the scene `whole`."""
+    """All emitters of a builder but the sun; `environment` as from `sky_without`, for the scene `whole`."""
 
     def __init__(self, builder: SceneBuilder, whole: Any, found: FoundSun, environment: Any) -> None:
         lights = [e for e, light in zip(builder.lights, builder.scene.lights, strict=True) if not is_sun(light, found)]
@@ -31,10 +31,10 @@ class FirstLight:
         self.scene = mi.load_dict({"type": "scene", **parts}, optimize=False)
         self._environment = environment
         for emitter in emitters:
-            emitter.set_scene(whole)  # light from afar begins beyond the whole scene
+            emitter.set_scene(whole)  # distant light begins beyond the whole scene
 
     def pdf(self, si: Any, ds: Any, active: Any) -> Any:
-        """Density (mi.Float) of `scene.sample_emitter_direction`, where `ds` says what a ray met in the whole scene."""
+        """Density (mi.Float) of `scene.sample_emitter_direction`; `ds` describes a ray's hit in the whole scene."""
         if self._environment is not None:
             ds = dr.copy(ds)
             ds.emitter = dr.select(ds.emitter.is_environment(), mi.EmitterPtr(self._environment), ds.emitter)
@@ -42,7 +42,7 @@ class FirstLight:
 
 
 def sky_without(found: FoundSun, builder: SceneBuilder, whole: Any) -> Any:
-    """mi.Emitter of a builder's environment without its sun, with a guide of its own; None where there is none.
+    """mi.Emitter of a builder's environment without its sun, with its own guide; None without an environment.
 
     The guide sees the sky through the panes that the sun passes.
     """
@@ -66,7 +66,7 @@ def sky_without(found: FoundSun, builder: SceneBuilder, whole: Any) -> Any:
 
 
 def _take_out(picture: Any, sun: SunPicture, scale: float) -> None:
-    """Take the light of a sun out of a picture (H, W, 3)."""
+    """Subtract the light of a sun from a picture (H, W, 3)."""
     (height, width), (top, left) = sun.size, sun.corner
     row, column = np.nonzero(sun.pixels.any(axis=-1))
     at = row + top, (column + left) % width

@@ -1,6 +1,6 @@
-"""Light of paths sorted by the group of its emitter: the same paths as without groups, and one more index.
+"""Light of paths, separated by the group of its emitter: the same paths as without groups, plus an index.
 
-Of an environment with a sun in it, what the sun's picture adds is the sun's, the rest the sky's.
+For an environment that contains a sun, the sun's part of the picture belongs to the sun's group, the rest to the sky's.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from lambent.scenes.light_groups import SortedLights
 
 
 class Direct(Enum):
-    """Light that is summed apart: `straight` from emitters, or `uncached`, by lobes as well but from no cache."""
+    """Separately summed light: `straight` from emitters, or `uncached`, which adds lobes but not caches."""
 
     straight = "straight"
     uncached = "uncached"
 
 
 class GroupTally:
-    """A `path_tracer.Tally` with a sum for each group and, with `direct`, one more for its direct light.
+    """A `path_tracer.Tally` with a sum per group and, with `direct`, another per group for its direct light.
 
-    Sums of all light are the first `count`. Its caches are `GroupedCache`s, or None.
+    The first `count` sums are of all light. Its caches are `GroupedCache`s, or None.
     """
 
     def __init__(self, lights: SortedLights, builder: SceneBuilder, sun: Sun | None, direct: Direct | None) -> None:

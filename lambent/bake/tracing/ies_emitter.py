@@ -1,4 +1,4 @@
-"""Luminaires of IES photometry as emitters of Mitsuba: points whose intensity is linear between the file's angles."""
+"""Luminaires of IES photometry as Mitsuba emitters: points with intensity linear between the file's angles."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _emitter_class() -> Any:
             )
 
         def _intensity(self, w: Any, active: Any) -> Any:
-            """W/sr towards unit world directions."""
+            """W/sr along unit world directions."""
             x, y, z = (dr.dot(w, axis) for axis in self._axes)
             return mi.Color3f(self._scale) * self._candela.towards(mi.UInt32(0), x, y, z, active)
 

@@ -1,9 +1,9 @@
 """Path tracing: radiance along rays and irradiance at points, one vectorised loop for every bake.
 
-Multiple importance sampling between emitter sampling and BSDF sampling (Veach 1997, balance heuristic), Russian
-roulette from the second bounce on. The path starts at a vertex that the caller has sampled, with its density.
+Multiple importance sampling of emitters and BSDFs (Veach 1997, balance heuristic), Russian roulette from the second
+bounce on. The path starts at a vertex sampled by the caller, with its density.
 
-Paths and shadow rays pass holes of surfaces (`rays`). An emitter is sampled as if it had none.
+Paths and shadow rays pass through holes of surfaces (`rays`). Emitters are sampled as if they had no holes.
 """
 
 from __future__ import annotations
@@ -23,32 +23,32 @@ Cache = Callable[[Any, Any], Any]  # (surface interaction, active) -> diffuse ra
 
 
 class Tally(Protocol):
-    """Sums (mi.Color3f) of the light that paths bring: one of all, or one for each group of emitters.
+    """Sums (mi.Color3f) of the light that paths bring: a single one, or one per group of emitters.
 
-    The first `count` add up to all light; others are parts of these.
+    The first `count` sums add up to all light; others are parts of these.
     """
 
     count: int
 
     def begin(self, width: int) -> list[Any]:
-        """Sums of no light."""
+        """Zero sums."""
         ...
 
     def emitted(self, sums: list[Any], light: Any, emitter: Any, w: Any, factor: Any, first: Any) -> list[Any]:
-        """With `light` of emitters (mi.EmitterPtr), straight from them where `first`.
+        """Add `light` of emitters (mi.EmitterPtr), straight from them where `first`.
 
-        It is the radiance that they send from the unit directions w, times `factor`, unless their sun is left out:
-        then `factor` is 0.
+        It is their radiance from the unit directions w, times `factor`, unless their sun is left out: then `factor` is
+        0.
         """
         ...
 
     def cached(self, sums: list[Any], throughput: Any, cache: Any, si: Any, active: Any) -> list[Any]:
-        """With the light of a cache at surfaces."""
+        """Add the light of a cache at surfaces."""
         ...
 
 
 class AllLight:
-    """One sum of all light; a cache is a `Cache`, or None. With `direct`, one more without the light of the cache."""
+    """One sum of all light; a cache is a `Cache`, or None. With `direct`, another sum without the cache's light."""
 
     count = 1
 
@@ -69,11 +69,11 @@ class AllLight:
 
 @dataclass
 class Start:
-    """Where paths start: `ray`, the interaction it leaves, and the density of its direction, pdf (sr^-1).
+    """Start of paths: `ray`, the interaction it leaves, and the density of its direction, pdf (sr^-1).
 
-    The density weights the emitters that the ray meets; `direct` counts them in full, where nothing else samples them.
-    The ray does not see the sun that is given as `unseen`. If that passes panes, clear glass is not met until the path
-    is scattered: what a ray sees straight through it, emitters are sampled for from the start.
+    The density weights the emitters that the ray hits; `direct` counts them in full, if nothing else samples them. The
+    ray does not see the sun `unseen`. If that sun passes panes, clear glass is ignored until the path scatters:
+    everything that a ray sees straight through glass is emitter-sampled from the start.
     """
 
     ray: Any
@@ -84,7 +84,7 @@ class Start:
 
 
 def camera_start(ray: Any) -> Start:
-    """Start of paths from a camera: nothing else samples their first ray."""
+    """Start of paths from a camera, whose first rays nothing else samples."""
     return Start(ray, dr.zeros(mi.SurfaceInteraction3f, dr.width(ray.o)), mi.Float(1.0), True)
 
 
@@ -94,15 +94,15 @@ def radiance(scene: Any, sampler: Any, start: Start, max_depth: int, cache: Cach
     Parameters
     ----------
     max_depth : int
-        Vertices on a path, the last emitter not counted: 1 sees emitters and, with a cache, diffuse surfaces.
+        Vertices on a path, excluding the last emitter: 1 sees emitters and, with a cache, diffuse surfaces.
     cache : callable, optional
-        Diffuse radiance at a surface from baked light; the scene's materials must then be without diffuse terms.
+        Diffuse radiance at a surface from baked light; the scene's materials must then have no diffuse terms.
     """
     return radiance_sums(scene, sampler, start, max_depth, cache, AllLight())[0]
 
 
 def radiance_sums(scene: Any, sampler: Any, start: Start, max_depth: int, cache: Any, tally: Tally) -> list[Any]:
-    """The same as the sums of a tally; the cache is one that the tally takes."""
+    """Likewise as the sums of a tally, with a cache that suits it."""
     found: list[Any] = _trace(
         scene, sampler, mi.Ray3f(start.ray), mi.SurfaceInteraction3f(start.origin), mi.Float(start.pdf),
         mi.Bool(start.direct), max_depth, cache, rays.has_holes(scene), start.unseen, tally,
@@ -115,7 +115,7 @@ def sample_emitter(
 ) -> tuple[Any, Any]:
     """DirectionSample3f of an emitter of the mi.Scene `lights`, and its light over its density, 0 in shadow.
 
-    Light of the sun `unseen` is left out; where that passes panes, all other light does.
+    Light of the sun `unseen` is left out; if that sun passes panes, all other light does too.
     """
     ds, value = lights.sample_emitter_direction(si, u, False, active)
     lit = active & (ds.pdf > 0)
@@ -132,7 +132,7 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, un
     width = dr.width(ray.o)
     sums = tally.begin(width)
     throughput = dr.ones(mi.Color3f, width)
-    straight = dr.full(mi.Bool, unseen is not None, width)  # from the start, through clear glass alone
+    straight = dr.full(mi.Bool, unseen is not None, width)  # so far only through clear glass
     depth = dr.zeros(mi.UInt32, width)
     active = dr.full(mi.Bool, True, width)
     ctx = mi.BSDFContext()
@@ -155,7 +155,7 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, un
         active &= si.is_valid() & (depth < max_depth)
         sums = tally.cached(sums, throughput, cache, si, active)
 
-        at = mi.SurfaceInteraction3f(si)  # with the normal on the ray's side, by which a guided sky is sampled
+        at = mi.SurfaceInteraction3f(si)  # oriented to the ray's side, for sampling a guided sky
         at.n = dr.select(dr.dot(si.n, ray.d) > 0, -si.n, si.n)
         bsdf = si.bsdf(ray)
         lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
@@ -212,11 +212,11 @@ def irradiance(
     Parameters
     ----------
     u_bsdf, u_emitter : mi.Point2f
-        In [0, 1)^2, for a cosine distributed direction and a point on an emitter; to be stratified.
+        In [0, 1)^2, for a cosine-distributed direction and a point on an emitter; to be stratified.
     max_depth, cache
-        As `radiance` takes them.
+        As in `radiance`.
     unseen : Sun, optional
-        Whose direct light is left out, straight through clear glass as well.
+        Sun whose direct light is left out, including light straight through clear glass.
     """
     return irradiance_sums(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, AllLight(), unseen)[0]
 
@@ -225,7 +225,7 @@ def irradiance_sums(
     scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Any, tally: Tally,
     unseen: Sun | None = None,
 ) -> list[Any]:  # fmt: skip
-    """The same as the sums of a tally; the cache is one that the tally takes."""
+    """Likewise as the sums of a tally, with a cache that suits it."""
     arriving, _, direct, _ = _contributions(
         scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, tally, unseen
     )  # fmt: skip
@@ -236,7 +236,7 @@ def moment(
     scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None = None,
     unseen: Sun | None = None,
 ) -> Any:  # fmt: skip
-    """One sample of the sum of directions (as mi.Color3f), each times the luminance that it adds to `irradiance`."""
+    """One sample of the sum of directions (as mi.Color3f), each weighted by its luminance in `irradiance`."""
     (arriving,), w, (direct,), w_direct = _contributions(
         scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, AllLight(), unseen
     )  # fmt: skip
@@ -247,7 +247,7 @@ def _contributions(
     scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Any, tally: Tally,
     unseen: Sun | None,
 ) -> tuple[list[Any], Any, list[Any], Any]:  # fmt: skip
-    """Sums of radiance from BSDF sampling, times pi irradiance, and of irradiance from emitters, with directions."""
+    """Sums of radiance by BSDF sampling, times pi irradiance, and of irradiance by emitters, with directions."""
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.position))
     si.p, si.n, si.sh_frame = points.position, mi.Normal3f(points.flat), mi.Frame3f(mi.Normal3f(points.normal))
     local = mi.warp.square_to_cosine_hemisphere(u_bsdf)

@@ -1,7 +1,7 @@
 """Rays: arrays on the device, the offset from surfaces, and intersections.
 
-Where a texture says that there is no surface (`eval_null_transmission` of the BSDF), rays go on as if nothing were
-there. `holes` is `has_holes(scene)` everywhere: where no shape has holes, nothing is spent on looking for them.
+Rays pass through holes, places where a texture says that there is no surface (`eval_null_transmission` of the BSDF).
+The argument `holes` is always `has_holes(scene)`: a scene without holes spends no time on them.
 """
 
 from __future__ import annotations
@@ -19,42 +19,41 @@ from lambent.core.directions import basis
 from lambent.core.sequences import cosine_hemisphere, r2
 from lambent.materials.clear import MOST
 
-ALIGNED_BYTES = 64  # the longest vectors that LLVM has
-OFFSET = 1e-5  # metres, and share of the largest coordinate, over a surface from where rays leave it
-OFFSET_OF_SCENE = 1e-7  # likewise, of the scene's diagonal: rays over a triangle of 1 km meet it from 30 micrometres
-APPROACH = 10 * OFFSET  # likewise, before a surface that rays fall onto: at grazing incidence little of it is height
-SHADOW_SHORT = 9e-4  # share of a ray to a point that it ends before it, Mitsuba's own
+ALIGNED_BYTES = 64  # LLVM's longest vectors
+OFFSET = 1e-5  # metres, and share of the largest coordinate: distance above a surface where rays leave it
+OFFSET_OF_SCENE = 1e-7  # likewise, of the scene's diagonal: rays above a triangle of 1 km hit it from 30 micrometres
+APPROACH = 10 * OFFSET  # likewise, before a surface that rays hit; at grazing incidence little of it is height
+SHADOW_SHORT = 9e-4  # share of a ray to a point by which it stops short, as in Mitsuba
 
 
 def vectors(kind: Any, array: Floats) -> Any:
-    """An array (..., 3) as `kind`: mi.Vector3f, mi.Point3f or mi.Normal3f, one after another.
+    """An array (..., 3) as `kind`: mi.Vector3f, mi.Point3f or mi.Normal3f, flattened.
 
-    Kernels do not depend on the array. Dr.Jit takes an (n, 3) array apart by a kernel that holds n as a constant, and
-    compiles another one for memory that does not begin at a multiple of the vector's length: seconds, where the kernel
-    traces paths.
+    Keeps the array out of kernels. Dr.Jit splits an (n, 3) array by a kernel with n as a constant, and compiles another
+    one for memory that is not aligned to the vector length: that takes seconds if the kernel traces paths.
     """
     return kind(*(mi.Float(_aligned(component)) for component in array.reshape(-1, 3).T))
 
 
 def rays_from(origins: Floats, directions: Floats) -> Any:
-    """mi.Ray3f from origins (n, 3), or one (3,), along directions (n, 3)."""
+    """mi.Ray3f from origins (n, 3), or a single one (3,), along directions (n, 3)."""
     return mi.Ray3f(vectors(mi.Point3f, np.broadcast_to(origins, directions.shape)), vectors(mi.Vector3f, directions))
 
 
 def array_of(vector: Any) -> NDArray[np.float32]:
-    """A vector or colour of Dr.Jit as an array (n, 3)."""
+    """A Dr.Jit vector or colour as an array (n, 3)."""
     components = [vector[0], vector[1], vector[2]]
     dr.eval(components)
     return np.stack([np.array(c) for c in components], axis=-1)
 
 
 def block_sums(vector: Any, n: int) -> NDArray[np.float32]:
-    """Sums (..., 3) over every n consecutive vectors or colours of Dr.Jit."""
+    """Sums (..., 3) over every n consecutive Dr.Jit vectors or colours."""
     return np.stack([np.array(dr.block_sum(component, n)) for component in (vector.x, vector.y, vector.z)], axis=-1)
 
 
 def _aligned(values: Floats) -> NDArray[np.float32]:
-    """A copy (n,) that begins at a multiple of ALIGNED_BYTES."""
+    """A copy (n,) aligned to ALIGNED_BYTES."""
     memory = np.empty(4 * len(values) + ALIGNED_BYTES, np.uint8)
     start = -memory.ctypes.data % ALIGNED_BYTES
     result = memory[start : start + 4 * len(values)].view(np.float32)
@@ -63,7 +62,7 @@ def _aligned(values: Floats) -> NDArray[np.float32]:
 
 
 def independent(seed: int, width: int) -> Any:
-    """mi.Sampler of independent random numbers for so many threads."""
+    """mi.Sampler of independent random numbers for `width` threads."""
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, width)
     return sampler
@@ -82,7 +81,7 @@ def leaving(scene: Any, p: Any, n: Any, direction: Any) -> Any:
 
 
 def towards(scene: Any, p: Any, n: Any, target: Any) -> Any:
-    """Rays that leave points p of surfaces of normals n, and end just before a point elsewhere; as `leaving`."""
+    """Rays that leave points p of surfaces with normals n and end just before a target point; see `leaving`."""
     p, n, target = _on_device(p, n, target)
     start = leaving(scene, p, n, target - p).o
     offset = target - start
@@ -104,7 +103,7 @@ def cosine_directions(normals: Floats) -> Floats:
 
 
 def distances(scene: Any, ray: Any) -> NDArray[np.float64]:
-    """Distances (n,) to the first hits of rays, infinite where there is none."""
+    """Distances (n,) to the first hits of rays, infinite without a hit."""
     return np.array(scene.ray_intersect_preliminary(ray).t).astype(float)
 
 
@@ -114,35 +113,35 @@ def has_holes(scene: Any) -> bool:
 
 
 def intersect(scene: Any, ray: Any, active: Any, holes: bool) -> Any:
-    """The interaction (mi.SurfaceInteraction3f) behind all holes; `si.t` counts from the last of them."""
+    """The interaction (mi.SurfaceInteraction3f) behind all holes; `si.t` is measured from the last hole."""
     if not holes:
         return scene.ray_intersect(ray, active)
     return _behind_holes(scene, mi.Ray3f(ray), mi.Bool(active))
 
 
 def in_shadow(scene: Any, ray: Any, active: Any, holes: bool, coherent: bool = False) -> Any:
-    """Whether anything without a hole blocks a ray; `coherent` is a hint that neighbours are nearly parallel."""
+    """Whether anything blocks a ray, holes excluded; `coherent` hints that neighbouring rays are nearly parallel."""
     return intersect(scene, ray, active, True).is_valid() if holes else scene.ray_test(ray, coherent, active)
 
 
 def hidden(scene: Any, p: Any, n: Any, target: Any, active: Any, holes: bool) -> Any:
-    """Whether anything without a hole stands between points p of surfaces of normals n and a point elsewhere."""
+    """Whether anything, holes excluded, stands between points p of surfaces with normals n and a target point."""
     ray = towards(scene, p, n, target)
     return _blocked(scene, ray, mi.Point3f(target), mi.Bool(active)) if holes else scene.ray_test(ray, active)
 
 
 def straight_on(si: Any, active: Any) -> Any:
-    """What (mi.Color3f) the surfaces of interactions pass straight on: 1 in holes, 0 but on clear glass."""
+    """Undeviated transmittance (mi.Color3f) of the surfaces at interactions: 1 in holes, 0 except on clear glass."""
     return si.bsdf().eval_null_transmission(si, active)
 
 
 def passed(scene: Any, ray: Any, active: Any) -> Any:
-    """What (mi.Color3f) of the light along rays gets straight through holes and clear glass, 0 behind all else."""
+    """Transmittance (mi.Color3f) along rays, straight through holes and clear glass; 0 behind anything else."""
     return _passed(scene, mi.Ray3f(ray), mi.Bool(active), None)
 
 
 def passed_from(scene: Any, p: Any, n: Any, target: Any, active: Any) -> Any:
-    """The same of light from points elsewhere that falls onto points p of surfaces of normals n."""
+    """Likewise for light from target points that falls onto points p of surfaces with normals n."""
     return _passed(scene, towards(scene, p, n, target), mi.Bool(active), mi.Point3f(target))
 
 
@@ -167,7 +166,7 @@ def _is_hole(si: Any, active: Any) -> Any:
 @dr.syntax
 def _behind_holes(scene, ray, active):  # type: ignore[no-untyped-def]
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(ray.o))
-    si.t = dr.full(mi.Float, dr.inf, dr.width(ray.o))  # nothing is met where `active` is false
+    si.t = dr.full(mi.Float, dr.inf, dr.width(ray.o))  # no hit where `active` is false
     again = active
     while again:
         si = scene.ray_intersect(ray, again)

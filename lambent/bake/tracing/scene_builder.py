@@ -1,6 +1,6 @@
-"""A scene as Mitsuba sees it.
+"""Conversion of a scene to Mitsuba.
 
-Mitsuba's world is ours: right-handed, y up, metres. Every object stays one Mitsuba mesh with the object's name as id.
+Mitsuba's world is ours: right-handed, y up, metres. Every object stays one Mitsuba mesh, with its name as id.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ from lambent.scenes.scene import (
 )
 
 UV2_ATTRIBUTE = "vertex_uv2"
-COARSE = 4  # pixels along each side of one of a coarse sky
-FEW_PIXELS = 128  # along the shorter side of a picture: with fewer left, it stays as it is
+COARSE = 4  # pixels along each side that become one pixel of a coarse sky
+FEW_PIXELS = 128  # least pixels along the shorter side of a coarse picture; otherwise it stays unchanged
 
 
 @dataclass(frozen=True)
 class EmitterSampling:
-    """How a pre-pass has found emitters are best sampled: the environment (mi.Emitter), guided or not, and weights.
+    """Sampling of emitters as found by a pre-pass: the environment (mi.Emitter), guided or not, and weights.
 
     weights (n,) are those of `SceneBuilder.emitters()`.
     """
@@ -53,24 +53,24 @@ class EmitterSampling:
 
 
 class SceneBuilder:
-    """Makes Mitsuba scenes of one scene: whole, or with objects left out; meshes are shared between them.
+    """Makes Mitsuba scenes of one scene: whole, or with objects left out; they share meshes.
 
     Parameters
     ----------
     scene : Scene
         The scene to build.
     uv2 : mapping, optional
-        Light map coordinates (V, 2) per object name; they become the mesh attribute `vertex_uv2` (third component 0).
+        Light map coordinates (V, 2) by object name; they become the mesh attribute `vertex_uv2` (third component 0).
     diffuse : bool
-        False takes the diffuse terms out of all materials (for tracing with a light map).
+        False removes the diffuse terms of all materials (for tracing with a light map).
     measured : mapping, optional
-        Tables by material name, by which surfaces scatter instead of their material, whole even without `diffuse`.
+        Tables by material name that replace the material, whole even without `diffuse`.
     edited : mapping, optional
-        Terms and curves by material name, by which surfaces scatter instead of by their documents.
+        By material name, terms and curves that replace those of documents.
     sampling : EmitterSampling, optional
-        Of another builder of the same scene, whose emitters are sampled alike.
+        From another builder of the same scene, to sample emitters identically.
     coarse_sky : bool
-        Whether a picture of the environment has a sixteenth of its pixels, for trials that do not tell the difference.
+        Reduce the environment's picture to a sixteenth of its pixels, for trials that cannot tell the difference.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class SceneBuilder:
         tables = {name: mi.load_dict(table_dict(grid)) for name, grid in self.measured.items()}
         for name, made in self.edited.items():
             tables[name] = mi.load_dict(edited_dict(scene.materials[name], made, scene.textures.get(name)))
-        # Equal materials share a BSDF: each one costs every kernel a function of its own.
+        # Equal materials share a BSDF: each BSDF adds a function to every kernel.
         bsdfs: dict[object, Any] = {}
         self.meshes = {}
         for o in scene.objects:
@@ -109,10 +109,10 @@ class SceneBuilder:
             self.weigh_emitters(sampling.weights)
 
     def build(self, leave_out: Collection[str] = (), *, watertight: bool = False) -> Any:
-        """mi.Scene without the named objects (their emission goes with them).
+        """mi.Scene without the named objects (and their emission).
 
-        Of 100,000 rays one slips between two triangles that share an edge; none does where the scene is `watertight`,
-        at a third more time for a ray. Graphics cards are watertight anyway.
+        One in 100,000 rays slips between two triangles that share an edge; none does if the scene is `watertight`,
+        which takes a third more time per ray. Graphics cards are always watertight.
         """
         parts: dict[str, Any] = {f"object_{i}": m for i, (n, m) in enumerate(self.meshes.items()) if n not in leave_out}
         parts |= {f"light_{i}": light for i, light in enumerate(self.lights)}
@@ -134,12 +134,12 @@ class SceneBuilder:
         return [*found, self.environment] if self.environment is not None else found
 
     def sampling(self) -> EmitterSampling:
-        """How emitters are sampled, for another builder of the same scene."""
+        """The sampling of emitters, for another builder of the same scene."""
         weights = np.array([float(mi.traverse(emitter)["sampling_weight"]) for emitter in self.emitters()])
         return EmitterSampling(self.environment, weights)
 
     def weigh_emitters(self, weights: Floats) -> None:
-        """Set how often each of `emitters()` is chosen, relative to the others, in scenes built from now on."""
+        """Set the relative sampling frequency of each of `emitters()`, in scenes built from now on."""
         for emitter, weight in zip(self.emitters(), weights, strict=True):
             parameters = mi.traverse(emitter)
             parameters["sampling_weight"] = float(weight)
@@ -164,7 +164,7 @@ def light_map_uv(si: Any, active: Any) -> Any:
 
 
 def light_map_texel(si: Any, width: int, height: int, active: Any) -> Any:
-    """Texel (mi.UInt32), row * width + column, of the light map that surface interactions lie in."""
+    """Light map texel (mi.UInt32), row * width + column, of surface interactions."""
     uv2 = light_map_uv(si, active)
     column = dr.clip(mi.Int32(dr.floor(uv2.x * width)), 0, width - 1)
     row = dr.clip(mi.Int32(dr.floor(uv2.y * height)), 0, height - 1)
@@ -192,13 +192,13 @@ def mesh_of(o: SceneObject, bsdf: Any, uv2: Floats | None = None) -> Any:
 
 
 def bare_scene(corners: Floats) -> Any:
-    """mi.Scene of triangles (F, 3, 3) in one mesh without a material: for rays that ask what they meet."""
+    """mi.Scene of triangles (F, 3, 3) in one mesh without a material, for intersections only."""
     mesh = mi.Mesh("all", 3 * len(corners), len(corners))
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = mi.Float(corners.astype(np.float32).ravel())
     parameters["faces"] = mi.UInt32(np.arange(3 * len(corners), dtype=np.uint32))
     parameters.update()
-    dark = {"type": "point", "position": [0.0, 0.0, 0.0], "intensity": 0.0}  # without, Mitsuba warns
+    dark = {"type": "point", "position": [0.0, 0.0, 0.0], "intensity": 0.0}  # Mitsuba warns without a light
     return mi.load_dict({"type": "scene", "all": mesh, "dark": dark}, optimize=False)
 
 
@@ -225,9 +225,9 @@ def light_dict(light: PointLight | DirectionalLight) -> dict[str, Any]:
 
 
 def _emitter_of(environment: Environment | None, size: int = 1) -> Any:
-    """mi.Emitter, its picture in pixels of `size` x `size`.
+    """mi.Emitter, its picture reduced by `size` x `size`.
 
-    None where no light comes from it: Mitsuba's densities of a black picture are not finite.
+    None if it emits no light: Mitsuba's densities of a black picture are not finite.
     """
     if environment is None:
         return None
@@ -236,13 +236,13 @@ def _emitter_of(environment: Environment | None, size: int = 1) -> Any:
 
 
 def environment_dict(environment: Environment, size: int = 1) -> dict[str, Any]:
-    """Mitsuba's dictionary of an environment, `size` x `size` pixels of its picture as one where there are enough.
+    """Mitsuba's dictionary of an environment, with `size` x `size` pixels of its picture averaged if there are enough.
 
-    Mitsuba's lat-long image looks along -z at its left edge, ours in the middle: it is turned by 180 degrees about y.
+    Mitsuba's lat-long image looks along -z at its left edge, ours at the centre: it is rotated by 180 degrees about y.
     """
     scale, rotation_deg, tilt = 1.0, 0.0, np.eye(4)
     if isinstance(environment, ConstantEnvironment):
-        # an image, since Mitsuba's own constant evaluates to one value for any number of directions
+        # as an image: Mitsuba's own constant evaluates to one value for any number of directions
         image = np.full((8, 16, 3), environment.radiance, np.float32)
     elif isinstance(environment, SunSky):
         image = sky_image(environment)

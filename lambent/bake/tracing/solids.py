@@ -1,4 +1,4 @@
-"""Points within closed, opaque objects: no light gets there, and nothing is baked."""
+"""Points within closed, opaque objects: light does not reach them, and nothing is baked there."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from lambent.scenes.geometry import merge
 from lambent.scenes.scene import Mesh, Scene, SceneObject
 
 RAYS = 16
-EMBEDDED_SHARE = 0.25  # of a point's rays that end on the inner side of a solid
+EMBEDDED_SHARE = 0.25  # share of a point's rays that hit the inner side of a solid
 POINTS_AT_ONCE = 1 << 16
 
 
 def is_closed(mesh: Mesh) -> bool:
-    """Whether every edge joins exactly two faces of opposite direction, once coincident vertices are one."""
+    """Whether every edge joins exactly two faces of opposite direction, after merging coincident vertices."""
     _, vertex = np.unique(mesh.positions, axis=0, return_inverse=True)
     corners = vertex.reshape(-1)[mesh.faces.astype(np.int64)]
     edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
@@ -35,7 +35,7 @@ def is_closed(mesh: Mesh) -> bool:
 
 
 def _closed(scene: Scene) -> set[str]:
-    """Names of closed objects; parts are closed where their whole is."""
+    """Names of closed objects; parts count as closed if their whole is."""
     wholes: dict[str, list[SceneObject]] = {}
     for o in scene.objects:
         wholes.setdefault(scene.parts.get(o.name, o.name), []).append(o)
@@ -43,9 +43,9 @@ def _closed(scene: Scene) -> set[str]:
 
 
 class SolidTest:
-    """Tells points within closed, opaque objects, by the inner sides their rays meet.
+    """Tests points for lying within closed, opaque objects, by the inner sides that their rays hit.
 
-    With `sheets`, objects that are not closed have inner sides too: those that their normals point away from.
+    With `sheets`, open objects have inner sides too: those that their normals point away from.
     """
 
     def __init__(self, builder: SceneBuilder, scene: Any, *, sheets: bool = False) -> None:
@@ -55,26 +55,26 @@ class SolidTest:
         solid = [o.name in closed and o.material not in open_ for o in builder.scene.objects]
         self._scene, self._numbers = scene, builder.object_numbers()
         self._solid = mi.UInt32(np.array(solid, np.uint32))
-        # Normals by triangle: an interaction would be compiled for each mesh of the scene.
+        # Normals by triangle, because an interaction would be compiled for each mesh of the scene.
         counts = [len(o.mesh.faces) for o in builder.scene.objects]
         self._first_face = mi.UInt32(np.cumsum([0, *counts])[:-1].astype(np.uint32))
         self._flat = vectors(mi.Vector3f, triangle_normals(builder.scene.corners))
 
     def within(self, scene: Any) -> SolidTest:
-        """The same test in another Mitsuba scene of the same builder, with the same closed objects."""
+        """The same test, with the same closed objects, in another Mitsuba scene of the same builder."""
         other = copy.copy(self)
         other._scene = scene
         return other
 
     def embedded(self, positions: Floats, normals: Floats) -> Flags:
-        """For points (n, 3) on surfaces of normals (n, 3): whether they lie within a solid. (n,) bool."""
+        """(n,) whether points (n, 3) on surfaces of normals (n, 3) lie within a solid."""
         found = np.zeros(len(positions), bool)
         for mine in slices(len(positions), POINTS_AT_ONCE):
             found[mine] = self.inner_share(positions[mine], normals[mine]) > EMBEDDED_SHARE
         return found
 
     def inner_share(self, positions: Floats, normals: Floats) -> Floats:
-        """Share (n,) of the rays of a few points, spread about their normals, that meet an inner side first."""
+        """Share (n,) of rays, spread about the normals of a few points, that hit an inner side first."""
         thread = dr.arange(mi.UInt32, len(positions) * RAYS)
         at, k = thread // RAYS, thread % RAYS
         p = dr.gather(mi.Point3f, vectors(mi.Point3f, positions), at)

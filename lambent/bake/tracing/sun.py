@@ -1,4 +1,4 @@
-"""The sun that leaves the light map: what paths leave out of their first light, and its light by shadow rays."""
+"""The sun that is removed from the light map: the light to leave out of paths' starts, and its light by shadow rays."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lambent.core.directions import basis
 
 
 class FirstEmitters(Protocol):
-    """Emitters of a mi.Scene without a sun, and their density where light met in the whole scene (`FirstLight`)."""
+    """Emitters of a mi.Scene without the sun, and their density for light hit in the whole scene (`FirstLight`)."""
 
     scene: Any
 
@@ -22,9 +22,9 @@ class FirstEmitters(Protocol):
 
 
 class Sun:
-    """A sun on the device, in whatever scenes its scene is built into.
+    """A sun on the device, valid in all Mitsuba scenes built from its scene.
 
-    `first` are the other emitters of one such scene, that paths without the sun sample where they start.
+    `first` are the other emitters of one of these, sampled at the start of paths without the sun.
     """
 
     def __init__(self, found: FoundSun, first: FirstEmitters | None = None) -> None:
@@ -38,11 +38,11 @@ class Sun:
 
     @property
     def is_in_sky(self) -> bool:
-        """Whether it is a part of the environment's picture."""
+        """Whether it is part of the environment's picture."""
         return self._picture is not None
 
     def radiance(self, w: Any) -> Any:
-        """What the sun adds to the environment's radiance (mi.Color3f) in unit directions w (mi.Vector3f)."""
+        """The sun's part of the environment's radiance (mi.Color3f) along unit directions w (mi.Vector3f)."""
         if self._picture is None:
             return mi.Color3f(0.0)
         (height, width), (top, left) = self._picture.size, self._picture.corner
@@ -57,19 +57,19 @@ class Sun:
         return dr.select(inside, mi.Color3f(self._texels.eval(place, inside)), 0.0)
 
     def left_out(self, ds: Any, value: Any) -> Any:
-        """Light over density (mi.Color3f) of emitter samples ds (mi.DirectionSample3f), without the sun's."""
+        """Light over density (mi.Color3f) of emitter samples ds (mi.DirectionSample3f), without the sun's part."""
         if self._picture is not None:
             return value - dr.select(ds.emitter.is_environment(), self.radiance(ds.d) / ds.pdf, 0.0)
         directional = mi.has_flag(ds.emitter.flags(), mi.EmitterFlags.DeltaDirection)
         return dr.select(directional & (dr.dot(ds.d, self.direction) > 1 - ALIGNED), 0.0, value)
 
     def goes_on(self, si: Any, wi: Any, active: Any) -> Any:
-        """Whether light along wi (mi.Vector3f, local) gets to `si.wi` straight through clear glass."""
+        """Whether light along wi (mi.Vector3f, local) reaches `si.wi` straight through clear glass."""
         across = active & (wi.z * si.wi.z < 0)
         return across & (dr.max(rays.straight_on(si, across)) > 0) if self.passes_panes else mi.Bool(False)
 
     def sky_share(self, environment: Any, w: Any) -> Any:
-        """Share (mi.Color3f) of the environment's radiance in unit directions w that is not the sun's."""
+        """Share (mi.Color3f) of the environment's radiance along unit directions w that is not the sun's."""
         if self._picture is None:
             return mi.Color3f(1.0)
         si = dr.zeros(mi.SurfaceInteraction3f, dr.width(w))
@@ -77,13 +77,13 @@ class Sun:
         return dr.clip(1 - self.radiance(w) / dr.maximum(environment.eval(si), 1e-20), 0, 1)
 
     def is_light(self, emitter: Any, w: Any) -> Any:
-        """Whether emitters (mi.EmitterPtr) that light arrives from along w are the sun."""
+        """Whether emitters (mi.EmitterPtr) seen along w are the sun."""
         directional = mi.has_flag(emitter.flags(), mi.EmitterFlags.DeltaDirection)
         return directional & (self._picture is None) & (dr.dot(w, self.direction) > 1 - ALIGNED)
 
 
 class SunRays:
-    """Irradiance of a sun on surfaces of a Mitsuba scene, by shadow rays to random places of its disc."""
+    """Irradiance of a sun on surfaces of a Mitsuba scene, by shadow rays to random points of its disc."""
 
     def __init__(self, sun: Sun, scene: Any) -> None:
         self._sun, self._scene = sun, scene
@@ -94,9 +94,9 @@ class SunRays:
         self._irradiance = mi.Color3f(*sun.record.irradiance)
 
     def __call__(self, si: Any, active: Any) -> Any:
-        """Irradiance (mi.Color3f), the cosine of the shading normal included: negative where it falls on the back.
+        """Irradiance (mi.Color3f), including the cosine of the shading normal: negative on the back.
 
-        Each place of a surface has one random direction of its own.
+        Each place of a surface has its own random direction.
         """
         bits = [dr.reinterpret_array(mi.UInt32, x) for x in (si.p.x, si.p.y, si.p.z)]
         u = mi.Point2f(mi.sample_tea_float32(bits[0] ^ bits[1], bits[2]), mi.sample_tea_float32(bits[2], bits[0]))

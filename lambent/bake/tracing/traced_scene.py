@@ -1,6 +1,6 @@
-"""The scene as a bake traces it: Mitsuba's scenes, and which points of the light map are lit and seen, each made once.
+"""The scene in traceable form: Mitsuba's scenes, and the lit and visible points of the light map, each created once.
 
-Everything follows from the scene and the split meshes alone: a bake that continues an interrupted one finds the same.
+Everything follows from the scene and the split meshes alone: a resumed bake finds the same.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from lambent.scenes.light_groups import SortedLights, sorted_lights
 
 
 class TracedScene:
-    """Shared by the artefacts of a bake. `merged` is the geometry of the atlas in one, as in `atlas.merged`.
+    """Shared by the artefacts of a bake. `merged` is the concatenated geometry of the atlas, as from `atlas.merged`.
 
-    `two_sided` is, of each object, whether its back has a light map too: where light crosses it, or viewers see it.
+    `two_sided` flags each object whose back has a light map too: because light crosses it, or viewers see it.
     """
 
     def __init__(
@@ -55,10 +55,10 @@ class TracedScene:
         self._views: dict[float, tuple[Sides, Indices]] = {}
 
     def builder(self, *, diffuse: bool, photons: bool = False) -> SceneBuilder:
-        """Builder of the scene, with or without diffuse terms; kept until another one is needed.
+        """Builder of the scene, with or without diffuse terms; kept until the other one is needed.
 
-        Kernels contain every live BSDF, traced or not: two builders would double the time to compile. All builders
-        sample emitters as the pre-pass of the first one found.
+        Kernels contain every live BSDF, traced or not: two builders would double compile time. All builders sample
+        emitters as the first one's pre-pass found.
         """
         kind = diffuse, photons
         if self._builder is None or self._builder[0] != kind:
@@ -74,13 +74,13 @@ class TracedScene:
         return self._builder[1]
 
     def _measured_tables(self, photons: bool) -> Mapping[str, Lookup]:
-        """Tables that materials scatter by, by the material's name, for photons with light and viewer exchanged.
+        """Tables that replace materials, by material name; for photons with light and viewer swapped.
 
         The renderer shows a fit of the table, the material's document.
         """
         files = self.scene.measured
         worn = {o.material for o in self.scene.objects} & set(files)
-        tell: Any = self.progress  # hashable, which its protocol does not say
+        tell: Any = self.progress  # hashable, which its protocol does not state
         return {name: _lookup(files[name], sha256_of(files[name]), photons, tell) for name in sorted(worn)}
 
     def whole(self, *, diffuse: bool, photons: bool = False) -> Any:
@@ -92,7 +92,7 @@ class TracedScene:
 
     @cached_property
     def sun(self) -> Sun | None:
-        """The sun whose direct light leaves the light map."""
+        """The sun whose direct light is removed from the light map."""
         return None if self._found_sun is None else Sun(self._found_sun)
 
     @cached_property
@@ -100,7 +100,7 @@ class TracedScene:
         return sun_of(self.scene)
 
     def unseen(self, *, diffuse: bool) -> Sun | None:
-        """That sun beside the emitters of `whole(diffuse=diffuse)`, as points of the light map sample them."""
+        """That sun with the emitters of `whole(diffuse=diffuse)`, for sampling at points of the light map."""
         if self._found_sun is None:
             return None
         builder, whole = self.builder(diffuse=diffuse), self.whole(diffuse=diffuse)
@@ -109,24 +109,24 @@ class TracedScene:
         return Sun(self._found_sun, FirstLight(builder, whole, self._found_sun, *self._sky_without))
 
     def cache(self, irradiance: Floats, irradiance_back: Floats | None) -> LightMapCache:
-        """A light map (H, W, 3) as radiance cache of the scene without diffuse terms, with the sun that it lacks."""
+        """A light map (H, W, 3) as radiance cache of the scene without diffuse terms, including the sun it lacks."""
         builder = self.builder(diffuse=False)
         sun = None if self.sun is None else SunRays(self.sun, self.whole(diffuse=False))
         return LightMapCache(builder, irradiance, irradiance_back, sun)
 
     @cached_property
     def sorted_lights(self) -> SortedLights:
-        """The light groups of the scene, its sun found."""
+        """The light groups of the scene, with its sun."""
         found, lights = self._found_sun, enumerate(self.scene.lights)
         suns = [] if found is None else [number for number, light in lights if is_sun(light, found)]
         return sorted_lights(self.scene, suns, sun_in_sky=found is not None and found.picture is not None)
 
     def tally(self, *, diffuse: bool, direct: Direct | None) -> GroupTally:
-        """Sorts the light of paths in `whole(diffuse=diffuse)` by group; `direct` light apart as well."""
+        """Separates the light of paths in `whole(diffuse=diffuse)` by group; `direct` light separately as well."""
         return GroupTally(self.sorted_lights, self.builder(diffuse=diffuse), self.sun, direct)
 
     def grouped_cache(self, irradiance: Floats, irradiance_back: Floats | None) -> GroupedCache:
-        """`cache` of the light maps (n, H, W, 3) of groups."""
+        """`cache` for the light maps (n, H, W, 3) of groups."""
         sun = None if self.sun is None else SunRays(self.sun, self.whole(diffuse=False))
         of_sun = self.sorted_lights.sun
         return GroupedCache(self.builder(diffuse=False), irradiance, irradiance_back, sun, of_sun)
@@ -137,7 +137,7 @@ class TracedScene:
 
     @property
     def crossed(self) -> Flags:
-        """(T,) faces of objects whose back has a light map too."""
+        """(T,) faces of objects whose backs have a light map too."""
         return self._two_sided
 
     @cached_property
@@ -160,7 +160,7 @@ class TracedScene:
         return self._sides[sign]
 
     def in_view(self, sign: float) -> tuple[Sides, Indices]:
-        """`lit_sides` without hidden points, where a texel has others, and `labels` with BEYOND for hidden texels."""
+        """`lit_sides` without hidden points if a texel has others, and `labels` with BEYOND added for hidden texels."""
         if sign not in self._views:
             sides = self.lit_sides(sign)
             self.progress(0, 1, "visibility")
@@ -174,20 +174,20 @@ class TracedScene:
 
     @cached_property
     def places(self) -> Floats:
-        """(n, 3) where viewers may stand."""
+        """(n, 3) possible positions of viewers."""
         return viewing_places(self.scene, self.whole(**self._at_hand))
 
     @property
     def _at_hand(self) -> dict[str, bool]:
-        """The kind of scene at hand, if there is one: the shapes of all kinds are the same."""
+        """The kind of scene already built, if any: the shapes of all kinds are the same."""
         diffuse, photons = self._builder[0] if self._builder else (False, False)
         return {"diffuse": diffuse, "photons": photons}
 
     def _of_points(self, asked: Flags, sign: float, test: Callable[[Floats, Floats], Flags]) -> Flags:
-        """(K, POINTS) results of a test of points (n, 3) and normals of triangles (n, 3), where `asked`."""
+        """(K, POINTS) results of a test of points (n, 3) and triangle normals (n, 3), where `asked`."""
         t = self.texels
         same = (t.face[:, :, None] == t.face[:, None]) & (t.positions[:, :, None] == t.positions[:, None]).all(axis=-1)
-        first = np.argmax(same & asked[:, None], axis=2)  # points that repeat are tested once
+        first = np.argmax(same & asked[:, None], axis=2)  # repeated points are tested once
         once = asked & (first == np.arange(POINTS))
         found = np.zeros(asked.shape, bool)
         found[once] = test(t.positions[once], sign * t.flat[once])

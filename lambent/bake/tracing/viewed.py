@@ -1,7 +1,7 @@
-"""What viewers see of a scene: rays from its cameras and from free places in view of them, in all directions.
+"""What viewers see of a scene: rays in all directions from its cameras and from free places in their view.
 
-Rays find how much is seen of large parts. Parts that few rays meet are looked at the other way round: from points on
-them towards those places.
+Rays measure how much is seen of large parts. Parts that few rays hit are tested in reverse: from points on them towards
+the viewers.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ from lambent.core.geometry import points_on_triangles, triangle_areas, triangle_
 log = logging.getLogger(__name__)
 
 RAYS = 1 << 18
-FEW = 64  # rays that meet a part: with fewer, points on it are looked from
-LOOKS, LEAST_LOOKS = 256, 16  # back from each of those, and from each of very many...
-MOST_LOOKS = 1 << 22  # ...where all together would be more
-NEAREST = 0.1  # of how far viewers see: what is closer is behind them, as the wall that a camera stands against
+FEW = 64  # parts hit by fewer rays are tested in reverse
+LOOKS, LEAST_LOOKS = 256, 16  # reverse looks per part, and for very many parts...
+MOST_LOOKS = 1 << 22  # ...when the total would exceed this
+NEAREST = 0.1  # share of the viewing distance: anything closer is behind viewers, like the wall a camera stands against
 
 
 @dataclass(frozen=True)
 class Viewers:
-    """Eyes (E, 3) of the viewers of a scene, and how far they see: nine tenths of their looks end within `reach_m`."""
+    """Eyes (E, 3) of a scene's viewers, and their reach: nine tenths of their looks end within `reach_m`."""
 
     eyes: Floats
     reach_m: float
 
 
 def viewers_of(sight: Sight) -> Viewers | None:
-    """Eyes at the cameras and at free places in view of them, half each; None without cameras, or if they see nothing.
+    """Eyes at the cameras and at free places in their view, half each; None without cameras, or if they see nothing.
 
-    Places that are further away than cameras see are left out: rays that leave by a window end far outside.
+    Places beyond the cameras' reach are left out, because rays through a window end far outside.
     """
     scene = sight.scene
     cameras = [*scene.cameras, *(key for path in scene.paths for key in path.keys)]
@@ -58,9 +58,9 @@ def viewers_of(sight: Sight) -> Viewers | None:
 
 
 def texel_sizes(sight: Sight, pieces: list[Piece], texels: int) -> Floats:
-    """Size of the texels of each piece in metres (N,); even where the scene has no cameras, or they see nothing.
+    """Texel size of each piece in metres (N,); equal if the scene has no cameras, or they see nothing.
 
-    Objects that get far larger texels than viewers need are logged as warnings.
+    Objects whose texels are far larger than viewers need are logged as warnings.
     """
     scene, viewers = sight.scene, sight.viewers
     if viewers is None:
@@ -90,7 +90,7 @@ def texel_sizes(sight: Sight, pieces: list[Piece], texels: int) -> Floats:
 
 
 def seen_from_behind(sight: Sight, least: float) -> list[str]:
-    """Names of opaque objects, sorted, whose backs are more than a share `least` of all that viewers see."""
+    """Sorted names of opaque objects whose backs take more than the share `least` of all that viewers see."""
     if sight.viewers is None:
         return []
     ray, face, _ = sight.met
@@ -102,7 +102,7 @@ def seen_from_behind(sight: Sight, least: float) -> list[str]:
 
 
 def met(traced: Any, eyes: Floats, count: int) -> tuple[Floats, Indices, Floats]:
-    """Directions (M, 3) of the rays from the eyes, of so many, that meet a triangle, which (M,), how far away (M,)."""
+    """Of `count` rays from the eyes, those that hit: directions (M, 3), triangles (M,), distances (M,)."""
     rng = np.random.default_rng(0)
     z, phi = 1 - 2 * rng.random(count), 2 * np.pi * rng.random(count)
     directions = np.stack([np.sqrt(1 - z**2) * np.cos(phi), z, np.sqrt(1 - z**2) * np.sin(phi)], axis=-1)
@@ -114,9 +114,9 @@ def met(traced: Any, eyes: Floats, count: int) -> tuple[Floats, Indices, Floats]
 def _looked_back(
     traced: Any, triangles: Floats, surfaces: list[Indices], eyes: Floats, nearest: float
 ) -> tuple[Floats, Floats]:
-    """Means over surfaces and the eyes of |cos| / (4 pi d^3) and |cos| / (4 pi d^2), 0 where hidden: (N,).
+    """Means over surfaces and eyes of |cos| / (4 pi d^3) and |cos| / (4 pi d^2), 0 if hidden: (N,).
 
-    `surfaces` are numbers (K,) of the `triangles` (F, 3, 3).
+    `surfaces` are indices (K,) into the `triangles` (F, 3, 3).
     """
     if not surfaces:
         return np.zeros(0), np.zeros(0)

@@ -1,8 +1,8 @@
-"""Visibility: which points of the light map viewers can see.
+"""Visibility of the light map's points to viewers.
 
-A texel of some centimetres may reach behind a wall, above a ceiling or under an object. The light there differs from
-that on the part in view, by a factor of a thousand where the sky shines on it, and one value cannot hold both: the part
-in view decides. A point is hidden if none of many places where a viewer may stand sees it.
+A texel of some centimetres may extend behind a wall, above a ceiling or under an object. The light there can differ
+from the visible part by a factor of a thousand, under the sky for example, and one value cannot represent both: the
+visible part decides. A point is hidden if it is seen from none of many possible positions of a viewer.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from lambent.core.sequences import r2
 from lambent.scenes.scene import Scene
 
 PLACES = 256
-FEW = (8, 32, 96)  # places that are tried before all are; most points are seen from one of the first
+FEW = (8, 32, 96)  # positions tried before all the others; most points are seen from one of the first
 RAYS_AT_ONCE = 1 << 21
 
 
 def viewing_places(scene: Scene, traced: Any) -> Floats:
-    """Free places (PLACES, 3) in view of the scene's cameras: along their rays, and along one diffuse bounce.
+    """Free positions (PLACES, 3) in view of the scene's cameras: along their rays, and along one diffuse bounce.
 
-    Rays that meet nothing have no places. (0, 3) where there are no cameras, or they see nothing.
+    Rays without a hit give no positions. (0, 3) without cameras, or if they see nothing.
     """
     cameras = [*scene.cameras, *(camera for path in scene.paths for camera in path.keys)]
     if not cameras:
@@ -47,7 +47,7 @@ def viewing_places(scene: Scene, traced: Any) -> Floats:
 
 
 def _hits(traced: Any, ray: Any) -> tuple[Indices, Floats, Floats]:
-    """Which rays hit the front or back of something, where (n, 3), and the unit normals on the rays' side (n, 3)."""
+    """Which rays hit something, front or back, the hits (n, 3), and unit normals on the rays' side (n, 3)."""
     si = traced.ray_intersect(ray)
     hit = np.flatnonzero(np.array(si.is_valid()))
     normals = array_of(si.n)[hit].astype(float)
@@ -56,7 +56,7 @@ def _hits(traced: Any, ray: Any) -> tuple[Indices, Floats, Floats]:
 
 
 def seen(traced: Any, places: Floats, positions: Floats, normals: Floats) -> Flags:
-    """(n,) bool: whether points (n, 3) are seen from a place, on the side of their normals (n, 3)."""
+    """(n,) bool: whether points (n, 3) are seen from any of `places`, on the side of their normals (n, 3)."""
     found = np.zeros(len(positions), bool)
     for some in np.split(places, FEW):
         left = np.flatnonzero(~found)
@@ -83,15 +83,15 @@ def _seen_from(traced: Any, places: Floats, positions: Floats, normals: Floats) 
 
 
 def without_hidden(texels: Texels, valid: Flags, in_view: Flags, labels: Indices) -> tuple[Flags, Indices]:
-    """Leave to every texel the points that are in view, if it has any.
+    """Restrict every texel to its visible points, if it has any.
 
-    Texels without, next to one with them, are left to be filled from there: bilinear look-ups near the border read
-    them, too. Others are kept, as the hidden part of their chart.
+    Hidden texels next to visible ones are left unknown, to be filled from these: bilinear look-ups near the border read
+    them too. Other hidden texels are kept, as the hidden part of their chart.
 
     Parameters
     ----------
     valid, in_view : (K, POINTS) bool
-        Which points can be lit at all, and which are seen.
+        Points that can be lit at all, and visible points.
     labels : (H, W) int
         Chart of each texel, -1 in gutters.
 
@@ -114,7 +114,7 @@ def without_hidden(texels: Texels, valid: Flags, in_view: Flags, labels: Indices
 
 
 def _beside(labels: Indices, index: Indices) -> Flags:
-    """(H, W) bool: texels next to one of the given, also across corners, in the same chart."""
+    """(H, W) bool: texels adjacent to one of the given, corners included, in the same chart."""
     height, width = labels.shape
     padded = np.pad(labels, 1, constant_values=-1)
     marked = np.zeros(labels.size, bool)

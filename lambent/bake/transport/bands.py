@@ -1,11 +1,11 @@
-"""Transport of the pixels of a view: how much light reaches the viewer by each node of a curve.
+"""Transport of the pixels of a view: light that reaches the viewer, by node of a curve.
 
     T_j = sum over lights m of  V rho_q |cos| L_m Delta_mj        (Ben-Artzi 2007, eqs 4.4, 4.11, 4.12)
 
-Delta_mj is the mean over triangle m of hat function j, which is 1 at the centre of band j and 0 at those beside it:
-curves are straight lines from node to node (`Curve.node_values`), where the thesis has steps. One thread is one pixel:
-it walks through the lights, touches only the nodes that each of them meets, in memory of its own, and writes them once.
-With two curves, nodes are pairs of nodes (4.15).
+Delta_mj is the mean over triangle m of hat function j, which is 1 at the centre of band j and 0 at the neighbouring
+ones: curves are linear between nodes (`Curve.node_values`), where the thesis has steps. One thread is one pixel: it
+loops over the lights, accumulates only the nodes that each of them meets, in its own memory, and writes them once. With
+two curves, nodes are pairs of nodes (4.15).
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from lambent.materials.factored.roughness import narrowed, thinned, varies
 from lambent.materials.factored.terms import Factor, Term
 from lambent.scenes.triangle_lights import TriangleLights
 
-BLOCK = 1 << 14  # threads that Dr.Jit gives to one core together
+BLOCK = 1 << 14  # threads that Dr.Jit gives to one core at a time
 PAIRS_AT_ONCE = 1 << 24  # of points and pairs of bands: 128 MB
-LONGEST = 255  # step from an entry to the next
-OWN_PAIRS = 1 << 13  # of bands that threads hold at a time: 1.6 MB for 16 threads that run as one vector
+LONGEST = 255  # largest step between entries
+OWN_PAIRS = 1 << 13  # of bands, held per thread at a time: 1.6 MB for 16 threads that run as one vector
 
 
 class Pairs(NamedTuple):
-    """Transport by pairs of bands: of each point the number of its entries, and all entries, point after point.
+    """Transport by pairs of bands: the number of entries per point, and all entries, point after point.
 
     counts (P,); steps (N,) uint8 from one entry's pair to the next: pairs are numbered j K + k, and each point begins
-    at -1; light (N,) RGB9E5 (`core.shared_exponent`). Black entries stand where a step would be too long.
+    at -1; light (N,) RGB9E5 (`core.shared_exponent`). Black entries bridge steps that would be too long.
     """
 
     counts: NDArray[np.int64]
@@ -51,7 +51,7 @@ class Pairs(NamedTuple):
 
 @dataclass(frozen=True)
 class Bands:
-    """A factor's curve cut into `count` equal bands."""
+    """A factor's curve divided into `count` equal bands."""
 
     factor: Factor
     count: int
@@ -65,7 +65,7 @@ def transport(
     Parameters
     ----------
     seen : (words, P) uint32
-        Of `visibility`.
+        From `visibility`.
     bands
         Those of the term's curve, or of the first of two if the other is constant.
     """
@@ -86,10 +86,11 @@ def pair_transport(
     texture: NDArray[np.float32] | None = None,
     least: float = 0.0,
 ) -> Iterator[Pairs]:
-    """Transport of a term with two curves as `transport`, times `texture` (P, 3), in multiples of `unit`.
+    """Transport of a term with two curves as in `transport`, times `texture` (P, 3), in multiples of `unit`.
 
-    Of each band of the first curve, entries of less than `least` of its light are added to the last larger one before
-    them, or to the first. What rounds to black is left out. The points come in blocks, so that little memory is needed.
+    For each band of the first curve, entries below the share `least` of its light are added to the last larger entry
+    before them, or to the first. Entries that round to black are left out. Points are yielded in blocks, to save
+    memory.
     """
     size = bands[0].count * bands[1].count
     at_once = max(1, PAIRS_AT_ONCE // size)
@@ -105,7 +106,7 @@ def pair_transport(
 
 
 def _joined(parts: list[Pairs]) -> Pairs:
-    """The entries of several ranges of bands of the same points, point after point."""
+    """Join the entries of several ranges of bands of the same points, point after point."""
     if len(parts) == 1:
         return parts[0]
     counts = np.stack([part.counts for part in parts], axis=1)
@@ -118,7 +119,7 @@ def _joined(parts: list[Pairs]) -> Pairs:
 
 
 def _pairs(lit: _Lit, begin: int, count: int, factor: NDArray[np.float32], last: Any, least: float) -> Pairs:
-    """Pairs of `count` bands of the first curve from `begin`; `last` (P,) is each point's last entry."""
+    """Pairs of `count` bands of the first curve from `begin`; `last` (P,) is each point's previous entry."""
     size, points = count * lit.counts[1], len(lit)
     row, pixel, active = lit.rows(begin, count)
     scale = dr.gather(mi.Vector3f, vectors(mi.Vector3f, factor), pixel, active)
@@ -139,12 +140,12 @@ def _pairs(lit: _Lit, begin: int, count: int, factor: NDArray[np.float32], last:
 
 
 def _entries(count: int) -> list[Any]:
-    """Memory for steps and light of so many entries."""
+    """Memory for steps and light of `count` entries."""
     return [dr.empty(dr.uint8_array_t(mi.UInt32), count), dr.empty(mi.UInt32, count)]
 
 
 def _threads(points: int) -> tuple[Any, Any]:
-    """The point of every thread, and whether it has one: every core has as many, and pieces of work of its own."""
+    """Each thread's point, and whether it has one: all cores have equally many threads, in pieces of their own."""
     cores = dr.thread_count() if "llvm" in mi.variant() else 1
     blocks = cores * -(-points // (cores * BLOCK)) if cores > 1 else 1
     own = -(-points // blocks)
@@ -156,7 +157,7 @@ def _threads(points: int) -> tuple[Any, Any]:
 
 
 class _Lit:
-    """Points on the device, and the lights that they see by one term."""
+    """Points on the device, and the light they receive by one term."""
 
     def __init__(
         self,
@@ -181,7 +182,7 @@ class _Lit:
     def rows(self, begin: int, count: int) -> tuple[Any, Any, Any]:
         """Transport by `count` bands of the first curve from `begin`, (count, 3) or (count, K, 3), of each thread.
 
-        Also its point, and whether it has one.
+        Also returns each thread's point, and whether it has one.
         """
         pixel, active = _threads(self._many)
         p, *axes, seen_from = (dr.gather(mi.Vector3f, array, pixel, active) for array in self._arrays)
@@ -191,12 +192,12 @@ class _Lit:
         rough = None if self._roughness is None else dr.gather(mi.Float, self._roughness, pixel, active)
         sheet = None if self._sheet is None else dr.gather(mi.Vector3f, self._sheet, pixel, active)
 
-        # Dr.Jit's loops take dataclasses apart, and frozen ones cannot be put together again: they are in functions.
+        # Dr.Jit's loops rebuild dataclasses, which fails for frozen ones: closures keep them out of the loop state.
         def local(w: Any) -> Any:
             return dr.dot(w, axes[0]) * turned, dr.dot(w, axes[1]) * turned, dr.dot(w, axes[2]) * mirrored
 
         def steps(w: Any) -> list[Any]:
-            """The angles of a direction, in bands."""
+            """The angles of a direction, in units of bands."""
             wi = local(w)
             angles = [angle_of(b.factor.over, wi, wo, b.factor.stretch, dr) for b in bands]
             if rough is not None:
@@ -228,7 +229,7 @@ class _Lit:
 
 @dr.syntax
 def _cleared(row, size):  # type: ignore[no-untyped-def]
-    """A thread's memory, set to zero: as `alloc_local` is told to, LLVM compiles a store for each number."""
+    """A thread's memory, zeroed in a loop: zeroed by `alloc_local`, LLVM compiles one store per number."""
     j = mi.UInt32(0)
     while j < size:
         row[j] = mi.Float(0)
@@ -279,7 +280,7 @@ def _sum(row: Any, at: Any) -> Any:
 
 @dr.syntax
 def _pack(places, counts, last, row, pixel, active, scale, first, size):  # type: ignore[no-untyped-def]
-    """Write those pairs of each thread that are not black at the beginning of its `size` places."""
+    """Write each thread's nonblack pairs to the beginning of its `size` places."""
     code, found = mi.UInt32(0), mi.UInt32(0)
     before = dr.gather(mi.UInt32, last, pixel, active)
     while active & (code < size):
@@ -307,7 +308,7 @@ def _floats(bits: Any) -> Any:
 
 @dr.syntax
 def _move(to, places, pixel, count, begin, size):  # type: ignore[no-untyped-def]
-    """Bring what each thread has at its places together, from `begin`."""
+    """Compact the entries of all threads, from `begin`."""
     i = mi.UInt32(0)
     while i < count:
         for k in range(2):

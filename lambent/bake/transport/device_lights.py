@@ -1,4 +1,4 @@
-"""Triangle lights on the device, and how a point sees each of them."""
+"""Triangle lights on the device, and their light at a point."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from lambent.bake.transport.pieces import solid_angle
 from lambent.bake.transport.polygon_light import highest_part
 from lambent.scenes.triangle_lights import TriangleLights
 
-WIDE_SR = 1e-3  # of lights of the scene: wider ones are integrated over their extent
+WIDE_SR = 1e-3  # lights of the scene with a larger solid angle are integrated over their extent
 
 
 def lights_on_device(lights: TriangleLights) -> dict[str, Any]:
-    """The arrays of lights; those of points and of cones only where there are some."""
+    """The arrays of lights; those for points and cones only if there are any."""
     arrays = {
         "corners": [vectors(mi.Vector3f, lights.corners[:, c]) for c in range(3)],
         "centres": vectors(mi.Vector3f, lights.centres),
@@ -40,7 +40,7 @@ def lights_on_device(lights: TriangleLights) -> dict[str, Any]:
 
 
 def _luminaires(lights: TriangleLights) -> dict[str, Any]:
-    """Which luminaire a light is, one past the last for others; their axes and intensities."""
+    """Luminaire index of each light, one past the last for others; their axes and intensities."""
     those = list(lights.luminaires.values())
     which = np.full(len(lights), len(those), np.uint32)
     which[list(lights.luminaires)] = np.arange(len(those))
@@ -55,8 +55,8 @@ def _luminaires(lights: TriangleLights) -> dict[str, Any]:
 def light_at(lights: dict[str, Any], m: Any, p: Any, n: Any = None) -> tuple[Any, ...]:
     """Direction and corners of light m from p, its light, the solid angle that multiplies it, and whether it is wide.
 
-    The last is None where all lights are at infinity.
-    The direction to a wide light is above a surface of normal n, if there is one and any of the light is.
+    The last is None if all lights are at infinity. The direction to a wide light is above a surface with normal n, if n
+    is given and any part of the light is above.
     """
     centre = dr.gather(mi.Vector3f, lights["centres"], m)
     a, b, c = [dr.gather(mi.Vector3f, corner, m) for corner in lights["corners"]]
@@ -84,7 +84,7 @@ def light_at(lights: dict[str, Any], m: Any, p: Any, n: Any = None) -> tuple[Any
 
 
 def _candela(lights: dict[str, Any], m: Any, w: Any) -> Any:
-    """What light m is multiplied by towards unit directions w: 1 where it is no luminaire."""
+    """Factor on light m towards unit directions w: 1 if it is not a luminaire."""
     if "luminaire" not in lights:
         return 1.0
     which, axes = dr.gather(mi.UInt32, lights["luminaire"], m), lights["turned"]
@@ -94,7 +94,7 @@ def _candela(lights: dict[str, Any], m: Any, w: Any) -> Any:
 
 
 def brightest(p: NDArray[np.float32], lights: TriangleLights) -> float:
-    """Largest sum of light, W/m^2, that reaches one of the points (P, 3) where nothing shadows it."""
+    """Largest sum of unshadowed light, W/m^2, at any of the points (P, 3)."""
     if not lights.near.any():
         return float(lights.light.max(axis=1).sum())
     here = vectors(mi.Vector3f, p)
@@ -108,6 +108,6 @@ def _reaching(here, lights, count):  # type: ignore[no-untyped-def]
     total = dr.zeros(mi.Float, dr.width(here))
     while m < count:
         light, share = light_at(lights, m, here)[4:6]
-        total += dr.max(light) * dr.minimum(share, 2 * dr.pi)  # points come near to point lights
+        total += dr.max(light) * dr.minimum(share, 2 * dr.pi)  # points can be very close to point lights
         m += 1
     return total

@@ -1,4 +1,4 @@
-"""All that lights a scene, as triangles."""
+"""All lights of a scene, as triangles."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from lambent.scenes.triangle_lights import (
     surface_triangles,
 )
 
-ROWS = 256  # of the environment's samples; the bright ones are replaced by the finer ones within them
-LEAST_FINE, MOST_FINE = 4, 32  # rows of these in one of those: as many as the environment's picture has
-BRIGHT = 1 / 4000  # of all light: samples with more are bright
+ROWS = 256  # of samples of the environment; bright samples are replaced by finer ones
+LEAST_FINE, MOST_FINE = 4, 32  # fine rows per coarse row: the resolution of the environment's picture
+BRIGHT = 1 / 4000  # of all light: share above which samples are bright
 Samples = tuple[Floats, Floats, Floats]
-DARK = DirectionalLight((0.0, -1.0, 0.0), (0.0, 0.0, 0.0))  # kernels need a light
-LAMPS = 0.5  # of all lights, where there are an environment and glowing surfaces
+DARK = DirectionalLight((0.0, -1.0, 0.0), (0.0, 0.0, 0.0))  # kernels need at least one light
+LAMPS = 0.5  # share of all lights, if there are both an environment and glowing surfaces
 
 
 def scene_lights(scene: Scene, samples: Samples | None, count: int) -> TriangleLights:
-    """The lights of a scene: about `count` triangles, and its point and directional lights.
+    """The lights of a scene: about `count` triangles, plus its point and directional lights.
 
     `samples` are those of the environment, if there is one.
     """
@@ -48,9 +48,9 @@ def scene_lights(scene: Scene, samples: Samples | None, count: int) -> TriangleL
 
 
 def environment_samples(environment: Any) -> Samples:
-    """Directions (N, 3), solid angles (N,) and radiance (N, 3) of an environment (mi.Emitter): fine where it is bright.
+    """Directions (N, 3), solid angles (N,) and radiance (N, 3) of an environment (mi.Emitter), fine where it is bright.
 
-    Every sample has the mean of the radiance in its part of the sphere, so that small lamps count with all their light.
+    Every sample has the mean radiance of its part of the sphere, so that small lamps count with all their light.
     """
     n = int(np.clip(np.ceil(_rows_of(environment) / ROWS), LEAST_FINE, MOST_FINE))
     rows, columns = ROWS * n, 2 * ROWS * n
@@ -74,7 +74,7 @@ def environment_samples(environment: Any) -> Samples:
 
 
 def environment_rows(environment: Any, rows: int) -> NDArray[np.float32]:
-    """(rows, 2 rows, 3) lat-long picture of an environment (mi.Emitter): means over the pixels, in radiance."""
+    """(rows, 2 rows, 3) lat-long picture of an environment (mi.Emitter): mean radiance per pixel."""
     n = int(np.clip(np.ceil(_rows_of(environment) / rows), 2, MOST_FINE))
     weight = -np.diff(np.cos(np.linspace(0, np.pi, rows * n + 1))).reshape(rows, n)
     picture = np.empty((rows, 2 * rows, 3), np.float32)
@@ -86,12 +86,12 @@ def environment_rows(environment: Any, rows: int) -> NDArray[np.float32]:
 
 
 def _rows_of(environment: Any) -> int:
-    """Rows of the picture of an environment."""
+    """Number of rows of an environment's picture."""
     return int(mi.traverse(environment)["data"].shape[0])
 
 
 def _directions(rows: int, columns: int, some: slice) -> Floats:
-    """`lat_long_directions`, some rows of them."""
+    """A slice of the rows of `lat_long_directions`."""
     theta = (np.arange(some.start, some.stop) + 0.5) / rows * np.pi
     phi = (np.arange(columns) + 0.5) / columns * (2 * np.pi) - np.pi
     across = np.stack([np.sin(phi), np.zeros(columns), -np.cos(phi)], axis=-1)
@@ -99,9 +99,9 @@ def _directions(rows: int, columns: int, some: slice) -> Floats:
 
 
 def lamp_triangles(corners: Floats, radiance: Floats, count: int) -> TriangleLights:
-    """Glowing triangles (F, 3, 3) of radiances (F, 3) as about `count` lights, in proportion to the light they give.
+    """Glowing triangles (F, 3, 3) of radiances (F, 3) as about `count` lights, in proportion to their light.
 
-    Of more triangles than that, evenly spaced ones stand for their neighbours.
+    If there are more triangles, evenly spaced ones represent their neighbours.
     """
     areas = triangle_areas(corners)
     power = areas * radiance.sum(axis=1)

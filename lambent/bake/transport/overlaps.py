@@ -1,22 +1,22 @@
-"""How much of a triangle counts for each node of a curve, from the angles at its corners alone (Ben-Artzi 2007, 4.2.1).
+"""Overlap of a triangle with the nodes of a curve, from the angles at its corners alone (Ben-Artzi 2007, 4.2.1).
 
-Curves run straight from node to node. Where an angle a is linear over a triangle, nodes cut the triangle into parts;
-the area of each (4.10) and its mean of a say exactly what the hat functions of its two nodes get; its mean of a second
-angle b says where it is along b. Functions take `ops`, as `materials.lobes` does.
+Curves are linear between nodes. If an angle a is linear over a triangle, nodes cut the triangle into parts. The area of
+each part (4.10) and its mean of a determine exactly the shares of the hat functions of its two nodes; its mean of a
+second angle b gives its position along b. Functions take `ops`, as `materials.lobes` does.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-LEAST = 1e-12  # of the difference of two corners: the area below such an edge is all or nothing
+LEAST = 1e-12  # difference of two corners below which an edge counts as having all or none of the area below it
 
 Three = tuple[Any, Any, Any]
 Spread = tuple[Three, Three, Three]
 
 
 def spread(a: Three, b: Three, ops: Any) -> Spread:
-    """a at the corners in rising order, b at the same corners, and 1 over the differences of a: 01, 02, 12."""
+    """a at the corners in ascending order, b at the same corners, and 1 over the differences of a: 01, 02, 12."""
     corners = list(zip(a, b, strict=True))
     for i, k in ((0, 1), (1, 2), (0, 1)):
         (a0, b0), (a1, b1) = corners[i], corners[k]
@@ -29,9 +29,10 @@ def spread(a: Three, b: Three, ops: Any) -> Spread:
 
 
 def below(y: Any, of: Spread, ops: Any) -> Three:
-    """Where a is below y: the share of a triangle's area (4.10), and the integrals of a and b over that share.
+    """The part of a triangle where a is below y: its share of the area (4.10), and the integrals of a and b over it.
 
-    All of it where all corners are at y. a and b are from their values at the lowest corner, so that little cancels.
+    The whole triangle if all corners are at y. a and b are relative to their values at the lowest corner, to avoid
+    cancellation.
     """
     (low, middle, high), (b0, b1, b2), (to_1, to_2, from_1) = of
     rise, fall, width = y - low, high - y, high - low

@@ -1,4 +1,4 @@
-"""Pieces of triangles, so small that angles are nearly linear in each, and the angles at their corners."""
+"""Pieces of triangles small enough for angles to be nearly linear, and the angles at their corners."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ import mitsuba as mi
 from lambent.bake.transport.overlaps import spread
 from lambent.materials.factored.curve import END_RAD
 
-BEND, BEND_BY_ANGLE, MOST_BEND = 0.5, 1 / 8, 4.0  # bands that an angle may be from linear within a piece; more, in
+BEND, BEND_BY_ANGLE, MOST_BEND = 0.5, 1 / 8, 4.0  # deviation of an angle from linear within a piece, in bands; more, in
 # proportion to the angle, where curves have no narrow peaks
 WIDEST = 3  # nodes that a piece may span along both of two curves
-COS_BROAD = 0.975  # between the corners of a piece of a wide light: more than 13 degrees
-MOST_CUTS, MOST_CUTS_OF_WIDE = 5, 10  # of a triangle into four, and of those
+COS_BROAD = 0.975  # between the corners of a piece of a wide light: corresponds to 13 degrees
+MOST_CUTS, MOST_CUTS_OF_WIDE = 5, 10  # subdivisions of a triangle into four, and of a wide light's
 
 
 def in_bands(angle: Any, count: int) -> Any:
-    """An angle in bands; the end of the last band where rounding puts 90 degrees beyond it."""
+    """An angle in units of bands; clamped to the last band if rounding puts 90 degrees beyond it."""
     step = angle * (count / END_RAD)
     return dr.select(step < count * (1 + 1e-5), dr.minimum(step, count), step)
 
 
 def is_bent(corners: list[Any], middles: list[Any]) -> Any:
-    """Whether a piece has to be cut, as its angles are not nearly linear: the error of a part is a quarter.
+    """Whether a piece must be cut because its angles are not nearly linear: a cut reduces the error to a quarter.
 
     Of two angles, one is taken at its mean along the other (4.15 takes them as independent), so one must vary little.
     """
@@ -40,10 +40,10 @@ def is_bent(corners: list[Any], middles: list[Any]) -> Any:
 
 
 def is_beyond(corners: list[Any], middles: list[Any], part: tuple[Any, Any]) -> Any:
-    """Whether a piece meets no node of a part [begin, end) of the first curve, nor does what it would be cut into.
+    """Whether a piece, and all its subdivisions, meet no node of a part [begin, end) of the first curve.
 
-    An angle that is quadratic leaves the range of its corners and middles by less than an edge's bend; twice the
-    largest bend and the width of a hat function are left as margin.
+    A quadratic angle leaves the range of its corners and midpoints by less than an edge's bend; the margin is twice the
+    largest bend plus the width of a hat function.
     """
     at, between = [w[0] for w in corners], [w[0] for w in middles]
     bends = [dr.abs(m - (x + y) / 2) for m, x, y in zip(between, at, (*at[1:], at[0]), strict=True)]
@@ -54,13 +54,13 @@ def is_beyond(corners: list[Any], middles: list[Any], part: tuple[Any, Any]) -> 
 
 
 def is_broad(corners: list[Any]) -> Any:
-    """Whether a piece spans so many directions that its quotient may differ much from that at its middle."""
+    """Whether a piece spans so many directions that its quotient may differ much from that at its centre."""
     a, b, c = corners
     return _least([dr.dot(a, b), dr.dot(b, c), dr.dot(c, a)]) < COS_BROAD
 
 
 def above(w: Any, n: Any) -> Any:
-    """Unit w, or the direction on the horizon of n that is above it."""
+    """Unit w, or, if it is below the horizon of n, the nearest direction on the horizon."""
     return dr.normalize(w - n * dr.minimum(dr.dot(w, n), 0.0))
 
 
@@ -72,9 +72,9 @@ def _least(values: Sequence[Any]) -> Any:
     return reduce(dr.minimum, values)
 
 
-# A piece of a triangle a, b, c: how often it was cut into four, which part it is of each cut (2 bits, the last one
-# lowest), u and v of its first corner a + u (b - a) + v (c - a), and its edges as a share of the whole ones, negative
-# where turned.
+# A piece of a triangle a, b, c: the number of subdivisions into four, the part chosen at each (2 bits, the last one
+# lowest), u and v of its first corner a + u (b - a) + v (c - a), and its edges relative to the whole ones, negative if
+# rotated by 180 degrees.
 Where = tuple[Any, Any, Any, Any, Any]
 
 
@@ -83,7 +83,7 @@ def whole() -> Where:
 
 
 def corners_of(a: Any, b: Any, c: Any, where: Where) -> tuple[list[Any], list[Any]]:
-    """Unit directions of the corners of a piece of a flat triangle, and of the middles of its edges."""
+    """Unit directions of the corners of a piece of a flat triangle, and of the midpoints of its edges."""
     _, _, u, v, edge = where
     first, along, across = a + (b - a) * u + (c - a) * v, (b - a) * edge, (c - a) * edge
     places = [
@@ -95,7 +95,7 @@ def corners_of(a: Any, b: Any, c: Any, where: Where) -> tuple[list[Any], list[An
 
 
 def share_of(where: Where) -> Any:
-    """Of the triangle's area."""
+    """Share of the triangle's area."""
     return where[4] * where[4]
 
 
@@ -109,7 +109,7 @@ def is_last_part(where: Where) -> Any:
 
 
 def next_part(where: Where) -> Where:
-    """The parts at the second and third corner, and the one between, which is turned."""
+    """The next part: at the second and third corner, then the central one, which is rotated."""
     cuts, path, u, v, edge = where
     part = path & 3
     turned = part == 2
@@ -118,16 +118,16 @@ def next_part(where: Where) -> Where:
 
 
 def parent(where: Where) -> Where:
-    """Of a last part."""
+    """The parent of a last part."""
     cuts, path, u, v, edge = where
     return cuts - 1, path >> 2, u + edge, v + edge, -2 * edge
 
 
 def angles(corners: list[Any], middles: list[Any], counts: list[int]) -> list[Any]:
-    """The angles at a piece's corners, by curve, moved so that their mean is that of the whole piece.
+    """The angles at a piece's corners, by curve, shifted to give them the mean of the whole piece.
 
-    That is the mean at the middles of its edges, for angles that are quadratic. Angles are convex along most edges:
-    without the correction they would be too large in the mean, and highlights too dark.
+    For quadratic angles, that is the mean at the midpoints of its edges. Angles are convex along most edges:
+    uncorrected they would be too large on average, and highlights too dark.
     """
     found = []
     for at, between, end in zip(zip(*corners, strict=True), zip(*middles, strict=True), counts, strict=True):
@@ -149,9 +149,9 @@ def spread_of(angles: list[Any]) -> tuple[Any, Any]:
 
 
 def solid_angle(a: Any, b: Any, c: Any, across: Any) -> Any:
-    """Of a triangle seen from the origin: corners, and (b - a) x (c - a) (van Oosterom and Strackee 1983, eq. 8).
+    """Solid angle of a triangle at the origin: corners, (b - a) x (c - a) (van Oosterom & Strackee 1983, eq. 8).
 
-    Computed from directions alone, the volume of a small lamp would be lost in rounding.
+    From directions alone, the volume of a small lamp would be lost in rounding.
     """
     volume, x, y, z = dr.abs(dr.dot(a, across)), dr.norm(a), dr.norm(b), dr.norm(c)
     return 2 * dr.atan2(volume, x * y * z + dr.dot(a, b) * z + dr.dot(b, c) * x + dr.dot(c, a) * y)

@@ -1,4 +1,4 @@
-"""Light of a triangle that is wide: integrated over its part above the surface, where that of a point is too coarse."""
+"""Light of a wide triangle, integrated over its part above the surface; a point light would be too coarse."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from typing import Any
 
 from lambent.materials.lobes import Vector, dot
 
-LEAST = 1e-30  # keeps quotients of what has no size finite
+LEAST = 1e-30  # keeps quotients of degenerate shapes finite
 
 
 def cosine_integral(a: Vector, b: Vector, c: Vector, ops: Any) -> Any:
     """Integral of cos(theta) over the solid angle of a triangle above the horizon z = 0, in sr.
 
-    Lambert's formula for polygons (Lambert 1760; Baum et al. 1989, eq. 1): half the sum over the edges of each one's
-    angle times z of its plane's unit normal. What is below the horizon is replaced by the arc between the places
-    where edges cross it. Corners are seen from the origin, of any length but 0. In single precision the error is 1e-7
-    sr: take the solid angle times a cosine where a triangle is small.
+    Lambert's formula for polygons (Lambert 1760; Baum et al. 1989, eq. 1): half the sum over the edges of each edge's
+    angle times z of its plane's unit normal. Parts below the horizon are replaced by the arc between the points where
+    edges cross it. Corners are relative to the origin, of any length but 0. In single precision the error is 1e-7 sr:
+    for a small triangle, use solid angle times cosine.
     """
     total: Any = 0.0
     falls_x, falls_y, rises_x, rises_y = (0.0 * a[2] for _ in range(4))
@@ -38,9 +38,9 @@ def cosine_integral(a: Vector, b: Vector, c: Vector, ops: Any) -> Any:
 
 
 def highest_part(centre: Any, corners: Any, n: Any, ops: Any) -> Any:
-    """A place in a triangle that is above a surface of normal n, if any is: its centre, or nearer to the corners above.
+    """A point of a triangle above a surface with normal n, if there is one: its centre, or closer to the corners above.
 
-    Places are vectors (dr) from the surface's point.
+    Positions are vectors (dr) relative to the surface point.
     """
     heights = [ops.maximum(dot(corner, n), 0.0) for corner in corners]
     total = sum(heights)

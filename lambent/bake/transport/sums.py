@@ -1,4 +1,4 @@
-"""Sums of a thread: lights cut into pieces, whose shares go to the hat functions, or pairs of them, that they meet."""
+"""Sums of a thread: lights are cut into pieces, whose light goes to the hat functions, or pairs of them, they meet."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ from lambent.bake.transport.pieces import (
 from lambent.bake.transport.polygon_light import cosine_integral, highest_part
 from lambent.bake.transport.visibility import BITS
 
-TINY = 1e-12  # of a light: less is nowhere
+TINY = 1e-12  # of a light: smaller amounts are ignored
 
 
 @dr.syntax
 def accumulate(  # type: ignore[no-untyped-def]
     row, part, pixel, active, pixels, p, lights, seen, count, up, local, steps, height, quotient, counts
 ):
-    """Add all lights that a point sees to its row. Pieces are cut where the angles bend, depth first.
+    """Add all lights that a point sees to its row. Pieces are cut, depth first, if their angles bend.
 
-    Of wide lights, each piece counts by its own light and quotient, and what is below the horizon is on it.
+    For wide lights, each piece has its own light and quotient, and directions below the horizon are moved onto it.
     """
     m = mi.UInt32(0)
     while active & (m < count):
@@ -71,12 +71,12 @@ def accumulate(  # type: ignore[no-untyped-def]
 
 
 def _lifted(directions: list[Any], up: Any, wide: Any) -> list[Any]:
-    """What is below the horizon of a wide light, on it."""
+    """Move directions of a wide light from below the horizon onto it."""
     return directions if wide is None else [dr.select(wide, above(w, up), w) for w in directions]
 
 
 def _is_coarse(where: Where, corners: list[Any], bent: Any, wide: Any) -> Any:
-    """Whether a piece has to be cut."""
+    """Whether a piece must be cut."""
     if wide is None:
         return bent & (where[0] < MOST_CUTS)
     return (bent | (wide & is_broad(corners))) & (where[0] < dr.select(wide, MOST_CUTS_OF_WIDE, MOST_CUTS))
@@ -84,7 +84,7 @@ def _is_coarse(where: Where, corners: list[Any], bent: Any, wide: Any) -> Any:
 
 @dr.syntax
 def _of_piece(light, power, wide, ends, between, up, local, height, quotient):  # type: ignore[no-untyped-def]
-    """The light of a piece: of a wide light, its own."""
+    """The light of a piece; computed separately for a wide light."""
     if wide:
         middle = dr.normalize(highest_part(sum(between), ends, up, dr))
         a, b, c = (local(w) for w in ends)
@@ -95,12 +95,13 @@ def _of_piece(light, power, wide, ends, between, up, local, height, quotient):  
 
 @dr.syntax
 def _add_piece(row, part, power, found, counts):  # type: ignore[no-untyped-def]
-    """Add a piece of a light to the nodes, or pairs of nodes, that it meets; of the first curve those of a part.
+    """Add a piece of a light to the nodes, or pairs of nodes, that it meets; of the first curve, those of a part.
 
-    Of two angles, it walks along the nodes of that which varies more; the other is at its mean around each of them.
+    Of two angles, it walks along the nodes of the one that varies more; the other is taken at its mean around each
+    node.
     """
     outer, turned = spread_of(found)
-    low, high = outer[0][0] - 0.5, outer[0][2] - 0.5  # from the first node
+    low, high = outer[0][0] - 0.5, outer[0][2] - 0.5  # in units of nodes, from the first
     sides = outer[1][1] - outer[1][0], outer[1][2] - outer[1][0]
     lowest, highest = dr.minimum(dr.minimum(*sides), 0), dr.maximum(dr.maximum(*sides), 0)
     begin, end = mi.Float(part[0]) - 1, mi.Float(part[1]) - 1
@@ -115,13 +116,13 @@ def _add_piece(row, part, power, found, counts):  # type: ignore[no-untyped-def]
     if y < begin:
         before = below(begin + 0.5, outer, dr)
         y = mi.Float(begin)
-    left, left_b = mi.Float(0), mi.Float(0)  # what is for this node from before it
+    left, left_b = mi.Float(0), mi.Float(0)  # carried over to this node from the previous interval
     end = dr.minimum(end, high + 1)
     while y <= end:
         now = below(dr.minimum(y + 1.5, many), outer, dr)
         here = now[0] - before[0]
         mean = dr.clip((now[2] - before[2]) / dr.maximum(here, TINY), lowest, highest)
-        beyond = dr.clip(now[1] - before[1] + here * (low - y), 0, here)  # what is for the next node
+        beyond = dr.clip(now[1] - before[1] + here * (low - y), 0, here)  # for the next node
         beyond = dr.select(y < 0, here, dr.select(y < many - 1, beyond, 0))
         share = left + here - beyond
         inner = outer[1][0] + (left_b + mean * (here - beyond)) / dr.maximum(share, TINY)

@@ -1,9 +1,9 @@
-"""What the points of a view reflect of each triangle of the sphere: transport of light for relighting.
+"""Reflected light of a view's points by triangle of the sphere: transport of light for relighting.
 
     T_n = integral over triangle n of  f(w, wo) V(w) |cos|        (Ng et al. 2003, eq. 3, with all BRDFs fixed)
 
-Directions are drawn in every part of every triangle, and by the BSDF, which finds narrow highlights. Every sample
-counts its light over the density of all samples together (balance heuristic, Veach 1997): sums are exact in the mean.
+Directions are drawn in every part of every triangle, and by the BSDF, which finds narrow highlights. Every sample is
+divided by the combined density of all samples (balance heuristic, Veach 1997), so the sums are unbiased.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ STEPS = 1 / 1.22074408460575947536 ** np.arange(1, 4)  # of the additive sequenc
 def triangle_transport(
     scene: Any, si: Any, tree: TriangleTree, levels: int, samples: int, seed: int
 ) -> NDArray[np.float32]:
-    """(N, 3, P) radiance towards the viewer by a radiance of 1 in each of a tree's triangles, sr times 1/sr.
+    """(N, 3, P) radiance towards the viewer due to radiance 1 in each of a tree's triangles, sr times 1/sr.
 
     Parameters
     ----------
     si : mi.SurfaceInteraction3f
         The P points, evaluated.
     levels
-        Below the tree's: a direction is drawn in each of the 4^levels parts of every triangle.
+        Levels below the tree's: a direction is drawn in each of the 4^levels parts of every triangle.
     samples
         Directions drawn by the BSDF.
     """
@@ -50,7 +50,7 @@ def triangle_transport(
 
 
 def light_of_lamps(scene: Any, ray: Any, paths: int, seed: int) -> NDArray[np.float32]:
-    """(P, 3) direct light that rays (mi.Ray3f) see reflected in a scene, without what they see shine."""
+    """(P, 3) direct light of lamps reflected along rays (mi.Ray3f), without emission of the surfaces they hit."""
     points = dr.width(ray)
     number = dr.arange(mi.UInt32, points * paths) // paths
     start = path_tracer.camera_start(dr.gather(mi.Ray3f, ray, number))
@@ -61,7 +61,7 @@ def light_of_lamps(scene: Any, ray: Any, paths: int, seed: int) -> NDArray[np.fl
 
 
 def _density_vectors(corners: Floats) -> Floats:
-    """(M, 3) vectors q such that directions to even points of a flat triangle have the density (q.w)^-3 in 1/sr.
+    """(M, 3) vectors q for which directions to uniform points of a flat triangle have the density (q.w)^-3 in 1/sr.
 
     An area A at distance h has the density r^3 / (A h) at r = h / (n.w).
     """
@@ -107,7 +107,7 @@ def _sum_of_parts(scene, si, bsdf, first, each, triangles, samples, thread, seed
 
 
 def _by_bsdf(scene: Any, si: Any, samples: int, seed: int) -> tuple[Floats, Floats, Floats]:
-    """Directions (P * samples, 3), light that they bring times the cosine, and their densities by the BSDF."""
+    """Directions (P * samples, 3) drawn by the BSDF, their light times the cosine, and their densities."""
     thread = dr.arange(mi.UInt32, dr.width(si) * samples)
     pixel, k = thread // samples, mi.Float(thread % samples + 1)
     shift = [

@@ -1,4 +1,4 @@
-"""The points that the pixels of a view show: where they are, their shading frames, and the viewer in them."""
+"""The surface points that the pixels of a view show: positions, shading frames, and the viewer's directions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Floats32 = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class ViewPoints:
-    """What P pixels of a view show; float32.
+    """The surface points at P pixels of a view; float32.
 
     Attributes
     ----------
@@ -36,16 +36,16 @@ class ViewPoints:
     p, flat : (P, 3)
         Position and geometric normal, world space.
     t, b, n : (P, 3)
-        Shading frame in world space, turned so that the viewer is above it.
+        Shading frame in world space, oriented to have the viewer above.
     wo : (P, 3)
         Direction to the viewer in that frame.
     diffuse, specular : (P, 3)
-        What textures multiply diffuse and specular terms by.
+        Textures' factors on diffuse and specular terms.
     roughness : (P,)
-        What they multiply the slopes of highlights by.
+        Texture's factor on the slopes of highlights.
     sheet : (P, 3)
-        Normal of the mesh, world space, on the viewer's side, where a normal map bends the frame: light is on one side
-        of both. Elsewhere 0.
+        Normal of the mesh, world space, on the viewer's side, if a normal map bends the frame: light must be on the
+        same side of both. Otherwise 0.
     """
 
     pixel: NDArray[np.int64]
@@ -65,12 +65,12 @@ class ViewPoints:
         return len(self.pixel)
 
     def where(self, chosen: NDArray[np.bool_ | np.integer] | slice) -> ViewPoints:
-        """The chosen points, by a mask, by their numbers or by a slice."""
+        """Select points by a mask, by indices or by a slice."""
         return replace(self, **{name: getattr(self, name)[chosen] for name in self.__dataclass_fields__})
 
 
 def view_points(builder: SceneBuilder, scene: Any, camera: Camera, width: int, height: int) -> ViewPoints:
-    """The points in the centres of the pixels; pixels that show no surface have none."""
+    """The points at the pixels' centres; pixels without a surface have none."""
     origin = np.asarray(camera.position, float)
     ray = rays_from(origin, pixel_rays(camera, width, height).reshape(-1, 3))
     si = intersect(scene, ray, mi.Bool(True), has_holes(scene))

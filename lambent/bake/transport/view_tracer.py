@@ -1,4 +1,4 @@
-"""The scene of edited views as it is traced: what pixels show, and the lights, each found once."""
+"""The scene of edited views in traceable form: visible points and lights, each computed once."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from lambent.scenes.triangle_lights import TriangleLights
 
 
 class ViewTracer:
-    """A scene for Mitsuba, whose views are taken apart into points.
+    """A scene for Mitsuba whose views are converted to points.
 
-    Surfaces scatter by their materials' terms and curves in `editables` where those are not of the scene's documents.
+    Materials in `editables` whose terms and curves differ from the scene's documents scatter by them.
     """
 
     def __init__(self, scene: Scene, editables: Mapping[str, Editable] | None = None) -> None:
@@ -40,15 +40,15 @@ class ViewTracer:
 
     @property
     def object_numbers(self) -> Any:
-        """mi.UInt32: number of the object by that of Mitsuba's shape."""
+        """mi.UInt32: object number by Mitsuba's shape number."""
         return self._builder.object_numbers()
 
     def _points(self, view: View) -> ViewPoints:
-        """What the pixels of a view show. A ray that slipped through a surface would leave a black pixel."""
+        """The points of a view, traced watertight: a ray through a crack would leave a black pixel."""
         return view_points(self._builder, self._builder.build(watertight=True), view.camera, view.width, view.height)
 
     def surfaces(self, view: View) -> tuple[Any, Any]:
-        """Interactions (mi.SurfaceInteraction3f) at the points, in their order, and the rays (mi.Ray3f) to them."""
+        """Interactions (mi.SurfaceInteraction3f) at the points, in order, and the rays (mi.Ray3f) to them."""
         ray = self._rays(view)
         si = intersect(self.scene, ray, mi.Bool(True), has_holes(self.scene))
         shown = dr.compress(si.is_valid())
@@ -60,14 +60,14 @@ class ViewTracer:
 
     @cached_property
     def lamps(self) -> Any:
-        """The scene (mi.Scene) without its environment; None where nothing else shines."""
+        """The scene (mi.Scene) without its environment; None if it then has no emitters."""
         scene = self._builder.scene
         if not scene.lights and not any(any(o.emission) for o in scene.objects):
             return None
         return SceneBuilder(replace(scene, environment=None), edited=self._builder.edited).build()
 
     def environment_rows(self, rows: int) -> NDArray[np.float32]:
-        """(rows, 2 rows, 3) lat-long picture of the environment, black where there is none."""
+        """(rows, 2 rows, 3) lat-long picture of the environment, black without one."""
         environment = self._builder.environment
         black = np.zeros((rows, 2 * rows, 3), np.float32)
         return black if environment is None else environment_rows(environment, rows)
@@ -83,7 +83,7 @@ class ViewTracer:
         return None if environment is None else environment_samples(environment)
 
     def backdrop(self, view: View) -> NDArray[np.float32]:
-        """(height, width, 3) radiance that the pixels show without reflection."""
+        """(height, width, 3) radiance of the pixels without reflection."""
         ray = self._rays(view)
         si = intersect(self.scene, ray, mi.Bool(True), has_holes(self.scene))
         si.wi = dr.select(si.is_valid(), si.wi, -ray.d)

@@ -1,4 +1,4 @@
-"""Which lights the pixels of a view see, traced ray by ray."""
+"""Visibility of lights from the pixels of a view, traced ray by ray."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ BITS = 32
 def visibility(
     scene: Any, points: ViewPoints, lights: TriangleLights, behind: NDArray[np.bool_] | None = None
 ) -> NDArray[np.uint32]:
-    """Words (ceil(M / 32), P): bit m % 32 of word m // 32 is set where light m's centre is seen.
+    """Words (ceil(M / 32), P): bit m % 32 of word m // 32 is set if light m's centre is visible.
 
-    Of surfaces that shine, a place above the point's horizon is seen instead, where the centre is below it.
+    For a glowing surface with its centre below the point's horizon, a place above the horizon is tested instead.
 
     Parameters
     ----------
     behind : (P,) bool, optional
-        Points at which lights behind the shading normal count, too; elsewhere these are not traced and count as hidden.
+        Points at which lights behind the shading normal count too; at others these are not traced and count as hidden.
         All points by default.
     """
     words = -(-len(lights) // BITS)

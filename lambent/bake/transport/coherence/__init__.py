@@ -1,1 +1,1 @@
-"""Visibility of distant lights from few shadow rays, by coherence between pixels and between lights."""
+"""Visibility of distant lights with few shadow rays, by coherence between pixels and between lights."""

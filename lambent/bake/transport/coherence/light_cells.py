@@ -1,4 +1,4 @@
-"""Cells of distant lights: each is the directions that are nearest to its light, a Voronoi cell on the sphere."""
+"""Cells of distant lights: the directions nearest to each light, that is, Voronoi cells on the sphere."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Floats, Indices
 from lambent.core.octahedral import texel_directions, to_square
 
-TABLE = 512  # texels of an edge of the octahedral map by which cells are looked up
+TABLE = 512  # texels along a side of the octahedral map for looking up cells
 
 
 def neighbours(directions: Floats) -> NDArray[np.int64]:
-    """Lights whose cells touch that of each light, (M, K): a light itself fills the places that are left in its row.
+    """Lights whose cells are adjacent to each light's, (M, K); unused places hold the light itself.
 
-    Two cells touch where the Delaunay triangulation, of points on a sphere their convex hull, has an edge.
+    Two cells are adjacent if the Delaunay triangulation, for points on a sphere their convex hull, has an edge.
 
     Parameters
     ----------
     directions : (M, 3)
-        Unit directions of the lights, all different; at least four, not all in one plane.
+        Distinct unit directions of the lights; at least four, not all in one plane.
     """
     from scipy.spatial import ConvexHull
 
@@ -34,7 +34,7 @@ def neighbours(directions: Floats) -> NDArray[np.int64]:
 
 
 class CellTable:
-    """Which light's cell a direction lies in, by an octahedral map."""
+    """Looks up the light whose cell contains a direction, by an octahedral map."""
 
     def __init__(self, directions: Floats) -> None:
         from scipy.spatial import cKDTree
@@ -42,6 +42,6 @@ class CellTable:
         self._cell = cKDTree(directions).query(texel_directions(TABLE).reshape(-1, 3))[1]
 
     def at(self, w: Floats) -> Indices:
-        """Lights (n,) in whose cells the directions w (n, 3), of any length, lie."""
+        """Lights (n,) whose cells contain the directions w (n, 3), of any length."""
         column, row = np.clip((to_square(w) * TABLE).astype(np.int64), 0, TABLE - 1).T
         return np.asarray(self._cell[row * TABLE + column])

@@ -1,6 +1,6 @@
-"""The order in which pixels are evaluated, and from which evaluated pixels each of them is predicted.
+"""Order of evaluation of pixels, and the evaluated pixels from which each is predicted.
 
-Pixels of one pass do not depend on each other (Ben-Artzi 2007, section 8.6.1 and figure 8.4).
+Pixels of one pass are independent of each other (Ben-Artzi 2007, section 8.6.1 and figure 8.4).
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ STRAIGHT, DIAGONAL = ((-1, 0), (0, -1), (0, 1), (1, 0)), ((-1, -1), (-1, 1), (1,
 
 @dataclass(frozen=True)
 class Pass:
-    """Pixels (n,), row * width + column, and those that inform them (n, k), OUTSIDE where there is none; k may be 0."""
+    """Pixels (n,), row * width + column, and the pixels that inform them (n, k), padded with OUTSIDE; k may be 0."""
 
     pixels: Indices
     informers: Indices
-    finest: bool = False  # whether the grid ends here
+    finest: bool = False  # whether this is the last pass of the grid
 
 
 def scanline(width: int, height: int) -> Iterator[Pass]:
-    """Informed by the left, the upper and the upper left pixel: by diagonals, whose pixels are independent."""
+    """Each pixel is informed by its left, upper and upper left neighbour; passes are independent diagonals."""
     row, column = np.divmod(np.arange(width * height), width)
     yield _pass(np.flatnonzero((row == 0) | (column == 0)), (), width, height)
     for diagonal in range(2, width + height - 1):
@@ -36,7 +36,7 @@ def scanline(width: int, height: int) -> Iterator[Pass]:
 
 
 def grid(width: int, height: int) -> Iterator[Pass]:
-    """From coarse to fine: the centres of squares of evaluated pixels, then the middles of their sides."""
+    """Coarse to fine: the centres of squares of evaluated pixels, then the midpoints of their sides."""
     row, column = np.divmod(np.arange(width * height), width)
     yield _pass(np.flatnonzero((row % SPACING == 0) & (column % SPACING == 0)), (), width, height)
     step = SPACING // 2
@@ -49,7 +49,7 @@ def grid(width: int, height: int) -> Iterator[Pass]:
 
 
 def side_by_side(width: int, height: int) -> Pass:
-    """All pixels, with those that share a side with each of them."""
+    """All pixels, each informed by its neighbours along the sides."""
     return _pass(np.arange(width * height), STRAIGHT, width, height)
 
 

@@ -1,11 +1,11 @@
-"""Visibility of distant lights, predicted from pixels nearby, and shadow rays where the prediction is in doubt.
+"""Visibility of distant lights, predicted from nearby pixels, with shadow rays where the prediction is doubtful.
 
 Ben-Artzi 2007, chapter 8 (Ben-Artzi, Ramamoorthi and Agrawala 2006). It traces few rays, but a ray of a modern tracer
-costs less than a prediction (docs/performance.md): `bands.visibility` traces all of them. Lights are at infinity.
+costs less than a prediction (docs/performance.md), so `bands.visibility` traces all of them. Lights are at infinity.
 
-The last sweep is not of the thesis. A sliver of light between two shadows, narrower than the coarse grid, lies between
-pixels that all tell of a blocker; a finer pixel that is doubted for another reason finds a part of it, and the pixels
-around that part were predicted dark before. The sweep goes on from the part to the whole.
+The last sweep is not in the thesis. A sliver of light between two shadows, narrower than the coarse grid, lies between
+pixels that all report a blocker. A finer pixel, doubted for another reason, finds a part of it after the pixels around
+were predicted dark. The sweep extends from this part to the whole sliver.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ from lambent.bake.transport.coherence.votes import AT_ONCE, Same, Votes, Warped
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.core.arrays import Flags, Floats, Indices
 
-FEWEST_INFORMERS = 3  # that a prediction needs
+FEWEST_INFORMERS = 3  # needed for a prediction
 
 
 @dataclass(frozen=True)
 class Variant:
-    """How visibility is predicted and corrected.
+    """Options of prediction and correction.
 
     Attributes
     ----------
     grid : bool
         Order of the pixels: coarse to fine, or by scanlines.
     warp : bool
-        Whether blockers are turned to where they stand for the next pixel, or stay in the same light's cell.
+        Whether blockers are rotated to their direction from the next pixel, or stay in the same light's cell.
     boundary : bool
         What is traced first: lights next to one of other visibility, or those on which informing pixels disagree.
     sparing : bool
         Whether tracing spreads only to neighbours predicted otherwise, and not at all on the finest grid. A last sweep
-        then traces predictions that a pixel beside contradicts.
+        then traces predictions that contradict a neighbouring pixel.
     """
 
     grid: bool
@@ -66,13 +66,13 @@ class Predicted:
     Attributes
     ----------
     seen : (P, M) bool
-        False also where a light is behind the surface.
+        Also false for a light behind the surface.
     facing : (P, M) bool
-        Pairs that count: the light is before the surface.
+        Pairs that count: the light is in front of the surface.
     traced : int
-        Shadow rays, all of them of pairs that count.
+        Number of shadow rays, all for pairs that count.
     ray_seconds : float
-        That those rays took.
+        Time for those rays.
     """
 
     seen: Flags
@@ -85,14 +85,14 @@ class Predicted:
         return 100 * self.traced / max(1, int(self.facing.sum()))
 
     def wrong_percent(self, truth: Flags) -> float:
-        """Per cent of the pairs that count whose visibility is not that of (P, M) `truth`."""
+        """Percentage of the pairs that count whose visibility differs from (P, M) `truth`."""
         return 100 * int((self.facing & (self.seen != truth)).sum()) / max(1, int(self.facing.sum()))
 
 
 def predicted_visibility(
     scene: Any, points: ViewPoints, directions: Floats, width: int, height: int, variant: Variant
 ) -> Predicted:
-    """Visibility of lights of unit `directions` (M, 3) from the points of a view of `width` x `height` pixels."""
+    """Visibility of lights in unit `directions` (M, 3) from the points of a view of `width` x `height` pixels."""
     run = _Run(scene, points, directions, width * height, variant)
     for step in grid(width, height) if variant.grid else scanline(width, height):
         run.evaluate(step)
@@ -106,12 +106,12 @@ class _Run:
         self.rays = ShadowRays(scene, points, directions)
         self.seen, self._traced = np.zeros((2, *self.rays.facing.shape), bool)
         self._variant, self._object, self._neighbours = variant, points.object, neighbours(directions)
-        self._point = np.full(pixels + 1, OUTSIDE)  # the last one is of pixels outside the picture
+        self._point = np.full(pixels + 1, OUTSIDE)  # the last entry serves pixels outside the picture
         self._point[points.pixel] = np.arange(len(points))
         self._votes: Votes = Warped(points.p, directions) if variant.warp else Same()
 
     def evaluate(self, step: Pass) -> None:
-        """Find the visibility of the pixels of a pass."""
+        """Determine the visibility of the pixels of a pass."""
         shown = self._point[step.pixels] != OUTSIDE
         point, informers = self._point[step.pixels[shown]], self._point[step.informers[shown]]
         alike = (step.informers[shown] == OUTSIDE) | self._on_one_object(point, informers)
@@ -121,9 +121,9 @@ class _Run:
             self._predict(point[informed], informers[informed], floods=not (self._variant.sparing and step.finest))
 
     def sweep(self, step: Pass) -> None:
-        """Trace what a pixel beside contradicts, and on from each light that is not as predicted to the pixels beside.
+        """Trace predictions that contradict a neighbouring pixel, and spread from every wrong one to the neighbours.
 
-        Pixels of `step` are all pixels, each informed by those beside it.
+        `step` has all pixels, each informed by its neighbours.
         """
         shown = self._point[step.pixels] != OUTSIDE
         point, informers = self._point[step.pixels[shown]], self._point[step.informers[shown]]
@@ -145,7 +145,7 @@ class _Run:
             row, light = np.divmod(keys, self.seen.shape[1])
 
     def _contradicted(self, beside: Indices, some: slice) -> tuple[Indices, Indices]:
-        """Points and lights, predicted alone, that a point beside sees otherwise."""
+        """Predicted pairs of point and light that a neighbouring point contradicts."""
         found = np.zeros_like(self.seen[some])
         for other in beside[some].T:
             tells = self.rays.facing[other] & (other != OUTSIDE)[:, None]
@@ -161,7 +161,7 @@ class _Run:
         self._trace(point[row], light)
 
     def _trace(self, point: Indices, light: Indices) -> Flags:
-        """Whether lights are seen, (n,), kept for the pixels that follow."""
+        """(n,) whether lights are visible; stored for later pixels."""
         if self._variant.warp:
             blocked, place = self.rays.blockers(point, light)
             self._votes.keep(point[blocked], light[blocked], place[blocked])
@@ -185,7 +185,7 @@ class _Run:
         self._correct(point, facing, estimate, uncertain, doubted, floods)
 
     def _at_boundary(self, estimate: Flags, facing: Flags) -> Flags:
-        """Lights beside one of the other visibility; in scanlines also beside one behind the surface (8.7.4)."""
+        """Lights next to one of other visibility; in scanlines also next to one behind the surface (8.7.4)."""
         found = np.zeros_like(estimate)
         for beside in self._neighbours.T:
             if self._variant.grid:
@@ -197,7 +197,7 @@ class _Run:
     def _correct(
         self, point: Indices, facing: Flags, estimate: Flags, uncertain: Flags, doubted: Flags, floods: bool
     ) -> None:
-        """Trace doubted lights, and on from each that is not as estimated, or had no estimate, to its neighbours."""
+        """Trace doubted lights, and spread from each one estimated wrongly, or not at all, to its neighbours."""
         left = facing.copy()
         row, light = np.nonzero(doubted)
         while len(row):

@@ -1,4 +1,4 @@
-"""Shadow rays of chosen pairs of a point and a distant light, in batches."""
+"""Shadow rays for selected pairs of a point and a distant light, in batches."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ RAYS_AT_ONCE = 1 << 22
 
 
 class ShadowRays:
-    """Rays from the points of a view to lights of unit `directions` (M, 3).
+    """Rays from the points of a view to lights in unit `directions` (M, 3).
 
     Attributes
     ----------
     facing : (P, M) bool
         Whether a light is on the side of a point's surface that the viewer sees; only those count.
     count : int
-        Rays so far.
+        Number of rays so far.
     seconds : float
-        That they took.
+        Time for them.
     """
 
     def __init__(self, scene: Any, points: ViewPoints, directions: Floats) -> None:
@@ -40,7 +40,7 @@ class ShadowRays:
         self.count, self.seconds = 0, 0.0
 
     def blocked(self, point: Indices, light: Indices) -> Flags:
-        """(n,) bool: whether something stands between a point and a light."""
+        """(n,) bool: whether the light is occluded from the point."""
         found = np.zeros(len(point), bool)
         began = time.perf_counter()
         for some in slices(len(point), RAYS_AT_ONCE):
@@ -51,7 +51,7 @@ class ShadowRays:
         return found
 
     def blockers(self, point: Indices, light: Indices) -> tuple[Flags, NDArray[np.float32]]:
-        """(n,) bool as `blocked`, and where it stands (n, 3); anything where nothing does."""
+        """(n,) bool as `blocked`, and the position of the blocker (n, 3), undefined if there is none."""
         found, place = np.zeros(len(point), bool), np.zeros((len(point), 3), np.float32)
         began = time.perf_counter()
         for some in slices(len(point), RAYS_AT_ONCE):

@@ -1,4 +1,4 @@
-"""What informing pixels say about the lights of a pixel: how many of them know a blocker, light by light."""
+"""Votes of informing pixels: how many of them report a blocker, light by light."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ NONE = -1
 
 class Votes(Protocol):
     def keep(self, point: Indices, light: Indices, place: Floats) -> None:
-        """Remember blockers (n, 3) that shadow rays have met."""
+        """Store blockers (n, 3) hit by shadow rays."""
 
     def count(self, seen: Flags, facing: Flags, point: Indices, informers: Indices) -> tuple[Counts, Counts]:
-        """Blockers, and informers that can tell, for every light of n points, (n, M).
+        """Numbers of blockers, and of informers that can tell, for every light of n points, (n, M).
 
-        An informer cannot tell of a light behind its surface.
+        An informer cannot tell about a light behind its surface.
 
         Parameters
         ----------
         seen, facing : (P, M) bool
             Of all points.
         point : (n,)
-            Points to be predicted.
+            Points to predict.
         informers : (n, k)
-            The points that inform them, OUTSIDE where there is none.
+            The points that inform them, padded with OUTSIDE.
         """
 
 
@@ -41,7 +41,7 @@ class Same:
     """Blockers stay in the cell of the light that they block."""
 
     def keep(self, point: Indices, light: Indices, place: Floats) -> None:
-        """Nothing: what is seen is all that is needed."""
+        """Does nothing: visibility alone is needed."""
 
     def count(self, seen: Flags, facing: Flags, point: Indices, informers: Indices) -> tuple[Counts, Counts]:
         votes = np.zeros((len(point), seen.shape[1]), np.uint8)
@@ -54,12 +54,12 @@ class Same:
 
 
 class Warped:
-    """Blockers are turned to the cells in which they stand for the next point."""
+    """Blockers are rotated to the cells that contain them from the next point."""
 
     def __init__(self, p: Floats, directions: Floats) -> None:
         self._p, self._cells, self._lights = p, CellTable(directions), len(directions)
-        self._of = np.full((len(p), len(directions)), NONE, np.int32)  # number of the blocker of each light
-        self._places = np.zeros((1 << 16, 3), np.float32)  # doubled when it is full
+        self._of = np.full((len(p), len(directions)), NONE, np.int32)  # index of each light's blocker
+        self._places = np.zeros((1 << 16, 3), np.float32)  # doubled when full
         self._count = 0
 
     def keep(self, point: Indices, light: Indices, place: Floats) -> None:
