@@ -56,10 +56,21 @@ def test_the_line_on_a_bake_moves_no_control(panels, state):
     state.answering.possible = state.rebaking.possible = True
     panels.frame()
     places = dict(panels.rects)
-    for line, exact in (("baking again 0:07: starting", False), ("exact: baked again", True), ("", False)):
-        state.rebaking.line, state.rebaking.exact = line, exact
+    for line, done in (("baking again 0:07: starting", False), ("exact: baked again", True), ("", False)):
+        state.rebaking.line, state.rebaking.said = line, done
         panels.frame()
         assert panels.rects == places
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_baked_light_is_not_called_an_estimate(panels, state, monkeypatch, exact):
+    state.answering.possible = state.rebaking.possible = state.rebaking.said = True
+    state.answering.likely_error, state.rebaking.exact = 0.024, exact
+    state.rebaking.line = "exact: baked again" if exact else "exact except the light field of teapot"
+    drawn = []
+    monkeypatch.setattr(imgui, "text_disabled", drawn.append)
+    panels.frame()
+    assert state.rebaking.line in drawn and not any("estimated" in text for text in drawn)
 
 
 @pytest.mark.parametrize("size", [(640, 480), (1680, 1050)])

@@ -22,7 +22,7 @@ class Rebaking:
     exact : bool
         Whether the picture has the light of a bake for the present materials.
     said : bool
-        Whether the line says so.
+        Whether the bake is done and the line says how exact the picture is.
     """
 
     on: bool = True

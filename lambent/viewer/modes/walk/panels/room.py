@@ -42,7 +42,7 @@ def _light(state: WalkState) -> None:
     if rebaking.possible:
         meaning = "bakes the light of edited materials again in the background and updates the picture"
         rebaking.on = check("bake edits", rebaking.on, meaning)
-    lines = [rebaking.line if rebaking.exact else answering.note]
+    lines = [rebaking.line if rebaking.said else answering.note]
     if rebaking.possible:
-        lines.append("" if rebaking.exact else rebaking.line)
+        lines.append("" if rebaking.said else rebaking.line)
     status(lines, LONGEST[: len(lines)])
