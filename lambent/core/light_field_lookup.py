@@ -85,7 +85,8 @@ class Marched:
 def basis_weights(field: LightField, place: Place, w: Floats, basis: Basis, power: int = POWER) -> Floats:
     """(k, 4) weights B_j, of sum 1, of the points near a place; all 0 without points (4.5, 4.9 to 4.11).
 
-    If all points are below the horizon of the basis, the weights are equal.
+    `w` (k, 3) is unit; `power` is the exponent N. If all points are below the horizon of the basis, the weights are
+    equal.
     """
     towards = normalize(-place.offsets(field))
     known = place.known

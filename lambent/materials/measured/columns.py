@@ -178,7 +178,13 @@ def _angle(name: str) -> str | None:
 
 
 def rows_of(body: bytes, columns: int, path: Path) -> Floats:
-    """(N, columns) numbers, separated by blanks, commas or semicolons."""
+    """(N, columns) numbers, separated by blanks, commas or semicolons.
+
+    Raises
+    ------
+    UserError
+        If there are no rows, a row has another number of values, or numbers have decimal commas.
+    """
     refuse_decimal_commas(body, path)
     flat = numbers(re.sub(rb"[,;]", b" ", body), path)
     lines = sum(1 for line in body.split(b"\n") if line.strip(b" \t,;"))
