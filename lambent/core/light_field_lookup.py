@@ -216,7 +216,7 @@ def surface(field: LightField, place: Place) -> tuple[Floats, Flags]:
     """Radiance (k, 3) of the surface itself, and whether a point sees it, (k,) (3.11).
 
     The result comes from the nearest point that lies in a cone about the normal and sees the surface at x: first in the
-    narrow cone, then in the wider one, then anywhere.
+    narrow cone, then in the wider one, then anywhere. If none sees it, the light of the nearest is returned.
     """
     offset, point, known = place.offsets(field), place.named(), place.known
     distance = np.linalg.norm(offset, axis=-1)
