@@ -67,13 +67,13 @@ class Box:
     Attributes
     ----------
     lo, hi : (4,) float64
-        Bounds in search coordinates; equal where the parameter is fixed.
+        Bounds in search coordinates; equal if the parameter is fixed.
     tied : bool
         Whether my equals mx (isotropic).
     k_limits : tuple of (float, float)
         Interval of the coefficient per channel.
     retro : bool
-        Whether the lobe stands about the direction to the light.
+        Whether the lobe is centred on the direction to the light.
     """
 
     lo: Floats

@@ -55,7 +55,7 @@ class Layout:
     values : tuple of int
         The value columns.
     quantity : {"f", "f_cos", "p"}, optional
-        None where no name gives it.
+        None if no name gives it.
     kind : str
         grey, rgb, xyz or spectra.
     wavelengths_nm : tuple of float
@@ -212,10 +212,10 @@ def assemble(
     Parameters
     ----------
     phi_i_deg : float
-        Used where no column holds phi_i. A theta_o without a phi_o is in the plane of incidence, positive ahead of the
+        Used if no column has phi_i. A theta_o without a phi_o is in the plane of incidence, positive ahead of the
         normal, in the mirror direction.
     gridded : bool
-        False for rows whose format has no columns for the light, so that a grid of them is chance.
+        False for a format without columns for the light, where a grid would be coincidence.
     """
     angles = _degrees(rows, layout, phi_i_deg)
     check_angles(angles, path)
