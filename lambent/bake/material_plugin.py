@@ -1,4 +1,4 @@
-"""The import that exported Mitsuba scenes name: it makes their exact material known to Mitsuba."""
+"""Registers the exact material with Mitsuba; exported Mitsuba scenes tell their users to import this module."""
 
 from lambent.bake.bsdfs.material_plugin import material_dict, register_material_plugin
 

@@ -82,7 +82,13 @@ def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent
 
 
 def timed(command: list[str]) -> tuple[float, float | None]:
-    """(seconds, peak resident memory in MB or None if the system does not report it) of one process."""
+    """(seconds, peak resident memory in MB or None if the system does not report it) of one process.
+
+    Raises
+    ------
+    UserError
+        If the command fails.
+    """
     # Through a small separate process: a forked child's peak starts at its parent's memory.
     done = subprocess.run([sys.executable, "-c", _TIMED, *command], capture_output=True, text=True, timeout=TIMEOUT_S)
     if done.returncode != 0:

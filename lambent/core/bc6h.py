@@ -33,9 +33,12 @@ _AT_ONCE = 1 << 16  # blocks that a thread takes at a time
 
 
 def encoded(rgb: NDArray[Any]) -> NDArray[np.uint32]:
-    """Blocks (..., H/4, W/4, 4) of light (..., H, W, 3); negative values and NaN become 0.
+    """Compress light (..., H, W, 3) to blocks (..., H/4, W/4, 4); negative values and NaN become 0.
 
-    H and W must be multiples of 4.
+    Raises
+    ------
+    ValueError
+        If H or W is not a multiple of 4, or there are not three channels.
     """
     *lead, height, width, channels = rgb.shape
     if channels != 3 or height % BLOCK or width % BLOCK:

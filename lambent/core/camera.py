@@ -69,14 +69,20 @@ def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
 
 
 def image_plane(camera: Camera, width: int, height: int) -> tuple[Floats, Floats, Floats]:
-    """Vectors (across, up, forward): the ray of clip position (x, y) is forward + x across + y up."""
+    """Vectors (across, up, forward), (3,) each: the ray of clip position (x, y) is forward + x across + y up.
+
+    `width` and `height` are the image's size in pixels; only their ratio matters.
+    """
     right, up, forward = camera_axes(camera)
     half = np.tan(np.radians(camera.fov_y_deg) / 2)
     return right * half * width / height, up * half, forward
 
 
 def rays_through(camera: Camera, x_px: ArrayLike, y_px: ArrayLike, width: int, height: int) -> Floats:
-    """Unit directions (..., 3) of the rays through points of the image in pixels, y downwards from the top edge."""
+    """Unit directions (..., 3) of the rays through points of an image of `width` x `height` pixels.
+
+    `x_px` and `y_px` (...) are in pixels from the top left corner, y downwards.
+    """
     across, up, forward = image_plane(camera, width, height)
     x, y = 2 * np.asarray(x_px, float) / width - 1, 1 - 2 * np.asarray(y_px, float) / height
     return normalize(forward + x[..., None] * across + y[..., None] * up)
@@ -91,7 +97,7 @@ def pixel_rays(camera: Camera, width: int, height: int) -> Floats:
 def clip_from_world(
     camera: Camera, width: int, height: int, near_m: float, jitter_px: tuple[float, float] = (0.0, 0.0)
 ) -> Floats:
-    """(4, 4) matrix to clip space: infinite far plane, reversed depth near/z.
+    """(4, 4) matrix from world to clip space: infinite far plane, reversed depth near/z, near plane at `near_m` metres.
 
     `jitter_px` moves the sample within its pixel, x to the right, y down.
     """

@@ -37,6 +37,11 @@ def encoded(inverse: NDArray[Any], cover: NDArray[np.uint8] | None) -> NDArray[n
     """Blocks (P, h/4 + pool, w/4, 2) of inverse distances (P, h, w), 1/m, and cover (P, h, w).
 
     Without cover, texels with an inverse distance above 0 show a surface.
+
+    Raises
+    ------
+    ValueError
+        If h or w is not a multiple of 4.
     """
     count, height, width = inverse.shape
     if height % BLOCK or width % BLOCK:

@@ -100,7 +100,13 @@ def even_size(width: int, height: int) -> tuple[int, int]:
 
 
 def sequence_file(path: Path, number: int) -> Path:
-    """Path of picture `number` of a sequence: it replaces the # signs of `path`, or is appended with four digits."""
+    """Path of picture `number` of a sequence: it replaces the # signs of `path`, or is appended with four digits.
+
+    Raises
+    ------
+    UserError
+        If the name has # signs in several places.
+    """
     stem, signs, rest = re.fullmatch(r"([^#]*)(#*)(.*)", path.stem, re.DOTALL).groups()  # type: ignore[union-attr]
     if "#" in rest:
         raise UserError(

@@ -124,7 +124,7 @@ def glare(radiance: Floats, view: View, threshold: float = THRESHOLD_CD_M2) -> G
 
 
 def position_index(right: ArrayLike, up: ArrayLike, ahead: ArrayLike) -> Floats:
-    """Guth's position index (...), at least 1, of directions given by their components."""
+    """Guth's position index (...), at least 1, of directions with components (...) `right`, `up` and `ahead`."""
     right, up, ahead = (np.asarray(part, float) for part in (right, up, ahead))
     across = np.hypot(right, up)
     sigma = np.degrees(np.arctan2(across, ahead))

@@ -85,7 +85,8 @@ class Marched:
 def basis_weights(field: LightField, place: Place, w: Floats, basis: Basis, power: int = POWER) -> Floats:
     """(k, 4) weights B_j, of sum 1, of the points near a place; all 0 without points (4.5, 4.9 to 4.11).
 
-    If all points are below the horizon of the basis, the weights are equal.
+    `w` (k, 3) is unit; `power` is the exponent N. If all points are below the horizon of the basis, the weights are
+    equal.
     """
     towards = normalize(-place.offsets(field))
     known = place.known
@@ -215,7 +216,7 @@ def surface(field: LightField, place: Place) -> tuple[Floats, Flags]:
     """Radiance (k, 3) of the surface itself, and whether a point sees it, (k,) (3.11).
 
     The result comes from the nearest point that lies in a cone about the normal and sees the surface at x: first in the
-    narrow cone, then in the wider one, then anywhere.
+    narrow cone, then in the wider one, then anywhere. If none sees it, the light of the nearest is returned.
     """
     offset, point, known = place.offsets(field), place.named(), place.known
     distance = np.linalg.norm(offset, axis=-1)

@@ -143,6 +143,11 @@ def parse_light(texts: Iterable[str]) -> MixTrack:
     """Parse a track from texts such as "lamp=off", "lamp=0.3", "lamp=2700K", "lamp=0.5,#ffd0a0" and "lamp=0.5@4".
 
     The number after @ is a time in seconds, 0 by default. Values are interpolated between times.
+
+    Raises
+    ------
+    UserError
+        If a text is malformed, a value is out of range, or a group has two mixes at one time.
     """
     said: dict[str, dict[float, GroupMix]] = {}
     for text in texts:
@@ -159,7 +164,7 @@ def parse_light(texts: Iterable[str]) -> MixTrack:
 
 
 def mix_of(value: str, text: str) -> GroupMix:
-    """Parse the mix of a value such as "0.5,2700K"; errors quote `text`, the whole argument."""
+    """Parse the mix of a value such as "0.5,2700K"; raises `UserError` that quotes `text`, the whole argument."""
     mix, said = AS_BAKED, set[str]()
     for word in (part.strip() for part in value.split(",")):
         if word.lower() in ("on", "off"):

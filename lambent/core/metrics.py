@@ -42,7 +42,7 @@ class Flip:
 
 
 def psnr(reference: Floats, test: Floats, peak: float = 1.0) -> float:
-    """Peak signal-to-noise ratio in dB over all values; infinite if the images are equal."""
+    """Peak signal-to-noise ratio in dB over arrays of equal shape; `peak` is the largest value. Infinite if equal."""
     mse = float(np.mean((np.asarray(reference, np.float64) - test) ** 2))
     return 10 * float(np.log10(peak**2 / mse)) if mse > 0 else float("inf")
 
@@ -77,7 +77,10 @@ def _flip(reference: Floats, test: Floats, in_colour: bool) -> Floats:
 
 
 def compare(reference: Floats, test: Floats, *, radiance: bool) -> tuple[dict[str, Any], Floats]:
-    """All metrics of two linear images, and the FLIP error in false colour (encoded)."""
+    """All metrics of two linear RGB images (H, W, 3), and the FLIP error in false colour (H, W, 3), encoded.
+
+    PSNR and FLIP compare displayed values: at a common exposure for scene `radiance`, otherwise sRGB-encoded.
+    """
     shown = display_pair(reference, test) if radiance else (srgb_encode(reference), srgb_encode(test))
     seen = flip(*shown)
     return {

@@ -46,7 +46,8 @@ def texel_solid_angles(n: int) -> Floats:
 def bordered(maps: Any, width: int) -> Any:
     """Maps (..., E, E, C) with a border of `width` texels, for filters that read beyond an edge.
 
-    The border continues each edge with the same edge, mirrored about its middle.
+    The border continues each edge with the same edge, mirrored about its middle. Raises `ValueError` unless
+    0 <= `width` <= E.
     """
     n = maps.shape[-2]
     if not 0 <= width <= n:

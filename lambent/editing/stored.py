@@ -109,7 +109,10 @@ def _show(picture: EditedPicture, name: str, session: Session, store: Store) -> 
 
 
 def parts_of(store: Store, session: Session, materials: Mapping[str, Editable], lights: int) -> dict[str, Part]:
-    """The parts of a view, for the materials it shows; `materials` are those that transport was computed for."""
+    """The parts of a view, for the materials it shows; `materials` are those that transport was computed for.
+
+    `lights` is the number of lights of the transport. Raises `NotBaked` if an earlier version baked it.
+    """
     view = session.document
 
     def name(kind: str, part: str) -> str:

@@ -44,7 +44,7 @@ def coupling(cos_i: Any, cos_o: Any, ops: Any = NUMPY) -> Any:
 
 
 def evaluate(wi: Vector, wo: Vector, material: Material, ops: Any = NUMPY) -> Vector:
-    """f in 1/sr per RGB channel, without the cosine (3.6)."""
+    """f in 1/sr per RGB channel, without the cosine (3.6), for unit directions on any side of the sheet."""
     same, across = wi[2] * wo[2] > 0, wi[2] * wo[2] < 0
     share = coupling(ops.abs(wi[2]), ops.abs(wo[2]), ops) if material.kd_coupled else 1.0
     value = [
@@ -78,7 +78,7 @@ def selection(wo: Vector, material: Material, ops: Any = NUMPY) -> list[Any]:
 
 
 def pdf(wi: Vector, wo: Vector, material: Material, ops: Any = NUMPY) -> Any:
-    """Density in 1/sr of `sample`."""
+    """Density in 1/sr of `sample` at wi, given wo."""
     chosen = selection(wo, material, ops)
     cosine = ops.abs(wi[2]) / np.pi
     value = ops.select(wi[2] * wo[2] > 0, chosen[0] * cosine, 0.0)

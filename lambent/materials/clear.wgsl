@@ -1,4 +1,4 @@
-// What clear glass passes straight on; clear.py is the truth. Needs lobes.wgsl.
+// Undeviated transmittance of clear glass; clear.py is the reference. Needs lobes.wgsl.
 
 const LAMBENT_CLEAR_TERMS = 4u; // MOST_TERMS
 const LAMBENT_CLEAR_MOST = 0.9999;

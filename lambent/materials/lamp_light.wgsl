@@ -1,4 +1,4 @@
-// A lobe under one small lamp, in closed form: see lamp_light.py, which is the truth; tests compare the two. Needs lobes.wgsl.
+// A lobe lit by one small lamp, in closed form: lamp_light.py is the reference; tests compare the two. Needs lobes.wgsl.
 
 const LAMBENT_GGX_WIDER = 1.7;
 const LAMBENT_HORIZON = 1.2;
@@ -13,7 +13,7 @@ fn lambent_lamp_response(lobe: LambentLobe, wo: vec3f, wi: vec3f, a: vec3f, b: v
     let cos_o = max(wo.z, LAMBENT_LAMP_COS_MIN);
     let total = vec3f(wi.xy + wo.xy, cos_i + cos_o);
     let length2 = dot(total, total);
-    // one division for four reciprocals: on a processor they are most of the work
+    // one division for four reciprocals, which dominate the cost on a processor
     let per_pair = vec2f(reach * total.z, cos_i * length2);
     let inverse = 1.0 / (per_pair.x * per_pair.y);
     let per_length2 = per_pair.x * cos_i * inverse;

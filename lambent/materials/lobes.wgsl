@@ -1,4 +1,4 @@
-// The Kurt lobe for shaders: eval, sample, pdf. Sibling of lobes.py, which is the truth; tests compare the two.
+// The Kurt lobe for shaders: eval, sample, pdf. lobes.py is the reference; tests compare the two.
 //
 // Conventions (those of lobes.py): local shading frame (t, b, n), n = +z; unit directions away from the surface;
 // wi to the light, wo to the viewer. f is in 1/sr and without the cosine. The sheet is thin and two-sided: a pair of
@@ -29,10 +29,10 @@ struct LambentLobe {
     alpha: f32,         // exponent of the cosine product, 0..1
     side: u32,          // LAMBENT_REFLECTION or LAMBENT_TRANSMISSION
     distribution: u32,  // LAMBENT_BECKMANN or LAMBENT_GGX
-    retro: u32,         // 1: about the direction to the light itself
+    retro: u32,         // 1: centred on the direction to the light
 }
 
-// normalize(wi + wo); of opposite directions finite but without meaning.
+// normalize(wi + wo); finite but meaningless for opposite directions.
 fn lambent_half_vector(wi: vec3f, wo: vec3f) -> vec3f {
     let sum = wi + wo;
     return sum * inverseSqrt(max(dot(sum, sum), 1e-20));
@@ -45,7 +45,7 @@ fn lambent_fresnel(cos_d: f32, r0: vec3f) -> vec3f {
     return r0 + (1.0 - r0) * (m2 * m2 * m);
 }
 
-// 1 - (1 - cos)^5, without cancelling at grazing: what Schlick's Fresnel lets through, as a share of that at cos = 1.
+// 1 - (1 - cos)^5, without cancellation at grazing: Schlick transmittance relative to that at cos = 1.
 fn lambent_under_fresnel(cosine: f32) -> f32 {
     let c = min(cosine, 1.0);
     let m = 1.0 - c;
@@ -96,7 +96,7 @@ fn lambent_up(w: vec3f) -> vec3f {
     return vec3f(w.xy, abs(w.z));
 }
 
-// wi on the upper side where the lobe is one about the mirror direction. Its own inverse on that side.
+// wi moved to the upper side, where the lobe is about the mirror direction. Its own inverse on that side.
 fn lambent_unfolded(wi: vec3f, lobe: LambentLobe) -> vec3f {
     return vec3f(select(wi.xy, -wi.xy, lobe.retro == 1u), abs(wi.z));
 }
@@ -133,7 +133,7 @@ fn lambent_scattered(wo: vec3f, h: vec3f, lobe: LambentLobe) -> vec3f {
     return vec3f(select(wi.xy, -wi.xy, lobe.retro == 1u), select(wi.z, -wi.z, below));
 }
 
-// wi from u in [0, 1)^2. A direction on the wrong side of the surface comes back as it is: pdf, f and weight are 0.
+// wi from u in [0, 1)^2. A direction on the wrong side of the surface is returned unchanged: pdf, f and weight are 0.
 fn lambent_sample(wo: vec3f, u: vec2f, lobe: LambentLobe) -> vec3f {
     return lambent_scattered(wo, lambent_sample_half_vector(u, lobe), lobe);
 }

@@ -51,7 +51,7 @@ def _lengths(points: Floats, knots: Floats) -> tuple[Floats, Floats]:
 
 
 def _parameter(points: Floats, knots: Floats, share: float) -> float:
-    """Curve parameter at a share of the length; if the path stands still, at that share of the parameters."""
+    """Curve parameter at a fraction of the length; for a path without length, at that fraction of the parameters."""
     u, lengths = _lengths(points, knots)
     if lengths[-1] == 0:
         return float(share * knots[-1])

@@ -1,14 +1,14 @@
-"""Illuminance of clear daylight by published models, which daylight is calibrated to.
+"""Illuminance of clear daylight by published models, to which daylight is calibrated.
 
-Turbidity is how many clean, dry atmospheres extinguish sunlight as much: of all energy (Linke's), or of visible light.
-The models of either kind differ by up to half at low sun; what is returned lies between them, as a geometric mean.
+Turbidity is the number of clean, dry atmospheres with the same extinction of sunlight: of all energy (Linke's), or of
+visible light. Models of the two kinds differ by up to half at low sun; the result is their geometric mean.
 
     sun   ESRA's beam (Rigollier, Bauer & Wald 2000) by Perez's efficacy; and Kittler's luminous turbidity with the
           extinction of Clear (1982), 133.8 klx outside the atmosphere
     sky   ESRA's diffuse by Perez's efficacy; and the CIE clear sky (1973) with the zenith of Karayel, Navvab, Ne'eman &
-          Selkowitz (1984), which holds from turbidity 2 on
+          Selkowitz (1984), which is valid from turbidity 2 on
 
-`docs/scenes.md` compares the sums with each. Efficacies are those of Perez et al. (1990), for 2 cm of water.
+`docs/scenes.md` compares the results with each. Efficacies are those of Perez et al. (1990), for 2 cm of water.
 """
 
 from __future__ import annotations
@@ -35,18 +35,18 @@ _DIFFUSE = np.array(
         (141.88, 1.90, -53.24, -14.03), (152.23, 0.35, -45.27, -7.98),
     ]
 )  # fmt: skip
-_ZENITH_FROM, _ZENITH_UP_TO_DEG = 2.0, 70.0  # turbidity and height of the sun that Karayel's zenith holds for
+_ZENITH_FROM, _ZENITH_UP_TO_DEG = 2.0, 70.0  # turbidity and elevation for which Karayel's zenith is valid
 
 
 def sun_illuminance(height_deg: float, turbidity: float) -> float:
-    """Illuminance, lx, on a surface that faces the sun, of the sun alone; `height_deg` from 0 to 90."""
+    """Illuminance, lx, by the sun alone on a surface that faces it; `height_deg` from 0 to 90."""
     beam_w_m2, diffuse_w_m2 = esra(height_deg, turbidity)
     linke_lx = beam_w_m2 * efficacies(height_deg, beam_w_m2, diffuse_w_m2)[0]
     return float(np.sqrt(linke_lx * kittler_sun(height_deg, turbidity)))
 
 
 def sky_illuminance(height_deg: float, turbidity: float) -> float:
-    """Illuminance, lx, on level ground of the sky without the sun."""
+    """Illuminance, lx, by the sky without the sun on level ground."""
     beam_w_m2, diffuse_w_m2 = esra(height_deg, turbidity)
     esra_lx = diffuse_w_m2 * efficacies(height_deg, beam_w_m2, diffuse_w_m2)[1]
     within = min(height_deg, _ZENITH_UP_TO_DEG), max(turbidity, _ZENITH_FROM)
@@ -54,7 +54,7 @@ def sky_illuminance(height_deg: float, turbidity: float) -> float:
 
 
 def daylight_in_words(sky: SunSky) -> str:
-    """What daylight is, in a line: its sun, its illuminances, and what lies below the horizon."""
+    """One line on daylight: its sun, its illuminances, and the ground below the horizon."""
     height_deg = float(np.degrees(np.arcsin(np.clip(sky.sun_direction[1], 0, 1))))
     sun_klx = sky.sun_scale * sun_illuminance(height_deg, sky.turbidity) / 1000
     sky_klx = sky.sky_scale * sky_illuminance(height_deg, sky.turbidity) / 1000
@@ -71,7 +71,7 @@ def air_mass(height_deg: float) -> float:
 
 
 def esra(height_deg: float, turbidity: float) -> tuple[float, float]:
-    """Irradiance, W/m^2, of the beam on a surface that faces it, and of the sky on level ground; Linke's turbidity."""
+    """Irradiance, W/m^2, by the beam on a surface that faces it, and by the sky on level ground; Linke's turbidity."""
     m, sine = air_mass(height_deg), np.sin(np.radians(height_deg))
     rayleigh = 10.4 + 0.718 * m if m > 20 else np.polyval((-0.00013, 0.0065, -0.1202, 1.7513, 6.6296), m)  # 1/delta
     beam = SOLAR_W_M2 * np.exp(-0.8662 * turbidity * m / rayleigh)
@@ -83,13 +83,13 @@ def esra(height_deg: float, turbidity: float) -> tuple[float, float]:
 
 
 def kittler_sun(height_deg: float, turbidity: float) -> float:
-    """Illuminance, lx, on a surface that faces the sun, of the sun alone; luminous turbidity."""
+    """Illuminance, lx, by the sun alone on a surface that faces it; luminous turbidity."""
     m = air_mass(height_deg)
     return float(SOLAR_LX * np.exp(-m * turbidity / (9.9 + 0.043 * m)))
 
 
 def cie_clear_sky(height_deg: float, turbidity: float) -> float:
-    """Illuminance, lx, on level ground of the CIE standard clear sky (1973) under Karayel's zenith."""
+    """Illuminance, lx, by the CIE standard clear sky (1973) with Karayel's zenith on level ground."""
     height = np.radians(height_deg)
     zenith_kcd_m2 = (1.376 * turbidity - 1.81) * np.tan(height) + 0.38
     y = (np.arange(4096) + 0.5) / 4096  # a spiral of equal solid angles over the sky

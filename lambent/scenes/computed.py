@@ -1,4 +1,4 @@
-"""Surroundings made by code, by name, as lat-long images of linear radiance."""
+"""Procedural surroundings, by name, as lat-long images of linear radiance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures that light scenes: read in any layout, and the way they lie in the world."""
+"""Pictures that light scenes: reading any layout, and orientation in the world."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from lambent.scenes.computed import lat_long_image
 from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, Environment, ImageEnvironment
 
 _UPRIGHT = np.eye(3)
-# The least turns that take +y to an axis: columns are where +x, +y, +z go. Upside down, front stays front.
+# Minimal rotations from +y to an axis: columns are the images of +x, +y, +z. Upside down, front stays front.
 _TURNS: dict[Axis, Floats] = {
     "+y": _UPRIGHT,
     "-y": np.diag([-1.0, -1.0, 1.0]),
@@ -28,14 +28,14 @@ _TURNS: dict[Axis, Floats] = {
 
 
 def read_lat_long(file: Path, layout: Layout | None = None) -> Image:
-    """(H, W, 3) float32 lat-long picture of a file in any layout; it is recognised where `layout` is None.
+    """(H, W, 3) float32 lat-long picture of a file in any layout, detected if `layout` is None.
 
-    Negative values, which filters leave beside bright lamps, are black.
+    Negative values, which filters leave next to bright lamps, become black.
 
     Raises
     ------
     UserError
-        The file is no picture, or not of that layout, or its layout is not clear.
+        If the file is not a picture, or not of that layout, or its layout is ambiguous.
     """
     picture = np.maximum(read_image(file)[..., :3], np.float32(0))
     return as_lat_long(picture, layout or layout_of(picture, file), file)
@@ -54,12 +54,12 @@ def orientation(environment: ImageEnvironment) -> Floats:
 
 
 def environment_picture(environment: Environment) -> Image:
-    """(H, W, 3) lat-long picture of an environment, unturned, scaled to its radiance.
+    """(H, W, 3) lat-long picture of an environment, not rotated, scaled to its radiance.
 
     Raises
     ------
     UserError
-        It is daylight, which a bake alone computes, or its file cannot be read.
+        If it is daylight, which only a bake can compute, or its file cannot be read.
     """
     if isinstance(environment, ImageEnvironment):
         return read_lat_long(environment.file, environment.layout) * np.float32(environment.scale)

@@ -77,7 +77,7 @@ _ZENITH = {
         (0.15346, -0.26756, 0.06670, 0.26688),
     ),
 }
-_SUN_KLUX, _SUN_RADIUS_RAD = 100.0, np.radians(1.0)  # the sun is drawn wider than it is, with the same light
+_SUN_KLUX, _SUN_RADIUS_RAD = 100.0, np.radians(1.0)  # the sun is drawn larger, with the same light
 
 
 def daylight(

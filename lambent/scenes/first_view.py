@@ -13,17 +13,17 @@ from lambent.core.plain import triple
 from lambent.scenes.mesh import boxes_of, corners_of
 from lambent.scenes.scene import EYE_HEIGHT_M, SceneObject
 
-GROUND, FLAT = 4.0, 0.05  # a ground is so many times as large as all others together, and not higher than its share
-PLACES, MOST_TRIED = 11, 25  # on each side of the floor, and of those with a floor and a ceiling
+GROUND, FLAT = 4.0, 0.05  # a ground is this many times as large as all others together, and this flat
+PLACES, MOST_TRIED = 11, 25  # candidates per side of the floor, and number of those with a floor and a ceiling
 ROOM_HEIGHT_M, ELBOW_ROOM_M = (1.9, 30.0), 0.5
-MOST_TRIANGLES = 4000  # the largest, that walls are made of
-AROUND = 24  # rays at each of these heights: the walls, what stands on the floor, and the ceiling
+MOST_TRIANGLES = 4000  # the largest, which represent walls
+AROUND = 24  # rays at each of these elevations: walls, things on the floor, and ceiling
 LEVEL, FLOORWARDS, UPWARDS = 0.0, math.radians(-30), math.radians(60)
-WALLED, ROOFED, UNEVEN = 0.45, 0.8, 0.25  # least shares of rays that hit; how far ceilings may be off their median
-INWARDS, FURNITURE = 0.7, 3  # least share of rays that hit fronts; least objects that stand free
-LONG_M, OBJECT_M = 5.0, 0.5  # views that are longer are no better; an object in sight is worth so much length
-MARGIN = 0.03  # of the room, between walls and what stands free
-FOV_Y_DEG, SIDES, PITCH = 60.0, 3, 0.08  # rays to each side that are in view; radians down
+WALLED, ROOFED, UNEVEN = 0.45, 0.8, 0.25  # least shares of rays that hit; tolerance of ceilings about their median
+INWARDS, FURNITURE = 0.7, 3  # least share of rays that hit front faces; least number of free-standing objects
+LONG_M, OBJECT_M = 5.0, 0.5  # longer views are no better; a visible object is worth this much length
+MARGIN = 0.03  # relative to the room, between walls and free-standing objects
+FOV_Y_DEG, SIDES, PITCH = 60.0, 3, 0.08  # rays to each side in view; radians downwards
 
 
 def first_views(objects: Sequence[SceneObject]) -> tuple[Camera, ...]:
@@ -49,10 +49,10 @@ def _surrounds(box: Floats, low: Floats, high: Floats) -> bool:
 
 
 def inside(objects: Sequence[SceneObject]) -> Camera | None:
-    """A camera at eye height, towards most of what stands there; None without a floor, walls and a ceiling.
+    """A camera at eye height that faces most objects; None without a floor, walls and a ceiling.
 
-    What surrounds a place is a room where its surfaces face it, or where furniture stands free in it: closed solids and
-    empty shells of buildings are neither.
+    A place is in a room if the surrounding surfaces face it, or if furniture stands free in it: closed solids and empty
+    shells of buildings are not rooms.
     """
     low, high = content_bounds(objects)
     if not ROOM_HEIGHT_M[0] <= high[1] - low[1] or min((high - low)[[0, 2]]) < 4 * ELBOW_ROOM_M:
@@ -85,7 +85,7 @@ def inside(objects: Sequence[SceneObject]) -> Camera | None:
 
 
 def _worth(length_m: Floats, hits: Floats) -> Floats:
-    """(AROUND,) what there is to see each way, of views (AROUND,) and the objects (rows, AROUND) that rays hit."""
+    """(AROUND,) value of each direction, from view lengths (AROUND,) and the objects (rows, AROUND) that rays hit."""
     turns = range(-SIDES, SIDES + 1)
     ahead = np.mean([np.roll(length_m, turn) for turn in turns], axis=0)
     objects = np.concatenate([np.roll(hits, turn, axis=1) for turn in turns])
@@ -93,7 +93,7 @@ def _worth(length_m: Floats, hits: Floats) -> Floats:
 
 
 def _around(tilt_rad: float) -> Floats:
-    """(AROUND, 3) directions so far above the horizon."""
+    """(AROUND, 3) directions at an elevation of `tilt_rad`."""
     angle, across = np.arange(AROUND) * 2 * math.pi / AROUND, math.cos(tilt_rad)
     return np.stack([across * np.cos(angle), np.full(AROUND, math.sin(tilt_rad)), across * np.sin(angle)], axis=1)
 
@@ -112,7 +112,7 @@ class _Walls:
         self._n = np.cross(self._u, self._v)
 
     def hit(self, origins: Floats, directions: Floats) -> tuple[Floats, Flags, Floats]:
-        """Distance (R,) of each ray's first triangle, inf of none, whether it is a front, and its object, -1 of none.
+        """Distance (R,) of each ray's first triangle, inf without a hit, whether it is a front, and its object, or -1.
 
         Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997.
         """
@@ -133,7 +133,7 @@ class _Walls:
 
 
 def _free(objects: Sequence[SceneObject], hits: Floats, low: Floats, high: Floats) -> int:
-    """How many of the objects of these numbers stand away from the walls."""
+    """Number of the given objects that stand away from the walls."""
     gap = MARGIN * (high - low)[[0, 2]]
 
     def stands_free(o: SceneObject) -> bool:

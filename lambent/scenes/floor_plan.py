@@ -1,11 +1,11 @@
-"""Floor plans of planar reflectors: which points of the plane lie past a wall that stands on the reflector's edge.
+"""Floor plans of planar reflectors: which points of the plane lie beyond a wall on the reflector's edge.
 
-A mirrored eye below a floor sees the room only up to the foot of its walls; past them it looks outside, where nothing
-lies that the floor mirrors. Past the edge of a table it sees what the table mirrors. A plan tells both kinds of edge
-apart along the true outline, bays included: a grid of signed distances, positive on the reflector and past its open
-edges, negative past a wall. A point beyond the reflector counts as past a wall if something stands at the nearest point
-of the edge. Floors reach under skirtings and into walls: a strip along the edge that the foot of an object cuts off is
-no part of the reflector.
+A mirrored eye below a floor sees the room only up to the foot of its walls; beyond them it looks outside, where there
+is nothing for the floor to mirror. Beyond the edge of a table it sees what the table mirrors. A plan distinguishes both
+kinds of edge along the true outline, bays included: a grid of signed distances, positive on the reflector and beyond
+its open edges, negative beyond a wall. A point off the reflector is beyond a wall if something stands at the nearest
+point of the edge. Floors extend under skirtings and into walls: a strip along the edge that the foot of an object cuts
+off is not part of the reflector.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from lambent.core.arrays import Flags, Floats
 from lambent.core.directions import basis
 from lambent.core.geometry import cross_2d
 
-CELLS = 600  # at most, per size of the reflector, the root of its area
-FEWEST_CELLS = 32  # where a scene has very many reflectors
-CELLS_OF_ALL = 6 * CELLS**2  # plans of one scene together take no more: some 2 s
+CELLS = 600  # at most, per size of the reflector, the square root of its area
+FEWEST_CELLS = 32  # for a scene with very many reflectors
+CELLS_OF_ALL = 6 * CELLS**2  # limit for all plans of one scene together: about 2 s
 MOST_CELLS = 2048  # along one side
-SPREAD = 4.0  # times the reflector's area: a rectangle around it that is larger has coarser cells
-HEIGHTS = (0.01, 0.03)  # of the cuts that look for walls, over the reflector, in shares of its size
+SPREAD = 4.0  # ratio of the bounding rectangle's area to the reflector's above which cells are coarser
+HEIGHTS = (0.01, 0.03)  # of the cuts that look for walls, above the reflector, relative to its size
 FOOT = 0.0005  # of the cut that looks for the feet of objects
-SHARE = 0.6  # of a stretch of edge and of the heights: the least at which a wall stands
-BORDER = 4  # cells around the reflector; beyond, the plan goes on as it ends
-NEAR = 0.02  # of the size: largest distance from an edge to a wall on it
-WINDOW = 0.05  # of the size: the stretch of edge over which SHARE counts
-STEPS = 16  # per cell, of distances in a plan
-FINE = 4  # subcells along each axis of a cell, to find which share of it the reflector covers
-AROUND = 0.25  # of a reflector's longer side: more than NEAR, and than BORDER of FEWEST_CELLS
-MARGIN = 0.25  # cells before a wall that count as past it: light from outside may be a thousand times as bright
+SHARE = 0.6  # of a stretch of edge, and of the heights, at which a wall must stand
+BORDER = 4  # cells around the reflector; beyond, the plan is clamped
+NEAR = 0.02  # relative to the size: largest distance from an edge to a wall on it
+WINDOW = 0.05  # relative to the size: the stretch of edge for SHARE
+STEPS = 16  # resolution of distances: steps per cell
+FINE = 4  # subcells along each axis of a cell, for the share covered by the reflector
+AROUND = 0.25  # relative to a reflector's longer side: more than NEAR, and than BORDER of FEWEST_CELLS
+MARGIN = 0.25  # cells before a wall that count as beyond it: light from outside may be a thousand times as bright
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,10 @@ class FloorPlan:
 
 
 def shared_cells(areas_m2: Sequence[float]) -> list[float]:
-    """Cells per size for the plan of every reflector of a scene, so that all together take CELLS_OF_ALL at most.
+    """Cells per size for the plan of every reflector of a scene, limited to CELLS_OF_ALL in total.
 
-    Reflectors have CELLS each as long as that suffices; else the large ones keep them, and the others have cells of
-    one size in metres.
+    Each reflector has CELLS if that suffices; otherwise the large ones keep them, and all others have cells of one size
+    in metres.
     """
     areas = np.asarray(areas_m2, float)
 
@@ -71,7 +71,7 @@ def shared_cells(areas_m2: Sequence[float]) -> list[float]:
 
 
 class Surroundings:
-    """All triangles (F, 3, 3) of a scene, found by the spheres around them: a reflector meets few."""
+    """All triangles (F, 3, 3) of a scene, searched by bounding spheres: a reflector meets few of them."""
 
     def __init__(self, corners: Floats) -> None:
         self._corners = corners
@@ -79,7 +79,7 @@ class Surroundings:
         self._radii = np.sqrt(((corners - self._middles[:, None]) ** 2).sum(axis=2)).max(axis=1, initial=0)
 
     def over(self, faces: Floats, normal: Floats) -> Floats:
-        """(N, 3, 3) those that may matter to the plan of a reflector of triangles (K, 3, 3), and few others."""
+        """(N, 3, 3) triangles that may affect the plan of a reflector of triangles (K, 3, 3), and few others."""
         flat = faces @ np.stack(basis(normal), axis=1)
         low, high = flat.reshape(-1, 2).min(axis=0), flat.reshape(-1, 2).max(axis=0)
         height = self._middles @ normal - float((faces @ normal).mean())
@@ -91,7 +91,7 @@ class Surroundings:
 
 
 def may_have_walls(faces: Floats, normal: Floats, corners: Floats) -> bool:
-    """Whether a triangle crosses a plane at one of HEIGHTS over the rectangle around a reflector, or close to it."""
+    """Whether a triangle crosses or nearly crosses a plane at one of HEIGHTS above a reflector's bounding box."""
     axes = np.stack(basis(normal), axis=1)
     flat = faces @ axes
     size = _size(flat)
@@ -110,17 +110,17 @@ def _size(flat: Floats) -> float:
 
 
 def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CELLS) -> FloorPlan | None:
-    """Plan of a reflector of the triangles `faces` (K, 3, 3), all in a plane of unit normal (3,); None without walls.
+    """Plan of a reflector of the triangles `faces` (K, 3, 3), in a plane of unit normal (3,); None without walls.
 
     `corners` (F, 3, 3) are the triangles of the scene, `cells` the number of cells per size of the reflector. A wall
-    stands on an edge where triangles cross the planes at both HEIGHTS over the reflector, within NEAR of the edge.
+    stands on an edge where triangles cross the planes at both HEIGHTS above the reflector, within NEAR of the edge.
     """
     from lambent.core.plan_cells import (
         filled,
         inner,
         share_filled,
         within,
-    )  # compiled, and only for scenes with reflectors
+    )  # compiled, and needed only for scenes with reflectors
 
     across, along = basis(normal)
     axes = np.stack([across, along], axis=1)
@@ -164,7 +164,7 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CE
 
 
 def _without_strips(covered: Flags, standing: Flags, width: float) -> Flags:
-    """`covered` without the strips along its edge that `standing` cuts off, up to `width` cells wide in the mean."""
+    """`covered` without strips along its edge, up to `width` cells wide on average, that `standing` cuts off."""
     from lambent.core.plan_cells import without_strips
 
     if not (covered & standing).any():
@@ -174,13 +174,13 @@ def _without_strips(covered: Flags, standing: Flags, width: float) -> Flags:
 
 
 def _edge_from(share: Floats, covered: Flags) -> Floats:
-    """Cells from the centre of a covered cell to the edge, by the covered shares of it and of its neighbours."""
+    """Cells from the centre of a covered cell to the edge, by its covered share and its neighbours'."""
     around = maximum_filter(np.where(covered, 0.0, share), footprint=np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]]))
     return np.asarray(np.where(covered, share - 0.5 + around, 0.0))
 
 
 def _cut(height: Floats, corners: Floats) -> Floats:
-    """Segments (S, 2, 3) in which triangles cross the plane of height 0; `height` (F, 3) is that of their corners."""
+    """Segments (S, 2, 3) where triangles cross the plane of height 0; `height` (F, 3) is that of their corners."""
     above = height > 0
     crossing = above.any(axis=1) & ~above.all(axis=1)
     height, corners, above = height[crossing], corners[crossing], above[crossing]

@@ -1,6 +1,6 @@
-"""Gardens made by code: radiance of a sky with its sun and clouds, of trees and of a lawn, seen from one point.
+"""Procedural gardens: radiance of a sky with sun and clouds, of trees and of a lawn, seen from one point.
 
-Noise is a sum of plane waves over the unit sphere, so that it has neither seam nor pole.
+Noise is a sum of plane waves over the unit sphere, without seams or poles.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from lambent.core.arrays import Floats
 from lambent.core.directions import normalize
 
 SUN = normalize(np.array([0.62, 0.5, 0.52]))
-SUN_RADIUS_DEG, SUN_RADIANCE = 1.3, np.array([16_000.0, 13_000.0, 9_200.0])  # wider than it is, with its light
+SUN_RADIUS_DEG, SUN_RADIANCE = 1.3, np.array([16_000.0, 13_000.0, 9_200.0])  # larger than real, with the same light
 EYE_M = 1.2  # height of the point over the lawn
 LEAVES = np.array([[0.10, 0.22, 0.03], [0.30, 0.34, 0.04], [0.62, 0.24, 0.02], [0.52, 0.07, 0.02], [0.06, 0.13, 0.05]])
 
@@ -37,7 +37,7 @@ def _sky(w: Floats) -> Floats:
     pale = np.exp(-4.5 * up)
     sky = pale * [5.2, 5.0, 4.6] + (1 - pale) * [0.9, 1.9, 4.2]
     sky = sky + np.exp(-9.0 * (1 - to_sun)) * [3.2, 2.4, 1.5] + np.exp(-90.0 * (1 - to_sun)) * [14.0, 10.0, 6.0]
-    above = w * (1, 0, 1) / (up + 0.18)  # a layer of clouds, met the farther the lower one looks
+    above = w * (1, 0, 1) / (up + 0.18)  # a cloud layer, hit farther away at lower elevation
     body = _noise(above, 1, 3.4) + 0.6 * _noise(above, 2, 9.0) + 0.35 * _noise(above, 3, 24.0)
     cover = np.clip((body - 0.45) / 1.1, 0, 1) * np.clip(up / 0.06, 0, 1)
     lit = 3.6 + 4.4 * np.clip(1.6 - body, 0, 1) + 7.0 * np.exp(-6.0 * (1 - to_sun))

@@ -1,11 +1,11 @@
 """IES photometry, IES LM-63 of 1986, 1991, 1995, 2002 and 2019: the luminous intensity of a luminaire by direction.
 
-Type C: the vertical angle is from where the luminaire points (straight down, unless it is aimed elsewhere), the
-horizontal one about that, counter-clockwise seen from above. Types A and B, of floodlights and headlamps, are refused.
+Type C: the vertical angle is measured from the luminaire's axis (straight down, unless it is aimed elsewhere), the
+horizontal one around it, counter-clockwise seen from above. Types A and B, for floodlights and headlamps, are refused.
 
-Candela are the file's times its multiplier and its ballast factor, in files up to 1991 also times the ballast-lamp
-factor, whose place later ones leave free. Between angles intensities are linear in both; beyond the vertical ones given
-there is no light.
+Candela are the file's values times its multiplier and its ballast factor; in files up to 1991 also times the
+ballast-lamp factor, a field that later versions reserve. Intensities are linear in both angles; beyond the given
+vertical angles there is no light.
 """
 
 from __future__ import annotations
@@ -40,15 +40,15 @@ class Photometry:
     Attributes
     ----------
     vertical_deg : (V,)
-        Rising, within 0 to 180; 0 is where the luminaire points.
+        Ascending, within 0 to 180; 0 is the luminaire's axis.
     horizontal_deg : (H,)
-        Rising from 0 to 360, both included.
+        Ascending from 0 to 360, both included.
     candela : (H, V)
         Not negative.
     opening_m : (width, length, height)
-        Of the luminous opening, as in the file; negative ones are diameters. Light comes from a point in its middle.
+        Of the luminous opening, as in the file; negative ones are diameters. Light comes from a point at its centre.
     tilt_deg, tilt_factors : (N,)
-        Factors on all intensities by the angle between where the luminaire is aimed and straight down.
+        Factors on all intensities by the angle between the luminaire's axis and straight down.
     """
 
     vertical_deg: tuple[float, ...]
@@ -70,7 +70,7 @@ class Photometry:
         return float(whole.sum())
 
     def tilted(self, tilt_deg: float) -> float:
-        """Factor on all intensities of a luminaire that is aimed so far from straight down."""
+        """Factor on all intensities of a luminaire whose axis is tilted by `tilt_deg` from straight down."""
         return float(np.interp(tilt_deg, self.tilt_deg, self.tilt_factors))
 
     def at(self, vertical_deg: Floats, horizontal_deg: Floats) -> Floats:
@@ -86,18 +86,18 @@ class Photometry:
 
 
 def read_ies(path: Path) -> Photometry:
-    """The photometry of an IES file.
+    """Read the photometry of an IES file.
 
     Raises
     ------
     UserError
-        Where the file is none, is damaged, is of type A or B, or has its tilt in another file.
+        If it is not an IES file, is damaged, is of type A or B, or has its tilt in another file.
     """
     return parse_ies(read_bytes(path, IES_BYTES), path)
 
 
 def parse_ies(content: bytes, path: Path) -> Photometry:
-    """As `read_ies`, of what a file at `path` holds."""
+    """`read_ies` for the content of the file at `path`."""
     with foreign_bytes(NAME, path):
         return _Reading(content.decode("latin-1"), path).photometry()
 
@@ -145,7 +145,7 @@ class _Reading:
         return replace(made, opening_m=tuple(opening), tilt_deg=tilt[0], tilt_factors=tilt[1])
 
     def _whole_sphere(self, vertical: Floats, horizontal: Floats, values: Floats) -> Photometry:
-        """All around, from the symmetry that the horizontal angles say."""
+        """Extend to the whole sphere, by the symmetry that the horizontal angles imply."""
         field = "vertical angles"
         if not (vertical[0] >= 0 and vertical[-1] <= 180):
             raise self._error(field, "are outside 0 to 180 degrees", f"{vertical[0]:g} to {vertical[-1]:g}")
@@ -210,7 +210,7 @@ class _Reading:
             try:
                 number = float(word)
             except ValueError:
-                return  # text after the data; where it is too early, numbers are missing
+                return  # text after the data; if it comes too early, numbers are missing
             if not np.isfinite(number):
                 raise self._error(None, "numbers are not finite", word[:20])
             yield number
@@ -231,7 +231,7 @@ def _mirrored(horizontal: Floats, values: Floats, at_deg: float) -> tuple[Floats
 
 
 def _closed(horizontal: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """From 0 to 360, with what is missing there between the last angle and the first."""
+    """Extend from 0 to 360, with the gap between the last angle and the first closed."""
     before, after = horizontal[-1] - 360, horizontal[0]
     share = -before / (after - before) if after > before else 0.0
     at_zero = (1 - share) * values[-1:] + share * values[:1]

@@ -1,7 +1,7 @@
-"""Interiors made by code: radiance from windows, lamps and walls of rooms seen from one point.
+"""Procedural interiors: radiance from windows, lamps and walls of rooms, seen from one point.
 
-They light scenes that work without any file. A ray from the point meets one wall of a box; windows are parts of walls.
-Window panes and lamps are small and bright, as in captured environments: they show as highlights and cast shadows.
+They light scenes without any file. A ray from the point hits one wall of a box; windows are parts of walls. Window
+panes and lamps are small and bright, as in captured environments: they show as highlights and cast shadows.
 """
 
 from __future__ import annotations
@@ -94,21 +94,21 @@ def _walls(w: Floats, low: ArrayLike, high: ArrayLike) -> tuple[Floats, NDArray[
 
 
 def _arch(across: Floats, y: Floats, half: float, bottom: float, spring: float) -> Mask:
-    """Within a window with a round arch above the height `spring`."""
+    """Whether points lie in a window with a round arch above the height `spring`."""
     return (y > bottom) & np.where(y < spring, np.abs(across) < half, np.hypot(across, y - spring) < half)
 
 
 def _stripes(x: Floats, period: float, wide: float) -> Mask:
-    """Within stripes of width `wide` about the multiples of `period`."""
+    """Whether points lie in stripes of width `wide` about the multiples of `period`."""
     return np.asarray(np.abs(x - period * np.round(x / period)) < wide / 2)
 
 
 def _colour(values: ArrayLike, colour: ArrayLike) -> Floats:
-    """Values (...), or one value, as (..., 3)."""
+    """Values (...), or a single value, as (..., 3)."""
     return np.asarray(np.asarray(values, float)[..., None] * np.asarray(colour, float))
 
 
 def _lamps(light: Floats, w: Floats, towards: ArrayLike, radius_deg: float, radiance: ArrayLike) -> Floats:
-    """`light` with round lamps in some directions."""
+    """`light` with round lamps in the directions `towards`."""
     closest = (w @ normalize(np.array(towards, float)).T).max(axis=-1)
     return np.where((closest > np.cos(np.radians(radius_deg)))[..., None], np.asarray(radiance, float), light)

@@ -1,8 +1,8 @@
-"""Light groups: which emitters of a scene are dimmed and coloured together.
+"""Light groups: emitters of a scene that are dimmed and coloured together.
 
-A scene names groups (`Scene.light_groups`); the first that lists an emitter has it. All other emitters are in groups by
-default: the sun, the sky, and lights and objects that emit by the stem of their name, so that "lamp_1" and "lamp.002"
-are one group. With more than MOST_GROUPS the weakest lamps are one group, "others".
+A scene names groups (`Scene.light_groups`); an emitter belongs to the first that lists it. All other emitters are in
+default groups: the sun, the sky, and lights and emitting objects by the stem of their name, so that "lamp_1" and
+"lamp.002" form one group. With more than MOST_GROUPS, the weakest lamps are merged into a group "others".
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ _NUMBER = re.compile(r"[\s._-]*\d+$")
 
 @dataclass(frozen=True)
 class SortedLights:
-    """The groups of a scene with the names of their members, and the group of each emitter as an index into them.
+    """The groups of a scene with the names of their members, and the group index of each emitter.
 
-    `of_lights` has one for each of `Scene.lights`, `of_objects` one by name for each object that emits; `sun` and `sky`
-    are None where there is none.
+    `of_lights` has one index for each of `Scene.lights`, `of_objects` one by name for each object that emits; `sun` and
+    `sky` are None if the scene has none.
     """
 
     groups: tuple[LightGroup, ...]
@@ -43,10 +43,10 @@ class SortedLights:
 
 @dataclass(frozen=True)
 class _Emitter:
-    """`names` it may be listed by, the first is shown; `power` in any unit, infinite for what is never merged."""
+    """`names` that may list it, the first one displayed; `power` in any unit, infinite for one that is never merged."""
 
     names: tuple[str, ...]
-    usual: str  # its group by default
+    usual: str  # its default group
     power: float
 
 
@@ -88,14 +88,14 @@ def sorted_lights(scene: Scene, suns: Collection[int] = (), *, sun_in_sky: bool 
 
 
 def groups_as_told(scene: Scene) -> tuple[LightGroup, ...]:
-    """The groups of a scene before its bake: a sun within a picture of the environment is not known then."""
+    """The groups of a scene before its bake, when a sun in a picture of the environment is not yet known."""
     suns = [n for n, light in enumerate(scene.lights) if isinstance(light, DirectionalLight) and any(light.irradiance)]
     shines = isinstance(scene.environment, SunSky) and scene.environment.sun_scale > 0
     return sorted_lights(scene, () if shines else suns[:1], sun_in_sky=shines).groups
 
 
 def names_of_lights(lights: Iterable[Light]) -> list[str]:
-    """Names of a scene's lights: those without a name are called by their kind, and numbered."""
+    """Names of a scene's lights; unnamed ones are named by kind and number."""
     found, count = [], Counter[str]()
     for light in lights:
         kind = _kind(light)
@@ -105,7 +105,7 @@ def names_of_lights(lights: Iterable[Light]) -> list[str]:
 
 
 def stem(name: str) -> str:
-    """A name without the numbers at its end; the whole of it where nothing else is left."""
+    """A name without trailing numbers; the whole name if nothing else is left."""
     while (shorter := _NUMBER.sub("", name)) and shorter != name:
         name = shorter
     return name
@@ -126,7 +126,7 @@ def _of_light(light: Light, name: str, is_sun: bool) -> _Emitter:
 
 
 def _power(light: Light) -> float:
-    """About how much light a light gives in all; of one that lights everything, as if on 10 m2."""
+    """Approximate total power of a light; for one that lights everything, as if on 10 m2."""
     if isinstance(light, DirectionalLight):
         return 10.0 * _bright(light.irradiance)
     if isinstance(light, IesLight):

@@ -13,11 +13,11 @@ from lambent.scenes.scene import Look
 
 @dataclass(frozen=True)
 class LookTrack:
-    """Looks of materials over time: by name, times in seconds, rising, each with a look.
+    """Looks of materials over time: by name, ascending times in seconds, each with a look.
 
-    Between two times the numbers of a material change evenly (`materials.between`), and light is computed for each
-    moment: every frame is a room that can be, where a cross-fade of two pictures would show both rooms at once.
-    Textures are those of the earlier time. Before the first time and after the last these hold.
+    Between two times the numbers of a material are interpolated (`materials.between`), and light is computed for each
+    moment: every frame shows a consistent room, where cross-fading two pictures would show both rooms at once. Textures
+    are those of the earlier time. The first and the last look hold beyond the ends.
     """
 
     materials: Mapping[str, tuple[tuple[float, Look], ...]] = field(default_factory=dict)

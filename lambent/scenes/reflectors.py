@@ -1,12 +1,12 @@
 """Planar reflectors of a scene, which get a planar reflection buffer besides their probes (thesis M, section 4.5).
 
-The search finds large, flat, glossy parts of objects. Coplanar parts form one reflector, whatever their objects and
-materials, because one mirrored view serves them all (the tiles of a floor, two tables of one height). A part need not
-be a whole object: the top of a table is found, its edge and its legs are not. `scene.toml` can override the search:
+The search finds large, flat, glossy parts of objects. Coplanar parts form one reflector, regardless of objects and
+materials, because one mirrored view serves all of them (the tiles of a floor, two tables of equal height). A part need
+not be a whole object: the top of a table is found, its edge and its legs are not. `scene.toml` can override the search:
 
     [[reflectors]]
     objects = "door*"     # a pattern of object names
-    use = true            # take their flat parts whatever their size and gloss; false: leave these objects out
+    use = true            # use their flat parts regardless of size and gloss; false: leave these objects out
     plane = [0, 1, 0, 0]  # optional, with use = true: the plane (n, d), n.x + d = 0
 """
 
@@ -36,19 +36,19 @@ from lambent.scenes.scene import ReflectorRule, Scene, SceneObject
 
 log = logging.getLogger(__name__)
 
-LEAST_AREA_M2 = 0.25  # of all parts in one plane
-ROUGHEST = 0.2  # sqrt(mx my) of the narrowest lobe: a mirrored view covers hardly more than such a lobe
-LEAST_PART_M2 = 0.02  # of one object in a plane: less is an edge that lies there by chance
+LEAST_AREA_M2 = 0.25  # of all parts in one plane together
+ROUGHEST = 0.2  # sqrt(mx my) of the narrowest lobe: a mirrored view hardly covers wider lobes
+LEAST_PART_M2 = 0.02  # of one object in a plane: anything smaller is an edge that lies there by chance
 FLAT_M = 1e-3  # largest distance of positions from the plane
 FLAT_DEG = 2.0  # largest angle of faces, and of shading normals at their corners, from the plane's normal
-MOST = 256  # of a scene, the largest: a frame shows a few
-TRIED = 2 * MOST  # large ones after which only objects that rules name are searched on; seeds come by their area
-SEED_SHARE = 1 / 16  # of LEAST_AREA_M2 in one bin of the histogram: a plane may straddle bins in all four dimensions
+MOST = 256  # largest reflectors of a scene; a frame shows a few
+TRIED = 2 * MOST  # large ones after which only objects named by rules are searched; seeds are sorted by area
+SEED_SHARE = 1 / 16  # share of LEAST_AREA_M2 in one histogram bin: a plane may straddle bins in all four dimensions
 
 
 @dataclass(frozen=True)
 class ReflectorPart:
-    """The faces of one object in a reflector: their numbers (K,) and area."""
+    """The faces (K,) of one object in a reflector, and their area."""
 
     object: str
     faces: NDArray[np.integer]
@@ -59,8 +59,8 @@ class ReflectorPart:
 class Reflector:
     """A plane (n, d), n.x + d = 0, n outwards; `outline` (P, 3) is the convex hull of its parts, in the plane.
 
-    `deviation_m` is the largest distance of a vertex of its parts from the plane; `two_sided` is whether it is a sheet
-    that can be seen from behind. `plan` is the floor plan of the walls on its edges, None without walls.
+    `deviation_m` is the largest distance of its parts' vertices from the plane; `two_sided` marks a sheet visible from
+    behind. `plan` is the floor plan of the walls on its edges, None without walls.
     """
 
     plane: tuple[float, float, float, float]
@@ -148,7 +148,7 @@ def is_glossy(material: Material) -> bool:
 
 
 def _ruling(rules: Iterable[ReflectorRule], name: str) -> bool | None:
-    """`use` of the last rule that fits an object; None if none does."""
+    """`use` of the last rule that matches an object; None if none does."""
     uses = [rule.use for rule in rules if fnmatchcase(name, rule.objects)]
     return uses[-1] if uses else None
 

@@ -1,4 +1,4 @@
-"""Meshes from files that stand in the place of a scene's objects (thesis R, "Object Replacement")."""
+"""Meshes from files that replace a scene's objects (thesis R, "Object Replacement")."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FORM = "OBJECT=FILE or OBJECT=FILE,MATERIAL"
 
 @dataclass(frozen=True)
 class Replacement:
-    """A mesh in the place of an object, in its material or in another one of the scene."""
+    """A mesh that replaces an object, with its material or another one of the scene."""
 
     object: str
     mesh: Mesh
@@ -28,12 +28,12 @@ class Replacement:
 
 
 def parse_replacements(texts: Sequence[str]) -> tuple[Replacement, ...]:
-    """Replacements from texts OBJECT=FILE or OBJECT=FILE,MATERIAL; a file's objects are one mesh.
+    """Parse replacements from texts OBJECT=FILE or OBJECT=FILE,MATERIAL; all objects of a file become one mesh.
 
     Raises
     ------
     UserError
-        Where a text is not of this form, an object is named twice, or a file cannot be read or holds no triangles.
+        If a text is malformed, an object is named twice, or a file is unreadable or has no triangles.
     """
     found: list[Replacement] = []
     for text in texts:
@@ -50,7 +50,7 @@ def parse_replacements(texts: Sequence[str]) -> tuple[Replacement, ...]:
 
 
 def mesh_of(file: str) -> Mesh:
-    """All objects of a file of geometry as one mesh."""
+    """All objects of a geometry file as one mesh."""
     from lambent.scenes import load_scene
 
     objects = load_scene(file).objects
@@ -61,7 +61,7 @@ def mesh_of(file: str) -> Mesh:
 
 
 def fitted(mesh: Mesh, low: Floats, high: Floats) -> Mesh:
-    """The mesh scaled to fit a box, in its middle, and standing on its floor (+y is up)."""
+    """The mesh scaled to fit a box, centred and standing on its floor (+y is up)."""
     from_low, from_high = (side.astype(float) for side in mesh.bounds)
     size = from_high - from_low
     used = size > 1e-9 * max(float(size.max()), 1e-30)
@@ -74,7 +74,7 @@ def fitted(mesh: Mesh, low: Floats, high: Floats) -> Mesh:
 
 
 def with_replacements(scene: Scene, replacements: Sequence[Replacement]) -> Scene:
-    """The scene, as the path tracer has it, with other meshes in the boxes of objects."""
+    """The scene with meshes replaced within the boxes of objects, as the path tracer needs it."""
     objects = {o.name: o for o in scene.objects}
     for one in replacements:
         o = objects[known("object", one.object, objects, field=FIELD)]

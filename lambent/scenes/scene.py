@@ -1,8 +1,8 @@
-"""The scene as every loader produces it and every bake consumes it.
+"""The scene as produced by every loader and consumed by every bake.
 
 Conventions: world space is right-handed, y up, metres. Meshes are stored in world space (loaders apply transforms).
-Faces are counter-clockwise seen from the outside; normals unit; uv with v up. Radiance in W/(sr m^2), linear Rec.709.
-All dataclasses are frozen; arrays are not to be written to.
+Faces are counter-clockwise seen from outside; normals are unit; uv has v up. Radiance is in W/(sr m^2), linear
+Rec.709. All dataclasses are frozen; arrays must not be modified.
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ class Texture:
 
 @dataclass(frozen=True)
 class MaterialTextures:
-    """The textures of a material: the first three multiply numbers of its document, the others stand for themselves.
+    """The textures of a material: the first three multiply numbers of its document, the others are absolute.
 
-    The document holds the mean of a quantity, so that it is right without its textures; a texture that multiplies is
-    texel / mean, at most the largest half float. The mean of a masked surface is over its visible texels.
+    The document has the mean of a quantity, so that it is right without its textures; a multiplying texture is texel /
+    mean, at most the largest half float. For a masked surface the mean is over its visible texels.
 
     diffuse (3 channels): kd and kt_d. specular (3): k of every lobe. roughness (1): mx and my of every lobe.
     normal (3): the shading normal in the frame (t, b, n), components from -1 to 1.
-    direction (2): cosine and sine of the angle by which t is turned about n.
+    direction (2): cosine and sine of the rotation of t about n.
     opacity (1): below `cutoff` there is no surface.
     """
 
@@ -83,10 +83,10 @@ class SceneObject:
 
 @dataclass(frozen=True)
 class SunSky:
-    """Clear daylight, up is +y, over a `ground` that is diffuse, of the sky's `albedo` and lit by it, or black.
+    """Clear daylight, up is +y, over a `ground` that is diffuse with the sky's `albedo` and lit by it, or black.
 
     Colours and distribution are those of Mitsuba's `sunsky` (Hosek-Wilkie), illuminances those of `scenes.clear_sky`
-    times `sun_scale` and `sky_scale`. The sun gives the same light whatever its radius.
+    times `sun_scale` and `sky_scale`. The sun gives the same light for any radius.
     """
 
     sun_direction: Triple  # unit, towards the sun
@@ -100,9 +100,9 @@ class SunSky:
 
 @dataclass(frozen=True)
 class ImageEnvironment:
-    """A picture of everything around, in one of the layouts of `core.environment_layouts`; None lets it be recognised.
+    """A picture of the surroundings, in a layout of `core.environment_layouts`; None to detect it.
 
-    It is turned by `rotation_deg` about its own up, from -z towards -x, and its up is then put along the axis `up`.
+    It is rotated by `rotation_deg` about its own up, from -z towards -x; its up is then aligned with the axis `up`.
     """
 
     file: Path
@@ -114,14 +114,14 @@ class ImageEnvironment:
 
 @dataclass(frozen=True)
 class ConstantEnvironment:
-    """The same radiance from everywhere."""
+    """Equal radiance from all directions."""
 
     radiance: Triple
 
 
 @dataclass(frozen=True)
 class ComputedEnvironment:
-    """Surroundings made by code, by their name in `scenes.computed`."""
+    """Procedural surroundings, by their name in `scenes.computed`."""
 
     name: str
 
@@ -140,7 +140,7 @@ class PointLight:
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """Irradiance W/m^2 on a surface that faces it; `direction` is that in which the light travels."""
+    """Irradiance W/m^2 on a surface that faces it; `direction` is the direction in which the light travels."""
 
     direction: Triple
     irradiance: Triple
@@ -149,9 +149,9 @@ class DirectionalLight:
 
 @dataclass(frozen=True)
 class IesLight:
-    """A luminaire at a point; `scale` is W/sr for each candela of its photometry.
+    """A luminaire at a point; `scale` is W/sr per candela of its photometry.
 
-    It is aimed along `aim`, unit; `rotation_deg` turns it about that, counter-clockwise seen from behind.
+    Its axis is `aim`, unit; `rotation_deg` rotates it about that, counter-clockwise seen from behind.
     """
 
     position: Triple
@@ -165,7 +165,7 @@ class IesLight:
     def axes(self) -> Array:
         """(3, 3) rows: unit world directions of the horizontal angles 0 and 90, and of vertical angle 0.
 
-        Aimed straight down, horizontal angle 0 is +x and 90 is -z; aimed elsewhere, as the shortest turn leaves them.
+        Aimed straight down, horizontal angle 0 is +x and 90 is -z; otherwise both follow the minimal rotation.
         """
         aim, down = np.asarray(self.aim, float), np.array([0.0, -1.0, 0.0])
         angle = np.radians(self.rotation_deg)
@@ -185,7 +185,7 @@ Environment = SunSky | ImageEnvironment | ConstantEnvironment | ComputedEnvironm
 
 @dataclass(frozen=True)
 class ReflectorRule:
-    """Whether objects whose name fits `objects` count as planar reflectors (`scenes.reflectors`).
+    """Whether objects with names that match `objects` count as planar reflectors (`scenes.reflectors`).
 
     `plane` (n, d), n.x + d = 0, replaces the plane that would be found.
     """
@@ -208,7 +208,7 @@ class LightGroup:
 
 @dataclass(frozen=True)
 class Look:
-    """A material as a variant shows it, with the textures of the scene's material of that name; "" is none."""
+    """A material as a variant shows it, with the textures of the scene's material of that name; "" for none."""
 
     material: Material
     textures: str = ""
@@ -220,8 +220,8 @@ class Look:
 class Variant:
     """A state of the scene's materials and of its light: see `scenes.variants`.
 
-    `looks` are by the name of the material that each stands in for; all others stay, and so do light groups that the
-    mix `light` does not name.
+    `looks` are by the name of the material that each replaces; all others stay, as do light groups that the mix `light`
+    does not name.
     """
 
     name: str
@@ -232,20 +232,19 @@ class Variant:
 
     @property
     def materials(self) -> dict[str, Material]:
-        """The documents that stand in for others, by the names of these."""
+        """The replacing documents, by the names of the replaced materials."""
         return {name: look.material for name, look in self.looks.items()}
 
 
 @dataclass(frozen=True)
 class LightFieldWish:
-    """What is asked of an object's offset surface light field (`core.light_field`); None leaves it to the bake.
+    """Settings of an object's offset surface light field (`core.light_field`); None lets the bake decide.
 
-    `points` at most, each with a map of `texels` a side, at `offset_m` off the surface; with one of
-    `levels`, the object shows itself without its lobes. With an `error`, the mean
-    difference in log(1 + L/median) to what viewers see mirrored, only as many points as it takes to come down to it.
-    With `volume`, points fill the object's box, and maps are taken without the object, so that another may stand there
-    (thesis R, "Object Replacement"). With `refracts`, maps are without it too, and light that it transmits is
-    refracted ("Thin Lens Refractions").
+    At most `points` points, each with a map of `texels` a side, at `offset_m` off the surface; with one of `levels`,
+    the object shows itself without its lobes. With an `error`, the mean difference in log(1 + L/median) from what
+    viewers see mirrored, the bake uses only as many points as that error needs. With `volume`, points fill the object's
+    bounding box, and maps leave the object out, so that another may stand there (thesis R, "Object Replacement"). With
+    `refracts`, maps leave it out too, and light that it transmits is refracted ("Thin Lens Refractions").
     """
 
     points: int | None = None
@@ -258,13 +257,13 @@ class LightFieldWish:
 
     @property
     def without_object(self) -> bool:
-        """Whether maps are taken without the object."""
+        """Whether maps leave the object out."""
         return self.volume or self.refracts
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything a bake needs. `sources` are the files it was read from: a bake hashes them to notice a change."""
+    """Everything that a bake needs. `sources` are its files, which a bake hashes to detect changes."""
 
     name: str
     objects: tuple[SceneObject, ...]
@@ -279,14 +278,14 @@ class Scene:
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
     probe_planes: Mapping[str, Array] = field(default_factory=dict)  # object -> (P, 4) planes, set by the user
     probe_centres: Mapping[str, Triple] = field(default_factory=dict)  # object -> centre of its probe, set by the user
-    light_fields: Mapping[str, LightFieldWish] = field(default_factory=dict)  # by the object that is to have one
-    reflector_rules: tuple[ReflectorRule, ...] = ()  # the last that fits an object counts
+    light_fields: Mapping[str, LightFieldWish] = field(default_factory=dict)  # by object
+    reflector_rules: tuple[ReflectorRule, ...] = ()  # the last one that matches an object counts
     variants: tuple[Variant, ...] = ()  # other states of the materials and the light
-    light_groups: tuple[LightGroup, ...] = ()  # that the user has named; other emitters are in groups by default
+    light_groups: tuple[LightGroup, ...] = ()  # named by the user; other emitters are in default groups
     parts: Mapping[str, str] = field(default_factory=dict)  # object that is a part -> name of the whole
-    borders: Mapping[str, tuple[Border, ...]] = field(default_factory=dict)  # of parts, as store.contract has them
-    measured: Mapping[str, Path] = field(default_factory=dict)  # material -> the table it scatters by in bakes
-    crease_deg: float | None = None  # of the hard edges that its normals were made anew for
+    borders: Mapping[str, tuple[Border, ...]] = field(default_factory=dict)  # of parts, as in store.contract
+    measured: Mapping[str, Path] = field(default_factory=dict)  # material -> the table that replaces it in bakes
+    crease_deg: float | None = None  # angle for which hard edges and normals were recomputed
     origin: str | None = None  # "builtin:NAME" or the absolute path that it was loaded from; None if made in memory
 
     @property

@@ -1,7 +1,7 @@
-"""Textures as arrays: the quantities that are averaged between texels, reduction, and filling beyond masks.
+"""Textures as arrays: interpolated quantities, reduction, and filling beyond masks.
 
-Texels are averaged in quantities whose means are meaningful: normals as slopes, directions (which have no sign) as
-doubled angles. Path tracer and renderer interpolate the same quantities.
+Texels are averaged as quantities with meaningful means: normals as slopes, directions (which have no sign) as doubled
+angles. Path tracer and renderer interpolate the same quantities.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ CHANNELS: Mapping[str, int] = {
     "diffuse": 3, "specular": 3, "roughness": 1, "normal": 3, "direction": 2, "opacity": 1,
 }  # fmt: skip
 SIDE_MAX = 2048  # texels; larger textures are halved until they fit
-STEEPEST = 8.0  # slope; steeper normals, and those below the surface, get this one
+STEEPEST = 8.0  # slope; limit for steeper normals, and for those below the surface
 
 
 def parts(textures: MaterialTextures) -> dict[str, Texture]:
-    """The textures that a material has, by the name of their field."""
+    """The textures of a material, by field name."""
     found = {name: getattr(textures, name) for name in CHANNELS}
     return {name: texture for name, texture in found.items() if texture is not None}
 
@@ -64,9 +64,9 @@ def _halved_along(texels: Floats, axis: int) -> Floats:
 
 
 def filled(texels: Floats, known: NDArray[np.bool_]) -> Floats:
-    """Texels (H, W, C) with means of the nearest known ones (H, W) in place of the others.
+    """Texels (H, W, C) with unknown ones replaced by means of the nearest `known` ones (H, W).
 
-    Without it, the white behind the leaves of a texture would enter every mean over an edge and show inside the mask.
+    Otherwise the white behind the leaves of a texture would enter every mean over an edge and show inside the mask.
     """
     weight = known[..., None].astype(np.float32)
     levels = [(texels.astype(np.float32) * weight, weight)]
@@ -102,7 +102,7 @@ def _filled(textures: MaterialTextures) -> MaterialTextures:
 
 
 def _bounded(textures: Mapping[str, MaterialTextures]) -> dict[str, MaterialTextures]:
-    smaller: dict[int, Texture] = {}  # a texture that several materials share stays one
+    smaller: dict[int, Texture] = {}  # keeps a texture shared by several materials shared
     found = {}
     for material, of_material in textures.items():
         changed: dict[str, Any] = {}
@@ -124,7 +124,7 @@ def _reduced(texels: Floats) -> Floats:
 
 
 def check(material: str, part: str, texture: Texture) -> None:
-    """`UserError` where a texture cannot be `part` of a material."""
+    """Raise `UserError` if a texture cannot be `part` of a material."""
     shape = texture.texels.shape
     field = f"{part} texture of {material}"
     if len(shape) != 3 or shape[2] != CHANNELS[part] or 0 in shape:

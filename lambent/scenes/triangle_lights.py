@@ -1,7 +1,7 @@
-"""Light as triangles: an environment cut into spherical triangles, and glowing surfaces into small ones.
+"""Light as triangles: the environment divided into spherical triangles, and glowing surfaces into small ones.
 
-Small triangles go where much light comes from. Their corners keep what editing a highlight needs to know, how wide each
-piece of the light is; point samples of the same number show as dots (Ben-Artzi 2007, section 4.2.3).
+Triangles are small where much light comes from. Their corners give the extent of each piece of light, which editing a
+highlight needs; equally many point samples would show as dots (Ben-Artzi 2007, section 4.2.3).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from lambent.core.plain import Triple
 from lambent.scenes.scene import DirectionalLight, IesLight, Light, PointLight
 
 SMALLEST_SR, POWER = 0.01, 0.25  # of the importance L omega^POWER (Agarwal et al. 2003, eq. 5 with a = 1)
-FEWEST_SAMPLES = 12  # of the environment within a triangle; less are not split
+FEWEST_SAMPLES = 12  # samples of the environment in a triangle; with fewer, it is not split
 FEWEST, MOST = 20, 100_000  # lights
 
 
@@ -31,17 +31,17 @@ class TriangleLights:
     corners : (M, 3, 3)
         Unit world directions of the corners at infinity; positions in metres of near ones.
     centres : (M, 3)
-        Direction, or position, that the light comes from on average.
+        Mean direction, or position, of the light.
     light : (M, 3)
-        Radiance times solid angle, W/m^2, of lights at infinity; radiance, W/(sr m^2), of near ones.
+        Radiance times solid angle, W/m^2, for lights at infinity; radiance, W/(sr m^2), for near ones.
     near : (M,) bool
-        Whether a light is a surface of the scene. It shines from the side from which its corners are counter-clockwise.
-        Near lights whose corners coincide are points; `light` is their intensity, W/sr.
+        Whether a light is a surface of the scene. It emits on the side from which its corners are counter-clockwise.
+        Near lights with coincident corners are points; `light` is then their intensity, W/sr.
     cones : (M, 5)
-        Of near points: unit axis and half-angles, radians, within which they shine fully, and beyond which not at all.
-        Empty where all shine everywhere.
+        For near points: unit axis, and half-angles in radians of full emission and of the cut-off. Empty if all lights
+        emit in all directions.
     luminaires : mapping of int to IesLight
-        Near points, by number, that shine as their photometry says; `light` is what its candela are multiplied by.
+        Near points, by number, that emit by their photometry; `light` is the factor on its candela.
     """
 
     corners: Floats
@@ -55,11 +55,11 @@ class TriangleLights:
         return len(self.light)
 
 
-EVERYWHERE = (0.0, 1.0, 0.0, np.pi, np.pi)  # the cone of a point that shines everywhere
+EVERYWHERE = (0.0, 1.0, 0.0, np.pi, np.pi)  # the cone of an omnidirectional point
 
 
 def joined(parts: Sequence[TriangleLights]) -> TriangleLights:
-    """Several sets of lights as one."""
+    """Concatenate sets of lights."""
     if not parts:
         return TriangleLights(np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, bool))
     cones = [p.cones if len(p.cones) else np.tile(EVERYWHERE, (len(p), 1)) for p in parts]
@@ -75,7 +75,7 @@ def joined(parts: Sequence[TriangleLights]) -> TriangleLights:
 
 
 def small_lights(lights: Sequence[Light]) -> TriangleLights:
-    """Point and directional lights, and luminaires, as triangles whose corners coincide."""
+    """Point and directional lights, and luminaires, as triangles with coincident corners."""
     places, values, near, cones = [], [], [], []
     for light in lights:
         near.append(not isinstance(light, DirectionalLight))
@@ -142,12 +142,12 @@ class _Tree:
         self._queue: list[tuple[float, int]] = []
         self._made = 0
         faces = icosahedron()
-        face = np.argmax(faces.sum(axis=1) @ w.T, axis=0)  # the nearest middle: faces are congruent
+        face = np.argmax(faces.sum(axis=1) @ w.T, axis=0)  # the nearest centre: faces are congruent
         for i, corners in enumerate(faces):
             self._add(_Leaf(corners, np.flatnonzero(face == i)))
 
     def divide(self) -> bool:
-        """Cut the most important triangle into four; False where none is left that can be."""
+        """Divide the most important triangle into four; returns False if none can be divided."""
         if not self._queue:
             return False
         leaf = self.leaves.pop(heapq.heappop(self._queue)[1])
@@ -198,7 +198,7 @@ def surface_triangles(corners: Floats, radiance: Floats, largest_m: float) -> Tr
 
 
 def _cut(triangle: Floats, n: int) -> Floats:
-    """A triangle (3, 3) as n^2 equal ones."""
+    """Divide a triangle (3, 3) into n^2 equal ones."""
     a, (u, v) = triangle[0], (triangle[1:] - triangle[0]) / n
     upright = [(i, j) for i in range(n) for j in range(n - i)]
     turned = [(i, j) for i in range(n - 1) for j in range(n - 1 - i)]

@@ -1,10 +1,10 @@
-"""Wavelets of light on the sphere, for relighting: Haar's on a hierarchy of spherical triangles.
+"""Haar wavelets of light on a hierarchy of spherical triangles, for relighting.
 
-Each of the icosahedron's 20 faces is cut into four triangles, level by level. A function is held by its values times
-the square roots of the triangles' areas, so that dot products are integrals. One step takes the values of four children
-to one mean and three details: the reflection that swaps the middle child with the parent's constant function, which is
-orthonormal for any areas, and treats the three corners alike (Haar wavelets on the sphere: Schroeder and Sweldens 1995;
-with orthonormal bases, Bonneau 1999).
+Each of the icosahedron's 20 faces is divided into four triangles, level by level. A function is stored as its values
+times the square roots of the triangles' areas, which turns dot products into integrals. One step converts the values of
+four children to one mean and three details, by the reflection that swaps the middle child with the parent's constant
+function. It is orthonormal for any areas, and treats the three corners alike (Haar wavelets on the sphere: Schroeder
+and Sweldens 1995; with orthonormal bases, Bonneau 1999).
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from lambent.scenes.triangle_lights import icosahedron, solid_angles
 FACES, CHILDREN = 20, 4
 DEEPEST = 6  # 81,920 triangles of 1.5 degrees
 LAMP = 8.0  # times the mean radiance: brighter parts of an environment are lamps
-PARTS = 2  # levels below the triangles at which a turned environment is looked up: 16 points each
+PARTS = 2  # levels below the triangles at which a rotated environment is looked up: 16 points each
 ROWS_OF_PARTS = 8  # of a picture, times 2^depth: a part is then two to three texels high
 
 
 @dataclass(frozen=True)
 class TriangleTree:
-    """The icosahedron cut `depth` times: N = 20 * 4^depth triangles; children of i are 4 i ... 4 i + 3."""
+    """The icosahedron divided `depth` times: N = 20 * 4^depth triangles; children of i are 4 i ... 4 i + 3."""
 
     depth: int
 
@@ -63,9 +63,9 @@ class TriangleTree:
         return self._transformed(_scaled(radiance, np.sqrt(self.areas_sr)))
 
     def of_transport(self, transport: Floats) -> Floats:
-        """Rows (N, ...) of transport (N, ...), the picture that each triangle makes with a radiance of 1.
+        """Rows (N, ...) of transport (N, ...), the picture due to each triangle at radiance 1.
 
-        The picture is the sum of the rows times `of_radiance`, exactly.
+        The picture is exactly the sum of the rows times `of_radiance`.
         """
         return self._transformed(_scaled(transport, 1 / np.sqrt(self.areas_sr)))
 
@@ -79,9 +79,9 @@ class TriangleTree:
         return _scaled(values, 1 / np.sqrt(self.areas_sr))
 
     def containing(self, w: Floats) -> Indices:
-        """(...) number of the finest triangle that has each unit direction (..., 3)."""
+        """(...) number of the finest triangle that contains each unit direction (..., 3)."""
         flat = np.asarray(w, float).reshape(-1, 3)
-        number = np.argmax(flat @ icosahedron().sum(axis=1).T, axis=1)  # the nearest middle: faces are congruent
+        number = np.argmax(flat @ icosahedron().sum(axis=1).T, axis=1)  # the nearest centre: faces are congruent
         for planes in self._cuts:
             beyond = np.matmul(planes[number], flat[:, :, None])[..., 0] > 0
             child = np.select([beyond[:, 0], beyond[:, 1], beyond[:, 2]], [0, 1, 2], 3)
@@ -91,7 +91,7 @@ class TriangleTree:
     def means(self, w: Floats, weight_sr: Floats, radiance: Floats) -> Floats:
         """Mean radiance (N, 3) in each triangle of samples: directions (S, 3), solid angles (S,), radiance (S, 3).
 
-        A triangle without samples has the mean of the smallest one around it that has some.
+        A triangle without samples takes the mean of the smallest enclosing one with samples.
         """
         at, count = self.containing(w), len(self)
         weight = [np.bincount(at, weight_sr, count)]
@@ -116,7 +116,7 @@ class TriangleTree:
 
     @cached_property
     def _cuts(self) -> list[Floats]:
-        """By level, normals (n, 3, 3) of the planes through the middles of two edges: corners a, b, c lie beyond."""
+        """By level, normals (n, 3, 3) of the planes through two edges' midpoints: corners a, b, c lie beyond."""
         cuts, triangles = [], icosahedron()
         for _ in range(self.depth):
             a, b, c = np.moveaxis(triangles, 1, 0)
@@ -138,14 +138,14 @@ class TriangleTree:
 
 @dataclass(frozen=True)
 class TurningLight:
-    """An environment that can be turned, as radiance by triangle.
+    """An environment that can be rotated, as radiance by triangle.
 
     Attributes
     ----------
     tree
         The triangles that light the scene.
     fine : (N * 16, 3)
-        Mean radiance of the environment, unturned, in the parts of the triangles.
+        Mean radiance of the environment before rotation, in the parts of the triangles.
     """
 
     tree: TriangleTree
@@ -153,12 +153,12 @@ class TurningLight:
 
     @classmethod
     def of_samples(cls, tree: TriangleTree, w: Floats, weight_sr: Floats, radiance: Floats) -> TurningLight:
-        """Of samples as in `TriangleTree.means`."""
+        """From samples as in `TriangleTree.means`."""
         return cls(tree, TriangleTree(tree.depth + PARTS).means(w, weight_sr, radiance))
 
     @classmethod
     def of_picture(cls, tree: TriangleTree, picture: Image) -> TurningLight:
-        """Of a lat-long picture (H, W, 3), texels repeated until every part has some."""
+        """From a lat-long picture (H, W, 3), with texels repeated until every part has some."""
         finer = -(-ROWS_OF_PARTS * 2 ** (tree.depth + PARTS) // len(picture))
         picture = picture.repeat(finer, axis=0).repeat(finer, axis=1)
         height, width = picture.shape[:2]
@@ -166,11 +166,11 @@ class TurningLight:
         return cls.of_samples(tree, lat_long_directions(height, width).reshape(-1, 3), weight, picture.reshape(-1, 3))
 
     def seen(self, w: Floats) -> Floats:
-        """(n, 3) radiance of the unturned environment in unit directions (n, 3), as fine as its parts."""
+        """(n, 3) radiance, in unit directions (n, 3), of the environment before rotation, as fine as its parts."""
         return np.asarray(self.fine[self._parts.containing(w)])
 
     def radiance(self, rotation: Floats | None = None) -> Floats:
-        """(N, 3) mean radiance by triangle once the environment is turned by `rotation` (3, 3)."""
+        """(N, 3) mean radiance by triangle after rotating the environment by `rotation` (3, 3)."""
         parts, each = self._parts, CHILDREN**PARTS
         light = self.fine * parts.areas_sr[:, None]
         if rotation is not None:
@@ -183,9 +183,9 @@ class TurningLight:
 
     @cached_property
     def _even(self) -> Floats:
-        """(3,) radiance up to which light is looked up where it comes from; what lamps have above is carried there.
+        """(3,) radiance up to which light is looked up after rotation; the excess of lamps is moved instead.
 
-        A look-up may miss a lamp as small as a part, or find it twice.
+        A look-up could miss a lamp as small as a part, or find it twice.
         """
         return np.asarray(LAMP * (self.fine * self._parts.areas_sr[:, None]).sum(axis=0) / (4 * np.pi))
 
@@ -203,7 +203,7 @@ class TurningLight:
 
 
 def children_of(triangles: Floats) -> Floats:
-    """(4 n, 3, 3): every spherical triangle (n, 3, 3) cut at the middles of its edges; the middle child is the last."""
+    """(4 n, 3, 3): every spherical triangle (n, 3, 3) divided at its edges' midpoints; the middle child is the last."""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     ab, bc, ca = normalize(a + b), normalize(b + c), normalize(c + a)
     four = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
@@ -211,10 +211,10 @@ def children_of(triangles: Floats) -> Floats:
 
 
 def _reflections(constant: Floats) -> Floats:
-    """(n, 4, 4) orthonormal, first row `constant` (n, 4), which are unit and positive.
+    """(n, 4, 4) orthonormal, first row `constant` (n, 4), which must be unit and positive.
 
     The reflection I - 2 v v^T swaps the unit vector of the middle child, the last, with `constant`; its rows are then
-    put in the order constant, corners.
+    ordered as constant, corners.
     """
     middle = np.array([0.0, 0.0, 0.0, 1.0])
     v = normalize(middle - constant)

@@ -1,4 +1,4 @@
-"""A scene under its sky turned about the vertical, with the suns in it: what relit light fields are compared with."""
+"""A scene under its sky rotated about the vertical, suns included: the reference for relit light fields."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ VERTICAL = "+y"
 
 
 def under_turned_sky(scene: Scene, degrees: float, folder: Path) -> Scene:
-    """The scene with its environment and distant lights turned by degrees from -z towards -x.
+    """The scene with its environment and distant lights rotated by `degrees` from -z towards -x.
 
-    Surroundings that are made by code are written to an image in `folder`, which has to outlive the scene.
+    Procedural surroundings are written to an image in `folder`, which must outlive the scene.
 
     Raises
     ------
     UserError
-        Where the environment is an image whose own up is not the vertical.
+        If the environment is an image whose own up is not the vertical.
     """
     if degrees % 360 == 0:
         return scene

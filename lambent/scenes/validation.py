@@ -43,12 +43,12 @@ def size_warnings(scene: Scene) -> list[str]:
 
 
 def _metres(extent: float) -> str:
-    """Three digits, and no power of ten below a million metres."""
+    """Three digits, without powers of ten below a million metres."""
     return f"{extent:.3g}" if not 1000 <= extent < 1e6 else f"{float(f'{extent:.3g}'):.0f}"
 
 
 def mesh_faults(mesh: Mesh) -> list[str]:
-    """Faults of one mesh: not finite, without area, not unit, turned against its normals, non-manifold, without uv."""
+    """Faults of one mesh: nonfinite, degenerate, not unit, wound against its normals, non-manifold, without uv."""
     arrays = (mesh.positions, mesh.normals, mesh.tangents, mesh.uv)
     if not all(np.isfinite(a).all() for a in arrays):
         return ["holds values that are not finite"]
@@ -80,12 +80,12 @@ def mirrored_share(mesh: Mesh) -> float:
 
 
 def _facing(mesh: Mesh) -> Floats:
-    """Per triangle, positive where its winding agrees with its normals."""
+    """Per triangle, positive if its winding agrees with its normals."""
     return np.asarray(np.sum(area_vectors(mesh.corners) * mesh.normals[mesh.faces].sum(axis=1), axis=-1))
 
 
 def _edge_uses(mesh: Mesh) -> NDArray[np.integer]:
-    """Triangles at each edge; vertices at the same position count as one."""
+    """Number of triangles at each edge; vertices at the same position count as one."""
     _, place = np.unique(mesh.positions, axis=0, return_inverse=True)
     corners = place.reshape(-1)[mesh.faces]
     edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=-1)

@@ -1,7 +1,7 @@
-"""Variants of a scene: other looks of its materials, and other mixes of its light, to choose from without a bake.
+"""Variants of a scene: other looks of its materials, and other mixes of its light, selectable without a bake.
 
-A file says how each object looks in a variant; the scene keeps it by material, as light between surfaces is computed
-by material. So objects of one material that some variant shows in different ways get materials of their own.
+A file gives the look of each object in a variant; the scene stores it by material, because light between surfaces is
+computed by material. So objects that share a material, but differ in some variant, get separate materials.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Kept = TypeVar("Kept")
 
 @dataclass(frozen=True)
 class Dressed:
-    """A variant as a file tells it: the look of each object, in the order of the scene's, and the mix of the light.
+    """A variant as given by a file: the look of each object, in the scene's order, and the mix of the light.
 
     Objects of equal looks share one `Look`.
     """
@@ -34,7 +34,7 @@ class Dressed:
 
 
 def with_variants(scene: Scene, told: Sequence[Dressed]) -> Scene:
-    """The scene with variants; objects that need it get a material of their own, a copy of theirs under a new name."""
+    """The scene with variants; objects that need a separate material get a copy of theirs under a new name."""
     names, given, objects = _free_names(scene.materials), dict[tuple[object, ...], str](), []
     for number, o in enumerate(scene.objects):
         future = (o.material, *(id(one.looks[number]) for one in told))
@@ -53,7 +53,7 @@ def with_variants(scene: Scene, told: Sequence[Dressed]) -> Scene:
 
 
 def _free_names(taken: Collection[str]) -> Callable[[str], str]:
-    """Makes names that nobody has: NAME_2, NAME_3..."""
+    """A function that makes unused names: NAME_2, NAME_3..."""
     used = set(taken)
 
     def free(name: str) -> str:
@@ -65,12 +65,12 @@ def _free_names(taken: Collection[str]) -> Callable[[str], str]:
 
 
 def _copied(of_materials: Mapping[str, Kept], copies: Mapping[str, str]) -> dict[str, Kept]:
-    """What materials have, by name, for their copies as well."""
+    """A mapping by material, extended to the copies of materials."""
     return {**of_materials, **{own: of_materials[of] for own, of in copies.items() if of in of_materials}}
 
 
 def _changed(scene: Scene, one: Dressed) -> dict[str, Look]:
-    """The looks of a variant by material, where they are others than the scene's."""
+    """The looks of a variant by material, where they differ from the scene's."""
     found, loaded = {}, looks_as_loaded(scene.materials, scene.textures)
     for o, look in zip(scene.objects, one.looks, strict=True):
         now = loaded[o.material]
@@ -81,18 +81,18 @@ def _changed(scene: Scene, one: Dressed) -> dict[str, Look]:
 
 
 def looks_as_loaded(materials: Mapping[str, Material], textured: Collection[str]) -> dict[str, Look]:
-    """How materials look as they are loaded; `textured` are the names of those with textures."""
+    """Looks of materials as loaded; `textured` are the names of those with textures."""
     return {name: Look(material, name if name in textured else "") for name, material in materials.items()}
 
 
 def documents_of(scene: Scene, material: str) -> list[Material]:
-    """A material of the scene as it is loaded, and as each variant shows it."""
+    """A material of the scene as loaded, and as in each variant."""
     shown = (variant.looks.get(material) for variant in scene.variants)
     return [scene.materials[material], *(look.material for look in shown if look is not None)]
 
 
 def variant_named(variants: Iterable[Variant], name: str, field: str = FIELD) -> Variant:
-    """The variant of this name; a `UserError` that lists all of them where there is none."""
+    """The variant of this name; `UserError` that lists all of them if there is none."""
     found = {variant.name: variant for variant in variants}
     if not found:
         hint = "add [[variants]] to the scene and bake it again, or store states in the window"
@@ -101,13 +101,13 @@ def variant_named(variants: Iterable[Variant], name: str, field: str = FIELD) ->
 
 
 def textures_worn(textures: Mapping[str, MaterialTextures], looks: Mapping[str, Look]) -> dict[str, MaterialTextures]:
-    """The textures of each material where some have other looks."""
+    """The textures of each material after some get other looks."""
     changed = {name: textures.get(look.textures) for name, look in looks.items()}
     return {name: found for name, found in {**textures, **changed}.items() if found is not None}
 
 
 def dressed(scene: Scene, variant: Variant) -> Scene:
-    """The scene with the materials of a variant; its light is as loaded."""
+    """The scene with the materials of a variant; its light stays as loaded."""
     return replace(
         scene,
         materials={**scene.materials, **variant.materials},

@@ -287,7 +287,7 @@ def view_meta(camera: Camera, width: int = 0, height: int = 0) -> dict[str, Any]
 
 
 def baked_views(store: Store) -> dict[str, ViewRecord]:
-    """The views with arrays in a store, finished or not, by key."""
+    """The views with arrays in a store, finished or not, by key; `UserError` if a record is invalid."""
     mine = [artefact for artefact in store.artefacts() if artefact.name.startswith(f"{VIEW}/")]
     try:
         return {a.name.split("/")[1]: ViewRecord.model_validate(a.meta.get(VIEW)) for a in mine}
@@ -328,7 +328,7 @@ def probe_irradiance(store: Store, object_name: str) -> tuple[float, ...]:
 
 
 def radiance_unit(store: Store, name: str) -> float:
-    """Unit in W/(sr m^2) of a cube map of radiance."""
+    """Unit in W/(sr m^2), from 1 to MOST_UNIT, of the cube map `name`; `UserError` if it is invalid."""
     unit = store.artefact(name).meta.get("unit", 1.0)
     if not (isinstance(unit, int | float) and 1 <= unit <= MOST_UNIT):
         expected = f"a number from 1 to {MOST_UNIT:g}"
@@ -337,7 +337,7 @@ def radiance_unit(store: Store, name: str) -> float:
 
 
 def sun_beside(store: Store) -> SunRecord | None:
-    """The sun whose direct light the light map leaves out; None if it has all light, as in earlier stores."""
+    """The sun whose direct light the light map leaves out; None if it has all light. `UserError` if it is invalid."""
     name = f"light_map/{SIDES[0]}"
     said = store.artefact(name).meta.get("sun") if name in store else None
     if said is None:
@@ -353,7 +353,7 @@ def sun_beside(store: Store) -> SunRecord | None:
 
 
 def shared_probes(store: Store) -> dict[str, str]:
-    """Owner of the shown probe, by object that has none of its own; empty for earlier stores."""
+    """Owner of the shown probe, by object without its own; empty for earlier stores. `UserError` if invalid."""
     said = store.documents.get(SHARED_PROBES, {})
     found = said.get("owners", {}) if isinstance(said, dict) else None
     if not isinstance(found, dict) or not all(isinstance(owner, str) for owner in found.values()):

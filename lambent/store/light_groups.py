@@ -28,7 +28,7 @@ def group_name(side: str, *, direct: bool = False) -> str:
 
 
 def light_groups(store: Store) -> tuple[LightGroupRecord, ...]:
-    """The light groups of a store, in the order of its arrays by group; empty if baked without groups."""
+    """Light groups of a store, in the order of its arrays by group; empty without groups. `UserError` if invalid."""
     name = group_name(SIDES[0])
     if name not in store:
         return ()

@@ -21,7 +21,7 @@ MOST_GAIN = 8.0
 
 
 def occlusion_gain(store: Store, object_name: str) -> float:
-    """Factor on the light map's share of `store.contract.probe_irradiance`."""
+    """Factor, 1 to MOST_GAIN, on the light map's share of `store.contract.probe_irradiance`; `UserError` if invalid."""
     name = probe_name(object_name, "radiance")
     gain = store.artefact(name).meta.get("occlusion_gain", 1.0)
     if not (isinstance(gain, int | float) and 1 <= gain <= MOST_GAIN):
@@ -31,7 +31,13 @@ def occlusion_gain(store: Store, object_name: str) -> float:
 
 
 def probe_shares(store: Store) -> tuple[Floats | None, frozenset[str]]:
-    """Coefficients (H, W, 4) of the texels, and the objects that use them; None and empty if absent."""
+    """Coefficients (H, W, 4) of the texels, and the objects that use them; None and empty if absent.
+
+    Raises
+    ------
+    UserError
+        If the objects' names are invalid, or the size differs from the light map's.
+    """
     if PROBE_SHARE not in store:
         return None, frozenset()
     names = store.artefact(PROBE_SHARE).meta.get("objects")
@@ -45,7 +51,13 @@ def probe_shares(store: Store) -> tuple[Floats | None, frozenset[str]]:
 
 
 def has_even_niches(store: Store, object_name: str) -> bool:
-    """Whether niches show the light map's light from all directions where they occlude the probe's."""
+    """Whether niches show the light map's light from all directions where they occlude the probe's.
+
+    Raises
+    ------
+    UserError
+        If the note is not a boolean.
+    """
     name = probe_name(object_name, "radiance")
     said = store.artefact(name).meta.get("even_niches", False)
     if not isinstance(said, bool):

@@ -55,7 +55,7 @@ class Sampling:
 
 
 def path_traced(samples: tuple[int, int], noise: float, max_depth: int) -> Sampling:
-    """All bounces, in the whole scene."""
+    """Sampling of all bounces, in the whole scene; `max_depth` as in `path_tracer.radiance`."""
     return Sampling(samples, noise, max_depth, min(32, max(1, samples[0] // 2)))
 
 

@@ -44,7 +44,7 @@ class PhotonMap:
         self, writer: Writer, scene: Scene, whole: Any, progress: Progress, *, per_texel: int, noise: float,
         max_bounces: int, seed: int, unseen: Sun | None = None,
     ) -> None:  # fmt: skip
-        """Fill the missing batches, at most `per_texel` photons, until `noise` is reached; the rest stay black.
+        """Fill the missing batches, up to `per_texel` photons per texel, until `noise` is reached; others stay black.
 
         Direct light of the sun `unseen` is not counted.
         """

@@ -62,10 +62,11 @@ class Surroundings:
 
 
 def bake_probe(scene: Surroundings, centre: Floats, n: int, samples: int, seed: int, noise: float = NOISE) -> Probe:
-    """Trace a probe.
+    """Trace a probe at `centre` (3,), of cube maps with `n` texels a side.
 
     Every texel gets `samples` paths. Texels that are still noisy, mostly of glossy surfaces, get as many more as they
-    need to reach `noise`, at most MOST times `samples` in total.
+    need to reach the relative standard error `noise`, at most MOST times `samples` in total. The same seed gives the
+    same probe.
     """
     rng = np.random.default_rng(seed)
     block = _block(samples)

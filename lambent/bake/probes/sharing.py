@@ -136,7 +136,7 @@ def _is_seen_from_one_side(mesh: Mesh, ways: Floats, valid: NDArray[np.bool_]) -
 def _largest(
     owner: NDArray[np.int64], worth: NDArray[np.int64], size: Floats, given: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
-    """The owners whose probes are baked: the MOST whose objects `worth` one fill most of the view, and all `given`."""
+    """The owners whose probes are baked: the MOST whose objects fill most of the view, and all `given` ones."""
     filled = np.bincount(owner[worth], size[worth] ** 2, minlength=len(owner))
     filled[given] = np.inf
     own = np.unique(owner[worth])

@@ -78,6 +78,17 @@ def preview(
 ) -> Preview:
     """Render both balls with the same seed and compare them.
 
+    Parameters
+    ----------
+    table, material
+        A measurement, and the material fitted to it.
+    environment : Environment
+        Lighting of both balls.
+    size_px : int
+        Pixels along each side of the images.
+    spp : int
+        Samples per pixel.
+
     Raises
     ------
     UserError

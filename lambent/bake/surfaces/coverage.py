@@ -45,7 +45,10 @@ def density_of(geometry: dict[str, Floats], corners: Floats) -> Floats:
 
 
 def pieces_of(geometry: dict[str, Floats], width: int, height: int, *, reach: float = 0.0) -> Pieces:
-    """Parts of all triangles in all texels, or in cells enlarged by `reach` texels on every side."""
+    """Parts of all triangles in all texels, or in cells enlarged by `reach` texels on every side.
+
+    `geometry` is as in `atlas.merged`; the map has `width` x `height` texels.
+    """
     corners = corners_of(geometry, width, height)
     density = density_of(geometry, corners)
     found: list[tuple[NDArray[Any], ...]] = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))]

@@ -32,7 +32,7 @@ def patch_means(evaluate: Evaluate, basis: AngleBasis, proposal: MaterialBSDF, s
     evaluate : callable
         f (N, C) of wi and wo (N, 3), on any side.
     proposal : MaterialBSDF
-        Proposal with lobes where f is large; the nearer, the less noise.
+        BSDF to draw directions from; the closer its lobes are to f, the less noise.
     side : +1 or -1
         The side of wi.
     """

@@ -42,9 +42,9 @@ class Scouts:
     ----------
     place : (M, rank)
     value : (M, C)
-    density : (M,) expected number of scouts per unit volume; infinite for a place that was not drawn by `density_at`
+    density : (M,) expected number of scouts per unit volume; infinite for a place not drawn by `density_at`
     density_at : callable
-        The same at any places (N, rank).
+        The density at any places (N, rank).
     """
 
     place: Floats

@@ -49,7 +49,7 @@ class Bounds:
 
 
 def minimise(problem: Problem, bounds: Bounds, start: Mixture, steps: int, stop_share: float) -> tuple[Mixture, float]:
-    """The model after at most `steps` descent steps, and its residual (`Problem.remaining`).
+    """The model after at most `steps` descent steps from `start`, and its residual (`Problem.remaining`).
 
     Stops after a step that lowers the error by less than the share `stop_share`.
     """

@@ -67,13 +67,13 @@ class Box:
     Attributes
     ----------
     lo, hi : (4,) float64
-        Bounds in search coordinates; equal where the parameter is fixed.
+        Bounds in search coordinates; equal if the parameter is fixed.
     tied : bool
         Whether my equals mx (isotropic).
     k_limits : tuple of (float, float)
         Interval of the coefficient per channel.
     retro : bool
-        Whether the lobe stands about the direction to the light.
+        Whether the lobe is centred on the direction to the light.
     """
 
     lo: Floats
@@ -154,7 +154,7 @@ def _check_value(name: str, value: float) -> None:
 
 
 def parse_fix(options: Iterable[str]) -> dict[str, Value]:
-    """{'mx': .1, 'kd': (.1, .2, .3)} from options such as 'mx=.1' and 'kd=.1,.2,.3'."""
+    """{'mx': .1, 'kd': (.1, .2, .3)} from options such as 'mx=.1' and 'kd=.1,.2,.3'; `UserError` if malformed."""
     fix: dict[str, Value] = {}
     for option in options:
         name, text = _split(option, "name=value")
@@ -166,7 +166,7 @@ def parse_fix(options: Iterable[str]) -> dict[str, Value]:
 
 
 def parse_ranges(options: Iterable[str]) -> dict[str, tuple[float, float]]:
-    """{'mx': (.05, .3)} from options such as 'mx=.05:.3'."""
+    """{'mx': (.05, .3)} from options such as 'mx=.05:.3'; `UserError` if malformed."""
     ranges = {}
     for option in options:
         name, text = _split(option, "name=lo:hi")

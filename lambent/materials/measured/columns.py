@@ -55,7 +55,7 @@ class Layout:
     values : tuple of int
         The value columns.
     quantity : {"f", "f_cos", "p"}, optional
-        None where no name gives it.
+        None if no name gives it.
     kind : str
         grey, rgb, xyz or spectra.
     wavelengths_nm : tuple of float
@@ -178,7 +178,13 @@ def _angle(name: str) -> str | None:
 
 
 def rows_of(body: bytes, columns: int, path: Path) -> Floats:
-    """(N, columns) numbers, separated by blanks, commas or semicolons."""
+    """(N, columns) numbers, separated by blanks, commas or semicolons.
+
+    Raises
+    ------
+    UserError
+        If there are no rows, a row has another number of values, or numbers have decimal commas.
+    """
     refuse_decimal_commas(body, path)
     flat = numbers(re.sub(rb"[,;]", b" ", body), path)
     lines = sum(1 for line in body.split(b"\n") if line.strip(b" \t,;"))
@@ -206,10 +212,10 @@ def assemble(
     Parameters
     ----------
     phi_i_deg : float
-        Used where no column holds phi_i. A theta_o without a phi_o is in the plane of incidence, positive ahead of the
+        Used if no column has phi_i. A theta_o without a phi_o is in the plane of incidence, positive ahead of the
         normal, in the mirror direction.
     gridded : bool
-        False for rows whose format has no columns for the light, so that a grid of them is chance.
+        False for a format without columns for the light, where a grid would be coincidence.
     """
     angles = _degrees(rows, layout, phi_i_deg)
     check_angles(angles, path)

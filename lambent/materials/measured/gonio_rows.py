@@ -179,7 +179,15 @@ def _side(angles_deg: Floats, f: Floats, images: Flags, incident_deg: tuple[Floa
 
 
 def sheet_of(angles_deg: Floats, f: Floats, images: Flags, path: Path) -> AnySheet:
-    """The rows (N, 4) of one incident direction and side, sorted by theta_o then phi_o, without repeats."""
+    """The sheet of one incident direction and side, from rows (N, 4) sorted by theta_o then phi_o, without repeats.
+
+    Angles are in degrees: theta_i, phi_i, theta_o, phi_o; f (N, C) is in 1/sr, and `images` (N,) flags mirror images.
+
+    Raises
+    ------
+    UserError
+        If no value was measured.
+    """
     theta_i, phi_i = angles_deg[0, :2]
     if not sensible(f).any():
         where = f"theta_i {theta_i:g}, phi_i {phi_i:g}"

@@ -84,7 +84,7 @@ class HalfVectorGrid:
     Attributes
     ----------
     faces : int
-        1: a two-sided sheet; 2: the back scatters otherwise than the front.
+        1: a two-sided sheet; 2: the back scatters differently from the front.
     kinds : int
         1: reflection only; 2: transmission as well.
     values : (faces, kinds, viewers, theta_h, phi_h, 3) flat float32

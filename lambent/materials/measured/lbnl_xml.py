@@ -48,7 +48,7 @@ def read(path: Path) -> LbnlTable:
     Raises
     ------
     UserError
-        The file is not well-formed, declares a document type, names an unknown basis, holds another count of values
+        The file is not well-formed, declares a document type, names an unknown basis, has another number of values
         than its bases need, a word that is no number or a value that is not finite, or nothing above zero.
     """
     content = read_bytes(path, MEASURED_BYTES)

@@ -46,7 +46,7 @@ class PatchSheet:
     Attributes
     ----------
     faces : int
-        1: a two-sided sheet; 2: the back scatters otherwise than the front.
+        1: a two-sided sheet; 2: the back scatters differently from the front.
     kinds : int
         1: reflection only; 2: transmission as well.
     patches : int

@@ -62,10 +62,10 @@ def _earring(side: str) -> list[SceneObject]:
 
 
 def _tilt(centres: Floats) -> Floats:
-    """Rotation (3, 3) of a wire in the plane y = 0 about the pearl's centre that rests it, lowest, on the cloth.
+    """Rotation (3, 3) about the pearl's centre that brings a wire in the plane y = 0 to rest on the cloth.
 
-    centres (N, 2) are in x, z. The wire sinks towards a direction until its first point touches; of all directions the
-    one counts in which its middle sinks most.
+    centres (N, 2) are in x, z. For each direction, the wire sinks until its first point touches; the direction in which
+    its centre sinks most is used.
     """
     turns = np.radians(np.arange(0, 360, 0.5))
     towards = np.stack([np.cos(turns), np.sin(turns)])

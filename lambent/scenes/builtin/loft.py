@@ -1,8 +1,7 @@
 """A room with a couch, stairs and windows, after figure 6.1 of Ben-Artzi 2007 ("Room").
 
-Daylight comes through three windows alone, so that most of the room is lit by its own surfaces. Books and toys stay as
-they are; the other six materials are there to be edited. Lights, the other materials and the camera are in
-loft.toml.
+Daylight enters through three windows alone, so that most of the room is lit by its own surfaces. Books and toys are
+fixed; the other six materials are meant for editing. Lights, the other materials and the camera are in loft.toml.
 """
 
 from __future__ import annotations

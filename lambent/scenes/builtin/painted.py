@@ -1,4 +1,4 @@
-"""Materials with a diffuse texture made by code, and meshes that show one of its colours."""
+"""Materials with a procedural diffuse texture, and meshes that show one of its colours."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A round cloth laid over a round pedestal: a developable-like surface in closed form, without a simulation.
 
-On the pedestal the cloth is flat. Over the edge it bends down, tightly in the valleys of its folds, which lie on the
-pedestal, and widely on their crests, which flare outwards: a hanging cloth is longer around than what it hangs from.
+On the pedestal the cloth is flat. Over the edge it bends down, tightly in the valleys of its folds, which touch the
+pedestal, and widely on their crests, which flare outwards: a hanging cloth has a longer circumference than its support.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Drape:
     folds: int
 
     def crest(self, phi: Floats) -> Floats:
-        """How much of a crest, 0 to 1, there is at angles phi: folds of uneven width and depth."""
+        """Share of a crest, 0 to 1, at angles phi: folds have uneven widths and depths."""
         warp = 0.8 * np.sin(2 * phi + 1.0) + 0.6 * np.sin(3 * phi + 0.3) + 0.4 * np.sin(5 * phi + 2.0)
         depth = 0.72 + 0.18 * np.sin(3 * phi + 4.0) + 0.1 * np.sin(5 * phi + 1.0)
         wave = 0.5 + 0.5 * np.cos(self.folds * phi + warp)
@@ -66,7 +66,7 @@ class Drape:
         phi = np.linspace(0, 2 * np.pi, around + 1)[None, :]
         positions = self.points(phi, np.broadcast_to(s, (len(s), around + 1)))
         positions[:, -1] = positions[:, 0]
-        outer = np.maximum(s, 1e-3 * radius)  # the normal of the middle is that of its neighbourhood
+        outer = np.maximum(s, 1e-3 * radius)  # the normal at the centre is that of its neighbourhood
         h = STEP * radius
         along = self.points(phi, outer + h) - self.points(phi, outer - h)
         across = self.points(phi + STEP, outer + 0 * phi) - self.points(phi - STEP, outer + 0 * phi)

@@ -9,7 +9,7 @@ from lambent.scenes.scene import Mesh
 
 
 def subdivided(mesh: Mesh, longest_m: float, most: int) -> Mesh:
-    """The same surface, each triangle cut into four until no edge is longer, or there would be more than `most`."""
+    """The same surface, with triangles divided into four until no edge exceeds `longest_m`, or to `most` triangles."""
     while 4 * len(mesh.faces) <= most and _longest_m(mesh) > longest_m:
         mesh = _in_four(mesh)
     return mesh
@@ -21,7 +21,7 @@ def _longest_m(mesh: Mesh) -> float:
 
 
 def _in_four(mesh: Mesh) -> Mesh:
-    """Triangles cut at the middles of their edges; an edge that two share has one new vertex."""
+    """Divide triangles at the midpoints of their edges; a shared edge has one new vertex."""
     faces = mesh.faces.astype(np.int64)
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1)
     pairs, middle = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)

@@ -1,4 +1,4 @@
-"""The contents of a geometry file, and a scene of them."""
+"""The contents of a geometry file, and a scene made of them."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ DAYLIGHT = SunSky(sun_direction=(0.4558, 0.7597, 0.4637))
 
 @dataclass(frozen=True)
 class Contents:
-    """Objects in world space, and everything else in the file that Lambent reads.
+    """Objects in world space, and everything else that Lambent reads from the file.
 
     `variants` are its material sets: variant -> object -> its material there and the radiance it then emits;
-    `materials` holds those of all variants. A scene of this file alone gets daylight unless `tells_its_light`, or if
+    `materials` has those of all variants. A scene of this file alone gets daylight unless `tells_its_light`, or if
     nothing in it emits light.
     """
 
@@ -60,14 +60,14 @@ class Contents:
         ])  # fmt: skip
 
     def dressed(self, variant: str | None) -> tuple[SceneObject, ...]:
-        """The objects in a material set of this name, as they are where the file has none."""
+        """The objects in the material set `variant`; unchanged if the file has none of this name."""
         worn = {} if variant is None else self.variants.get(variant, {})
         found = ((o, *worn.get(o.name, (o.material, o.emission))) for o in self.objects)
         return tuple(replace(o, material=material, emission=emission) for o, material, emission in found)
 
 
 def daylight_beside(lights: Sequence[Light]) -> SunSky:
-    """Daylight, without its sun where a directional light comes from above: the brightest such light is the sun."""
+    """Daylight, without its sun if a directional light comes from above: the brightest such light is the sun."""
     suns = [light for light in lights if isinstance(light, DirectionalLight) and light.direction[1] < 0]
     if not suns:
         return DAYLIGHT
@@ -76,7 +76,7 @@ def daylight_beside(lights: Sequence[Light]) -> SunSky:
 
 
 def lights_that_stay(objects: Sequence[SceneObject], variants: Mapping[str, Sequence[SceneObject]]) -> Iterator[str]:
-    """A warning for each variant, the same objects in other materials, that would emit other light."""
+    """A warning for each variant, the same objects in other materials, that would emit different light."""
     for variant, dressed in variants.items():
         others = [o.name for o, now in zip(objects, dressed, strict=True) if now.emission != o.emission]
         if others:
@@ -84,16 +84,16 @@ def lights_that_stay(objects: Sequence[SceneObject], variants: Mapping[str, Sequ
 
 
 class UniqueNames:
-    """Gives every name once; those in `taken` are given already."""
+    """Makes names unique; those in `taken` are in use already."""
 
     def __init__(self, taken: Iterable[str] = ()) -> None:
         self._taken = set(taken)
         self._tried: Counter[str] = Counter()
 
     def unique(self, name: str) -> str:
-        """`name`, or the first of name_2, name_3... that is free.
+        """`name`, or the first free one of name_2, name_3...
 
-        The search goes on where it ended, so that the thousandth object of a name costs what the second does.
+        The search resumes where it ended, so that the thousandth object of a name costs as much as the second.
         """
         candidate = name
         while candidate in self._taken:

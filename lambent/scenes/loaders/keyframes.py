@@ -1,4 +1,4 @@
-"""Keyframes of a film: states of materials and of the mix of light groups at times, from a file beside a store."""
+"""Keyframes of a film: states of materials and of the light mix over time, from a file beside a store."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MOST_KEYS = 1000
 
 
 class _Key(Section):
-    """A moment: all as baked, or as in a variant, or the light as saved with a view; then what is told by name."""
+    """One moment: all as baked, or as in a variant, or the light as saved with a view; then overrides by name."""
 
     at: NotNegative
     as_baked: bool = False
@@ -46,7 +46,7 @@ class _Document(Section):
 
 @dataclass(frozen=True)
 class Known:
-    """What keyframes may name: looks of the store's materials, its variants, and mixes saved with views."""
+    """Names that keyframes may use: looks of the store's materials, its variants, and mixes saved with views."""
 
     looks: Mapping[str, Look]
     variants: tuple[Variant, ...] = ()
@@ -55,7 +55,7 @@ class Known:
 
 @dataclass(frozen=True)
 class Keyframes:
-    """What changes with time: the mix of light, and materials."""
+    """Changes over time: the light mix, and materials."""
 
     light: MixTrack
     looks: LookTrack
@@ -63,7 +63,7 @@ class Keyframes:
 
 @dataclass(frozen=True)
 class _Moment:
-    """A key as it is told: `whole_looks` and `whole_light` say whether what it does not name is as baked."""
+    """A key before resolution: `whole_looks` and `whole_light` tell whether anything it does not name is as baked."""
 
     at: float
     looks: dict[str, Look]
@@ -73,16 +73,15 @@ class _Moment:
 
 
 def read_keyframes(path: Path, given: Known) -> Keyframes:
-    """The keyframes of a file.
+    """Read the keyframes of a file.
 
-    Each material and each light group has its own keys: where a key does not name one, it goes on changing from the key
-    before to the next that does. A key with a variant, or with `as_baked`, names all of them; one with a view, all
-    light.
+    Each material and each light group has its own keys: a key that does not name one lets it change from the previous
+    to the next key that does. A key with a variant, or with `as_baked`, names all of them; one with a view, all light.
 
     Raises
     ------
     UserError
-        Where the file is damaged, names what is not there, or its times do not grow.
+        If the file is damaged, uses unknown names, or its times do not increase.
     """
     with foreign_bytes("keyframes", path):
         try:

@@ -1,8 +1,8 @@
 """`load_scene`: built-in scenes, scene.toml, and every format that has a module among the loaders.
 
 A format is a module or folder in `scenes/loaders` with NAME, ENDINGS and load(path, root) -> Contents; files that the
-file names lie below the folder `root`, by default its own. A format that shares its ending with other files also has
-recognise(head), which tells a scene by its first bytes.
+file refers to must be below the folder `root`, by default its own. A format that shares its suffix with other files
+also has recognise(head), which recognises a scene by its first bytes.
 """
 
 from __future__ import annotations
@@ -29,24 +29,25 @@ from lambent.scenes.validation import size_warnings
 
 BUILTIN_PREFIX = "builtin:"
 TOML = ".toml"
-TOLD = 2  # objects that are named one by one in warnings of one kind
+TOLD = 2  # objects named individually in warnings of one kind
 
 
 def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> Scene:
-    """The scene of a file, or a built-in one.
+    """Load the scene of a file, or a built-in one.
 
     Parameters
     ----------
     path_or_builtin : str or Path
-        "builtin:room", "builtin:box", or the path of a scene.toml, .glb, .gltf, .obj, .ply or Mitsuba's .xml; light
-        and a camera, where such a file has none, are added.
+        "builtin:room", "builtin:box", or the path of a scene.toml, .glb, .gltf, .obj, .ply or Mitsuba's .xml; light and
+        a camera are added to a file without them.
     crease_deg : float, optional
-        Normals that lean far from their faces become smooth only where faces meet at less than this angle, 0 to 180.
+        0 to 180. Normals that lean far from their faces are recomputed: smooth where faces meet at less than this
+        angle.
 
     Raises
     ------
     UserError
-        Where there is no such scene, or its file cannot be used.
+        If there is no such scene, or its file is unusable.
     """
     scene, text = _load(path_or_builtin), str(path_or_builtin)
     origin = text if text.startswith(BUILTIN_PREFIX) else os.path.abspath(text)
@@ -58,7 +59,7 @@ def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> 
 
 
 def counted(warnings: Sequence[str]) -> list[str]:
-    """Warnings, those that more than TOLD objects share as one with their number, where the first of them was."""
+    """Warnings, with those that more than TOLD objects share merged into one with their number, at the first place."""
     shared: dict[str, list[str]] = {}
     for warning in warnings:
         name, _, what = warning.partition(": ")
@@ -84,7 +85,7 @@ def _load(path_or_builtin: str | Path) -> Scene:
 
 
 def read_geometry(name: str, scene_file: Path, scene_files: SceneFiles) -> Contents:
-    """Objects, and what comes with them, of a built-in scene or of a file that `scene_file` names."""
+    """Objects and other contents of a built-in scene, or of a file that `scene_file` refers to."""
     if name.startswith(BUILTIN_PREFIX):
         module = import_module(f"{builtin.__name__}.{_builtin_name(name)}")
         make: Callable[[], tuple[SceneObject, ...]] = module.objects
@@ -113,7 +114,7 @@ def is_scene(path: Path, head: bytes) -> bool:
 
 
 def formats() -> list[ModuleType]:
-    """The formats that are found, by the names of their modules."""
+    """The available formats, by module name."""
     return list(modules_in(loaders, having="ENDINGS").values())
 
 
@@ -127,7 +128,7 @@ def _format_of(path: Path) -> ModuleType:
 
 
 def _builtin_name(text: str) -> str:
-    """The name behind "builtin:"; a built-in scene is a .toml and a module in `scenes/builtin`.
+    """The name after "builtin:"; a built-in scene is a .toml and a module in `scenes/builtin`.
 
     The module has `objects()`, and `textured()` if some of its materials have textures.
     """

@@ -41,7 +41,7 @@ class _Element:
         return sum(count is not None for _, _, count in self.properties)
 
     def row(self, corners: int) -> np.dtype[Any]:
-        """The type of a row whose list, if it has one, has so many corners."""
+        """The dtype of a row whose list, if it has one, has `corners` entries."""
         fields: list[tuple[Any, ...]] = []
         for i, (_, kind, count) in enumerate(self.properties):
             fields += [(f"{i}", kind)] if count is None else [("size", count), ("list", kind, (corners,))]
@@ -59,12 +59,12 @@ def load(path: Path, root: Path | None = None) -> Contents:
 
 
 def read(path: Path) -> MeshArrays:
-    """Arrays of a file.
+    """Read the arrays of a file.
 
     Raises
     ------
     UserError
-        Where it is not PLY, damaged, cut off, or a face names a vertex that is not there.
+        If it is not PLY, damaged or truncated, or a face refers to a missing vertex.
     """
     data = read_bytes(path, PLY_BYTES)
     order, elements, start = _header(data, path)
@@ -80,7 +80,7 @@ def read(path: Path) -> MeshArrays:
         elif element.name in ("vertex", "face"):
             raise UserError("has unsupported lists", file=path, field=f"element {element.name}")
         else:
-            break  # what follows the faces cannot be seen
+            break  # elements after the faces are invisible
     positions = _columns(vertex, ("x", "y", "z"))
     if positions is None:
         raise UserError("has no vertices", file=path, expected="properties x, y, z")
@@ -94,7 +94,7 @@ def read(path: Path) -> MeshArrays:
 
 
 def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
-    """Byte order (a value of `ORDERS`), elements, and where the data begin."""
+    """Byte order (a value of `ORDERS`), elements, and the start of the data."""
     end = data.find(b"end_header", 0, HEADER_MAX)
     if not data.startswith(b"ply") or end < 0:
         raise UserError("not a PLY file", file=path, got=repr(data[:4]), expected="ply at its start")
@@ -129,7 +129,7 @@ def _type(word: str, order: str) -> str:
 
 
 class _Rows:
-    """Elements taken one after the other, each checked against what is left of the file."""
+    """Elements taken one after the other, each checked against the remaining bytes of the file."""
 
     def __init__(self, data: memoryview, path: Path) -> None:
         self._data, self._at, self._path = data, 0, path
@@ -142,7 +142,7 @@ class _Rows:
         return array
 
     def faces(self, element: _Element) -> tuple[Indices, Indices]:
-        """Corners of all faces, one face after the other, and the number (F,) of each."""
+        """Corners of all faces, face after face, and their numbers (F,)."""
         if element.count == 0:
             return np.zeros(0, np.int64), np.zeros(0, np.int64)
         head, item = element.row(0), np.dtype(next(kind for _, kind, count in element.properties if count))
@@ -168,7 +168,7 @@ class _Rows:
         return _integers(corners.reshape(-1)), counts
 
     def _alike(self, kind: np.dtype[Any], count: int) -> np.ndarray[Any, Any] | None:
-        """The next rows if all lists have the length of the first one, as in most files."""
+        """The next rows if all lists are as long as the first, as in most files; else None."""
         if self._at + kind.itemsize * count > len(self._data):
             return None
         rows = np.frombuffer(self._data, kind, count, self._at)
@@ -192,7 +192,7 @@ def _doubles(text: bytes, path: Path) -> memoryview:
 
 
 def _columns(vertex: dict[str, Floats], *choices: tuple[str, ...]) -> Floats | None:
-    """The first of several groups of properties that is there, (V, n)."""
+    """The first available one of several groups of properties, (V, n)."""
     names = next((group for group in choices if all(n in vertex for n in group)), None)
     return None if names is None else np.stack([vertex[n] for n in names], axis=-1)
 

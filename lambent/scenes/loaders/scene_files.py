@@ -1,4 +1,4 @@
-"""Files that a scene's files name: in the scene's folder or below, however they were written down."""
+"""Files that a scene's files refer to: in the scene's folder or below, with paths in any notation."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ HINT = "put the file into the scene's folder or below"
 
 
 class SceneFiles:
-    """The files of one scene, below the folder `root`, which is that of its first file if not given.
+    """The files of one scene, below the folder `root`, by default that of its first file.
 
-    `sources` are the files used so far, in order; `notes` say which of them are spelt otherwise than the scene has it.
+    `sources` are the files used so far, in order; `notes` tell which of them are spelt differently in the scene.
     """
 
     def __init__(self, first: Path, root: Path | None = None) -> None:
@@ -24,24 +24,24 @@ class SceneFiles:
         self.notes: list[str] = []
 
     def use(self, path: Path) -> Path:
-        """`path`, noted as a source."""
+        """`path`, recorded as a source."""
         if path not in self.sources:
             self.sources.append(path)
         return path
 
     def read(self, path: Path, limit_bytes: int) -> bytes:
-        """Content of a file, noted as a source."""
+        """Content of a file, recorded as a source."""
         return read_bytes(self.use(path), limit_bytes)
 
     def path(self, name: str, file: Path, field: str) -> Path:
-        """The path of `name` as written in `file`, which may be Windows's; it need not exist.
+        """The path of `name` as written in `file`, possibly in Windows notation; it need not exist.
 
-        Where it does not, and a file is there whose path differs in upper and lower case alone, it is that file's.
+        If it does not exist, a single file whose path differs only in case is used instead.
 
         Raises
         ------
         UserError
-            Where the name leads out of the scene's folder.
+            If the name leads out of the scene's folder.
         """
         if not name.strip():
             raise UserError("is not a file name", file=file, field=field, got=repr(name))
@@ -60,12 +60,12 @@ class SceneFiles:
         return spelt
 
     def find(self, name: str, file: Path, field: str) -> tuple[Path, bool]:
-        """As `path`; a name that leads out, or nowhere, is also looked for beside `file`, without its folders.
+        """Like `path`; a name that leads out, or to a missing file, is also looked for beside `file`, without folders.
 
         Returns
         -------
         path, moved : Path, bool
-            Where the file is, and whether it was found only beside `file`. The path need not exist.
+            The file's path, which need not exist, and whether it was found only beside `file`.
         """
         last = PureWindowsPath(name.replace("/", "\\")).name
         is_beside = bool(last) and _is_file(file.resolve().parent / last)
@@ -82,7 +82,7 @@ class SceneFiles:
     def look_for(
         self, what: str, name: str, file: Path, field: str, note: Callable[[str], None], otherwise: str = ""
     ) -> Path | None:
-        """The file that `name` means in `file`, as a source; None, and a note, where it is not there."""
+        """The file that `name` refers to in `file`, recorded as a source; None, with a note, if it is missing."""
         path, moved = self.find(name, file, field)
         if not path.is_file():
             note(f"{what} {name} is missing{otherwise}")
@@ -93,15 +93,15 @@ class SceneFiles:
 
 
 def _is_file(path: Path) -> bool:
-    """Whether a file of this name is there; names that no file can have are answered, too."""
+    """Whether a file of this name exists; handles impossible names too."""
     try:
         return path.is_file()
-    except (OSError, ValueError):  # too long, a zero or half of a character in it
+    except (OSError, ValueError):  # too long, or contains a null character or a lone surrogate
         return False
 
 
 def _in_other_case(path: Path, root: Path) -> Path | None:
-    """The one file below `root` whose path differs from `path` in upper and lower case alone, if there is one."""
+    """The one file below `root` whose path differs from `path` only in case; None without one."""
     root = root.resolve()
     found = [root]
     for part in path.relative_to(root).parts if path.is_relative_to(root) else ():

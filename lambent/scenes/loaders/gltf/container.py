@@ -1,4 +1,4 @@
-"""glTF on disk: the container, its buffers and accessors. Every length is checked before anything is read by it."""
+"""glTF on disk: the container, its buffers and accessors. Every length is checked before it is used for reading."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Gltf:
-    """A document with its buffers in memory; `files` are those it was read from."""
+    """A document with its buffers in memory; `files` are its source files."""
 
     path: Path
     document: GltfDocument
     buffers: tuple[bytes, ...]
     files: SceneFiles
-    asked: Counter[str] = field(default_factory=Counter)  # numbers of accessors so far, and those that are zeros
+    asked: Counter[str] = field(default_factory=Counter)  # numbers in accessors so far, and zeros among them
 
     def error(self, message: str, field: str, got: object, expected: object) -> UserError:
         return UserError(message, file=self.path, field=field, got=got, expected=expected)
 
     def pick(self, items: Sequence[T], index: int, field: str) -> T:
-        """`items[index]`, or a `UserError` that names the field."""
+        """`items[index]`; raises `UserError` that names the field if the index is invalid."""
         if index >= len(items):
             raise self.error("index out of range", field, index, f"below {len(items)}")
         return items[index]
@@ -82,7 +82,7 @@ class Gltf:
         return array
 
     def is_stored(self, index: int) -> bool:
-        """Whether the file has an accessor's numbers, uncompressed."""
+        """Whether an accessor's numbers are in the file, uncompressed."""
         a = self.pick(self.document.accessors, index, "accessors")
         return a.bufferView is not None or a.sparse is not None
 
@@ -115,11 +115,11 @@ class Gltf:
         return values
 
     def is_missing(self, uri: str, field: str) -> bool:
-        """Whether a uri names a file that is not there."""
+        """Whether a uri names a missing file."""
         return not uri.startswith("data:") and not is_remote(uri) and not self._file(uri, field).exists()
 
     def resource(self, uri: str, field: str) -> bytes:
-        """Bytes of a uri: data within it, or a file in the scene's folder or below."""
+        """Bytes of a uri: embedded data, or a file in the scene's folder or below."""
         if uri.startswith("data:"):
             try:
                 return base64.b64decode(uri.partition(",")[2], validate=True)
@@ -135,17 +135,17 @@ class Gltf:
 
 
 def is_remote(uri: str) -> bool:
-    """Whether a uri names something on the network."""
+    """Whether a uri refers to the network."""
     return not uri.startswith("data:") and "://" in uri
 
 
 def read(path: Path, root: Path | None = None) -> Gltf:
-    """A .glb or .gltf file with all its buffers; files it names lie below `root`, by default its own folder.
+    """Read a .glb or .gltf file with all its buffers; referenced files must be below `root`, by default its own folder.
 
     Raises
     ------
     UserError
-        Where the file is truncated, not glTF 2.0, requires an unsupported extension, or names a file elsewhere.
+        If the file is truncated, not glTF 2.0, requires an unsupported extension, or refers to a file elsewhere.
     """
     data = read_bytes(path, GLTF_BYTES)
     text, binary = _chunks(data, path) if path.suffix.lower() == ".glb" else (data, None)
@@ -170,7 +170,7 @@ def read(path: Path, root: Path | None = None) -> Gltf:
 
 
 def _buffers(gltf: Gltf, binary: bytes | None) -> Iterator[bytes]:
-    """The content of every buffer; `binary` is the first one's if it has no uri. Those of one uri share it."""
+    """The content of every buffer; `binary` is the first one's if it has no uri. Buffers with equal uri share it."""
     known: dict[str, bytes] = {}
     for i, buffer in enumerate(gltf.document.buffers):
         field = f"buffers.{i}"

@@ -1,4 +1,4 @@
-"""Luminaires of a glTF file (EXT_lights_ies): points that shine as an IES file within or beside it says."""
+"""Luminaires of a glTF file (EXT_lights_ies): points that emit by an IES file, embedded or beside it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from lambent.scenes.scene import IesLight
 
 
 class Luminaires:
-    """The profiles of a file, each read once; those that cannot be used are left out, and `note` is told."""
+    """The profiles of a file, each read once; unusable ones are left out and reported to `note`."""
 
     def __init__(self, gltf: Gltf, note: Callable[[str], None]) -> None:
         self._gltf, self._note = gltf, note

@@ -22,7 +22,7 @@ from lambent.scenes.scene import Texture
 
 
 def surface_of(document: MaterialDocument, textures: Textures, notes: list[str]) -> Surface:
-    """The surface a material describes; `notes` gets a line about everything lost."""
+    """The surface that a material describes; `notes` gets a line about everything lost."""
     notes += [f"ignored: {name}" for name in sorted(set(document.extensions) - READ_EXTENSIONS)]
     reading = _Reading(document, textures, notes)
     older = document.specular_glossiness
@@ -32,7 +32,7 @@ def surface_of(document: MaterialDocument, textures: Textures, notes: list[str])
 
 
 class _Reading:
-    """One material on its way to a surface."""
+    """State of converting one material to a surface."""
 
     def __init__(self, document: MaterialDocument, textures: Textures, notes: list[str]) -> None:
         self._document, self._textures, self._notes = document, textures, notes
@@ -88,11 +88,11 @@ class _Reading:
         return self._textures.rgb(reference, self._uv_set, self._notes, srgb=srgb)
 
     def _finished(self, surface: Surface, base: TextureImage | None, opacity: float) -> Surface:
-        """With what both kinds of material have: a normal map, emission, and the alpha of the base colour."""
+        """Add what both kinds of material share: a normal map, emission, and the alpha of the base colour."""
         return self._with_alpha(replace(surface, normal=self._normal(), emission=self._emission()), base, opacity)
 
     def _anisotropy(self) -> tuple[float, Texture | None]:
-        """Strength, and a texture of the angles by which the tangent is turned."""
+        """Strength, and a texture of the rotation angles of the tangent."""
         anisotropy = self._document.anisotropy
         strength, turn_rad = anisotropy.anisotropyStrength, anisotropy.anisotropyRotation
         if not strength:
@@ -111,7 +111,7 @@ class _Reading:
         return strength, absolute(Textured(directions, texture.uv_transform))
 
     def _translucent(self, surface: Surface) -> Surface:
-        """With the absorption of its volume and its diffuse transmission."""
+        """Add the absorption of its volume and its diffuse transmission."""
         volume = self._document.volume
         if volume.thicknessFactor and np.isfinite(volume.attenuationDistance):
             left = np.asarray(volume.attenuationColor) ** (volume.thicknessFactor / volume.attenuationDistance)
@@ -157,7 +157,7 @@ class _Reading:
         return rgb(radiance)
 
     def _with_alpha(self, surface: Surface, base: TextureImage | None, factor: float) -> Surface:
-        """With its holes (MASK), or with what shines through it (BLEND)."""
+        """Add its holes (MASK), or its transparency (BLEND)."""
         mode, cutoff = self._document.alphaMode, self._document.alphaCutoff
         if mode == "OPAQUE":
             return surface

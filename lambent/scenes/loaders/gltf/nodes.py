@@ -35,12 +35,12 @@ def load(path: Path, root: Path | None = None) -> Contents:
     """Contents of a .glb or .gltf file.
 
     Names are the nodes', made unique (with a warning); a mesh of several materials becomes an object per material.
-    Files it names lie below `root`, by default its own folder.
+    Files that it refers to must be below `root`, by default its own folder.
 
     Raises
     ------
     UserError
-        Where the file is damaged or holds no triangles.
+        If the file is damaged or has no triangles.
     """
     reading = _Reading(read(path, root))
     reading.walk()
@@ -49,7 +49,7 @@ def load(path: Path, root: Path | None = None) -> Contents:
 
 
 class _Materials:
-    """The materials of a file by their number, -1 for the default."""
+    """The materials of a file by number, -1 for the default."""
 
     def __init__(self, gltf: Gltf) -> None:
         self._documents = [*gltf.document.materials, MaterialDocument(name="default")]
@@ -69,7 +69,7 @@ class _Materials:
 
 
 class _Reading:
-    """One file, and what has been read of it."""
+    """State of reading one file."""
 
     def __init__(self, gltf: Gltf) -> None:
         self._gltf, self._materials = gltf, _Materials(gltf)
@@ -101,7 +101,7 @@ class _Reading:
         )
 
     def _unread(self) -> Iterator[str]:
-        """Extensions of anything but materials that are not read; materials name their own."""
+        """Unread extensions other than those of materials, which report their own."""
         document = self._gltf.document
         of_materials = {name for material in document.materials for name in material.extensions}
         for name in sorted(set(document.extensionsUsed) - READ_EXTENSIONS - of_materials):
@@ -151,7 +151,7 @@ class _Reading:
             self._add_mesh(node.mesh, node.name, world)
         if node.camera is not None:
             self._add_camera(node.camera, node.name, world)
-        if node.luminaire is not None:  # what stands beside it is for programs that cannot read it
+        if node.luminaire is not None:  # a fallback next to it serves programs that cannot read luminaires
             luminaire = self._luminaires.at(node, world)
             self._lights += [replace(luminaire, name=node.name or "")] if luminaire is not None else []
         elif node.light is not None:
@@ -196,7 +196,7 @@ class _Reading:
                 self._objects[number] = SceneObject(o.name, mesh, o.material, o.emission)
 
     def _note_variants(self, primitive: Primitive, name: str) -> None:
-        """Note an object's material in each of the file's material sets that has one for it."""
+        """Record an object's material in each material set of the file that has one for it."""
         listed = self._gltf.document.variants
         for variant in listed:
             self._variants.setdefault(variant.name, {})
@@ -273,7 +273,7 @@ def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int) -> tupl
         order = gltf.accessor(primitive.indices)[:, 0].astype(np.int64)
     notes: list[str] = []
     count, used = len(positions), np.arange(len(positions))
-    if len(order) < count and order.size and int(order.max()) < count:  # a few of an accessor that many share
+    if len(order) < count and order.size and int(order.max()) < count:  # a small part of a shared accessor
         used, order = np.unique(order, return_inverse=True)
         positions = positions[used]
     faces = _faces(order, primitive.mode)
@@ -293,7 +293,7 @@ def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int) -> tupl
         notes.append(f"{name}: vertex colours are ignored")
     uv = optional(f"TEXCOORD_{uv_set}", 2)
     if uv is not None:
-        uv = uv * (1, -1) + (0, 1)  # glTF counts v from the top
+        uv = uv * (1, -1) + (0, 1)  # glTF measures v from the top
     tangents = optional("TANGENT", 4)
     if tangents is not None:
         tangents = tangents[:, :3]

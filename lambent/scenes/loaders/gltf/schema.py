@@ -1,6 +1,6 @@
 """The part of glTF 2.0 that Lambent reads; everything else in a file is ignored.
 
-Fields of extensions and of small inner objects are fields of the object around them; `_at` names their place.
+Fields of extensions and of small inner objects become fields of the enclosing object; `_at` gives their path.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Three = tuple[Finite, Finite, Finite]
 Four = tuple[Finite, Finite, Finite, Finite]
 Colour = tuple[NotNegative, NotNegative, NotNegative]
-READ_EXTENSIONS = {"KHR_mesh_quantization"}  # needs no field of its own; `_extension` adds the others
+READ_EXTENSIONS = {"KHR_mesh_quantization"}  # needs no field; `_extension` adds the others
 
 
 def _at(*place: str, default: Any = ...) -> Any:
-    """A field at a place further in, by default required."""
+    """A field at a nested path, required by default."""
     return Field(default, validation_alias=AliasPath(*place))
 
 
 def _extension(name: str, *place: str, default: Any = None) -> Any:
-    """A field at a place within an extension."""
+    """A field at a path within an extension."""
     READ_EXTENSIONS.add(name)
     return _at("extensions", name, *place, default=default)
 
@@ -90,7 +90,7 @@ class MeshDocument(_Part):
 
 class Node(_Extended):
     name: str | None = None
-    children: list[Index] = Field(default_factory=list)  # a factory: pydantic copies other defaults for each node
+    children: list[Index] = Field(default_factory=list)  # a factory: pydantic copies other defaults per node
     mesh: Index | None = None
     camera: Index | None = None
     light: Index | None = _extension("KHR_lights_punctual", "light")

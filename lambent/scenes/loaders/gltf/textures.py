@@ -1,4 +1,4 @@
-"""glTF's textures: their images, the uv set of a mesh that they lie on, and their layout."""
+"""glTF's textures: images, uv sets and transforms."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Textures:
         self.images = TextureImages(gltf.files)
 
     def of(self, reference: TextureReference | None, uv_set: int, notes: list[str]) -> TextureImage | None:
-        """A reference's image, laid out; None if there is none.
+        """A reference's image with its transform; None if there is none.
 
         An image on another uv set than `uv_set` is reduced to one texel, its mean.
         """
@@ -55,7 +55,7 @@ class Textures:
         return None if image is None else image.rgb(srgb=srgb)
 
     def _image(self, number: int, notes: list[str]) -> TextureImage | None:
-        """An image; None, and a note, if its file is not there."""
+        """An image; None, with a note, if its file is missing."""
         gltf, field = self._gltf, f"images.{number}"
         document = gltf.pick(gltf.document.images, number, "images")
         if document.uri is not None and is_remote(document.uri):
@@ -77,7 +77,7 @@ class Textures:
 
 
 def uv_set_of(reference: TextureReference) -> int:
-    """The number of the TEXCOORD that a reference lies on."""
+    """The TEXCOORD number of a reference."""
     moved = reference.transform
     return reference.texCoord if moved is None or moved.texCoord is None else moved.texCoord
 
@@ -88,7 +88,7 @@ def main_uv_set(document: MaterialDocument) -> int:
 
 
 def references(document: MaterialDocument) -> Iterable[TextureReference]:
-    """The textures of a material that are read, the most visible first."""
+    """The textures of a material that are read, most visible first."""
     pbr, older = document.pbrMetallicRoughness, document.specular_glossiness
     named = (
         older.diffuseTexture if older is not None else None,
@@ -114,4 +114,4 @@ def _uv_transform(reference: TextureReference) -> UvTransform:
     theirs = np.eye(3)
     theirs[:2, :2] = np.array([[c, s], [-s, c]]) * moved.scale
     theirs[:2, 2] = moved.offset
-    return flipped_uv(theirs, decimals=12)  # without the rests of right angles
+    return flipped_uv(theirs, decimals=12)  # removes the rounding residue of right angles

@@ -1,4 +1,4 @@
-"""Hard edges: normals that are smooth across them lean far from their faces, and shade a box like a ball."""
+"""Hard edges: smooth normals across them lean far from their faces, and shade a box like a ball."""
 
 from __future__ import annotations
 
@@ -53,14 +53,14 @@ def leaning_warnings(objects: Sequence[SceneObject]) -> list[str]:
 
 
 def creased(mesh: Mesh, angle_deg: float) -> Mesh:
-    """The mesh with new normals: smooth where faces meet at less than an angle, and hard elsewhere.
+    """The mesh with new normals: smooth where faces meet at less than an angle, hard elsewhere.
 
-    The normal of a corner is the mean of the faces that meet there within the angle of its own, by area. Vertices are
-    split where corners get different normals.
+    A corner's normal is the area-weighted mean of the faces that meet there within the angle of its own face. Vertices
+    are split if their corners get different normals.
     """
     corners = mesh.corners.astype(float)
     vectors, faces = area_vectors(corners), triangle_normals(corners)
-    turned = (faces * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1) < 0  # against the winding, as the file has it
+    turned = (faces * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1) < 0  # against the winding, as in the file
     vectors[turned], faces[turned] = -vectors[turned], -faces[turned]
     _, place = np.unique(mesh.positions, axis=0, return_inverse=True)
     place = place.reshape(-1)[mesh.faces.reshape(-1)]  # by corner

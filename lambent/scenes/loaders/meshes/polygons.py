@@ -1,4 +1,4 @@
-"""Polygons into triangles, and normals where a file has none."""
+"""Triangulation of polygons, and normals for files without them."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _newell(points: Floats) -> Floats:
 
 
 def _convex(points: Floats) -> Flags:
-    """(F,) whether polygons (F, n, 3) turn one way at every corner; one that is not finite counts as convex."""
+    """(F,) whether polygons (F, n, 3) turn one way at every corner; nonfinite ones count as convex."""
     with np.errstate(invalid="ignore", over="ignore"):
         edges = np.roll(points, -1, axis=1) - points
         turns = np.sum(np.cross(edges, np.roll(edges, -1, axis=1)) * _newell(points)[:, None], axis=-1)
@@ -81,7 +81,7 @@ def _fan(corners: int) -> Indices:
 
 
 def ranges(counts: Indices) -> Indices:
-    """0, 1, ..., c - 1 for each c of counts, one after the other."""
+    """0, 1, ..., c - 1 for each c of counts, concatenated."""
     starts = np.cumsum(counts) - counts
     return np.arange(int(counts.sum())) - np.repeat(starts, counts)
 

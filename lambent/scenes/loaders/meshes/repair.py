@@ -1,4 +1,4 @@
-"""From the arrays of a file to a mesh that can be baked: missing arrays made, broken triangles dropped, with notes."""
+"""Convert a file's arrays to a mesh that can be baked: create missing arrays, drop broken triangles, with notes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class MeshArrays:
     tangents: Floats | None = None
 
     def smooth(self) -> MeshArrays:
-        """The same with smooth normals, if they are absent."""
+        """The arrays with smooth normals, if they have none."""
         if self.normals is not None or not len(self.triangles) or int(self.triangles.max()) >= len(self.positions):
             return self
         normals = np.zeros_like(self.positions)
@@ -51,7 +51,7 @@ def mesh_of(arrays: MeshArrays, *, name: str, file: Path) -> tuple[Mesh | None, 
     Raises
     ------
     UserError
-        Where a triangle names a vertex that is not there.
+        If a triangle refers to a missing vertex.
     """
     notes: list[str] = []
     positions, faces = _tame(arrays.positions), arrays.triangles
@@ -62,7 +62,7 @@ def mesh_of(arrays: MeshArrays, *, name: str, file: Path) -> tuple[Mesh | None, 
     faces = _usable(positions, faces, notes)
     if not len(faces):
         return None, [f"{name}: left out, no triangle has an area ({'; '.join(notes) or 'empty'})"]
-    if normals is None:  # every triangle gets vertices of its own
+    if normals is None:  # every triangle gets its own vertices
         own = faces.reshape(-1)
         faces = np.arange(len(own)).reshape(-1, 3)
         positions, uv, tangents = positions[own], _at(uv, own), _at(tangents, own)
@@ -89,7 +89,7 @@ def mesh_of(arrays: MeshArrays, *, name: str, file: Path) -> tuple[Mesh | None, 
 
 
 def _tame(values: Floats) -> Floats:
-    """`values`, with NaN for absurdly large ones, whose squares would overflow in single precision."""
+    """`values` with NaN for extremely large ones, whose squares would overflow in single precision."""
     with np.errstate(invalid="ignore"):
         return np.where(np.abs(values) < ABSURD, values, np.nan)
 
@@ -99,7 +99,7 @@ def _at(values: Floats | None, index: NDArray[np.integer]) -> Floats | None:
 
 
 def _usable(positions: Floats, faces: NDArray[np.integer], notes: list[str]) -> NDArray[np.integer]:
-    """Faces with finite corners and an area, in float32, as they will be stored."""
+    """Faces with finite corners and positive area, in float32, as they will be stored."""
     finite = np.asarray(np.isfinite(positions).all(axis=-1))[faces].all(axis=-1)
     if not finite.all():
         notes.append(f"{int((~finite).sum())} triangles dropped: a vertex is not finite")
@@ -126,18 +126,18 @@ def _unit_normals(positions: Floats, faces: NDArray[np.integer], normals: Floats
             np.add.at(mean, faces[:, corner], vectors)
         unit[broken] = normalize(mean)[broken]
         notes.append(f"{int(broken.sum())} normals had no direction: replaced by face normals")
-    unit[np.linalg.norm(unit, axis=-1) < 0.5] = (0.0, 1.0, 0.0)  # of faces that cancel, of vertices that nothing uses
+    unit[np.linalg.norm(unit, axis=-1) < 0.5] = (0.0, 1.0, 0.0)  # for faces that cancel, and unused vertices
     return unit
 
 
 def _box_mapped(positions: Floats, normals: Floats) -> Floats:
-    """uv (V, 2) in metres: the two axes across which the normal is not largest."""
+    """uv (V, 2) in metres: the two axes other than that of the largest normal component."""
     kept = np.array([(2, 1), (0, 2), (0, 1)])[np.argmax(np.abs(normals), axis=-1)]
     return np.take_along_axis(np.nan_to_num(positions), kept, axis=-1)
 
 
 def _along_u(positions: Floats, faces: NDArray[np.integer], uv: Floats) -> Floats:
-    """Direction (V, 3) in which u grows, the mean over the faces of each vertex; +x where uv does not tell."""
+    """Direction (V, 3) of increasing u, averaged over the faces of each vertex; +x if uv does not determine it."""
     finite = np.nan_to_num(positions)
     a, b, c = (finite[faces[:, i]] for i in range(3))
     ua, ub, uc = (uv[faces[:, i]] for i in range(3))

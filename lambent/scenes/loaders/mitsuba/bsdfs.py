@@ -52,7 +52,7 @@ MEASURED = {
 
 
 def surface_of(plugin: Plugin) -> Surface:
-    """The surface a BSDF describes; one of an unknown kind is grey, or the BSDF nested in it."""
+    """The surface that a BSDF describes; for an unknown kind, grey or the BSDF nested in it."""
     known = plugin.reading.surfaces
     key = id(plugin.element)
     if key not in known:
@@ -124,7 +124,7 @@ def _dielectric(plugin: Plugin, rough: bool = False) -> Surface:
 
 def _thin_dielectric(plugin: Plugin) -> Surface:
     once = fresnel.reflectance(COS, _eta(plugin, "bk7"))
-    return _sheet(plugin, 2 * once / (1 + once), 1.0, rough=False)  # light that goes to and fro inside counts
+    return _sheet(plugin, 2 * once / (1 + once), 1.0, rough=False)  # includes light reflected to and fro inside
 
 
 def _sheet(plugin: Plugin, reflected: Floats, bend: float, rough: bool) -> Surface:
@@ -132,7 +132,7 @@ def _sheet(plugin: Plugin, reflected: Floats, bend: float, rough: bool) -> Surfa
     facets = _facets(plugin, rough)
     r0, rise = nearest_fresnel(reflected)
     drawn = rise * (r0 + (1 - r0) * (1 - COS) ** 5)
-    share, falloff = nearest_passage(1 - np.maximum(reflected, drawn))  # both together never return more than arrives
+    share, falloff = nearest_passage(1 - np.maximum(reflected, drawn))  # together they never return more than arrives
     back = replace(facets, k=scaled(colour(plugin, "specular_reflectance", 1.0), rise), r0=np.full(3, r0))
     k = scaled(colour(plugin, "specular_transmittance", 1.0), share)
     spread = scaled(facets.m, bend) if rough else facets.m
@@ -193,7 +193,7 @@ def _normal_map(plugin: Plugin) -> Surface:
         plugin.note("its normal map cannot be read")
         return surface
     normals = Textured(read.values * 2 - 1, read.uv_transform)
-    # Mitsuba's v points down the picture; normal maps are drawn for a v that points up, in both.
+    # Mitsuba's v points down the picture; normal maps in both are made for a v that points up.
     return replace(surface, normal=absolute(normals))
 
 

@@ -1,7 +1,7 @@
-"""Mitsuba's XML as a tree: parameters filled in, other files included, names of version 0.6 turned into those of 3.
+"""Mitsuba's XML as a tree: parameters substituted, other files included, names of version 0.6 converted to those of 3.
 
-The file is untrusted. A document type declaration is refused, and with it every entity of the file's own; the number of
-elements, their depth, the included files and the length of parameters are limited.
+The file is untrusted. Document type declarations, and with them entities, are refused; the number of elements, their
+depth, the included files and the length of parameters are limited.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Element:
         return self.attributes.get("type", "").lower()
 
     def floats(self, count: int | None = None, attribute: str = "value") -> list[float]:
-        """Finite numbers of an attribute, separated by blanks or commas; as many as `count`, if given."""
+        """Finite numbers of an attribute, separated by blanks or commas; exactly `count`, if given."""
         text = self.attributes.get(attribute, "")
         try:
             values = [float(word) for word in text.replace(",", " ").split()]
@@ -61,7 +61,7 @@ class Element:
         return values
 
     def vector(self, default: float = 0.0) -> Floats:
-        """(3,) of the attributes x, y, z or of a value, in which one number stands for all three."""
+        """(3,) of the attributes x, y, z or of a value; a single number stands for all three."""
         if "value" not in self.attributes:
             return np.array([self.floats(1, c)[0] if c in self.attributes else default for c in "xyz"])
         values = self.floats()
@@ -80,16 +80,16 @@ class Element:
 
 @dataclass
 class Document:
-    """A scene file with its includes; `ids` are the elements by their id, `files` the files it was read from."""
+    """A scene file with its includes; `ids` are the elements by id, `files` its source files."""
 
-    is_old: bool  # of version 0.6 or before
+    is_old: bool  # version 0.6 or earlier
     elements: list[Element]
     ids: dict[str, Element]
     files: SceneFiles
 
 
 def snake(name: str) -> str:
-    """The name in version 3 of a parameter of version 0.6: toWorld -> to_world."""
+    """The version 3 name of a parameter of version 0.6: toWorld -> to_world."""
     return _HUMP.sub("_", name).lower()
 
 
@@ -99,12 +99,12 @@ def is_scene(head: bytes) -> bool:
 
 
 def read(path: Path, files: SceneFiles) -> Document:
-    """The document of a file.
+    """Read the document of a file.
 
     Raises
     ------
     UserError
-        Where it is not XML, not a scene, names files that are not there, or uses parameters that are not set.
+        If it is not XML or not a scene, refers to missing files, or uses parameters that are not set.
     """
     parser = _Parser(files)
     scene = parser.scene(path)
@@ -129,7 +129,7 @@ def read(path: Path, files: SceneFiles) -> Document:
 
 
 def _filled(text: str, parameters: dict[str, str], element: Element) -> str:
-    """`text` with its $parameters; the longest known name counts."""
+    """`text` with its $parameters substituted; the longest known name matches."""
     if "$" not in text:
         return text
 
@@ -195,7 +195,7 @@ class _Parser:
         parser.StartDoctypeDeclHandler = refuse
         try:
             parser.Parse(self._files.read(path, MITSUBA_BYTES), True)
-        except (expat.ExpatError, LookupError, ValueError) as error:  # LookupError: of an unknown encoding
+        except (expat.ExpatError, LookupError, ValueError) as error:  # LookupError: an unknown encoding
             raise UserError(f"not XML ({error})", file=path) from error
         if not top.children or top.children[0].tag != "scene":
             got = f"<{top.children[0].tag}>" if top.children else "nothing"

@@ -59,10 +59,10 @@ def mean_transmittance(eta: float, m: float = 0.0, distribution: str = "ggx") ->
 
 
 def nearest_fresnel(exact: Floats) -> tuple[float, float]:
-    """r0 and k of the k (r0 + (1 - r0)(1 - cos)^5) nearest to a reflectance at `COS`, k at most 1.
+    """r0 and k <= 1 for which k (r0 + (1 - r0)(1 - cos)^5) is nearest to a reflectance at `COS`.
 
-    The error is relative and weighted by the cosine. Metals, whose reflectance dips before it rises, come out nearly
-    flat; a dielectric gains a little at normal incidence for what Schlick's curve lacks at 60 degrees.
+    The error is relative and weighted by the cosine. Metals, whose reflectance dips before it rises, become nearly
+    flat; a dielectric gets slightly more at normal incidence, to compensate for Schlick's deficit at 60 degrees.
     """
     rise = (1 - COS) ** 5
     weight = GAUSS_WEIGHTS * COS / np.maximum(exact, 1e-3)
@@ -78,7 +78,7 @@ def nearest_fresnel(exact: Floats) -> tuple[float, float]:
 
 
 def nearest_passage(exact: Floats) -> tuple[float, float]:
-    """k and x of the k (1 - (1 - cos)^5) cos^x nearest to a transmittance at `COS`."""
+    """k and x for which k (1 - (1 - cos)^5) cos^x is nearest to a transmittance at `COS`."""
     under = 1 - (1 - COS) ** 5
     powers = np.linspace(-0.04, 0.5, 55)
     shapes = under * COS ** powers[:, None]
@@ -95,7 +95,7 @@ def _mean(values: Floats) -> float:
 
 
 def _facets(cos_i: Floats, m: float, distribution: str) -> tuple[Floats, Floats, Floats]:
-    """cos_i (N, 1), and of facets of density D cos the cosines to the surface's normal and to the light (N, K)."""
+    """cos_i (N, 1), and for facets of density D cos the cosines to the surface's normal and to the light (N, K)."""
     u = (np.arange(FACETS) + 0.5) / FACETS
     r = np.sqrt(u / (1 - u)) if distribution == "ggx" else np.sqrt(-np.log(1 - u))
     x = (m * r[:, None] * np.cos(2 * np.pi * u)).ravel()

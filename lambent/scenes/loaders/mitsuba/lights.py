@@ -29,12 +29,12 @@ from lambent.scenes.scene import (
 )
 
 ENVIRONMENTS = ("envmap", "constant", "sunsky", "sky", "sun")
-UPRIGHT = 0.9995  # cosine of a tilt that does not matter
-SKY_UNIT = 683.0 * 106.856 / LM_PER_W  # W/(sr m^2) of 1 W/(sr m^2 nm): what a file with a sky has all its light in
+UPRIGHT = 0.9995  # cosine of a negligible tilt
+SKY_UNIT = 683.0 * 106.856 / LM_PER_W  # W/(sr m^2) of 1 W/(sr m^2 nm), the unit of all light in a file with a sky
 
 
 def environment_of(plugin: Plugin, world: Floats) -> Environment | None:
-    """The environment an emitter gives; `world` (4, 4) turns the file's world into ours."""
+    """The environment of an emitter; `world` (4, 4) rotates the file's world into ours."""
     matrix = world @ plugin.transform()
     made: Environment | None
     if plugin.type == "constant":
@@ -48,7 +48,7 @@ def environment_of(plugin: Plugin, world: Floats) -> Environment | None:
 
 
 def _picture(plugin: Plugin, matrix: Floats) -> Environment | None:
-    """Mitsuba's pictures have +y on top, as ours, and +z in the middle, where ours have -z."""
+    """Mitsuba's pictures have +y at the top, like ours, but +z in the middle, where ours have -z."""
     path = plugin.file()
     if not path.is_file():
         plugin.note(f"picture {plugin.text('filename')} is missing: left out")
@@ -106,7 +106,7 @@ def _sun_radius_deg(plugin: Plugin) -> float:
 
 
 def light_of(plugin: Plugin, world: Floats) -> PointLight | DirectionalLight | None:
-    """A light without extent; None, and a warning, if its kind is unknown."""
+    """A light without extent; None, with a warning, if its kind is unknown."""
     matrix, name = world @ plugin.transform(), plugin.element.id or ""
     made: PointLight | DirectionalLight
     if plugin.type == "point":
@@ -132,14 +132,14 @@ def light_of(plugin: Plugin, world: Floats) -> PointLight | DirectionalLight | N
 
 
 def in_sky_units(light: PointLight | DirectionalLight) -> Light:
-    """A light of a file that has a sky."""
+    """A light of a file with a sky, in Lambent's units."""
     if isinstance(light, PointLight):
         return replace(light, intensity=scaled(light.intensity))
     return replace(light, irradiance=scaled(light.irradiance))
 
 
 def scaled(light: Triple) -> Triple:
-    """Light of a file that has a sky, in Lambent's units."""
+    """Values of light of a file with a sky, in Lambent's units."""
     return triple(SKY_UNIT * np.array(light))
 
 
@@ -164,7 +164,7 @@ def _emitted(plugin: Plugin, name: str) -> Triple:
 
 
 def camera_of(plugin: Plugin, name: str, world: Floats) -> Camera | None:
-    """A perspective camera; None, and a warning, if it is of another kind."""
+    """A perspective camera; None, with a warning, for other kinds."""
     if plugin.type not in ("perspective", "thinlens"):
         plugin.note("left out, only perspective cameras are supported")
         return None

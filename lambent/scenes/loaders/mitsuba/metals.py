@@ -1,8 +1,8 @@
 """Reflectances of named metals, and refractive indices of named dielectrics, as Mitsuba names them.
 
-Of a metal: the reflectance at normal and at grazing incidence between which Schlick's curve comes nearest to Fresnel's
-(`interfaces.nearest_fresnel`) of the spectra of eta and k that Mitsuba ships (after Palik and the SOPRA data), as
-linear RGB under D65. Metals dip before they rise: hence less than 1 at grazing.
+For a metal: the reflectances at normal and at grazing incidence for which Schlick's curve is nearest to Fresnel's
+(`fresnel.nearest_fresnel`), from the spectra of eta and k that Mitsuba ships (after Palik and the SOPRA data), as
+linear RGB under D65. Reflectance of metals dips before it rises, so the grazing values are below 1.
 """
 
 from __future__ import annotations

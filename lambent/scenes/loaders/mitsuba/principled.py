@@ -38,7 +38,7 @@ def principled(plugin: Plugin, thin: bool = False) -> Surface:
         surface = _spread(surface, index, thin)
         if not thin:
             plugin.note("becomes a thin sheet: light is not refracted")
-    most = 1 - r0 - (1 - r0) / 21  # diffuse light that the lobe leaves: together their albedo stays below 1
+    most = 1 - r0 - (1 - r0) / 21  # diffuse light that the lobe leaves: their total albedo stays below 1
     kd = combined(lambda b, m: np.minimum(b, most) * (1 - m) * (1 - through), base, metallic, notes=notes)
     surface = replace(surface, kd=kd, coupled=False)
     if thin:
@@ -68,7 +68,7 @@ def _tint(plugin: Plugin, base: Textured) -> Floats:
 
 
 def _spread(surface: Surface, eta: float, thin: bool) -> Surface:
-    """With transmission of Mitsuba's width and colour, of a thin sheet (Burley 2015, fig. 15) or of a solid's face."""
+    """Add transmission with Mitsuba's width and colour, of a thin sheet (Burley 2015, fig. 15) or of a solid's face."""
     *others, through = surface.lobes
     bend = (0.65 * eta - 0.35) ** 2 if thin else (eta - 1) / 2
     k = through.k if thin else combined(np.sqrt, through.k, notes=[])

@@ -1,7 +1,6 @@
 """A Mitsuba scene file, versions 0.6 and 3, as parts of a scene.
 
-Everything that is not read is dropped, with a warning. A scene whose cameras have another up axis than y is turned to
-have y up.
+Everything that is not read is dropped, with a warning. A scene whose cameras use another up axis is rotated to y up.
 """
 
 from __future__ import annotations
@@ -29,24 +28,24 @@ from lambent.scenes.loaders.surfaces.surface import Surface
 from lambent.scenes.scene import DirectionalLight, Environment, Light, PointLight, SceneObject, SunSky
 
 GROUPS = ("shapegroup", "instance", "merge")
-LEVEL = 0.05  # how far from horizontal a camera's sideways axis may lie along the axis that is up
+LEVEL = 0.05  # largest component of a camera's sideways axis along the up axis
 UNREAD = {"medium": "participating media are ignored", "volume": "volumes are ignored",
           "subsurface": "subsurface scattering is ignored"}  # fmt: skip
 
 
 def load(path: Path, root: Path | None = None) -> Contents:
-    """Contents of a Mitsuba scene; files it names lie below `root`, by default its own folder.
+    """Contents of a Mitsuba scene; files that it refers to must be below `root`, by default its own folder.
 
     Raises
     ------
     UserError
-        Where the file, or a mesh it names, cannot be used, or it holds no triangles.
+        If the file, or a mesh it refers to, is unusable, or there are no triangles.
     """
     return _Scene(Reading(read(path, SceneFiles(path, root))), path).contents()
 
 
 class _Scene:
-    """One scene on its way to contents."""
+    """State of converting one scene to contents."""
 
     def __init__(self, reading: Reading, path: Path) -> None:
         self._reading, self._path = reading, path
@@ -96,7 +95,7 @@ class _Scene:
             self._add_instance(shape, world)
             return
         if shape.type == "shapegroup":
-            return  # shown by instances
+            return  # shown only by instances
         if shape.type == "merge":
             for inner in shape.objects("shape", refs=False):
                 self._add_shape(inner, world)
@@ -122,7 +121,7 @@ class _Scene:
         self._objects.append(SceneObject(self._names.unique(wanted), mesh, material, emission))
 
     def _add_instance(self, shape: Plugin, world: Floats) -> None:
-        """A group's shapes once more, at another place."""
+        """Add a copy of a group's shapes at another place."""
         placed = world @ shape.transform()
         for group in shape.objects("shape"):
             if group.type != "shapegroup":
@@ -134,7 +133,7 @@ class _Scene:
         shape.note_unread()
 
     def _material(self, bsdf: Plugin | None, shape: str) -> str:
-        """The name of a BSDF's material, made when it is first used."""
+        """The name of a BSDF's material, created at its first use."""
         key = id(bsdf.element) if bsdf is not None else 0
         if key not in self._by_element:
             wanted = "default" if bsdf is None else bsdf.element.id or f"{shape}_{bsdf.type}"
@@ -156,7 +155,7 @@ class _Scene:
         return environment, found
 
     def _take_sky_units(self, lit: bool) -> None:
-        """Bring emission beside a sky into its unit: Mitsuba has all light in W/(sr m^2 nm) then."""
+        """Convert emission in a scene with a sky to its unit: Mitsuba then has all light in W/(sr m^2 nm)."""
         if lit or any(any(o.emission) for o in self._objects):
             self._warnings.append("its lamps are taken in the unit of its sky, W/(sr m2 nm): 1 is 73 kcd/m2")
         self._objects = [replace(o, emission=lights.scaled(o.emission)) for o in self._objects]
@@ -171,7 +170,7 @@ class _Scene:
         return cameras
 
     def _say_the_rest(self) -> None:
-        """Note the elements at the top of the file that are not read."""
+        """Note the unread top-level elements of the file."""
         kinds = Counter(e.tag for e in self._reading.document.elements)
         for tag, words in UNREAD.items():
             if kinds[tag]:
@@ -186,7 +185,7 @@ class _Scene:
 
 
 def _upright(sensors: list[Plugin]) -> tuple[Floats, str | None]:
-    """Rotation (4, 4) that turns the up axis of most cameras to +y, and the name of that axis if it is another."""
+    """Rotation (4, 4) that takes the up axis of most cameras to +y, and the name of that axis if it is another."""
     votes = Counter(axis for axis in map(_up_axis, sensors) if axis is not None)
     if not votes:
         return np.eye(4), None
@@ -196,14 +195,14 @@ def _upright(sensors: list[Plugin]) -> tuple[Floats, str | None]:
     world = np.eye(4)
     if index == 1:
         world[:3, :3] = np.diag([1.0, -1.0, -1.0])
-    else:  # the shortest turn to y, by a right angle about up x y; rounded to exact numbers without -0
+    else:  # minimal rotation to y, by a right angle about up x y; rounded to exact numbers without -0
         axis = np.cross(np.eye(3)[index] * sign, [0.0, 1.0, 0.0])
         world[:3, :3] = np.round(rotation_about(axis, math.pi / 2)) + 0.0
     return world, f"{'-' if sign < 0 else ''}{'xyz'[index]}"
 
 
 def _up_axis(sensor: Plugin) -> tuple[int, int] | None:
-    """The signed world axis that is up for a camera; None if its transform does not tell."""
+    """The signed world axis that is up for a camera; None if its transform is ambiguous."""
     element = sensor.transform_element("to_world")
     if element is None:
         return None

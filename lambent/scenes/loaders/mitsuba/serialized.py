@@ -1,4 +1,4 @@
-"""Mitsuba 0.6's binary meshes (.serialized): deflated, several in a file. Sizes are checked before unpacking.
+"""Mitsuba 0.6's binary meshes (.serialized): deflated, several per file. Sizes are checked before unpacking.
 
 Source: Mitsuba 0.6's manual, "Serialized mesh loader".
 """
@@ -19,16 +19,16 @@ from lambent.scenes.loaders.meshes.repair import MeshArrays
 MAGIC = 0x041C
 DOUBLE = 0x2000
 OPTIONAL = ((0x0001, "normals", 3), (0x0002, "uv", 2), (0x0008, "colours", 3))
-HEAD_BYTES = 1 << 16  # of a mesh: its flags, name and counts lie in them
+HEAD_BYTES = 1 << 16  # of a mesh: contains its flags, name and counts
 
 
 def read(path: Path, index: int) -> MeshArrays:
-    """The mesh number `index` of a file.
+    """Read mesh number `index` of a file.
 
     Raises
     ------
     UserError
-        Where the file is damaged, cut off, or promises more than it holds.
+        If the file is damaged, truncated, or promises more than it holds.
     """
     data = read_bytes(path, SERIALIZED_BYTES)
     start, version = _offset(data, index, path)
@@ -41,7 +41,7 @@ def read(path: Path, index: int) -> MeshArrays:
             raise UserError(f"packed data is damaged ({error})", file=path) from error
 
     head = unpacked(memoryview(data)[start + 4 :], HEAD_BYTES)
-    begin = 4 if version == 3 else head.find(b"\0", 4) + 1  # after the name, which version 4 has
+    begin = 4 if version == 3 else head.find(b"\0", 4) + 1  # after the name, which exists in version 4
     if not 4 <= begin <= len(head) - 16:
         raise UserError("mesh is truncated, or its name does not end", file=path, got=f"{len(head)} bytes")
     flags, (vertices, triangles) = struct.unpack_from("<I", head)[0], struct.unpack_from("<QQ", head, begin)

@@ -19,11 +19,11 @@ from lambent.scenes.loaders.obj import text as obj_text
 from lambent.scenes.scene import Mesh
 
 AROUND, ROWS = 80, 40  # quads of a sphere
-UNSCALED = 1e-18  # determinant of a transform that leaves nothing
+UNSCALED = 1e-18  # smallest determinant of a transform that is not degenerate
 
 
 class MissingFile(Exception):
-    """The file of a shape is not there; its name as written."""
+    """The file of a shape is missing; carries its name as written."""
 
 
 Made = tuple[Mesh | None, list[str], bool]  # the mesh, notes of repairs, whether its normals come from its faces
@@ -32,7 +32,7 @@ Made = tuple[Mesh | None, list[str], bool]  # the mesh, notes of repairs, whethe
 def mesh_of_shape(plugin: Plugin, name: str, world: Floats, known: dict[int, Made]) -> tuple[Mesh | None, list[str]]:
     """Mesh of a shape under `world` (4, 4), None if nothing is left, and notes of repairs.
 
-    `known` holds the shapes of instances before they are moved.
+    `known` caches the shapes of instances before they are transformed.
     """
     make = KINDS.get(plugin.type)
     if make is None:
@@ -56,13 +56,13 @@ def mesh_of_shape(plugin: Plugin, name: str, world: Floats, known: dict[int, Mad
     if not len(local.faces):
         return None, [*notes, f"{name}: left out, no triangle has an area"]
     mesh = transformed(local, to_world)
-    # Mitsuba makes missing normals of faces that a mirroring transform has turned; given ones are moved as ours are.
+    # Mitsuba recomputes missing normals after a mirroring transform; given normals are transformed as ours are.
     turned = from_faces and np.linalg.det(to_world[:3, :3]) < 0
     return (flipped(mesh) if plugin.flag("flip_normals", False) != turned else mesh), notes
 
 
 def flipped(mesh: Mesh) -> Mesh:
-    """`mesh` with its other side outside."""
+    """`mesh` turned inside out."""
     return replace(mesh, normals=-mesh.normals, faces=mesh.faces[:, ::-1].copy())
 
 
@@ -122,7 +122,7 @@ def _rectangle(plugin: Plugin, name: str) -> Made:
 
 
 def _sheet(normal: Floats, place: Callable[[Floats, Floats], tuple[Floats, Floats, Floats]]) -> Mesh:
-    """A square whose uv run with the parameters x, y in [-1, 1] of `place`."""
+    """A square with uv along the parameters x, y in [-1, 1] of `place`."""
     x, y = np.meshgrid([-1.0, 1.0], [-1.0, 1.0])
     positions = np.stack(place(x, y), axis=-1)
     along = positions[0, 1] - positions[0, 0]
@@ -162,7 +162,7 @@ def _disk(plugin: Plugin, name: str) -> Made:
 
 
 def _cylinder(plugin: Plugin, name: str) -> Made:
-    """Open at both ends."""
+    """A cylinder without caps."""
     p0, p1 = plugin.vector("p0"), plugin.vector("p1")
     p0, p1 = np.zeros(3) if p0 is None else p0, np.array([0.0, 0.0, 1.0]) if p1 is None else p1
     radius, length = abs(plugin.number("radius", 1.0)), float(np.linalg.norm(p1 - p0))

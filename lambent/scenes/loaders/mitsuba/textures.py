@@ -14,11 +14,11 @@ from lambent.scenes.loaders.surfaces.textured import Textured, combined, constan
 from lambent.scenes.scene import UvTransform
 
 CHECKS = 128  # texels along a checkerboard of 2 x 2 fields
-LUMINANCE = np.array([0.212671, 0.715160, 0.072169], np.float32)  # Mitsuba's own weights, for parity with it
+LUMINANCE = np.array([0.212671, 0.715160, 0.072169], np.float32)  # Mitsuba's own weights, for agreement with it
 
 
 def colour(plugin: Plugin, name: str, default: float | Floats, *, emitted: bool = False) -> Textured:
-    """Linear RGB of a plugin's parameter, which may be of light that is `emitted`."""
+    """Linear RGB of a plugin's parameter, which may be `emitted` light."""
     fixed = plugin.constant(name, emitted=emitted)
     if fixed is not None:
         return constant(fixed)
@@ -29,7 +29,7 @@ def colour(plugin: Plugin, name: str, default: float | Floats, *, emitted: bool 
 
 
 def number(plugin: Plugin, name: str, default: float) -> Textured:
-    """A plugin's parameter as one channel, of a texture the luminance."""
+    """A plugin's parameter as one channel; for a texture, its luminance."""
     v = colour(plugin, name, default)
     if not v.is_texture:
         return constant(float(v.values.mean()))
@@ -37,7 +37,7 @@ def number(plugin: Plugin, name: str, default: float) -> Textured:
 
 
 def opacity(plugin: Plugin, name: str) -> Textured:
-    """As `number`; of an image with an alpha channel, that channel."""
+    """Like `number`; for an image with an alpha channel, that channel."""
     texture = plugin.texture(name)
     if texture is not None and texture.type == "bitmap":
         image = _image(texture)
@@ -99,7 +99,7 @@ def _bitmap(texture: Plugin) -> Textured:
 
 
 def _image(texture: Plugin) -> TextureImage | None:
-    """The image of a bitmap; None, and a note, if its file is not there."""
+    """The image of a bitmap; None, with a note, if its file is missing."""
     name, uv_transform, element = texture.text("filename"), _uv_transform(texture), texture.element
     field = f"line {element.line} filename"
     image = texture.reading.images.named(name, element.file, field, texture.note, ": it becomes grey")

@@ -1,4 +1,4 @@
-"""Values of a plugin's parameters: numbers, names, colours, transforms. Parameters that nothing reads are noted."""
+"""Values of a plugin's parameters: numbers, names, colours, transforms. Unread parameters are noted."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ OBJECTS = {
     "integrator", "subsurface",
 }  # fmt: skip
 FAR = 1e9
-# Filters, caches, samplers: settings of Mitsuba that do not describe the scene.
+# Filters, caches, samplers: settings of Mitsuba unrelated to the scene.
 MACHINERY = {
     "filter_type", "max_anisotropy", "cache", "sample_visible", "format", "accel", "sampling_weight", "variant",
     "component_format", "shutter_open", "shutter_close", "near_clip", "far_clip",
@@ -31,7 +31,7 @@ MACHINERY = {
 
 
 class Reading:
-    """The state of one scene file's reading: its document and files, its images, and notes for the user."""
+    """The state of reading one scene file: its document and files, its images, and notes for the user."""
 
     def __init__(self, document: Document) -> None:
         self.document, self.files, self.images = document, document.files, TextureImages(document.files)
@@ -49,7 +49,7 @@ class Reading:
 
 
 class Plugin:
-    """A plugin's element and its parameters; it remembers which were read."""
+    """A plugin's element and its parameters; records which were read."""
 
     def __init__(self, element: Element, reading: Reading, trail: tuple[int, ...] = (), within: str = "") -> None:
         reading.count_plugin(element)
@@ -83,14 +83,14 @@ class Plugin:
 
     @property
     def label(self) -> str:
-        """Its name in warnings: its id, or that of the element it is in."""
+        """Its name in warnings: its id, or that of the enclosing element."""
         return " ".join(filter(None, (self.element.tag, self._within, self.type and f"({self.type})")))
 
     def note(self, text: str) -> None:
         self.reading.note(f"{self.label}: {text}")
 
     def objects(self, tag: str, name: str | None = None, *, refs: bool = True) -> list[Plugin]:
-        """Plugins of one kind within it, in order; of one name if given; with `refs` those referred to as well."""
+        """Nested plugins of one kind, in order; of one name if given; with `refs` including referenced ones."""
         found = [(n, e) for n, e in self._objects if e.tag == tag and name in (None, n)]
         if not refs:
             found = [(n, e) for n, e in found if any(e is child for child in self.element.children)]
@@ -101,11 +101,11 @@ class Plugin:
         return any(n in self._values or any(n == o for o, _ in self._objects) for n in names)
 
     def ignore(self, *names: str) -> None:
-        """Count parameters as read: they have no effect here."""
+        """Mark parameters as read: they have no effect here."""
         self._asked |= set(names)
 
     def note_unread(self, *, but: tuple[str, ...] = ()) -> None:
-        """Note the parameters that nothing has read."""
+        """Note the parameters that were not read."""
         names = {**self._values, **{n or e.tag: e for n, e in self._objects}}
         left = sorted(n for n in names if n and n not in self._asked and n not in MACHINERY and n not in but)
         if left:
@@ -138,7 +138,7 @@ class Plugin:
         return None if element is None else element.vector()
 
     def transform(self, name: str = "to_world") -> Floats:
-        """(4, 4); the identity if it is not given."""
+        """(4, 4); the identity by default."""
         element = self._take(name)
         if element is None:
             return np.eye(4)
@@ -154,10 +154,10 @@ class Plugin:
         return self._values.get(name)
 
     def constant(self, name: str, *, emitted: bool = False) -> Floats | None:
-        """Linear RGB (3,) of a parameter that is the same everywhere; None if it is not given, or is a texture."""
+        """Linear RGB (3,) of a constant parameter; None if it is missing or a texture."""
         element = self._values.get(name)
         if element is None:
-            return None  # and is not read yet: it may be a texture
+            return None  # not marked as read: it may be a texture
         self._asked.add(name)
         return colour_of(element, self.reading.document, emitted=emitted)
 
@@ -165,15 +165,15 @@ class Plugin:
         return next(iter(self.objects("texture", name)), None)
 
     def file(self, name: str = "filename") -> Path:
-        """A file that a parameter names; it need not exist."""
+        """The file of a parameter; it need not exist."""
         field = f"line {self.element.line} <{self.element.tag}> {name}"
         return self.reading.files.path(self.text(name), self.element.file, field)
 
 
 def transform_of(element: Element) -> Floats:
-    """(4, 4) of a transform: the product of its parts, the first applied first."""
+    """(4, 4) of a transform: the product of its parts, the first one applied first."""
     matrix: Floats = np.eye(4)
-    with np.errstate(over="ignore", invalid="ignore"):  # the caller refuses what is not finite
+    with np.errstate(over="ignore", invalid="ignore"):  # the caller refuses nonfinite results
         for part in element.children:
             matrix = _part(part) @ matrix
     return matrix

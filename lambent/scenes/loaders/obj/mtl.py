@@ -1,9 +1,9 @@
 """MTL: the materials of OBJ files, with the PBR extension that exporters agreed on.
 
-The format does not define its numbers physically. Pr, Pm make a metallic-roughness surface. Otherwise Ns, an exponent
-of the half vector's cosine, becomes a slope roughness sqrt(2 / (Ns + 2)) (Walter et al. 2007, "Microfacet models for
-refraction", section 5.4); Ks is a mirror's reflectance if `illum` asks for reflections (3 to 9) or nothing is diffuse,
-otherwise a share of 8 %, the highest reflectance of plastics and varnish.
+The format does not define its numbers physically. Pr and Pm make a metallic-roughness surface. Otherwise Ns, an
+exponent of the half vector's cosine, becomes a slope roughness sqrt(2 / (Ns + 2)) (Walter et al. 2007, "Microfacet
+models for refraction", section 5.4); Ks is a mirror's reflectance if `illum` requests reflections (3 to 9) or nothing
+is diffuse, otherwise a share of 8 %, the highest reflectance of plastics and varnish.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from lambent.scenes.scene import Texture, UvTransform
 
 DEFAULT = "default"
 PLASTIC_R0_MAX = 0.08
-MIRRORS = range(3, 10)  # illum that asks for reflections
+MIRRORS = range(3, 10)  # illum values that request reflections
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-texres": 1, "-type": 1,
            "-bm": 1, "-mm": 2, "-o": 3, "-s": 3, "-t": 3}  # fmt: skip
 NUMBERS = {
@@ -48,9 +48,9 @@ MAPS = {
     "map_Ka", "map_Ps", "disp", "decal", "refl", "map_aat",
 }  # fmt: skip
 UNREAD = {"map_Ns", "disp", "decal", "refl", "map_Ps", "Ps"}
-SPELLED = {name.lower(): name for name in sorted(NUMBERS | MAPS, reverse=True)}  # exporters differ in capitals
-SILENT = {"map_ka", "ka", "sharpness", "map_aat", "vt", "endmtl"}  # change nothing here
-GLASS = (4, 6, 7, 9)  # illum that asks for glass
+SPELLED = {name.lower(): name for name in sorted(NUMBERS | MAPS, reverse=True)}  # exporters differ in capitalisation
+SILENT = {"map_ka", "ka", "sharpness", "map_aat", "vt", "endmtl"}  # without effect here
+GLASS = (4, 6, 7, 9)  # illum values that request glass
 
 
 @dataclass
@@ -63,7 +63,7 @@ class Entry:
 
 
 class Library:
-    """The materials of an OBJ file's libraries, each made when it is first used."""
+    """The materials of an OBJ file's libraries, each created at its first use."""
 
     def __init__(self, files: SceneFiles) -> None:
         self._files, self._images = files, TextureImages(files)
@@ -76,7 +76,7 @@ class Library:
         return [*self._notes, *self.made.notes, *self._images.notes, *self._files.notes]
 
     def add(self, obj: Path, names: str, line: int) -> None:
-        """Read the libraries that a line names: one name with blanks in it, or several."""
+        """Read the libraries named on a line: one name containing blanks, or several."""
         field = f"line {line} mtllib"
         whole, _ = self._files.find(names, obj, field)
         for name in [names] if whole.is_file() else names.split():
@@ -88,7 +88,7 @@ class Library:
                 self._entries = _entries(path, self._notes) | self._entries
 
     def use(self, name: str) -> str:
-        """Name of the material that a `usemtl` means."""
+        """Name of the material for a `usemtl`."""
         name = name or DEFAULT
         self.made.make(name, lambda notes: self._surface(name, notes))
         return name
@@ -169,7 +169,7 @@ def _map(text: str, path: Path, line: int) -> tuple[str, UvTransform]:
 
 
 class _Reading:
-    """One material on its way to a surface."""
+    """State of converting one material to a surface."""
 
     def __init__(self, entry: Entry, images: TextureImages, notes: list[str]) -> None:
         self._entry, self._images, self._notes = entry, images, notes
@@ -231,7 +231,7 @@ class _Reading:
         return rgb(ke)
 
     def _opaque(self, surface: Surface) -> Surface:
-        """With its mask, or with the light that passes through it."""
+        """Add its mask, or its transmitted light."""
         opacity = min(max(self._number("d", 1 - self._number("Tr", 0.0)), 0.0), 1.0)
         mask = self._image("map_d")
         cut = self._image("map_Kd") if mask is None and opacity == 1 else None
@@ -246,7 +246,7 @@ class _Reading:
         return surface
 
     def _pane(self, surface: Surface, opacity: float) -> Surface:
-        """A surface that covers a share of the background; glass reflects fully. Tf tints what passes."""
+        """A surface that covers a share of the background; glass reflects fully. Tf tints transmitted light."""
         tint = np.clip(self._colour("Tf", 1.0), 0, 1)
         tint = tint if tint.any() else np.ones(3)
         if int(self._number("illum", 2)) not in GLASS:
@@ -281,11 +281,11 @@ class _Reading:
         factor = np.maximum(self._colour(key, default), 0)
         image = self._image(map_key)
         if image is None:
-            even = float(np.ptp(factor)) == 0 and factor[0] in (0, 1)  # exporters write such factors beside a texture
+            even = float(np.ptp(factor)) == 0 and factor[0] in (0, 1)  # exporters write these along with a texture
             lost = map_key == "map_Kd" and map_key in self._entry.maps
             return constant(np.full(3, GREY) if lost and even else factor)
         if not factor.any():
-            factor = np.ones(3)  # exporters write black beside a texture that is meant to be seen
+            factor = np.ones(3)  # exporters write black along with a texture meant to be visible
         return scaled(image.rgb(srgb=True), factor)
 
     def _scaled(self, key: str, map_key: str, default: float) -> Textured:
@@ -305,7 +305,7 @@ def _first_channel(image: TextureImage) -> Textured:
 
 
 def _looks_like_normals(texels: Floats) -> bool:
-    """Whether a bump map is in truth a normal map: mean upwards, lengths about one."""
+    """Whether a bump map is really a normal map: its mean points up, and lengths are about one."""
     mean = texels.mean(axis=(0, 1))
     length = np.linalg.norm(texels, axis=-1)
     return bool(mean[2] > 0.5 and abs(mean[0]) < 0.3 and abs(mean[1]) < 0.3 and abs(float(length.mean()) - 1) < 0.15)

@@ -19,13 +19,13 @@ from lambent.scenes.loaders.obj.text import ObjText, read
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.scene import Mesh, SceneObject
 
-OBJECTS_MAX = 4096  # more groups than this are an exporter's habit, not objects
+OBJECTS_MAX = 4096  # more groups than this are an artefact of the exporter, not objects
 UNREAD = {"l": "lines", "p": "points", "curv": "curves", "surf": "surfaces", "vp": "curves"}
 
 
 @dataclass(frozen=True)
 class Triangles:
-    """Corners (T, 3, 3) as places in v, vt, vn of every triangle, its line's number and its smoothing group (T,)."""
+    """Corners (T, 3, 3) as indices into v, vt, vn of every triangle, its line number and its smoothing group (T,)."""
 
     corners: Indices
     lines: Indices
@@ -38,12 +38,12 @@ class Triangles:
 def load(path: Path, root: Path | None = None) -> Contents:
     """Contents of an .obj file: an object for each of its objects (or groups) and each material on it.
 
-    Files it names lie below `root`, by default its own folder.
+    Files that it refers to must be below `root`, by default its own folder.
 
     Raises
     ------
     UserError
-        Where a line cannot be read, or the file holds no triangles.
+        If a line is invalid, or the file has no triangles.
     """
     files = SceneFiles(path, root)
     text = read(path)
@@ -79,7 +79,7 @@ def load(path: Path, root: Path | None = None) -> Contents:
 
 
 def triangles_of(text: ObjText, file: Path) -> Triangles:
-    """All faces cut into triangles."""
+    """All faces, triangulated."""
     places, polygon = triangulate(text.v, text.corners[:, 0], text.sizes)
     TRIANGLES.check(len(places), file=file)
     lines = text.lines[polygon]
@@ -114,7 +114,7 @@ def _owners(
 
 
 def _changes(text: ObjText, keyword: str, start: str) -> tuple[list[str], tuple[Indices, Indices]]:
-    """Names in order of appearance; and the lines that begin one, with its number."""
+    """Names in order of first use; and the lines that switch to one, with its index."""
     numbers = {start: 0}
     at, which = [0], [0]
     for line, word, rest in text.words:
@@ -129,8 +129,8 @@ def mesh_of_triangles(
 ) -> tuple[Mesh | None, list[str]]:
     """Mesh of some of a file's triangles, None if nothing is left, and notes of repairs.
 
-    Missing normals come from the smoothing groups; with `faceted` True all normals are flat, with False missing ones
-    are smooth everywhere.
+    Missing normals follow the smoothing groups. If `faceted` is True all normals are flat; if False, missing ones are
+    smooth everywhere.
     """
     notes = []
     corners, normals = triangles.corners.copy(), text.vn
@@ -162,7 +162,7 @@ def mesh_of_triangles(
 
 
 def _made_normals(positions: Floats, vertices: Indices, smoothing: Indices, smooth: Flags) -> tuple[Floats, Indices]:
-    """Normals, and the number of each corner's (T, 3): shared within a smoothing group, else the triangle's own."""
+    """Normals, and the index of each corner's (T, 3): shared within a smoothing group, else the triangle's own."""
     triangle = np.arange(len(vertices))[:, None] + np.zeros((1, 3), int)
     group = np.where(smooth, smoothing, -1)[:, None]
     key = np.where(smooth[:, None], vertices, triangle) * (int(smoothing.max()) + 2) + group + 1

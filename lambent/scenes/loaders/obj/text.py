@@ -56,12 +56,12 @@ def read(file: Path) -> ObjText:
 
 
 def parse(data: bytes, file: Path) -> ObjText:
-    """Arrays of a file's content.
+    """Parse a file's content into arrays.
 
     Raises
     ------
     UserError
-        Where a number cannot be read, or a corner's index leads nowhere; with the line.
+        If a number is invalid, or a corner's index is out of range; names the line.
     """
     values: dict[str, list[Floats]] = {kind: [np.zeros((0, width))] for kind, width in WIDTHS.items()}
     counts = dict.fromkeys(WIDTHS, 0)
@@ -92,14 +92,14 @@ def parse(data: bytes, file: Path) -> ObjText:
 
 
 def _blocks(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Whole lines of the file, some megabytes at a time, with the number of the first."""
+    """Yield blocks of whole lines, some megabytes each, with the number of the first line."""
     data = data.removeprefix(b"\xef\xbb\xbf")
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     start, line = 0, 1
     while start < len(data):
         end = data.find(b"\n", min(start + BLOCK_BYTES, len(data) - 1))
-        while end > 0 and data[end - 1 : end] == b"\\":  # a line goes on in the next
+        while end > 0 and data[end - 1 : end] == b"\\":  # a line continues on the next
             end = data.find(b"\n", end + 1)
         end = len(data) if end < 0 else end + 1
         block = data[start:end]
@@ -109,10 +109,10 @@ def _blocks(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 class _Block:
-    """A block of lines, and the places where its lines begin and end."""
+    """A block of lines, and the positions where its lines begin and end."""
 
     def __init__(self, block: bytes, first_line: int, file: Path) -> None:
-        if b"\\\n" in block:  # empty lines in place of continued ones keep the line numbers
+        if b"\\\n" in block:  # empty lines replace continued ones, to keep line numbers
             block = re.sub(rb"(?m)^(?:[^\n]*\\\n)+[^\n]*\n?", _joined, block)
         block = block.translate(_BLANKS)
         if block.startswith(b" ") or b"\n " in block:
@@ -136,7 +136,7 @@ class _Block:
 
     def _text(self, lines: Indices, kind: str) -> bytes:
         """The lines without keyword and comments, each with its line end."""
-        breaks = np.flatnonzero(np.diff(lines) > 1) + 1  # lines of one kind mostly stand together
+        breaks = np.flatnonzero(np.diff(lines) > 1) + 1  # lines of one kind are mostly consecutive
         first, last = lines[np.concatenate([[0], breaks])], lines[np.concatenate([breaks, [len(lines)]]) - 1]
         whole = self.bytes.data
         text = b"".join([whole[a:b] for a, b in zip(self.starts[first], self.ends[last] + 1, strict=True)])
@@ -190,7 +190,7 @@ class _Block:
         yield corners, sizes, lines + self.first_line
 
     def words(self) -> list[tuple[int, str, str]]:
-        """(line, keyword, rest) of every other line that is no comment."""
+        """(line, keyword, rest) of every other line that is not a comment."""
         other = np.ones(len(self._head[0]), bool)
         for lines in self._kinds.values():
             other[lines] = False
@@ -203,7 +203,7 @@ class _Block:
         return found
 
     def _parsed(self, text: bytes, kind: type, lines: Indices) -> np.ndarray[Any, Any]:
-        with suppress(ValueError):  # the line is found below
+        with suppress(ValueError):  # the faulty line is found below
             return np.fromstring(text, dtype=kind, sep=" ")
         for line, words in zip(lines, text.split(b"\n"), strict=False):
             for word in words.split():
@@ -221,7 +221,7 @@ _BLANKS = bytes(32 if c in b"\t\v\f\0" else c for c in range(256))
 
 
 def _joined(match: re.Match[bytes]) -> bytes:
-    """Continued lines as one, and empty ones that keep the count."""
+    """Join continued lines, followed by empty ones that keep the count."""
     return match[0].replace(b"\\\n", b" ").rstrip(b"\n") + b"\n" * match[0].count(b"\n")
 
 
@@ -231,13 +231,13 @@ def _per_line(marks: Flags, ends: Indices) -> Indices:
 
 
 def _begins(flat: Bytes) -> Flags:
-    """Where words begin."""
+    """Flags of the first letter of each word."""
     blank = flat <= 32
     return np.asarray(~blank & np.concatenate([[True], blank[:-1]]))
 
 
 def _tokens(text: bytes) -> Indices:
-    """Words on each line."""
+    """Number of words per line."""
     flat = np.frombuffer(text, np.uint8)
     return _per_line(_begins(flat), np.flatnonzero(flat == 10))
 

@@ -1,4 +1,4 @@
-"""Several geometry files as one: unique names, a material set, materials assigned by name."""
+"""Combine several geometry files: unique names, a material set, materials assigned by name."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ class Assembly:
 
 
 def assembled(contents: Sequence[Contents], variant: str | None, path: Path) -> Assembly:
-    """The contents of all files as one, with the material set `variant` of the files that have it.
+    """The combined contents of all files, with the material set `variant` of the files that have it.
 
     Names of objects that are taken get a number. So do those of materials, unless both are the same.
 
     Raises
     ------
     UserError
-        Where no file has the variant.
+        If no file has the variant.
     """
     known = {name for c in contents for name in c.variants}
     if variant is not None and variant not in known:
@@ -60,7 +60,7 @@ def assembled(contents: Sequence[Contents], variant: str | None, path: Path) -> 
 def _own_names(
     contents: Contents, materials: Mapping[str, Material], textures: Mapping[str, MaterialTextures], warnings: list[str]
 ) -> dict[str, str]:
-    """Names of a file's materials that differ from those of other files."""
+    """Names for a file's materials that are distinct from those of other files."""
     called: dict[str, str] = {}
     names = UniqueNames({*materials, *contents.materials})
     for name, material in contents.materials.items():
@@ -77,14 +77,14 @@ def _own_names(
 def assigned(
     rules: Mapping[str, str], objects: Iterable[SceneObject], materials: Mapping[str, Material], path: Path
 ) -> tuple[tuple[SceneObject, ...], list[str]]:
-    """Objects with materials assigned by rules, and a warning for each rule that fits nothing.
+    """Objects with materials assigned by rules, and a warning for each rule that matches nothing.
 
     A rule is a pattern with * and ? over the names of objects and of their original materials; later ones win.
 
     Raises
     ------
     UserError
-        Where a rule names a material that is not there.
+        If a rule names an unknown material.
     """
     by_name = {o.name: o for o in objects}
     originals = {name: o.material for name, o in by_name.items()}
@@ -101,14 +101,14 @@ def assigned(
 
 
 def check_material(name: str, materials: Mapping[str, Material], path: Path, field: str) -> None:
-    """`UserError` where a scene.toml names a material that is not there."""
+    """Raise `UserError` if a scene.toml names an unknown material."""
     if name not in materials:
         hint = did_you_mean(name, materials) or f"define it under [materials.{name}]"
         raise UserError("unknown material", file=path, field=field, got=name, hint=hint)
 
 
 def fitting(pattern: str, names: Iterable[str], path: Path, field: str, got: str | None = None) -> list[str]:
-    """The names that fit a pattern with * and ?; a `UserError` where none does."""
+    """The names that match a pattern with * and ?; `UserError` if none does."""
     names = list(names)
     fits = [name for name in names if fnmatchcase(name, pattern)]
     if not fits:

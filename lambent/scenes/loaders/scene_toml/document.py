@@ -50,18 +50,18 @@ from lambent.scenes.scene import (
 )
 from lambent.scenes.variants import with_variants
 
-# What every scene.toml begins with.
+# Required at the beginning of every scene.toml.
 HEAD = {"format": 'format = "lambent-scene"', "version": "version = 1", "geometry": 'geometry = "model.glb"'}
 ReadGeometry = Callable[[str, Path, SceneFiles], Contents]  # name as written, the scene.toml, files below its folder
 
 
 def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
-    """Scene of a scene.toml; files it names lie in its folder or below.
+    """Scene of a scene.toml; files that it refers to must be in its folder or below.
 
     Raises
     ------
     UserError
-        Where the file is not TOML, has an unknown key or an impossible value, or names what is not there.
+        If the file is not TOML, has an unknown key or an invalid value, or refers to something missing.
     """
     document, files = _parse(path), SceneFiles(path)
     there, missing = _there(document, path, files)
@@ -126,7 +126,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
 
 
 def _there(document: SceneDocument, path: Path, files: SceneFiles) -> tuple[list[GeometrySection], list[str]]:
-    """The geometry files that are there, and a note of each that is not; a `UserError` where none is."""
+    """The geometry files that exist, and a note for each missing one; `UserError` if all are missing."""
     names = [entry.file for entry in document.geometry]
     gone = [
         name for name in names
@@ -172,7 +172,7 @@ def _geometry(entry: GeometrySection, path: Path, files: SceneFiles, read_geomet
 
 
 def _materials(document: SceneDocument, path: Path, files: SceneFiles) -> dict[str, Material]:
-    """Materials described in the document, or in files that it names."""
+    """Materials described in the document, or in files that it refers to."""
     materials = {}
     for name, table in document.materials.items():
         where = f"{path}: materials.{name}"
@@ -191,7 +191,7 @@ def _materials(document: SceneDocument, path: Path, files: SceneFiles) -> dict[s
 def _measured(
     document: SceneDocument, materials: Mapping[str, Material], path: Path, files: SceneFiles
 ) -> dict[str, Path]:
-    """Files of the tables that materials scatter by while the scene is baked."""
+    """Table files that replace materials during the bake, by material."""
     for name in document.measured:
         check_material(name, materials, path, f"measured.{name}")
     return {name: files.path(file, path, f"measured.{name}") for name, file in document.measured.items()}
@@ -236,7 +236,7 @@ def _reflector_rules(
 def _light_groups(
     document: SceneDocument, objects: tuple[SceneObject, ...], lights: tuple[Light, ...], path: Path
 ) -> tuple[LightGroup, ...]:
-    """The groups that the document names, each member of which fits something."""
+    """The groups that the document names; every member must match something."""
     names = [SUN, SKY, *(o.name for o in objects if any(o.emission)), *names_of_lights(lights)]
     for section in document.light_groups:
         for member in section.members:
@@ -266,7 +266,7 @@ def _lights(document: SceneDocument, path: Path, files: SceneFiles) -> list[Ligh
 
 
 def _light_of(mesh: Mesh, section: ObjectSection) -> dict[str, Any]:
-    """The emission of an object that its section says in photometric units."""
+    """The emission of an object whose section gives it in photometric units."""
     if section.luminance is None and section.lumens is None:
         return {}
     area_m2 = float(triangle_areas(mesh.corners).sum())

@@ -1,6 +1,6 @@
 """Lights of a scene.toml, in radiometric or photometric units: W/sr, cd, lm; W/m^2, lx; IES files.
 
-A photometric light is white, or of a `colour`, whose luminance does not matter.
+A photometric light is white, or has a `colour`, whose luminance has no effect.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ WHITE: Triple = (1.0, 1.0, 1.0)
 
 
 def one_of(section: Section, *names: str, needed: bool = True) -> None:
-    """`ValueError` where a section has more than one of these keys, or none that is needed."""
+    """Raise `ValueError` if a section has more than one of these keys, or none although one is `needed`."""
     given = [name for name in names if getattr(section, name) is not None]
     if len(given) > 1:
         raise ValueError(f"has two intensities, {given[0]} and {given[1]}")
@@ -49,7 +49,7 @@ class _Coloured(Section):
 
 
 class _Lamp(_Coloured):
-    """A small lamp, its light said by one of three units."""
+    """A small lamp whose light is given in one of three units."""
 
     position: Vector
     intensity: Colour | None = None
@@ -62,7 +62,7 @@ class _Lamp(_Coloured):
         return self
 
     def intensity_of(self, solid_angle_sr: float) -> Triple:
-        """W/sr; lumens are spread over `solid_angle_sr`."""
+        """W/sr; lumens are distributed over `solid_angle_sr`."""
         if self.intensity is not None:
             return self.intensity
         candela = self.candela if self.candela is not None else (self.lumens or 0.0) / max(solid_angle_sr, 1e-9)
@@ -79,7 +79,7 @@ class PointSection(_Lamp):
 
 
 class SpotSection(_Lamp):
-    """W/sr or cd in its middle, or lm in its cone."""
+    """W/sr or cd at its centre, or lm in its cone."""
 
     kind: Literal["spot"]
     direction: Vector
@@ -97,7 +97,7 @@ class SpotSection(_Lamp):
     def light(self) -> PointLight:
         inner, outer = math.radians(self.inner_deg), math.radians(self.outer_deg)
         edge = (math.sin(outer) - math.sin(inner)) / (outer - inner) if outer > inner else math.cos(outer)
-        intensity = self.intensity_of(2 * math.pi * (1 - edge))  # falls linearly in the angle from inner to outer
+        intensity = self.intensity_of(2 * math.pi * (1 - edge))  # falls linearly with the angle from inner to outer
         return PointLight(
             self.position, intensity, unit(self.direction), self.inner_deg, self.outer_deg, name=self.name
         )

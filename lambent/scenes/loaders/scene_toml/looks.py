@@ -1,4 +1,4 @@
-"""Looks of materials and mixes of light as a scene.toml and a file of keyframes tell them."""
+"""Parse looks of materials and mixes of light from a scene.toml or a file of keyframes."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from lambent.scenes.loaders.scene_toml.assembly import check_material
 from lambent.scenes.scene import Look
 
 USE, FILE, COLOUR = "use", "file", "colour"
-ReadMaterial = Callable[[str, str], Material]  # name of a file as written, and the field that names it
+ReadMaterial = Callable[[str, str], Material]  # name of a file as written, and the field that contains it
 
 
 def looks_told(
     tables: Mapping[str, Mapping[str, Any]], looks: Mapping[str, Look], read: ReadMaterial, path: Path, where: str
 ) -> dict[str, Look]:
-    """The looks that tables tell, by the names of the materials whose place they take.
+    """Looks given by tables, by the names of the materials they replace.
 
     Parameters
     ----------
     looks : mapping
-        Of all materials there are.
+        Of all existing materials.
     where : str
-        The field of `path` that holds the tables, for errors.
+        The field of `path` that contains the tables, for errors.
     """
     found = {}
     for name, table in tables.items():
@@ -39,7 +39,7 @@ def looks_told(
 
 
 def mixes_told(light: Mapping[str, str | float], path: Path, where: str) -> dict[str, GroupMix]:
-    """The mixes of light groups that a table tells; which groups there are is known after the bake."""
+    """Mixes of light groups given by a table; whether the groups exist is known only after the bake."""
     found = {}
     for name, value in light.items():
         try:
@@ -82,5 +82,5 @@ def _look(
 
 
 def _with_numbers(material: Material, numbers: Mapping[str, Any]) -> dict[str, Any]:
-    """A document with some of its keys replaced: where it was fitted to no longer says what it is."""
+    """A document with some keys replaced; its provenance no longer applies and is removed."""
     return {**material.model_dump(mode="json", exclude={"provenance"}), **numbers}

@@ -1,4 +1,4 @@
-"""Material documents that a scene.toml, or a file of keyframes, names."""
+"""Material documents that a scene.toml, or a file of keyframes, refers to."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from lambent.scenes.loaders.scene_files import SceneFiles
 
 
 def material_of_file(name: str, field: str, path: Path, files: SceneFiles) -> Material:
-    """The material of a document; a `UserError` if the file is a measurement, which has to be fitted first."""
+    """The material of a document; `UserError` for a measurement, which must be fitted first."""
     from lambent.materials.measured.registry import is_known
 
     source = files.path(name, path, field)

@@ -1,4 +1,4 @@
-"""The keys of a scene.toml, and the scene's values of each section. Unknown keys are errors."""
+"""The keys of a scene.toml, and the scene values of each section. Unknown keys are errors."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class SunSkySection(Section):
 
 
 class ImageSection(Section):
-    """An HDR picture of everything around; its layout is recognised where it is not said."""
+    """An HDR picture of the surroundings; its layout is detected if not given."""
 
     kind: Literal["image"]
     file: str
@@ -83,7 +83,7 @@ class ImageSection(Section):
 
 
 class ConstantSection(Section):
-    """The same radiance from everywhere."""
+    """Equal radiance from all directions."""
 
     kind: Literal["constant"]
     radiance: Colour
@@ -138,7 +138,7 @@ class LightFieldSection(Section):
 
 
 class ObjectSection(Section):
-    """Settings of the objects whose name fits a pattern; those left out stay as in the geometry file."""
+    """Settings of the objects whose name matches a pattern; settings left out stay as in the geometry file."""
 
     material: str | None = None
     emission: Colour | None = None  # W/(sr m^2); or luminance, cd/m^2; or lumens of each object, with a colour
@@ -250,10 +250,10 @@ class SceneDocument(Section):
     exposure_ev: Annotated[float, Field(ge=-30, le=30)] | None = None
     exposure_ev100: Annotated[float, Field(ge=-30, le=30)] | None = None
     environment: Annotated[EnvironmentSection, Field(discriminator="kind")] | None = None
-    crease_angle: Annotated[float, Field(ge=0, le=180)] | None = None  # degrees; edges of larger ones are hard
+    crease_angle: Annotated[float, Field(ge=0, le=180)] | None = None  # degrees; edges with a larger angle are hard
     variant: str | None = None  # a material set of the geometry files
     materials: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    measured: dict[str, str] = Field(default_factory=dict)  # material -> file of the table it scatters by in bakes
+    measured: dict[str, str] = Field(default_factory=dict)  # material -> file of the table that replaces it in bakes
     assign: dict[str, str] = Field(default_factory=dict)  # pattern over objects and materials -> material
     objects: dict[str, ObjectSection] = Field(default_factory=dict)
     lights: tuple[Annotated[LightSection, Field(discriminator="kind")], ...] = ()
@@ -265,7 +265,7 @@ class SceneDocument(Section):
 
     @property
     def exposure(self) -> float | None:
-        """Stops on radiance; None: by the first picture."""
+        """Stops on radiance; None: metered from the first picture."""
         return self.exposure_ev if self.exposure_ev100 is None else exposure_of(self.exposure_ev100)
 
     @model_validator(mode="after")

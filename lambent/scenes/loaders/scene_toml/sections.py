@@ -1,4 +1,4 @@
-"""What sections of a scene.toml are made of: numbers within bounds, directions. Unknown keys are errors."""
+"""Base types of scene.toml sections: bounded numbers, directions. Unknown keys are errors."""
 
 from __future__ import annotations
 

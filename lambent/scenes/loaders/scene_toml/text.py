@@ -1,4 +1,4 @@
-"""The text of a TOML document that people write, before its keys are checked."""
+"""The text of a user's TOML document, before its keys are checked."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _DEEP_KEY = re.compile(rb"""(?<![\w"'.-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){9,}""")
 
 
 def toml_of(path: Path) -> dict[str, Any]:
-    """The keys of a TOML document; a `UserError` where the file is none."""
+    """The keys of a TOML document; `UserError` if it is invalid."""
     content = read_bytes(path, SCENE_TOML_BYTES)
     deepest = max((key[0].count(b".") for key in _DEEP_KEY.finditer(content)), default=0)
-    TOML_LEVELS.check(deepest, file=path)  # the parser's time grows with their square
+    TOML_LEVELS.check(deepest, file=path)  # parsing time is quadratic in the number of levels
     try:
         return tomllib.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:

@@ -1,4 +1,4 @@
-"""The variants of a scene.toml: those of its geometry files, and its [[variants]], which may add to them."""
+"""The variants of a scene.toml: those of its geometry files, and its [[variants]], which may extend them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def variants_told(
     Raises
     ------
     UserError
-        Where a section names what is not there, or says what cannot be.
+        If a section uses unknown names or invalid values.
     """
     for name, times in Counter(section.name for section in sections).items():
         if times > 1:
@@ -54,7 +54,7 @@ def variants_told(
 
 
 def _exchanged(section: VariantSection, worn: list[str], scene: Scene, path: Path) -> list[str]:
-    """The materials of objects, where the section exchanges some; later patterns win."""
+    """The materials of objects after the section's exchanges; later patterns win."""
     names = [o.name for o in scene.objects]
     for pattern, material in section.objects.items():
         field = f"variants.{section.name}.objects.{pattern}"

@@ -1,4 +1,4 @@
-"""Materials and textures made of the surfaces that files describe."""
+"""Create materials and textures from the surfaces that files describe."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lambent.scenes.loaders.surfaces.textured import relative
 from lambent.scenes.scene import MaterialTextures, Texture
 
 ROUGHNESS_MAX = 4.0  # slope, of a material's document
-# Slope roughness; exponent of (cos_i cos_o) and coefficient of the lobe nearest to the same distribution under Smith's
+# Slope roughness; exponent of (cos_i cos_o) and coefficient of the lobe nearest to the same distribution with Smith's
 # masking, by least difference of f cos and of the albedo, weighted by the cosine. The albedo of a white lobe stays
 # below 1 up to 82 degrees and is at most 1.1 at 87.
 MASKED = {
@@ -32,7 +32,7 @@ MASKED = {
 
 
 class MadeMaterials:
-    """The materials of one file, each made when it is first used."""
+    """The materials of one file, each created at its first use."""
 
     def __init__(self, notes: list[str] | None = None) -> None:
         self.materials: dict[str, Material] = {}
@@ -41,7 +41,7 @@ class MadeMaterials:
         self.notes = [] if notes is None else notes
 
     def make(self, name: str, surface_of: Callable[[list[str]], Surface]) -> None:
-        """Make the material of a name, if not made; `surface_of` takes a list for its notes."""
+        """Create the material of a name, unless it exists; `surface_of` takes a list for its notes."""
         if name in self.materials:
             return
         notes: list[str] = []
@@ -54,10 +54,10 @@ class MadeMaterials:
 
 
 def finished(name: str, surface: Surface, notes: list[str]) -> tuple[Material, MaterialTextures | None]:
-    """Material document and textures of a surface; None where nothing varies.
+    """Material document and textures of a surface; None if nothing varies.
 
-    The document holds the means, so that it is right without its textures. Lobes share one texture of coefficients and
-    one of roughness: where they differ the first is used, which is noted.
+    The document has the means, so that it is right without its textures. Lobes share one texture of coefficients and
+    one of roughness: if they differ, the first is used and a note is added.
     """
     kd, diffuse = relative(surface.kd, surface.opacity)
     kt_d, through = relative(surface.kt_d, surface.opacity)
@@ -74,7 +74,7 @@ def finished(name: str, surface: Surface, notes: list[str]) -> tuple[Material, M
         slopes.append(slope)
         mx, my = (min(max(float(v), ROUGHNESS_MIN), ROUGHNESS_MAX) for v in (m[0], m[0] * lobe.aspect))
         alpha, share = masking(mx, my, lobe.distribution) if lobe.masked else (0.5, 1.0)
-        if lobe.masked and lobe.m.is_texture:  # where it is smoothest, its albedo must not exceed 1
+        if lobe.masked and lobe.m.is_texture:  # at the smoothest place, the albedo must not exceed 1
             least = float(lobe.m.values.min())
             share = min(share, masking(least, least * lobe.aspect, lobe.distribution)[1])
         alpha = min(max(alpha - lobe.falloff / 2, 0.0), 1.0)
@@ -105,7 +105,7 @@ def finished(name: str, surface: Surface, notes: list[str]) -> tuple[Material, M
 
 
 def masking(mx: float, my: float, distribution: Distribution) -> tuple[float, float]:
-    """Exponent of (cos_i cos_o) and coefficient of the lobe that replaces a masked one of these slopes."""
+    """Exponent of (cos_i cos_o) and coefficient of the lobe that replaces a masked one with these slopes."""
     m, alpha, k = MASKED[distribution]
     return float(np.interp([mx, my], m, alpha).mean()), float(np.interp([mx, my], m, k).mean())
 

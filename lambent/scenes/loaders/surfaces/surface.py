@@ -1,4 +1,4 @@
-"""Surfaces as files describe them, before materials and textures are made of them."""
+"""Surfaces as files describe them, from which materials and textures are created."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from lambent.scenes.scene import Texture
 
 ROUGHNESS_MIN = 0.003  # slope; below, single precision loses the lobe
 BLACK = np.zeros(3)
-# Albedo at 85 degrees of a dielectric's lobe, r0 .04, by its slope.
+# Albedo at 85 degrees of a dielectric's lobe with r0 = .04, by slope.
 AT_GRAZING = (0.25, 0.36, 0.49, 0.64, 1.0), (0.24, 0.18, 0.14, 0.1, 0.06)
-GREY = 0.5  # of surfaces that are not described
+GREY = 0.5  # of surfaces without a description
 UNDESCRIBED = "is not defined: it becomes grey"
 
 
@@ -25,7 +25,7 @@ UNDESCRIBED = "is not defined: it becomes grey"
 class SpecularLobe:
     """One lobe of slope roughness `m` along t and `m` times `aspect` across, coefficient `k` and reflectance `r0` (3,).
 
-    `masked` is whether the format multiplies it by Smith's masking. Its albedo has a further factor cos_o^falloff.
+    `masked`: the format multiplies it by Smith's masking. Its albedo has another factor cos_o^falloff.
     """
 
     m: Textured
@@ -54,11 +54,11 @@ class Surface:
 
     @staticmethod
     def grey() -> Surface:
-        """A surface that is not described."""
+        """A surface without a description."""
         return Surface(kd=constant(np.full(3, GREY)))
 
     def seen_through(self, opacity: Floats) -> Surface:
-        """A surface that covers a share (3,) of the background; the rest of the light goes straight through."""
+        """A surface that covers a share (3,) of the background; the rest of the light passes undeviated."""
         held = constant(opacity)
 
         def part(v: Textured) -> Textured:
@@ -68,7 +68,7 @@ class Surface:
         return replace(self, kd=part(self.kd), kt_d=part(self.kt_d), lobes=lobes)
 
     def coated(self, coat: SpecularLobe) -> Surface:
-        """A surface below a clear coat, which takes the light that it reflects: more at grazing incidence.
+        """A surface below a clear coat, which removes the light that it reflects: more at grazing incidence.
 
         1 - k F is nearly (1 - k r0) cos^(k/4) up to 80 degrees: lobes get that factor, the diffuse term is coupled.
         """
@@ -80,15 +80,15 @@ class Surface:
 
 
 def straight_through(k: Floats) -> SpecularLobe:
-    """A share k (3,) of the light goes on undeflected: the narrowest lobe of transmission.
+    """The narrowest lobe of transmission, which passes a share k (3,) of the light undeviated.
 
-    Such a lobe falls as 1 - (1 - cos)^5 whatever its r0; the exponent compensates up to 60 degrees.
+    Such a lobe falls off as 1 - (1 - cos)^5 for any r0; the exponent compensates for that up to 60 degrees.
     """
     return SpecularLobe(constant(ROUGHNESS_MIN), constant(k), BLACK, side="transmission", masked=False, falloff=-0.04)
 
 
 def blended(parts: Sequence[tuple[Surface, float]], notes: list[str]) -> Surface:
-    """Sum of surfaces, each weighted by its share; normal map and mask are those of the first."""
+    """Weighted sum of surfaces; normal map and mask are those of the first."""
     first = parts[0][0]
     kd, kt_d = constant(BLACK), constant(BLACK)
     lobes: list[SpecularLobe] = []

@@ -1,4 +1,4 @@
-"""Images that textures are made of: each read once, reduced to a size that a scene full of them can bear."""
+"""Images used by textures: each read once, and reduced to a size that a scene with many of them can hold."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.surfaces.textured import Textured
 from lambent.scenes.scene import IDENTITY, UvTransform
 
-SIDE_MAX = 2048  # texels; larger images are reduced, which is noted
+SIDE_MAX = 2048  # texels; larger images are reduced, with a note
 FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "WEBP", "GIF")
 _LINEAR_OF_BYTE = srgb_decode(np.arange(256, dtype=np.float32) / 255)
 
@@ -35,7 +35,7 @@ class TextureImage:
     uv_transform: UvTransform = IDENTITY
 
     def rgb(self, *, srgb: bool) -> Textured:
-        """3 channels, float32; bytes are decoded from sRGB, or taken as linear. Radiance stays as it is."""
+        """3 channels, float32; bytes are decoded from sRGB, or taken as linear. Radiance is unchanged."""
         if srgb and self.texels.dtype == np.uint8:
             return Textured(_LINEAR_OF_BYTE[self.texels[..., :3]], self.uv_transform)
         return Textured(_unit(self.texels[..., :3]), self.uv_transform)
@@ -46,7 +46,7 @@ class TextureImage:
 
 
 class TextureImages:
-    """The images of one scene; `notes` tells which were reduced."""
+    """The images of one scene; `notes` tells which ones were reduced."""
 
     def __init__(self, files: SceneFiles) -> None:
         self._files = files
@@ -56,12 +56,12 @@ class TextureImages:
     def named(
         self, name: str, file: Path, field: str, note: Callable[[str], None], otherwise: str = ""
     ) -> TextureImage | None:
-        """Image that `file` names; None where it is not there, which is noted together with what happens `otherwise`.
+        """Image that `file` refers to; None if it is missing, with a note that includes the consequence `otherwise`.
 
         Raises
         ------
         UserError
-            Where it lies outside the scene's folder, is of an unknown kind, damaged, or absurdly large.
+            If it lies outside the scene's folder, is of an unknown kind, damaged, or far too large.
         """
         path = self._files.look_for("picture", name, file, field, note, otherwise)
         if path is not None and path not in self._read:
@@ -74,7 +74,7 @@ class TextureImages:
         return None if path is None else self._read[path]
 
     def within(self, key: object, data: bytes, file: Path, field: str) -> TextureImage:
-        """Image of bytes within another file; `key` tells it from the others."""
+        """Image from bytes within another file; `key` identifies it."""
         if key not in self._read:
             self._read[key] = self._decoded(data, file, field, field)
         return self._read[key]
@@ -102,7 +102,7 @@ class TextureImages:
             raise UserError(f"picture cannot be read ({why})", file=file, field=field) from error
 
     def _reduced(self, rgb: NDArray[np.float32], name: str) -> NDArray[np.float32]:
-        """Means over blocks of texels, until the image is small enough."""
+        """Average blocks of texels until the image is small enough."""
         height, width = rgb.shape[:2]
         step = -(-max(height, width) // SIDE_MAX)
         if step == 1:
@@ -116,5 +116,5 @@ class TextureImages:
 
 
 def _unit(texels: NDArray[np.uint8] | NDArray[np.float32]) -> Floats:
-    """Bytes as float32 in [0, 1]; float32 as it is."""
+    """Bytes as float32 in [0, 1]; float32 unchanged."""
     return np.asarray(texels / np.float32(255) if texels.dtype == np.uint8 else texels, np.float32)

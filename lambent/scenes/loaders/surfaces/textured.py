@@ -1,7 +1,7 @@
-"""Quantities of a surface that are one value everywhere, or a texture of values, and their arithmetic.
+"""Surface quantities that are constant or textured, and their arithmetic.
 
 Formats multiply factors and textures, and derive one quantity from several. At the end, `relative` splits a quantity
-into its mean, the number of the material's document, and a texture that multiplies it.
+into its mean, the number in the material's document, and a texture that multiplies it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from lambent.core.colour import HALF_MAX
 from lambent.core.directions import Floats
 from lambent.scenes.scene import IDENTITY, Texture, UvTransform
 
-EVEN = 1e-3  # a texture that departs from its mean by less than this share is dropped
+EVEN = 1e-3  # a texture that deviates from its mean by less than this share is dropped
 _V_FLIPPED = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 
 
@@ -50,19 +50,19 @@ class Textured:
 
 
 def constant(values: ArrayLike) -> Textured:
-    """The same everywhere; (C,), a single number becomes (1,)."""
+    """A constant quantity; (C,), a single number becomes (1,)."""
     return Textured(np.atleast_1d(np.asarray(values, float)))
 
 
 def scaled(v: Textured, factor: float | Floats) -> Textured:
-    """`v` times a number, or one per channel."""
+    """`v` times a number, or times one number per channel."""
     return Textured(v.values * np.asarray(factor, v.values.dtype), v.uv_transform)
 
 
 def combined(function: Callable[..., Any], *inputs: Textured, notes: list[str], what: str = "textures") -> Textured:
     """`function` of the inputs' values, texel by texel.
 
-    Textures of one uv transform are brought to the size of the largest. A texture laid out otherwise than the first
+    Textures with the same uv transform are resized to the largest. A texture with another uv transform than the first's
     becomes its mean; `notes` gets a line about it that names `what`.
     """
     textures = [v for v in inputs if v.is_texture]
@@ -89,7 +89,7 @@ def _resized(texels: Floats, height: int, width: int) -> Floats:
 
 
 def relative(v: Textured, visible: Texture | None = None) -> tuple[Floats, Texture | None]:
-    """The mean (C,) of a quantity, and the texture that multiplies it; None where it does not vary.
+    """The mean (C,) of a quantity, and the texture that multiplies it; None if it is constant.
 
     With a mask `visible` of the same layout, the mean is over the visible texels.
     """
@@ -113,7 +113,7 @@ def absolute(v: Textured) -> Texture:
 
 
 def flipped_uv(theirs: Floats, decimals: int | None = None) -> UvTransform:
-    """Our uv transform of a format's (3, 3) whose v points down, for points and for textures."""
+    """Our uv transform from a format's (3, 3) matrix whose v points down, for points and for textures."""
     ours = _V_FLIPPED @ theirs @ _V_FLIPPED
     (a, b, c), (d, e, f) = (ours if decimals is None else np.round(ours, decimals))[:2].tolist()
     return (a, b, c), (d, e, f)
