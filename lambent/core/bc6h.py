@@ -35,6 +35,7 @@ from lambent.core.bc6h_format import (
 BLOCK = 4  # texels a side
 LARGEST = 65504.0
 ROUGH = 8.0  # rms error of one line, in units of a half float, about .6 %, above which two are tried
+SLACK = 48.0  # units of a half float, 3 to 5 %: so far ends may lie beyond their texels
 _FITS = 3  # times that lines are fitted to the choice of the texels
 _MODES_TRIED = 2  # of those that hold the ends, finest first
 _POWERS = 4  # iterations towards the main axis
@@ -44,21 +45,27 @@ _ONE, _TWO = FINEST_FIRST
 _WHOLE = np.zeros(TEXELS, np.int64)  # one subset
 
 
-def encoded(rgb: NDArray[Any]) -> NDArray[np.uint32]:
+def encoded(rgb: NDArray[Any], importance: NDArray[Any] | None = None) -> NDArray[np.uint32]:
     """Blocks (..., H/4, W/4, 4) of light (..., H, W, 3); what is negative or not a number becomes 0.
 
-    H and W must be multiples of 4.
+    H and W must be multiples of 4. Squared errors of texels count by their `importance` (..., H, W), by default 1.
     """
     *lead, height, width, channels = rgb.shape
     if channels != 3 or height % BLOCK or width % BLOCK:
         raise ValueError(f"light of shape {rgb.shape} has no whole blocks of {BLOCK} x {BLOCK} texels")
     halves = np.clip(np.nan_to_num(rgb, nan=0.0, posinf=LARGEST), 0, LARGEST).astype(np.float16)
-    rows, columns = height // BLOCK, width // BLOCK
-    texels = halves.view(np.uint16).reshape(-1, rows, BLOCK, columns, BLOCK, 3).swapaxes(2, 3)
-    flat = np.ascontiguousarray(texels).reshape(-1, TEXELS, 3)
-    blocks = np.zeros((len(flat), 4), np.uint32)
-    _in_threads(_encode, flat, blocks)
-    return blocks.reshape(*lead, rows, columns, 4)
+    counts = np.ones(rgb.shape[:-1], np.float32) if importance is None else importance.astype(np.float32)
+    texels, weights = _by_block(halves.view(np.uint16)), _by_block(counts[..., None])[..., 0]
+    blocks = np.zeros((len(texels), 4), np.uint32)
+    _in_threads(_encode, texels, weights, blocks)
+    return blocks.reshape(*lead, height // BLOCK, width // BLOCK, 4)
+
+
+def _by_block(image: NDArray[Any]) -> NDArray[Any]:
+    """(B, 16, C) of (..., H, W, C)."""
+    height, width, channels = image.shape[-3:]
+    texels = image.reshape(-1, height // BLOCK, BLOCK, width // BLOCK, BLOCK, channels).swapaxes(2, 3)
+    return np.ascontiguousarray(texels).reshape(-1, TEXELS, channels)
 
 
 def decoded(blocks: NDArray[np.uint32]) -> NDArray[np.float16]:
@@ -71,22 +78,23 @@ def decoded(blocks: NDArray[np.uint32]) -> NDArray[np.float16]:
     return np.ascontiguousarray(light).reshape(*lead, rows * BLOCK, columns * BLOCK, 3)
 
 
-def _in_threads(work: Any, given: NDArray[Any], made: NDArray[Any]) -> None:
-    """`work` on parts of both arrays: loops in parallel take numba four times as long to compile."""
+def _in_threads(work: Any, *arrays: NDArray[Any]) -> None:
+    """`work` on parts of arrays: loops in parallel take numba four times as long to compile."""
     with ThreadPoolExecutor() as pool:
-        parts = [slice(first, first + _AT_ONCE) for first in range(0, len(given), _AT_ONCE)]
-        list(pool.map(lambda part: work(given[part], made[part]), parts))
+        parts = [slice(first, first + _AT_ONCE) for first in range(0, len(arrays[0]), _AT_ONCE)]
+        list(pool.map(lambda part: work(*(array[part] for array in arrays)), parts))
 
 
 @numba.njit(cache=True, nogil=True)
-def _encode(texels: Any, blocks: Any) -> None:
-    """Bits of half floats (B, 16, 3) to blocks (B, 4)."""
+def _encode(texels: Any, importance: Any, blocks: Any) -> None:
+    """Bits of half floats (B, 16, 3), whose errors count by their importance (B, 16), to blocks (B, 4)."""
     values, weights = np.zeros((TEXELS, 3)), np.zeros(TEXELS)
     ends, other_ends = np.zeros((MOST_ENDS, 3), np.int64), np.zeros((MOST_ENDS, 3), np.int64)
     index, other_index = np.zeros(TEXELS, np.int64), np.zeros(TEXELS, np.int64)
     for b in range(len(texels)):
         values[:] = texels[b]
         _weigh(values, weights)
+        weights *= importance[b]
         error, mode = _fit(values, weights, _WHOLE, _ONE, 0, ends, index)
         partition = 0
         if error > ROUGH**2 * 3 * weights.sum():
@@ -196,7 +204,6 @@ def _fit(
         for mode in modes:
             if not _quantised_ends(lines, mode, count, now):
                 continue
-            tries += 1
             error = _choose(texels, weights, subset, count, now, mode, now_index)
             if fit:
                 _step_ends(texels, weights, subset, count, now, mode, now_index)
@@ -204,10 +211,13 @@ def _fit(
             if error < least:
                 least = error
                 chosen[:] = now_index
-            if error < best and ordered(mode, partition, now, now_index):
+            if not ordered(mode, partition, now, now_index):
+                continue
+            if error < best:
                 best, best_mode = error, mode
                 ends[:] = now
                 index[:] = now_index
+            tries += 1
             if tries == _MODES_TRIED:
                 break
     return best, best_mode
@@ -330,12 +340,13 @@ def _quantised_ends(ends: Any, mode: int, count: int, found: Any) -> bool:
 def _step_ends(texels: Any, weights: Any, subset: Any, count: int, ends: Any, mode: int, index: Any) -> None:
     """Quantised ends moved by at most a step in each channel to where they fit best, as the texels have chosen.
 
-    They do not leave the range of the texels, nor go on where they are beyond it.
+    They may leave the range of the texels by SLACK, a step or two of fine ends; coarser ones stay in it.
     """
     bits = BITS[mode]
     for s in range(count):
         for c in range(3):
             low, high = _range_of(texels, subset, s, c)
+            low, high = low - SLACK, high + SLACK
             first, last, best = ends[2 * s, c], ends[2 * s + 1, c], np.inf
             for a in range(max(first - 1, 0), min(first + 2, 1 << bits)):
                 whole_a = unquantised(a, bits)

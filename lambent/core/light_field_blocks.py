@@ -13,14 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core import distance_blocks
+from lambent.core.arrays import Flags
 from lambent.core.bc6h import BLOCK, decoded, encoded
 from lambent.core.light_field import LightField
 from lambent.core.light_field_tiles import pool_rows, tiled, up
 
+OPEN = 0.25  # what a texel of sky counts beside one of a surface in the same block
 
-def blocks_of(maps: NDArray[Any]) -> NDArray[np.uint32]:
-    """(P, B, B, 4) of maps (P, E, E, 3): 4 B is the first multiple of 4 from E + 2 on."""
-    return encoded(tiled(maps, up(maps.shape[1] + 2, BLOCK)))
+
+def blocks_of(maps: NDArray[Any], shows: Flags | None = None) -> NDArray[np.uint32]:
+    """(P, B, B, 4) of maps (P, E, E, 3): 4 B is the first multiple of 4 from E + 2 on.
+
+    Where `shows` (P, E, E) says that texels show no surface, they count as OPEN: the environment itself answers there.
+    """
+    size = up(maps.shape[1] + 2, BLOCK)
+    importance = None if shows is None else np.where(tiled(shows[..., None], size)[..., 0], 1.0, OPEN)
+    return encoded(tiled(maps, size), importance)
 
 
 def blocks_shape(side: int) -> tuple[int, int, int]:
@@ -60,7 +68,8 @@ def distances_of(blocks: NDArray[np.uint32], side: int) -> tuple[NDArray[np.floa
 def in_blocks(field: LightField) -> LightField:
     """A light field as it is read again where its store has blocks."""
     side = field.radiance.shape[1]
-    blocks, distances = blocks_of(field.radiance), distance_blocks_of(field.inverse_distance, field.cover)
+    shows = None if field.cover is None or field.volume else field.cover != 0
+    blocks, distances = blocks_of(field.radiance, shows), distance_blocks_of(field.inverse_distance, field.cover)
     inverse, cover = distances_of(distances, side)
     return replace(
         field, radiance=maps_of(blocks, side), inverse_distance=inverse, blocks=blocks, distances=distances,
