@@ -152,3 +152,14 @@ def test_two_lines_keep_the_hues_of_edges() -> None:
     error = np.log(shown / CORNERS)
     hue = error - error.mean(axis=-1, keepdims=True)
     assert np.sqrt(np.mean(hue**2)) < 0.02
+
+
+def test_texels_of_little_importance_leave_lines_to_the_others() -> None:
+    """Every other column shows another colour than its neighbours, and a line cannot have both."""
+    ignored = (X * 64).astype(int) % 2 == 1
+    light = np.where(ignored[..., None], TURNING[:, ::-1], EDGE)
+    errors = []
+    for importance in (None, np.where(ignored, 0.01, 1.0)):
+        error = np.log(decoded(encoded(light, importance)).astype(float) / light)
+        errors.append(np.sqrt(np.mean(error[~ignored] ** 2)))
+    assert errors[1] < 0.8 * errors[0]
