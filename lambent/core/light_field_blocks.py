@@ -1,7 +1,7 @@
-"""Maps of a light field in blocks: light as BC6H, one byte a texel, distances in five bits a texel. It imports numba.
+"""Maps of a light field in blocks: light as BC6H, a byte per texel, distances in five bits. It imports numba.
 
-Blocks cover tiles: maps with a border of one texel, padded to whole blocks. A renderer can upload them as they are.
-Maps of 310 texels a side are 78 x 78 blocks without padding.
+Blocks are of tiles, maps with a border of one texel and what fills the last blocks, so that a renderer can show them as
+they are: maps of 310 texels a side are 78 x 78 blocks, and nothing is filled.
 """
 
 from __future__ import annotations
@@ -13,37 +13,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core import distance_blocks
+from lambent.core.arrays import Flags
 from lambent.core.bc6h import BLOCK, decoded, encoded
 from lambent.core.light_field import LightField
 from lambent.core.light_field_tiles import pool_rows, tiled, up
 
+OPEN = 0.25  # what a texel of sky counts beside one of a surface in the same block
 
-def blocks_of(maps: NDArray[Any]) -> NDArray[np.uint32]:
-    """Blocks (P, B, B, 4) of maps (P, E, E, 3); 4 B is the first multiple of 4 from E + 2 on."""
-    return encoded(tiled(maps, up(maps.shape[1] + 2, BLOCK)))
+
+def blocks_of(maps: NDArray[Any], shows: Flags | None = None) -> NDArray[np.uint32]:
+    """(P, B, B, 4) of maps (P, E, E, 3): 4 B is the first multiple of 4 from E + 2 on.
+
+    Where `shows` (P, E, E) says that texels show no surface, they count as OPEN: the environment itself answers there.
+    """
+    size = up(maps.shape[1] + 2, BLOCK)
+    importance = None if shows is None else np.where(tiled(shows[..., None], size)[..., 0], 1.0, OPEN)
+    return encoded(tiled(maps, size), importance)
 
 
 def blocks_shape(side: int) -> tuple[int, int, int]:
-    """(B, B, 4) for maps of `side` texels a side."""
+    """(B, B, 4) of maps of so many texels a side."""
     return up(side + 2, BLOCK) // BLOCK, up(side + 2, BLOCK) // BLOCK, 4
 
 
 def maps_of(blocks: NDArray[np.uint32], side: int) -> NDArray[np.float16]:
-    """Maps (P, E, E, 3) of blocks (P, B, B, 4); `side` is E."""
+    """(P, E, E, 3) of blocks (P, B, B, 4); `side` is E."""
     if up(side + 2, BLOCK) != BLOCK * blocks.shape[1]:
         raise ValueError(f"{blocks.shape[1]} blocks in a row do not hold maps of {side} texels")
     return decoded(blocks)[:, 1 : side + 1, 1 : side + 1]
 
 
 def distance_blocks_of(inverse: NDArray[np.float16], cover: NDArray[np.uint8] | None) -> NDArray[np.uint32]:
-    """Blocks (P, R, B, 2) of inverse distances and cover (P, E, E): `core.distance_blocks` of bordered tiles."""
+    """(P, R, B, 2) of inverse distances and cover (P, E, E): `core.distance_blocks` of tiles as of `blocks_of`."""
     size = up(inverse.shape[1] + 2, BLOCK)
     bits = None if cover is None else tiled(cover[..., None], size)[..., 0]
     return distance_blocks.encoded(tiled(inverse[..., None], size)[..., 0], bits)
 
 
 def distance_blocks_shape(side: int) -> tuple[int, int, int]:
-    """(R, B, 2) for maps of `side` texels a side."""
+    """(R, B, 2) of maps of so many texels a side."""
     rows = up(side + 2, BLOCK) // BLOCK
     return rows + pool_rows(rows), rows, 2
 
@@ -58,9 +66,10 @@ def distances_of(blocks: NDArray[np.uint32], side: int) -> tuple[NDArray[np.floa
 
 
 def in_blocks(field: LightField) -> LightField:
-    """A light field after a round trip through a store with blocks."""
+    """A light field as it is read again where its store has blocks."""
     side = field.radiance.shape[1]
-    blocks, distances = blocks_of(field.radiance), distance_blocks_of(field.inverse_distance, field.cover)
+    shows = None if field.cover is None or field.volume else field.cover != 0
+    blocks, distances = blocks_of(field.radiance, shows), distance_blocks_of(field.inverse_distance, field.cover)
     inverse, cover = distances_of(distances, side)
     return replace(
         field, radiance=maps_of(blocks, side), inverse_distance=inverse, blocks=blocks, distances=distances,

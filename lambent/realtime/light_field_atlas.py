@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -99,7 +100,7 @@ def coding(device: Any) -> Coding:
     if BLOCKS in device.features and not is_software(device):
         from lambent.core.bc6h import BLOCK, encoded  # which imports numba
 
-        return Coding("bc6h-rgb-ufloat", BLOCK, 16, encoded)
+        return Coding("bc6h-rgb-ufloat", BLOCK, 16, partial(encoded, rough=math.inf))
     return Coding("rgb9e5ufloat", 1, 4, lambda texels: packed_rgb(texels)[..., None])
 
 

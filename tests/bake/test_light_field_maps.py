@@ -216,7 +216,7 @@ def test_texels_hold_the_light_of_what_their_middle_meets(mi: Any) -> None:
 
 def test_quarters_of_texels_tell_where_a_square_ends(mi: Any) -> None:
     """Every quarter whose middle is before the square, by hand; texels with any of these show it, and its distance."""
-    from lambent.bake.light_fields.acquisition import Around, covered_distances, radiance_maps
+    from lambent.bake.light_fields.acquisition import Around, covered_distances, covered_radiance_maps, radiance_maps
     from lambent.bake.tracing.scene_builder import SceneBuilder
 
     square = SceneObject("square", patch((-1.03, -1, 1.07), (2, 0, 0), (0, 0, -2)), "black")
@@ -231,6 +231,9 @@ def test_quarters_of_texels_tell_where_a_square_ends(mi: Any) -> None:
     mixed = bits.any(axis=-1) & ~bits.all(axis=-1)
     assert mixed.sum() > 20 and (inverse[0][bits.any(axis=-1)] > 0).all()
     light = radiance_maps(Around(built, None, 2), point, n, 2, 0, covers=True)[0, ..., 0]
+    with_shows, shows = covered_radiance_maps(Around(built, None, 2), point, n, 2, 0)
+    np.testing.assert_array_equal(with_shows[0, ..., 0], light)
+    np.testing.assert_array_equal(shows[0], bits.any(axis=-1))
     assert (light[bits.all(axis=-1)] == 0).all()
     np.testing.assert_allclose(light[inverse[0] == 0], 1, atol=1e-6)
     assert (light[mixed] == 0).mean() > 0.9, "where no part of two by two meets it, its sky"

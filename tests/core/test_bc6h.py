@@ -14,7 +14,19 @@ RNG = np.random.default_rng(3)
 LINE = np.exp2(6 * X - 3)[..., None] * [1.0, 0.6, 0.3]  # six stops in 64 texels, one hue
 TURNING = np.exp(1.5 * X[..., None] * [1, 0.8, 0.5] - Y[..., None] * [0.2, 1, 1.5])
 EDGE = np.where((X + 0.5 * Y > 0.6)[..., None], [20, 0.3, 0.1], [0.05, 0.1, 0.2])
+CORNERS = np.where((X // 0.04 + Y // 0.06) % 2 > 0, 1.0, 0.4)[..., None] * np.where(
+    (X + 0.5 * Y > 0.6)[..., None], [2, 0.3, 0.1], [0.5, 0.9, 1.2]
+)  # three colours and more in a block
 HOSTILE = RNG.gamma(0.05, 100.0, (64, 64, 3))
+
+
+MODES = (0, 1, 2, 6, 10, 14, 18, 22, 26, 30, 3, 7, 11, 15)
+
+
+def modes(blocks: np.ndarray) -> set[int]:
+    """Numbers of the modes of blocks (B, 4), reserved ones among them."""
+    low = blocks[:, 0] & 3
+    return set(np.where(low < 2, low, blocks[:, 0] & 31).tolist())
 
 
 def psnr_db(light: np.ndarray) -> float:
@@ -45,11 +57,11 @@ def test_what_is_no_light_becomes_black_and_what_is_too_much_the_largest() -> No
 
 
 def test_a_block_shows_no_more_than_its_texels() -> None:
-    """However wild: within the block's own range in each channel, but for the steps of the ends."""
+    """However wild: within the block's own range in each channel, but for half a step of ends of 6 bits."""
     shown = decoded(encoded(HOSTILE)).astype(float)
     tops = HOSTILE.reshape(16, 4, 16, 4, 3).max(axis=(1, 3), keepdims=True)
     assert np.isfinite(shown).all() and shown.min() >= 0
-    assert np.all(shown.reshape(16, 4, 16, 4, 3) <= np.minimum(1.1 * tops + 1e-3, LARGEST))
+    assert np.all(shown.reshape(16, 4, 16, 4, 3) <= np.minimum(1.25 * tops + 1e-3, LARGEST))
 
 
 def test_shapes() -> None:
@@ -58,8 +70,6 @@ def test_shapes() -> None:
     assert encoded(np.zeros((0, 8, 8, 3))).shape == (0, 2, 2, 4)
     with pytest.raises(ValueError, match="whole blocks"):
         encoded(np.zeros((6, 8, 3)))
-    with pytest.raises(ValueError, match="two subsets"):
-        decoded(np.full((1, 1, 4), 0xFFFFFFE0, np.uint32))
 
 
 def test_the_adapter_decodes_the_same_bits(adapter: None) -> None:
@@ -72,11 +82,11 @@ def test_the_adapter_decodes_the_same_bits(adapter: None) -> None:
     device: Any = open_device()
     if BLOCKS not in device.features:
         pytest.skip("the adapter has no textures in blocks")
-    light = np.concatenate([LINE, TURNING, EDGE, HOSTILE], axis=1)
+    light = np.concatenate([LINE, TURNING, EDGE, CORNERS, HOSTILE], axis=1)
     written = encoded(light).reshape(-1, 4)
-    assert set(written[:, 0] & 31) == {3, 7, 11, 15}
-    random = RNG.integers(0, 1 << 32, (1024, 4), dtype=np.uint64).astype(np.uint32)
-    random[:, 0] = random[:, 0] & ~np.uint32(31) | RNG.choice(np.array([3, 7, 11, 15], np.uint32), 1024)
+    assert modes(written) >= {0, 2, 3, 7, 11, 15}
+    random = RNG.integers(0, 1 << 32, (4096, 4), dtype=np.uint64).astype(np.uint32)
+    assert modes(random) >= set(MODES)
     blocks = np.concatenate([written, random]).reshape(1, 32, -1, 4)
     rows, columns = 4 * blocks.shape[1], 4 * blocks.shape[2]
     texture = device.create_texture(
@@ -134,3 +144,22 @@ def test_a_lamp_keeps_its_light_before_what_is_dark_and_uneven() -> None:
     lamp[0, row, column] += rng.uniform(25, 100, (40, 40, 1)) * np.array([1, 0.8, 0.5])
     kept = (decoded(encoded(lamp)).astype(float) - dark).sum(axis=(0, 1, 2)) / (lamp - dark).sum(axis=(0, 1, 2))
     np.testing.assert_allclose(kept, 1, atol=0.006)
+
+
+def test_two_lines_keep_the_hues_of_edges() -> None:
+    """Red and blue, both bright and dark: one line errs by 8 % in hue, two by 1.4 %."""
+    shown = decoded(encoded(CORNERS)).astype(float)
+    error = np.log(shown / CORNERS)
+    hue = error - error.mean(axis=-1, keepdims=True)
+    assert np.sqrt(np.mean(hue**2)) < 0.02
+
+
+def test_texels_of_little_importance_leave_lines_to_the_others() -> None:
+    """Every other column shows another colour than its neighbours, and a line cannot have both."""
+    ignored = (X * 64).astype(int) % 2 == 1
+    light = np.where(ignored[..., None], TURNING[:, ::-1], EDGE)
+    errors = []
+    for importance in (None, np.where(ignored, 0.01, 1.0)):
+        error = np.log(decoded(encoded(light, importance)).astype(float) / light)
+        errors.append(np.sqrt(np.mean(error[~ignored] ** 2)))
+    assert errors[1] < 0.8 * errors[0]

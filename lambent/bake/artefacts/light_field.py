@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 KIND = "light_field"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 7
+REVISION = 8
 MATTE = "%s: light_field is ignored: its material is purely diffuse"
 PATHS_OF_A_CHUNK = 1 << 21
 MIRROR_DEPTH = 6  # glossy surfaces in a row on paths of level 1, of objects without light fields
@@ -219,7 +219,12 @@ def _chooser(context: BakeContext, traced: Traced) -> Chooser:
 
 
 def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced, progress: Progress) -> None:
-    from lambent.bake.light_fields.acquisition import covered_distances, inverse_distances, radiance_maps
+    from lambent.bake.light_fields.acquisition import (
+        covered_distances,
+        covered_radiance_maps,
+        inverse_distances,
+        radiance_maps,
+    )
     from lambent.core.light_field_blocks import blocks_of, blocks_shape, distance_blocks_of, distance_blocks_shape
 
     start, how = time.perf_counter(), settings_of(context, wish)
@@ -231,11 +236,10 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
     def radiance(region: tuple[slice, ...], seed: int) -> Array:
         some = region[0]
         surface = None if wish.without_object else normals[some]  # what is beneath points is seen as well
-        light = radiance_maps(
-            seen, points[some], how.texels, how.strata, seed, how.onward, surface, covers=not wish.volume
-        )
+        rays = seen, points[some], how.texels, how.strata, seed, how.onward, surface
+        light, shows = (radiance_maps(*rays), None) if wish.volume else covered_radiance_maps(*rays)
         maps = halves(light, traced.unit)
-        return blocks_of(maps) if how.blocks else maps
+        return blocks_of(maps, shows) if how.blocks else maps
 
     def inverse_distance(region: tuple[slice, ...], seed: int) -> Array:
         some = points[region[0]]

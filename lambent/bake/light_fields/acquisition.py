@@ -71,7 +71,23 @@ def radiance_maps(
     `inverse_distances` has it, and look-ups tell them apart. With `covers`, it has that of surfaces where any of its
     quarters meets one: as `covered_distances`.
     """
+    return _maps(around, points, texels, strata, seed, onward, normals, covers)[0]
+
+
+def covered_radiance_maps(
+    around: Around, points: Floats, texels: int, strata: int, seed: int, onward: int = 1, normals: Floats | None = None
+) -> tuple[NDArray[np.float32], Flags]:
+    """As `radiance_maps` with `covers`, and which texels (P, texels, texels) show a surface in any quarter."""
+    return _maps(around, points, texels, strata, seed, onward, normals, covers=True)
+
+
+def _maps(
+    around: Around, points: Floats, texels: int, strata: int, seed: int, onward: int, normals: Floats | None,
+    covers: bool,
+) -> tuple[NDArray[np.float32], Flags]:  # fmt: skip
+    """Radiance, and where `covers` asks for it which texels show a surface; all of them otherwise."""
     found = np.empty((len(points), texels, texels, 3), np.float32)
+    shows = np.full(found.shape[:3], True)
     for mine in slices(len(points), max(1, PATHS_AT_ONCE // texels**2)):
         some, shape = points[mine], found[mine].shape
         every = dr.arange(mi.UInt32, len(some) * texels**2)
@@ -82,7 +98,8 @@ def radiance_maps(
         if covers:
             quarters, glow = _quarters(around.scene, some, texels)
             lamps = np.asarray(glow.any(axis=(3, 4)))
-            mixed = ~solid & (quarters > 0).any(axis=(3, 4)).ravel()
+            shows[mine] = (quarters > 0).any(axis=(3, 4))
+            mixed = ~solid & shows[mine].ravel()
             light[mixed] = _parted(around, some, texels, np.flatnonzero(mixed), mixed[mixed], 2, onward, ~seed)
         edges = unlike(np.zeros(shape), lamps)
         parted = unlike(light.reshape(shape), solid.reshape(shape[:3])) | edges | unlike(np.zeros(shape), edges)
@@ -95,7 +112,7 @@ def radiance_maps(
             index = np.flatnonzero(which)
             light[index] = _parted(around, some, texels, index, solid[index], parts, onward, seed + mine.start)
         found[mine] = light.reshape(shape)
-    return found
+    return found, shows
 
 
 def unlike(light: Floats, solid: Flags) -> Flags:
