@@ -120,6 +120,21 @@ def test_slats_in_the_penumbra_of_a_roof_leave_shadows_of_their_own(device: Any,
     assert abs(error.mean()) < 0.01
 
 
+def test_surfaces_aside_of_the_way_to_a_wide_sun_do_not_shade(device: Any) -> None:
+    """A floor that rises gently from a fold, as a seat does: beside the fold, only the bars far above hide the sun."""
+    rising = patch((0.0, 0.0, 4.0), (3.8, 1.0, 0.0), (0.0, 0.0, -8.0))
+    bars = [((-1.0 + 0.3 * k, 3.0, 2.0), (0.15, 0.0, 0.0), (0.0, 0.0, -4.0)) for k in range(12)]
+    level = patch((-4.0, 0.0, 4.0), (4.0, 0.0, 0.0), (0.0, 0.0, -8.0))
+    meshes = {"level": level, "rising": rising, "bars": merge(patch(*one) for one in bars)}
+    points = places(DOWN)
+    beside = (points[..., 0] < -0.02) & (points[..., 0] > -0.1)
+    expected = past(bars, points[beside], 5.0)
+    found = drawn(device, scene(meshes, 5.0), frames=32)[beside] / TOWARDS[1]
+    assert beside.sum() > 300
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.05)
+    assert np.sqrt(((found - expected) ** 2).mean()) < 0.05
+
+
 def past(patches: list[Any], points: Floats, radius_deg: float, eye: Floats | None = None) -> Floats:
     """Shares (n,) of the sun's disc, or of an eye, that points (n, 3) see past patches (corner and two edges)."""
     t, b = basis(TOWARDS)
