@@ -16,6 +16,7 @@
     light_map/lean                         (H, W, 3) float16, dominant light direction, world space: mean direction of
                                            the incident light, weighted by its irradiance; 0 without a normal map
     light_map/probe_share                  (H, W, 4) float16, a and b of meta["objects"]: store.occlusion; may be absent
+    light_map/sunlit                       (H, W) uint8, 0 where the sun does not get: store.sunlit; may be absent
     environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap) of radiance, sun disc included,
                                            in units of meta["unit"] W/(sr m^2): a power of two; 1 where it is absent
     probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"] in meta["unit"] as
