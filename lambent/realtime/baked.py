@@ -23,6 +23,7 @@ from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, Scen
 from lambent.store.light_fields import has_light_field, light_name, read_light_field
 from lambent.store.occlusion import has_even_niches, occlusion_gain, probe_shares
 from lambent.store.store import Store
+from lambent.store.sunlit import read_sunlit
 from lambent.store.textures import read_textures
 
 ENVIRONMENT = "environment/radiance"
@@ -85,6 +86,7 @@ class BakedScene:
     light_field_mb: float | None = None  # that the maps of all light fields may take on the GPU; None: any
     policy: str = LEAST_RECENT  # of their caches
     sun: SunRecord | None = None  # whose direct light the light maps leave out
+    sunlit: NDArray[np.uint8] | None = None  # (H, W), 0 where it does not get (`store.sunlit`); may be absent
     groups: GroupArrays | None = None  # the light by group; None where it was baked as one
     replaced: bool = False  # whether a mesh stands in the place of an object: light maps are not the store's then
 
@@ -167,6 +169,7 @@ def read_baked(store: Store, light_field_mb: float | None = None, policy: str = 
         if radiance is not None:
             probes[obj.name] = _probe(store, obj.name, radiance)
     shares, share_objects = probe_shares(store)
+    sun = contract.sun_beside(store)
     back = "light through two-sided sheets is black" if two_sided else None
     return BakedScene(
         record,
@@ -187,7 +190,8 @@ def read_baked(store: Store, light_field_mb: float | None = None, policy: str = 
         unit=unit,
         light_field_mb=light_field_mb,
         policy=policy,
-        sun=_in_units(contract.sun_beside(store), unit),
+        sun=_in_units(sun, unit),
+        sunlit=read_sunlit(store, sun),
         groups=groups_in(store, unit),
         replaced=False,
     )

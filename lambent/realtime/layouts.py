@@ -33,8 +33,8 @@ KINDS: dict[str, dict[str, Any]] = {
 
 
 LIGHT = "layers", "uniform", "exact"  # light maps; the sun, and the share of it that each pixel sees
-# The sun, depths towards it, and their blocks; depths of panes before it, and what each lets through.
-SHADOW_MAP = "uniform", "depth layers", "exact layers", "depth layers", "exact layers"
+# The sun, depths towards it, and their blocks; depths of panes before it, and what they let through; texels it reaches.
+SHADOW_MAP = "uniform", "depth layers", "exact layers", "depth layers", "exact layers", "exact"
 PANE = "uniform", "depth layers", "depth layers"  # terms of clear glass, depths of what is solid, of the layer before
 
 

@@ -81,6 +81,7 @@ def _replaced(scene: BakedScene, one: Replacement) -> BakedScene:
         dominant_direction=room.joined(scene.dominant_direction),
         probe_share=room.joined(scene.probe_share),
         light_fields={name: room.moved_field(f) for name, f in scene.light_fields.items()} | {record.name: own},
+        sunlit=None,
         groups=None,
         replaced=True,
     )

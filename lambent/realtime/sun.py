@@ -37,7 +37,7 @@ class SunLight:
 
     def __init__(
         self, layouts: Layouts, sun: SunRecord | None = None, parts: SunParts = (), depths: Any = None,
-        panes: PaneLayers | None = None,
+        panes: PaneLayers | None = None, sunlit: NDArray[np.uint8] | None = None,
     ) -> None:  # fmt: skip
         self.exists, self.is_wide = len(parts) > 0, len(parts) > 1
         panes = panes or no_panes(layouts.device)
@@ -51,7 +51,9 @@ class SunLight:
             blocks = upload(layouts.device, [np.concatenate([block_ranges(one) for one in read])], "rg32float")
             textures = (depths, blocks, panes.depths, panes.colours)
             views = (texture.create_view(dimension="2d-array") for texture in textures)
-            self.group = layouts.group(layouts.of(*SHADOW_MAP), self.uniform, *views)
+            reached = np.ones((1, 1), np.uint8) if sunlit is None else sunlit
+            reached = upload(layouts.device, [reached[None, :, :, None] * np.uint8(255)], "r8unorm").create_view()
+            self.group = layouts.group(layouts.of(*SHADOW_MAP), self.uniform, *views, reached)
 
     def shine(self, irradiance: Triple) -> None:
         """Bring so many W/m^2 from now on, where there is a sun."""
@@ -123,4 +125,6 @@ def sun_light(layouts: Layouts, scene: BakedScene, resources: Any) -> SunLight:
     sun, corners = scene.sun, scene.positions[scene.faces].astype(float)
     parts = parts_of(sun.direction, sun.radius_rad, corners, eyes)
     depths = draw_depths(layouts, parts, resources, sun.panes)
-    return SunLight(layouts, sun, parts, depths, pane_layers(layouts, parts, resources, depths, sun.panes))
+    return SunLight(
+        layouts, sun, parts, depths, pane_layers(layouts, parts, resources, depths, sun.panes), scene.sunlit
+    )

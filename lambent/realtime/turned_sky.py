@@ -39,6 +39,7 @@ def under_turned_sky(scene: BakedScene, degrees: float) -> BakedScene:
         scene,
         environment=_seen(turned(_of(whole, 2 * scene.environment.shape[1]), rotation), scene.environment.shape[1]),
         sun=sun,
+        sunlit=None,
         probes={name: _probe_under(probe, whole, rotation) for name, probe in scene.probes.items()},
         light_fields={
             name: under_sky(field, turned(_of(clear, field.inverse_distance.shape[1]), rotation))

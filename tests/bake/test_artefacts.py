@@ -110,6 +110,7 @@ def test_the_command_offers_every_kind_there_is(toy: str) -> None:
         "light_map",
         "probe",
         "probe_share",
+        "sunlit",
         "light_field",
         "answer",
         *of_views,

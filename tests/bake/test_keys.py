@@ -248,6 +248,7 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
     "interreflection": {},
     "probe": {"texels": (32, PROBES), "samples": (17, PROBES), "noise": (0.2, PROBES)},
     "probe_share": {},
+    "sunlit": {},
     "light_field": {
         "points": (15, NOTHING),  # the scene says how many
         "texels": (12, FIELDS),

@@ -77,7 +77,7 @@ def keys(context: BakeContext) -> dict[str, str]:
     effort += [how.tile_texels, how.max_depth, context.seed]
     if _by_photons(context):
         effort.append([LightMapMethod.photons, how.photons_per_texel])
-    if _may_have_sun(context.scene):
+    if may_have_sun(context.scene):
         effort.append(["without the sun", REVISION_OF_SUN])
         if panes_of(context.scene):
             effort.append(["nor the sun through panes", REVISION_OF_PANES])
@@ -149,7 +149,7 @@ def _by_photons(context: BakeContext) -> bool:
     return context.methods["light_map"] == LightMapMethod.photons
 
 
-def _may_have_sun(scene: Scene) -> bool:
+def may_have_sun(scene: Scene) -> bool:
     """Whether direct light of a sun would be left out; certain only once the environment's picture is read."""
     constant = scene.environment is None or isinstance(scene.environment, ConstantEnvironment)
     return not constant or any(isinstance(light, DirectionalLight) for light in scene.lights)

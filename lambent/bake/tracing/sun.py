@@ -10,6 +10,7 @@ import numpy as np
 
 from lambent.bake.sky.sun import ALIGNED, FoundSun
 from lambent.bake.tracing import rays
+from lambent.core.arrays import Flags, Floats
 from lambent.core.directions import basis
 
 
@@ -100,11 +101,22 @@ class SunRays:
         """
         bits = [dr.reinterpret_array(mi.UInt32, x) for x in (si.p.x, si.p.y, si.p.z)]
         u = mi.Point2f(mi.sample_tea_float32(bits[0] ^ bits[1], bits[2]), mi.sample_tea_float32(bits[2], bits[0]))
-        on_disc = mi.warp.square_to_uniform_disk_concentric(u) * self._tangent
-        w = dr.normalize(self._sun.direction + self._across * on_disc.x + self._up * on_disc.y)
         cosine = dr.dot(si.sh_frame.n, self._sun.direction)
         lit = active & (cosine != 0)
-        ray = rays.leaving(self._scene, si.p, si.n, w)
+        ray = rays.leaving(self._scene, si.p, si.n, self._direction(u))
         if self._blocked_by_all:
             return dr.select(lit & ~self._scene.ray_test(ray, lit), self._irradiance * cosine, 0.0)
         return self._irradiance * cosine * rays.passed(self._scene, ray, lit)
+
+    def arrive(self, points: Floats, normals: Floats, seed: int) -> Flags:
+        """Whether one ray each from points (n, 3) of flat surfaces (normals (n, 3)) reaches the sun, (n,)."""
+        w = self._direction(rays.independent(seed, len(points)).next_2d())
+        ray, active = rays.leaving(self._scene, points, normals, w), mi.Bool(True)
+        if self._blocked_by_all:
+            return ~np.array(self._scene.ray_test(ray, active))
+        return np.array(dr.max(rays.passed(self._scene, ray, active))) > 0
+
+    def _direction(self, u: Any) -> Any:
+        """Unit directions to places of the disc, by u (mi.Point2f) in the unit square."""
+        on_disc = mi.warp.square_to_uniform_disk_concentric(u) * self._tangent
+        return dr.normalize(self._sun.direction + self._across * on_disc.x + self._up * on_disc.y)

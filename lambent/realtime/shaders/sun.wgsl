@@ -18,6 +18,7 @@
 
 @group(1) @binding(3) var pane_depths: texture_depth_2d_array; // layer x squares + square
 @group(1) @binding(4) var pane_colours: texture_2d_array<f32>;
+@group(1) @binding(5) var sun_reaches: texture_2d<f32>; // by texel of the light map: 0 where the sun does not get
 
 override PANES: u32 = 0u;        // layers of clear glass
 override WIDE: bool = false;      // taps are places of the disc
@@ -298,6 +299,12 @@ fn mean_of_parts(seen: vec3f, pixel: vec2u) -> vec3f {
     return select(seen, clamp(all, vec3f(0.0), vec3f(1.0)), sun.parts > 1u && frame.alone == 1u);
 }
 
+// Whether the sun gets to the light map's texel at a place. Along joints of thin sheets, depths alone let light through.
+fn is_sunlit(uv2: vec2f) -> bool {
+    let size = vec2f(textureDimensions(sun_reaches));
+    return textureLoad(sun_reaches, vec2i(clamp(uv2 * size, vec2f(0.0), size - 1.0)), 0).r > 0.0;
+}
+
 @fragment fn sun_main(v: Varyings, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     let flat_normal = cross(dpdx(v.p_world), dpdy(v.p_world));
     let n = select(v.n_world, normalize(flat_normal), dot(flat_normal, flat_normal) > 0.0);
@@ -307,5 +314,6 @@ fn mean_of_parts(seen: vec3f, pixel: vec2u) -> vec3f {
     for (var i = 0u; i < select(0u, 1u, TRANSMITS | (facing > 0.0)); i++) { seen = sun_visibility(v.p_world, n); }
     var passed = vec3f(1.0);
     for (var i = 0u; i < select(0u, 1u, PANES > 0u && seen > 0.0); i++) { passed = sun_through_panes(v.p_world, n); }
-    return vec4f(mean_of_parts(seen * passed, vec2u(v.position.xy)), 1.0);
+    let mean = mean_of_parts(seen * passed, vec2u(v.position.xy)); // over pixels whose texels may be of other charts
+    return vec4f(select(vec3f(0.0), mean, is_sunlit(v.uv2)), 1.0);
 }
