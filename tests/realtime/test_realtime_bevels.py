@@ -32,7 +32,7 @@ MIRROR = ReflectorRecord(
 
 
 def bevelled_mirror(drop_m: float = 0.008, framed: bool = True) -> BakedScene:
-    """A mirror whose right edge is cut, a frame beside it, a post before it, and a wall, which is all its probe sees."""
+    """A mirror whose right edge is cut, a frame beside it, a post before it, and a wall, all that its probe sees."""
     meshes = {
         "mirror": merge([patch((-0.5, 0, 0), (1, 0, 0), (0, 1, 0)), patch((0.5, 0, 0), (0.08, 0, -drop_m), (0, 1, 0))]),
         **({"frame": placed(box((0.04, 1.0, 0.06)), (0.6, 0.5, 0.01))} if framed else {}),
