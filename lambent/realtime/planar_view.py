@@ -12,12 +12,13 @@ is 1 (times w) in the plane and falls with the distance along every ray to 1 - a
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from lambent.core.arrays import Floats
+from lambent.realtime.bevels import FLAT, Bevel
 from lambent.realtime.structs import MIRRORED_VIEW_DTYPE, PLAN_DTYPE, Record
 from lambent.store.contract import ObjectRecord, PlanRecord, ReflectorRecord
 
@@ -48,11 +49,12 @@ class PlanarView:
 def planar_views(
     frame: Record, reflectors: Sequence[ReflectorRecord], width: int, height: int, most: int,
     widest: Mapping[str, float] | None = None, whole: bool = False,
+    bevel_of: Callable[[ReflectorRecord], Bevel] = lambda reflector: FLAT,
 ) -> list[PlanarView]:  # fmt: skip
     """Views of the reflectors that a frame (of FRAME_DTYPE) sees, the largest first, at most `most`.
 
     `widest` is the largest m of an object's lobes, by its name: wide lobes need a larger buffer. `whole`: buffers hold
-    the whole frame, for lobes that are sampled to their very ends.
+    the whole frame, for lobes that are sampled to their very ends. `bevel_of` a reflector is that of its front.
     """
     seen = []
     for reflector in reflectors:
@@ -70,8 +72,12 @@ def planar_views(
     for number, (_, reflector, plane, shown) in enumerate(seen[:most]):
         m = max((widest or {}).get(part.object, 0.0) for part in reflector.parts)
         place = _window(frame, (width, height), m, None if whole else shown)
-        views.append(_view(frame, plane, reflector, (width, height), place, number))
-    return [view for view in views if view is not None]
+        view = _view(frame, plane, reflector, (width, height), place, number)
+        if view is not None:
+            bevel = bevel_of(reflector) if plane @ reflector.plane > 0 else FLAT
+            view.uniform["bevel_depth"], view.uniform["bevel_cos"] = bevel.depth_m, bevel.least_cos
+            views.append(view)
+    return views
 
 
 def clearance_m(reflector: ReflectorRecord, eye: Floats) -> float:

@@ -23,6 +23,7 @@ from lambent.core.images import to_bytes
 from lambent.core.progress import Progress, silent
 from lambent.core.sequences import hammersley
 from lambent.realtime.baked import BakedScene, read_baked
+from lambent.realtime.bevels import Bevels
 from lambent.realtime.clusters import Clusters
 from lambent.realtime.context import FrameContext, Pass
 from lambent.realtime.discs import Discs
@@ -88,7 +89,7 @@ class Renderer:
         )
         self.streaming: Streaming = beside.streaming if beside else Streaming(scene, self.resources.objects)
         self.mixer: LightMixer = beside.mixer if beside else LightMixer(layouts, scene, self.resources)
-        self.waits = True
+        self.waits, self._bevels = True, Bevels(scene)
         depth, base = DepthPass(layouts), BasePass(layouts)
         planar = PlanarPass(layouts, depth)
         light = LightPass(layouts, planar.reflections)
@@ -298,7 +299,9 @@ class Renderer:
         }
         whole = integrator(state.integrator).progressive
         reflectors = [r for r in record.reflectors if any(part.object not in panes for part in r.parts)]
-        return planar_views(data, reflectors, state.width, state.height, MOST_REFLECTORS, widest, whole)
+        return planar_views(
+            data, reflectors, state.width, state.height, MOST_REFLECTORS, widest, whole, self._bevels.of
+        )
 
 
 def _subframes(state: FrameState, count: int) -> Iterator[FrameState]:

@@ -17,6 +17,7 @@ override HIDDEN_DROP: f32 = 0.0; // of a hit's weight where the buffer shows som
 
 const FARTHEST = 2e4; // m
 const FADE_PX = 24.0; // beyond the edges of the buffer
+const FLAT_COS = 0.998; // least cosine of the reflector's own normals, as in lambent/realtime/bevels.py
 const BESIDE = 8u;    // neighbours, up to two pixels away
 
 // A pixel of a reflector: q, the plane seen in the mirror direction, the distance to it; x about the probe's centre.
@@ -175,12 +176,6 @@ fn from_probe(s: Surface, beyond: Beyond) -> vec3f {
     return beyond.gain * incident(s, normalize(beyond.w), 0.5 * log2(beyond.omega));
 }
 
-// `gain` with cosines of at least GRAZING, as the bent frames of other surfaces have them.
-fn planar_gain(lobe: LambentLobe, wi: vec3f, wo: vec3f, h: vec3f) -> vec3f {
-    let least = vec3f(-2.0, -2.0, GRAZING);
-    return gain(lobe, max(wi, least), max(wo, least), h);
-}
-
 // Tells pixels apart that cleaning must not mix: of other reflectors and materials, and with other lobes interleaved (the
 // bits of `interleaved`). 1 to 1999.
 fn surface_number(interleaved: u32) -> f32 {
@@ -199,13 +194,16 @@ struct PlanarLight {
     let view = normalize(frame.eye.xyz - v.p_world);
     // seen from right above, so that no normal is bent as those of rounded things are at grazing angles
     var s = shading_frame(v, select(-1.0, 1.0, upright > 0.0), mirrored.plane.xyz);
-    if (abs(dot(mirrored.plane.xyz, v.p_world) + mirrored.plane.w) > mirrored.tolerance || abs(upright) < 0.998) { discard; }
+    // Bevels lie below the plane. One comparison: software Vulkan (Mesa 22.3) crashes on further branches here.
+    let height = dot(mirrored.plane.xyz, v.p_world) + mirrored.plane.w;
+    let beside = max(height - mirrored.tolerance, -height - max(mirrored.bevel_depth, mirrored.tolerance));
+    if (max(beside, mirrored.bevel_cos - abs(upright)) > 0.0) { discard; }
     let e = layer_of(reflector_light_maps, select(BACK, FRONT, front), v.uv2).rgb;
     s = with_shares(s, reflector_light_maps, v.uv2, front, e);
     let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), max(dot(view, s.n), 1e-3)));
     let place = place_of(v, s, to_world(s, vec3f(-wo.xy, wo.z)));
     var result = PlanarLight(vec4f(0.0, 0.0, 0.0, min(place.t, HALF_MAX)), vec4f(0.0));
-    var interleaved = 0u;
+    var interleaved = select(0u, 256u, abs(upright) < FLAT_COS); // bevels are cleaned by themselves
     for (var i = 0u; i < LOBES; i++) {
         let found = integrate_planar(i, wo, s, place);
         let elsewhere = !lobe_mirrors(lobes[i].lobe); // light from behind the plane or from the viewer: left to the probe

@@ -24,7 +24,7 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
         let q = samples[first + k];
         let at = sample_about(wo, lambent_from_slopes(q.xy * here.growth));
         if (!at.seen) { continue; }
-        let g = q.w * planar_gain(here.lobe, at.wi, wo, at.h);
+        let g = q.w * gain(here.lobe, at.wi, wo, at.h);
         let w = to_world(s, at.wi);
         let hit = first_hit(place, w, fract(first_jitter + 0.618034 * f32(k)));
         let outside = u32(round(SHARE_STEPS * (1.0 - hit.inside)));
@@ -43,7 +43,7 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
         let q = samples[first + k];
         let at = sample_about(wo, lambent_from_slopes(q.xy * here.growth));
         let share = f32((shares[k >> 3u] >> ((k & 7u) << 2u)) & 15u) / SHARE_STEPS;
-        let g = share * q.w * planar_gain(here.lobe, at.wi, wo, at.h);
+        let g = share * q.w * gain(here.lobe, at.wi, wo, at.h);
         let light = incident(s, at.wi, half_log2_omega(q, at, here) + BEYOND_WIDER);
         others += select(vec3f(0.0), g * light, share > 0.0);
     }

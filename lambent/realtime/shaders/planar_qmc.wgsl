@@ -12,7 +12,7 @@ fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
     for (var k = 0u; k < SAMPLES; k++) {
         let at = sample_about(wo, lambent_sample_half_vector(sequence(offset, frame.first_sample + k), lobe));
         if (!at.seen) { continue; }
-        let g = planar_gain(lobe, at.wi, wo, at.h);
+        let g = gain(lobe, at.wi, wo, at.h);
         let jitter = f32(((frame.first_sample + k) * 2654435769u + offset.x) >> 8u) / 16777216.0;
         let hit = march(place, to_world(s, at.wi), jitter);
         let inside = hit.inside;

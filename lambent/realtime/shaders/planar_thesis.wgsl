@@ -26,7 +26,7 @@ fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
         let at = sample_about(wo, lambent_from_slopes(sample.xy * here.growth));
         if (!at.seen) { continue; }
         let p = sample.w / (at.h.z * at.h.z * at.h.z * at.cos_d);
-        let q = planar_gain(lobe, at.wi, wo, at.h) / at.wi.z;
+        let q = gain(lobe, at.wi, wo, at.h) / at.wi.z;
         let hit = find_hit(place, to_world(s, at.wi));
         let inside = hit.inside;
         let weight = select(q * q, q, FORMULA == 24u) * (at.wi.z * at.wi.z * p);
