@@ -19,7 +19,9 @@ BACKS = "backs"  # document: its key, and the objects
 LEAST = 4e-5  # share of all that viewers see, below which a back is left black: ten rays
 
 
-def find_backs(sight: Sight, store: Store, timed: Timed = untimed, progress: Progress = silent, *, anew: bool = False) -> None:
+def find_backs(
+    sight: Sight, store: Store, timed: Timed = untimed, progress: Progress = silent, *, anew: bool = False
+) -> None:
     """Note in the store whose backs are seen: as before where geometry is the same, whatever cameras, unless `anew`."""
     scene = sight.scene
     clear = sorted(name for name, material in scene.materials.items() if material.transmits)
