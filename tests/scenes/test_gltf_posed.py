@@ -105,14 +105,15 @@ def test_instances_of_a_node_become_objects_but_for_those_without_size(tmp_path:
     ]
     scene = loaded(tmp_path, content)
     assert [o.name for o in scene.objects] == ["thing_1", "thing_3"]
-    np.testing.assert_allclose(scene.objects[0].mesh.positions, TRIANGLE + (1, 1, 0))
-    np.testing.assert_allclose(scene.objects[1].mesh.positions, 2 * TRIANGLE + (0, 1, 3))
+    np.testing.assert_allclose(scene.objects[0].mesh.positions, TRIANGLE + np.array([1, 1, 0]))
+    np.testing.assert_allclose(scene.objects[1].mesh.positions, 2 * TRIANGLE + np.array([0, 1, 3]))
     assert scene.warnings == ("thing_2: left out, its node's scale is zero",)
 
 
 def test_instances_of_unlike_numbers_are_an_error(tmp_path: Path) -> None:
     content = document()
-    numbers = with_arrays(content, (np.zeros((2, 3), np.float32), FLOAT, "VEC3"), (np.ones((3, 3), np.float32), FLOAT, "VEC3"))  # fmt: skip
+    two, three = np.zeros((2, 3), np.float32), np.ones((3, 3), np.float32)
+    numbers = with_arrays(content, (two, FLOAT, "VEC3"), (three, FLOAT, "VEC3"))
     instances = {"attributes": dict(zip(("TRANSLATION", "SCALE"), numbers, strict=True))}
     content["nodes"] = [{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": instances}}]
     with pytest.raises(UserError, match="instances have no number"):

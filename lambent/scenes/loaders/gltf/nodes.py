@@ -275,7 +275,7 @@ class _Reading:
 def _volume(world: Floats) -> float:
     """How much larger a transform (4, 4) makes things; for so many nodes numpy's determinant is slow."""
     (a, b, c), (d, e, f), (g, h, i) = world[:3, :3].tolist()
-    return abs(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
+    return math.fabs(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
 
 
 def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int, pose: Pose) -> tuple[Mesh | None, list[str]]:
