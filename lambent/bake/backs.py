@@ -19,7 +19,9 @@ BACKS = "backs"  # document: its key, and the objects
 LEAST = 4e-5  # share of viewers' rays, ten in number, below which a back stays black
 
 
-def find_backs(sight: Sight, store: Store, timed: Timed = untimed, progress: Progress = silent, *, anew: bool = False) -> None:
+def find_backs(
+    sight: Sight, store: Store, timed: Timed = untimed, progress: Progress = silent, *, anew: bool = False
+) -> None:
     """Store which backs are seen; kept while geometry is unchanged, even if cameras change, unless `anew`."""
     scene = sight.scene
     clear = sorted(name for name, material in scene.materials.items() if material.transmits)

@@ -42,8 +42,8 @@ def cut_for_viewers(sight: Sight, store: Store, timed: Timed = untimed) -> Sight
     if not found["objects"]:
         return sight
     eyes, reach = np.array(found["eyes"]).reshape(-1, 3), found["reach_m"]
-    names = set(found["objects"])
-    objects = (replace(o, mesh=cut(o.mesh, eyes, reach)) if o.name in names else o for o in scene.objects)
+    large = set(found["objects"])
+    objects = (replace(o, mesh=cut(o.mesh, eyes, reach)) if o.name in large else o for o in scene.objects)
     return Sight(replace(scene, objects=tuple(objects)))
 
 

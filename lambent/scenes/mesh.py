@@ -1,4 +1,4 @@
-"""Triangle meshes, and what is found of many at once: a scene may have 100,000, and Python for each would take minutes."""
+"""Triangle meshes, and what is found of many at once: of 100,000, one by one, it would take minutes."""
 
 from __future__ import annotations
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from lambent.core.directions import Floats
 from lambent.core.geometry import area_vectors, cross_2d, triangle_areas
+from lambent.scenes.first_view import content_bounds
 from lambent.scenes.scene import Mesh, Scene
 
 LARGE, SMALL = 500.0, 0.05  # metres
@@ -34,8 +35,13 @@ def validate(scene: Scene) -> list[str]:
 
 
 def size_warnings(scene: Scene) -> list[str]:
-    """A warning if the scene's extent suggests another unit than the metre."""
+    """A warning if the extent of what stands in the scene suggests another unit than the metre.
+
+    Grounds and skies that dwarf all else may be as large as they like.
+    """
     low, high = scene.bounds
+    if (high - low).max() > LARGE:
+        low, high = content_bounds(scene.objects)
     extent = float((high - low).max())
     if SMALL <= extent <= LARGE:
         return []

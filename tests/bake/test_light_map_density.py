@@ -111,7 +111,9 @@ def test_cuts_leave_no_gaps_and_stay_with_the_store(tmp_path: Path) -> None:
     with Store.create(tmp_path / "s", {}) as store:
         first = cut_for_viewers(Sight(scene), store).scene
         moved = replace(scene, cameras=(replace(EYE, position=(400.0, 1.6, 400.0)),))
-        assert np.array_equal(cut_for_viewers(Sight(moved), store).scene.objects[0].mesh.faces, first.objects[0].mesh.faces)
+        assert np.array_equal(
+            cut_for_viewers(Sight(moved), store).scene.objects[0].mesh.faces, first.objects[0].mesh.faces
+        )
         assert len(first.objects[0].mesh.faces) > 100 and first.objects[2] is scene.objects[2]
 
 

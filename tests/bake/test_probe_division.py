@@ -11,6 +11,7 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.engine import engine
+from lambent.bake.sight import Sight
 from lambent.bake.tracing.solids import is_closed
 from lambent.core.camera import Camera
 from lambent.core.cubemap import texel_solid_angles
@@ -63,7 +64,6 @@ def test_object_in_two_rooms_has_a_probe_in_each(tmp_path: Path) -> None:
 def test_a_cut_that_viewers_do_not_see_is_not_made() -> None:
     """From a camera in the red room nobody sees the half of the bar that mirrors the blue one."""
     from lambent.bake.probes.division import cuts_of
-from lambent.bake.sight import Sight
 
     assert set(cuts_of(Sight(two_rooms()))) == {"bar"}
     red = Camera("red", (-1.5, 0.5, 1.5), (-1.5, 0, 0))

@@ -33,7 +33,7 @@ def too_long(meshes: Sequence[Mesh], reach_m: float = 0.0) -> Indices:
     longest = max(LEAST_M, TIMES * reach_m)
     boxes = boxes_of(meshes).astype(float)
     large = np.flatnonzero(np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1) > longest)
-    lengths = (lengths_of(meshes[number].corners).max(initial=0) for number in large)
+    lengths = (lengths_of(meshes[int(number)].corners).max(initial=0) for number in large)
     return large[np.fromiter(lengths, float, len(large)) > longest]
 
 

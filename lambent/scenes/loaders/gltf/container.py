@@ -164,6 +164,8 @@ def read(path: Path, root: Path | None = None) -> Gltf:
     unread = sorted(set(document.extensionsRequired) - READ_EXTENSIONS)
     if unread:
         advice = "export without compression" if any("compression" in name for name in unread) else None
+        if any("basisu" in name for name in unread):
+            advice = "export its textures as PNG, JPEG or WebP"
         raise UserError("requires an unsupported extension", file=path, got=", ".join(unread), hint=advice)
     gltf = Gltf(path, document, (), SceneFiles(path, root))
     return replace(gltf, buffers=tuple(_buffers(gltf, binary)))

@@ -21,13 +21,16 @@ from lambent.scenes.loaders.contents import Contents, UniqueNames
 from lambent.scenes.loaders.gltf.container import Gltf, read
 from lambent.scenes.loaders.gltf.luminaires import Luminaires
 from lambent.scenes.loaders.gltf.materials import surface_of
+from lambent.scenes.loaders.gltf.posed import Pose, joint_matrices, posed
 from lambent.scenes.loaders.gltf.schema import READ_EXTENSIONS, MaterialDocument, Node, Primitive
 from lambent.scenes.loaders.gltf.textures import Textures, main_uv_set
+from lambent.scenes.loaders.gltf.transforms import instances_of, locals_of
 from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
 from lambent.scenes.scene import DirectionalLight, Light, Mesh, PointLight, SceneObject
 
 FAR = 1e9  # metres
+_Key = tuple[int, int, int, tuple[float, ...], int]  # of a mesh: its number, primitive, uv set, morph weights, skin
 DRACO = "KHR_draco_mesh_compression"
 
 
@@ -44,6 +47,7 @@ def load(path: Path, root: Path | None = None) -> Contents:
     """
     reading = _Reading(read(path, root))
     reading.walk()
+    reading.add_skinned()
     reading.place()
     return reading.contents()
 
@@ -81,8 +85,10 @@ class _Reading:
         self._luminaires = Luminaires(gltf, self._warnings.append)
         self._names, self._camera_names = UniqueNames(), UniqueNames()
         self._renamed: dict[str, list[str]] = {}
-        self._meshes: dict[tuple[int, int, int], Mesh | None] = {}
-        self._placed: dict[tuple[int, int, int], list[tuple[int, Floats]]] = {}  # by mesh, objects and their transforms
+        self._meshes: dict[_Key, Mesh | None] = {}
+        self._placed: dict[_Key, list[tuple[int, Floats]]] = {}  # by mesh, objects and their transforms
+        self._joints: dict[int, Floats] = {}  # where joints of skins stand, by their nodes
+        self._skinned: list[tuple[Node, Floats]] = []
         self._triangles = 0
 
     def contents(self) -> Contents:
@@ -124,7 +130,7 @@ class _Reading:
             roots = gltf.pick(document.scenes, document.scene, "scene").nodes
         else:
             roots = sorted(set(range(len(document.nodes))) - {c for n in document.nodes for c in n.children})
-        matrices = _locals(document.nodes)
+        matrices, joints = locals_of(document.nodes), {joint for skin in document.skins for joint in skin.joints}
         skewed = np.abs(matrices[:, 3] - (0, 0, 0, 1)).max(axis=1) > 1e-6
         stack = [(index, np.eye(4)) for index in reversed(roots)]
         seen: set[int] = set()
@@ -143,12 +149,19 @@ class _Reading:
             world = parent @ matrices[index]
             if not np.abs(world).max() < FAR:
                 raise UserError("transform is not finite or too large", file=gltf.path, field=field)
+            if index in joints:
+                self._joints[index] = world
             self._visit(node, world)
             stack += [(child, world) for child in reversed(node.children)]
 
     def _visit(self, node: Node, world: Floats) -> None:
-        if node.mesh is not None:
-            self._add_mesh(node.mesh, node.name, world)
+        if node.mesh is not None and node.skin is not None:
+            self._skinned.append((node, world))
+        elif node.mesh is not None and node.instances is not None:
+            for number, place in enumerate(instances_of(self._gltf, node.instances, node.name or "instances"), 1):
+                self._add_mesh(node.mesh, f"{node.name}_{number}" if node.name else None, world @ place, node.weights)
+        elif node.mesh is not None:
+            self._add_mesh(node.mesh, node.name, world, node.weights)
         if node.camera is not None:
             self._add_camera(node.camera, node.name, world)
         if node.luminaire is not None:  # a fallback next to it serves programs that cannot read luminaires
@@ -157,9 +170,30 @@ class _Reading:
         elif node.light is not None:
             self._add_light(node.light, node.name, world)
 
-    def _add_mesh(self, index: int, node_name: str | None, world: Floats) -> None:
+    def add_skinned(self) -> None:
+        """Add the meshes that joints place: their own nodes do not, by glTF's rules."""
+        for node, world in self._skinned:
+            assert node.mesh is not None and node.skin is not None
+            joints = joint_matrices(self._gltf, node.skin, self._joints)
+            if joints is None:
+                name = node.name or f"mesh_{node.mesh}"
+                self._warnings.append(f"{name}: its skin is ignored, not all of its joints are in the scene")
+                self._add_mesh(node.mesh, node.name, world, node.weights)
+            else:
+                self._add_mesh(node.mesh, node.name, np.eye(4), node.weights, (node.skin, joints))
+
+    def _add_mesh(
+        self,
+        index: int,
+        node_name: str | None,
+        world: Floats,
+        weights: Sequence[float] | None = None,
+        skin: tuple[int, Floats] | None = None,
+    ) -> None:
         gltf = self._gltf
         mesh = gltf.pick(gltf.document.meshes, index, "meshes")
+        morph = tuple(weights or mesh.weights or ())
+        pose = Pose(morph, None if skin is None else skin[1])
         wanted = node_name or mesh.name or f"mesh_{index}"
         if _volume(world) < 1e-18:
             self._warnings.append(f"{wanted}: left out, its node's scale is zero")
@@ -167,9 +201,10 @@ class _Reading:
         for k, primitive in enumerate(mesh.primitives):
             number = -1 if primitive.material is None else self._checked(primitive.material)
             uv_set = self._materials.uv_set(number)
-            key = (index, k, uv_set)
+            key = (index, k, uv_set, morph, -1 if skin is None else skin[0])
             if key not in self._meshes:
-                self._meshes[key], notes = _primitive(gltf, primitive, f"{wanted} ({k})" if k else wanted, uv_set)
+                title = f"{wanted} ({k})" if k else wanted
+                self._meshes[key], notes = _primitive(gltf, primitive, title, uv_set, pose)
                 self._warnings += notes
             local = self._meshes[key]
             if local is None:
@@ -215,6 +250,9 @@ class _Reading:
         if camera.yfov is None:
             self._warnings.append(f"{wanted}: left out, a camera without perspective")
             return
+        if _volume(world) < 1e-18:
+            self._warnings.append(f"{wanted}: left out, its node's scale is zero")
+            return
         name = self._camera_names.unique(wanted)
         position, forward, up = world[:3, 3], -normalize(world[:3, 2]), normalize(world[:3, 1])
         target, fov_y_deg = triple(position + forward), math.degrees(camera.yfov)
@@ -234,31 +272,13 @@ class _Reading:
             self._lights.append(PointLight(position, power, direction, min(inner, outer), outer, name))
 
 
-def _locals(nodes: Sequence[Node]) -> Floats:
-    """(N, 4, 4) matrices of nodes, relative to their parents."""
-    quaternions = np.array([node.rotation for node in nodes], float).reshape(-1, 4)
-    x, y, z, w = normalize(np.where(quaternions.any(axis=1, keepdims=True), quaternions, (0.0, 0.0, 0.0, 1.0))).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    matrices = np.tile(np.eye(4), (len(nodes), 1, 1))
-    scales = np.array([node.scale for node in nodes], float).reshape(-1, 1, 3)
-    matrices[:, :3, :3] = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2) * scales
-    matrices[:, :3, 3] = np.array([node.translation for node in nodes], float).reshape(-1, 3)
-    given = [i for i, node in enumerate(nodes) if node.matrix is not None]
-    matrices[given] = np.array([nodes[i].matrix for i in given], float).reshape(-1, 4, 4).transpose(0, 2, 1)
-    return matrices
-
-
 def _volume(world: Floats) -> float:
     """How much larger a transform (4, 4) makes things; for so many nodes numpy's determinant is slow."""
     (a, b, c), (d, e, f), (g, h, i) = world[:3, :3].tolist()
-    return abs(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
+    return math.fabs(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
 
 
-def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int) -> tuple[Mesh | None, list[str]]:
+def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int, pose: Pose) -> tuple[Mesh | None, list[str]]:
     attributes = primitive.attributes
     if "POSITION" not in attributes:
         return None, [f"{name}: left out, it has no positions"]
@@ -298,7 +318,7 @@ def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int) -> tupl
     if tangents is not None:
         tangents = tangents[:, :3]
     arrays = MeshArrays(positions, faces, optional("NORMAL", 3), uv, tangents)
-    mesh, repaired = mesh_of(arrays, name=name, file=gltf.path)
+    mesh, repaired = mesh_of(posed(gltf, primitive, name, arrays, used, pose), name=name, file=gltf.path)
     return mesh, notes + repaired
 
 

@@ -80,18 +80,28 @@ class Primitive(_Extended):
     indices: Index | None = None
     material: Index | None = None
     mode: Index = 4
+    targets: list[dict[str, Index]] | None = None
     variants: list[VariantMapping] = _extension("KHR_materials_variants", "mappings", default=[])
 
 
 class MeshDocument(_Part):
     primitives: list[Primitive]
     name: str | None = None
+    weights: list[Finite] | None = None
+
+
+class SkinDocument(_Part):
+    joints: list[Index]
+    inverseBindMatrices: Index | None = None
 
 
 class Node(_Extended):
     name: str | None = None
     children: list[Index] = Field(default_factory=list)  # a factory: pydantic copies other defaults per node
     mesh: Index | None = None
+    skin: Index | None = None
+    weights: list[Finite] | None = None
+    instances: dict[str, Index] | None = _extension("EXT_mesh_gpu_instancing", "attributes")
     camera: Index | None = None
     light: Index | None = _extension("KHR_lights_punctual", "light")
     luminaire: Index | None = _extension("EXT_lights_ies", "light")
@@ -255,6 +265,7 @@ class GltfDocument(_Extended):
     scenes: list[SceneNodes] = []
     nodes: list[Node] = []
     meshes: list[MeshDocument] = []
+    skins: list[SkinDocument] = []
     accessors: list[Accessor] = []
     bufferViews: list[BufferView] = []
     buffers: list[Buffer] = []

@@ -41,7 +41,7 @@ def leaning_faces(meshes: Sequence[Mesh]) -> Indices:
 def leaning_warnings(objects: Sequence[SceneObject]) -> list[str]:
     """One warning for all objects with `leaning_faces`, or none."""
     found = leaning_faces([o.mesh for o in objects])
-    counts = {objects[i].name: int(found[i]) for i in np.flatnonzero(found)}
+    counts = {objects[i].name: int(found[i]) for i in np.flatnonzero(found).tolist()}
     if not counts:
         return []
     names = ", ".join([*list(counts)[:NAMED], *(["..."] if len(counts) > NAMED else [])])
