@@ -41,6 +41,7 @@ class SunLight:
     ) -> None:  # fmt: skip
         self.exists, self.is_wide = len(parts) > 0, len(parts) > 1
         panes = panes or no_panes(layouts.device)
+        self.squares = len(parts[0].squares) if parts else 0
         self.pane_layers = panes.count
         self._data, self._queue = sun_data(sun, parts), layouts.device.queue
         self.uniform = layouts.uniform(SUN_DTYPE.itemsize)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import sys
 from dataclasses import replace
 from typing import Any
 
@@ -240,6 +242,29 @@ def test_slices_of_a_frame_are_the_frame(device: Any) -> None:
     for _ in renderer.slices(state, target.create_view(), Cut()):
         pass
     assert np.array_equal(whole, pixels(device, target))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts memory by glibc's mallinfo2")
+def test_frames_leave_no_memory_behind(device: Any) -> None:
+    """Mesa's software adapter keeps a copy of a shader for every render pass if branches depend on uniforms alone."""
+    renderer = Renderer(device, scene({"floor": floor(), "plate": plate()}, 0.0))
+    state = FrameState(camera=DOWN, width=SIZE, height=SIZE)
+    for _ in range(3):
+        renderer.image(state)
+    before = allocated_bytes()
+    for _ in range(8):
+        renderer.image(state)
+    assert allocated_bytes() - before < 8 * 200_000
+
+
+def allocated_bytes() -> int:
+    """Bytes that malloc has given out."""
+    fields = ("arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost")
+    info = type("Mallinfo2", (ctypes.Structure,), {"_fields_": [(name, ctypes.c_size_t) for name in fields]})
+    mallinfo2 = ctypes.CDLL(None).mallinfo2
+    mallinfo2.restype = info
+    found = mallinfo2()
+    return int(found.uordblks + found.hblkhd)
 
 
 @pytest.mark.parametrize("radius_deg", [0.27, 5.0])

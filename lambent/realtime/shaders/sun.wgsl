@@ -20,6 +20,9 @@
 @group(1) @binding(4) var pane_colours: texture_2d_array<f32>;
 @group(1) @binding(5) var sun_reaches: texture_2d<f32>; // by texel of the light map: 0 where the sun does not get
 
+// Conditions of uniforms alone, of loops or in `&&`, make Mesa's software adapter copy the shader for every render pass, and
+// keep the copies: use constants and `&`.
+override SQUARES: u32 = 4u;      // of each part of the disc
 override PANES: u32 = 0u;        // layers of clear glass
 override WIDE: bool = false;      // taps are places of the disc
 override TRANSMITS: bool = false; // surfaces show light from behind them
@@ -118,7 +121,7 @@ fn sun_place(p_world: vec3f, n_world: vec3f) -> SunPlace {
     let side = f32(textureDimensions(sun_depths).x);
     var at = SunPlace();
     at.square = u32(sun.irradiance.w);
-    for (var k = 0u; k < u32(sun.irradiance.w); k++) {
+    for (var k = 0u; k < SQUARES; k++) {
         at.texel = (axes - sun.squares[4u * sun_part + k].xy) * sun.squares[4u * sun_part + k].z;
         at.texel_m = sun.squares[4u * sun_part + k].w;
         if (all(at.texel > vec2f(2.0)) && all(at.texel < vec2f(side - 2.0))) {
@@ -296,7 +299,7 @@ fn mean_of_parts(seen: vec3f, pixel: vec2u) -> vec3f {
     let is_odd = vec2f(pixel & vec2u(1u));
     let row = seen + (0.5 - is_odd.x) * dpdxFine(seen);
     let all = row + (0.5 - is_odd.y) * dpdyFine(row);
-    return select(seen, clamp(all, vec3f(0.0), vec3f(1.0)), sun.parts > 1u && frame.alone == 1u);
+    return select(seen, clamp(all, vec3f(0.0), vec3f(1.0)), (sun.parts > 1u) & (frame.alone == 1u));
 }
 
 // Whether the sun gets to the light map's texel at a place. Along joints of thin sheets, depths alone let light through.
