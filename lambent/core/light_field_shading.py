@@ -74,5 +74,5 @@ def under_sky(field: LightField, sky: Sky) -> LightField:
     """The light field with another sky in its maps; what it lights keeps the light it had."""
     n = field.radiance.shape[1]
     behind = sky(texel_directions(n).reshape(-1, 3)).reshape(n, n, 3).astype(field.radiance.dtype)
-    radiance = np.where((field.inverse_distance == 0)[..., None], behind, field.radiance)
+    radiance = np.where((np.asarray(field.inverse_distance) == 0)[..., None], behind, np.asarray(field.radiance))
     return replace(field, radiance=radiance, blocks=None)  # which are those of the other sky
