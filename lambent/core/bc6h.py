@@ -182,7 +182,7 @@ def _off_line(sums: Any) -> float:
         p, q, r = xx * a + xy * b + xz * c, xy * a + yy * b + yz * c, xz * a + yz * b + zz * c
         along = a * p + b * q + c * r
         a, b, c = p, q, r
-    return max(all_of_it - along, 0.0) + along / _BETWEEN
+    return float(max(all_of_it - along, 0.0) + along / _BETWEEN)
 
 
 @numba.njit(cache=True, nogil=True)

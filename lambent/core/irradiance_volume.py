@@ -7,11 +7,13 @@ makes the interpolation continuous.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.irradiance import WEIGHTS, basis_of
-from lambent.core.light_field import LightField
+from lambent.core.light_field import LightField, Maps
 from lambent.core.octahedral import texel_directions, texel_solid_angles
 
 NEAREST = 12
@@ -42,8 +44,9 @@ class IrradianceVolume:
         return np.asarray(np.maximum(np.einsum("kb,kbc->kc", basis_of(n), by_normal), 0))
 
 
-def _parts(maps: Floats) -> list[Floats]:
-    return [maps[i : i + MAPS_AT_ONCE] for i in range(0, len(maps), MAPS_AT_ONCE)]
+def _parts(maps: Maps) -> Iterator[Floats]:
+    for i in range(0, maps.shape[0], MAPS_AT_ONCE):
+        yield maps[i : i + MAPS_AT_ONCE]
 
 
 def _summed(maps: Floats, flux: Floats) -> Floats:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,26 @@ MOST_POINTS = NO_POINT  # indices are 16 bits wide
 # Sky share of a texel that has the light of a surface, by the bits of `LightField.cover`.
 SKY_SHARE = np.array([0.0, *[1 - bits.bit_count() / 4 for bits in range(1, 16)]])
 LEAST_TEXELS, MOST_TEXELS = 8, 1024  # along a side of a map
+
+
+class Maps(Protocol):
+    """Maps of all points, (P, E, E) or (P, E, E, C): an array, or what is decoded where it is read."""
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+
+    @property
+    def dtype(self) -> np.dtype[Any]: ...
+
+    @property
+    def size(self) -> int: ...
+
+    @property
+    def nbytes(self) -> int: ...
+
+    def __getitem__(self, key: Any, /) -> Any: ...
+
+    def __array__(self) -> NDArray[Any]: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +94,8 @@ class LightField:
 
     points: NDArray[np.float32]
     normals: NDArray[np.float32]
-    radiance: NDArray[np.float32] | NDArray[np.float16]
-    inverse_distance: NDArray[np.float16]
+    radiance: Maps
+    inverse_distance: Maps
     sample_map: NDArray[np.uint16]
     corner: tuple[int, int]
     grid: tuple[int, int]
@@ -83,7 +104,7 @@ class LightField:
     own_diffuse: bool = False
     volume: bool = False
     glass: Glass | None = None
-    cover: NDArray[np.uint8] | None = None
+    cover: Maps | None = None
     distances: NDArray[np.uint32] | None = None
 
     @property

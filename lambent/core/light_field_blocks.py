@@ -6,7 +6,10 @@ they are: maps of 310 texels a side are 78 x 78 blocks, and nothing is filled.
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,8 +41,7 @@ def blocks_shape(side: int) -> tuple[int, int, int]:
 
 def maps_of(blocks: NDArray[np.uint32], side: int) -> NDArray[np.float16]:
     """(P, E, E, 3) of blocks (P, B, B, 4); `side` is E."""
-    if up(side + 2, BLOCK) != BLOCK * blocks.shape[1]:
-        raise ValueError(f"{blocks.shape[1]} blocks in a row do not hold maps of {side} texels")
+    _held(blocks, side)
     return decoded(blocks)[:, 1 : side + 1, 1 : side + 1]
 
 
@@ -58,20 +60,82 @@ def distance_blocks_shape(side: int) -> tuple[int, int, int]:
 
 def distances_of(blocks: NDArray[np.uint32], side: int) -> tuple[NDArray[np.float16], NDArray[np.uint8]]:
     """Inverse distances and cover (P, E, E) of blocks (P, R, B, 2); `side` is E."""
-    if blocks.shape[1:] != distance_blocks_shape(side):
-        raise ValueError(f"blocks of shape {blocks.shape} do not hold distances of maps of {side} texels")
+    _distances_held(blocks, side)
     inverse, cover = distance_blocks.decoded(blocks, up(side + 2, BLOCK) // BLOCK)
     inner = np.s_[:, 1 : side + 1, 1 : side + 1]
     return inverse[inner], cover[inner]
 
 
+@dataclass(frozen=True, eq=False)
+class MapsInBlocks:
+    """Maps (P, E, E) or (P, E, E, C) that stay in blocks; what is read of them is decoded, whole maps at a time.
+
+    `decode` makes maps of some of the blocks.
+    """
+
+    blocks: NDArray[np.uint32]
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    decode: Callable[[NDArray[np.uint32]], NDArray[Any]]
+
+    @property
+    def size(self) -> int:
+        return math.prod(self.shape)
+
+    @property
+    def nbytes(self) -> int:
+        """Of the maps when they are decoded."""
+        return self.size * self.dtype.itemsize
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, key: Any, /) -> NDArray[Any]:
+        """As of an array; the first index says which maps are decoded."""
+        first, *rest = key if isinstance(key, tuple) else (key,)
+        wanted = np.arange(len(self))[first]
+        which, place = np.unique(wanted, return_inverse=True)
+        return np.asarray(self.decode(self.blocks[which])[(place.reshape(np.shape(wanted)), *rest)])
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.asarray(self.decode(self.blocks), dtype)
+
+
+def light_in_blocks(blocks: NDArray[np.uint32], side: int) -> MapsInBlocks:
+    """Maps (P, E, E, 3) as of `maps_of`."""
+    _held(blocks, side)
+    return MapsInBlocks(blocks, (len(blocks), side, side, 3), np.dtype(np.float16), partial(maps_of, side=side))
+
+
+def distances_in_blocks(blocks: NDArray[np.uint32], side: int) -> tuple[MapsInBlocks, MapsInBlocks]:
+    """Inverse distances and cover, (P, E, E) each, as of `distances_of`."""
+    _distances_held(blocks, side)
+    shape = len(blocks), side, side
+    return (
+        MapsInBlocks(blocks, shape, np.dtype(np.float16), lambda some: distances_of(some, side)[0]),
+        MapsInBlocks(blocks, shape, np.dtype(np.uint8), lambda some: distances_of(some, side)[1]),
+    )
+
+
 def in_blocks(field: LightField) -> LightField:
     """A light field as it is read again where its store has blocks."""
     side = field.radiance.shape[1]
-    shows = None if field.cover is None or field.volume else field.cover != 0
-    blocks, distances = blocks_of(field.radiance, shows), distance_blocks_of(field.inverse_distance, field.cover)
-    inverse, cover = distances_of(distances, side)
+    light, inverse_distance = np.asarray(field.radiance), np.asarray(field.inverse_distance)
+    cover = None if field.cover is None else np.asarray(field.cover)
+    shows = None if cover is None or field.volume else cover != 0
+    blocks, distances = blocks_of(light, shows), distance_blocks_of(inverse_distance, cover)
+    inverse, bits = distances_of(distances, side)
     return replace(
         field, radiance=maps_of(blocks, side), inverse_distance=inverse, blocks=blocks, distances=distances,
-        cover=None if field.volume else cover,
+        cover=None if field.volume else bits,
     )  # fmt: skip
+
+
+def _held(blocks: NDArray[np.uint32], side: int) -> None:
+    if up(side + 2, BLOCK) != BLOCK * blocks.shape[1]:
+        raise ValueError(f"{blocks.shape[1]} blocks in a row do not hold maps of {side} texels")
+
+
+def _distances_held(blocks: NDArray[np.uint32], side: int) -> None:
+    if blocks.shape[1:] != distance_blocks_shape(side):
+        raise ValueError(f"blocks of shape {blocks.shape} do not hold distances of maps of {side} texels")

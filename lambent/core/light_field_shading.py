@@ -75,5 +75,5 @@ def under_sky(field: LightField, sky: Sky) -> LightField:
     """The light field with another sky in its maps; light that surfaces received from the old sky stays."""
     n = field.radiance.shape[1]
     behind = sky(texel_directions(n).reshape(-1, 3)).reshape(n, n, 3).astype(field.radiance.dtype)
-    radiance = np.where((field.inverse_distance == 0)[..., None], behind, field.radiance)
+    radiance = np.where((np.asarray(field.inverse_distance) == 0)[..., None], behind, np.asarray(field.radiance))
     return replace(field, radiance=radiance, blocks=None)  # blocks hold the old sky

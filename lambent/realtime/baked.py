@@ -125,7 +125,11 @@ def _light_field(store: Store, name: str, unit: float) -> LightField:
     """The light field of an object, its light in `unit`."""
     found = read_light_field(store, name)
     own = contract.radiance_unit(store, light_name(store, name))
-    return found if own == unit else replace(found, radiance=found.radiance * np.float32(own / unit), blocks=None)
+    return (
+        found
+        if own == unit
+        else replace(found, radiance=np.asarray(found.radiance) * np.float32(own / unit), blocks=None)
+    )
 
 
 def _in_units(sun: SunRecord | None, unit: float) -> SunRecord | None:

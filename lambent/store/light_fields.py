@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
-from lambent.core.light_field import CANDIDATES, NO_POINT, Glass, LightField
+from lambent.core.light_field import CANDIDATES, NO_POINT, Glass, LightField, Maps
 from lambent.core.plain import triple
 from lambent.store.consistency import numbers_of
 from lambent.store.contract import light_field_name
@@ -37,7 +37,7 @@ def read_light_field(store: Store, object_name: str) -> LightField:
     name = light_field_name(object_name, PARTS[-1])
     corner, grid = (numbers_of(store, name, key, 2) for key in ("corner", "grid"))
     (offset_m,) = [float(x) for x in np.atleast_1d(store.artefact(name).meta.get("offset_m", np.nan))]
-    count, side = len(points), radiance.shape[1] if radiance.ndim == 4 else 0
+    count, side = len(points), radiance.shape[1] if len(radiance.shape) == 4 else 0
     fits = (
         points.shape == normals.shape == (count, 3)
         and 0 < count <= NO_POINT
@@ -65,20 +65,18 @@ def read_light_field(store: Store, object_name: str) -> LightField:
     )  # fmt: skip
 
 
-def _distances(
-    store: Store, object_name: str
-) -> tuple[NDArray[np.float16], NDArray[np.uint8] | None, NDArray[np.uint32] | None]:
-    """Inverse distances and cover, and their blocks if stored."""
+def _distances(store: Store, object_name: str) -> tuple[Maps, Maps | None, NDArray[np.uint32] | None]:
+    """Inverse distances and cover, and their blocks if stored; they are decoded when read."""
     name = light_field_name(object_name, DISTANCES)
     if name not in store:
-        inverse = store.read(light_field_name(object_name, "inverse_distance"))
-        return inverse, _cover(store, object_name, inverse.shape), None
-    from lambent.core.light_field_blocks import distances_of  # imports numba
+        whole = store.read(light_field_name(object_name, "inverse_distance"))
+        return whole, _cover(store, object_name, whole.shape), None
+    from lambent.core.light_field_blocks import distances_in_blocks  # imports numba
 
     blocks, (side,) = store.read(name), numbers_of(store, name, "texels", 1)
     volume = store.artefact(light_field_name(object_name, PARTS[-1])).meta.get("volume") is True
     try:
-        inverse, cover = distances_of(blocks, int(side))
+        inverse, cover = distances_in_blocks(blocks, int(side))
     except ValueError as error:
         raise UserError("broken store", file=store.folder, field=name, got=str(error)) from error
     return inverse, None if volume else cover, blocks
@@ -113,17 +111,17 @@ def light_name(store: Store, object_name: str) -> str:
     return blocks if blocks in store else light_field_name(object_name, "radiance")
 
 
-def _radiance(store: Store, object_name: str, side: int) -> tuple[NDArray[np.float16], NDArray[np.uint32] | None]:
+def _radiance(store: Store, object_name: str, side: int) -> tuple[Maps, NDArray[np.uint32] | None]:
     """Maps, and their blocks if stored."""
     name = light_name(store, object_name)
     array = store.read(name)
     if not name.endswith(BLOCKS):
         return array, None
-    from lambent.core.light_field_blocks import maps_of  # imports numba
+    from lambent.core.light_field_blocks import light_in_blocks  # imports numba
 
     if array.ndim != 4 or array.shape[1] != array.shape[2] or array.shape[3] != 4 or array.dtype != np.uint32:
         raise UserError("broken store", file=store.folder, field=name, got=str(array.shape), expected="n x b x b x 4")
     try:
-        return maps_of(array, side), array
+        return light_in_blocks(array, side), array
     except ValueError as error:
         raise UserError("broken store", file=store.folder, field=name, got=str(error)) from error

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from lambent.core.distance_blocks import decoded, encoded
-from lambent.core.light_field_blocks import distance_blocks_of, distance_blocks_shape, distances_of
+from lambent.core.light_field_blocks import (
+    MapsInBlocks,
+    distance_blocks_of,
+    distance_blocks_shape,
+    distances_in_blocks,
+    distances_of,
+)
 from lambent.core.light_field_tiles import pool_rows
 
 N = 96
@@ -84,3 +90,20 @@ def test_one_distance_is_exact() -> None:
     for inverse in (1e-3, 1.0, 6e4):
         even = np.full((1, 4, 4), inverse, np.float16)
         np.testing.assert_allclose(decoded(encoded(even, None), 1)[0], even, rtol=1e-3)
+
+
+def test_maps_in_blocks_read_as_arrays_and_decode_what_is_read() -> None:
+    """By one map, slices, lists and arrays of indices; maps that are not read stay in blocks."""
+    inverse = np.stack([FLOOR, EDGE, FLOOR.T, NOISE])[:, :22, :22].astype(np.float16)
+    blocks = distance_blocks_of(inverse, None)
+    exact = distances_of(blocks, 22)[0]
+    maps, cover = distances_in_blocks(blocks, 22)
+    assert maps.shape == exact.shape and maps.dtype == exact.dtype and maps.nbytes == exact.nbytes
+    picked = np.array([[3, 1], [1, 0]])
+    for key in (2, -1, slice(1, 3), [0, 3], picked, (picked, picked + 1, 5), np.s_[1:3, ::2]):
+        np.testing.assert_array_equal(maps[key], exact[key])
+    np.testing.assert_array_equal(np.asarray(maps), exact)
+    assert (np.asarray(cover) == 15).all()
+    read = []
+    counting = MapsInBlocks(blocks, maps.shape, maps.dtype, lambda some: read.append(len(some)) or maps.decode(some))
+    assert counting[[3, 1, 3]].shape == (3, 22, 22) and read == [2]
