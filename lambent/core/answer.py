@@ -9,7 +9,7 @@ B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, a and t 
 transmission, F (P, P) the share of what a patch receives that comes from each other one. Patches have most bounces; the
 last PASSES are gathered among some thirty times as many points, each with its own direct light. Beside contacts, where
 light changes from texel to texel, more points gather in the last pass, and send nothing. Light is linear, so D,
-E and I have a leading axis of light groups; F may have one. A ratio, and not a difference, is applied to the baked
+E and I have a leading axis of light groups. A ratio, and not a difference, is applied to the baked
 light, so that it keeps its detail and the error is relative; with albedos as baked the ratio is 1 and nothing changes.
 
 Rays that lobes have sent on, and textures, are in the weights of rays. Points send the mean light around them. With the
@@ -57,8 +57,8 @@ class Patches:
         The patch on the other side; its own number on surfaces that no light crosses.
     direct : (G, P, 3) float32
         Direct irradiance by group of lights, W/m^2, the sun's included.
-    transfer : (P, P) or (G, P, P) float32
-        F, rows by the patch that receives, of all groups alike or of each.
+    transfer : (P, P) float32
+        F, rows by the patch that receives.
     """
 
     material: NDArray[np.integer]
@@ -77,20 +77,16 @@ class Patches:
         return self._rows(1.0)
 
     def _rows(self, most: float) -> SparseRows:
-        groups = len(self.direct)
-        bounded = self.transfer * np.minimum(1, most / np.maximum(self.transfer.sum(axis=-1, keepdims=True), most))
-        each = [csr_matrix(one) for one in np.broadcast_to(bounded, (groups, *bounded.shape[-2:]))]
-        first = np.cumsum([0, *(one.nnz for one in each[:-1])])
-        bounds = np.stack([one.indptr.astype(np.int64) + at for one, at in zip(each, first, strict=True)])
-        senders, shares = (np.concatenate([getattr(one, part) for one in each]) for part in ("indices", "data"))
-        return SparseRows(bounds[:, :-1], bounds[:, 1:], senders, shares)
+        sums = self.transfer.sum(axis=1, keepdims=True)
+        rows = csr_matrix(self.transfer * np.minimum(1, most / np.maximum(sums, most)))
+        return SparseRows(rows.indptr[:-1], rows.indptr[1:], rows.indices, rows.data)
 
 
 class SparseRows(NamedTuple):
-    """Entries `senders`, `shares` (n,) of rows that go from `starts` to `ends` (G, P)."""
+    """Entries `senders`, `shares` (n,) of rows that go from `starts` to `ends` (P,)."""
 
-    starts: NDArray[np.int64]
-    ends: NDArray[np.int64]
+    starts: NDArray[np.int32]
+    ends: NDArray[np.int32]
     senders: NDArray[np.int32]
     shares: NDArray[np.float32]
 
@@ -249,14 +245,14 @@ def gathered(rays: Rays, exitance: NDArray[np.float32]) -> NDArray[np.float32]:
 
     Rays are cosine distributed: it is pi times the mean of the radiance exitance/pi.
     """
-    given = rays.starts, rays.points, rays.weights, weights_of_bytes(), rays.scale, exitance
-    groups = exitance.shape[1]
+    given = rays.starts, rays.points, rays.weights, weights_of_bytes(), rays.scale
+    count, groups = exitance.shape[:2]
     if groups == 1:
-        return np.asarray(loops.gather_one(*given))
-    found = np.empty((len(rays.scale), groups, 4), np.float32)
-    for first in range(0, groups, 4):
-        loops.gather_four(*given, first, found)
-    return found
+        return np.asarray(loops.gather_one(*given, exitance))
+    padded = np.pad(exitance, ((0, 0), (0, -groups % 4), (0, 0))) if groups % 4 else exitance
+    fours = (padded[:, first : first + 4].reshape(count, 16) for first in range(0, groups, 4))
+    found = [loops.gather_four(*given, four).reshape(-1, 4, 4) for four in fours]
+    return np.ascontiguousarray(found[0] if groups == 4 else np.concatenate(found, axis=1)[:, :groups])
 
 
 @dataclass(frozen=True, eq=False)

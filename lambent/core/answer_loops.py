@@ -15,6 +15,7 @@ import numba
 import numpy as np
 
 NO_LIGHT = np.float32(1e-30)
+BLOCK = 128  # texels whose light stays in a processor's nearest cache
 _COMPILING, _NUMBA = Lock(), cast(Any, numba.config)
 
 
@@ -36,42 +37,68 @@ def by_lanes(loop: Callable[..., Any]) -> Callable[..., Any]:
     return called
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+@by_lanes
 def solve(starts, ends, senders, shares, direct, reflected, transmitted, paired, tolerance, sweeps, light):  # type: ignore[no-untyped-def]
     """Bring light (G, P, 3) to B = F (a (D + B) + t (D + B) of the other side) + D by Gauss and Seidel's method.
 
-    F is sparse by group and row: `senders` and `shares` from `starts` to `ends` (G, P). Groups stop one by one, when no
-    patch changes by more than `tolerance` of its light. Returns the sweeps of each (G,), and whether it stopped (G,).
+    F is sparse: `senders` and `shares` of row p from `starts` to `ends` (P,). Four groups are summed in one pass over its
+    rows, and stop together, when no patch changes by more than `tolerance` of its light. Returns the sweeps of each four,
+    and whether they stopped.
     """
     groups, patches = light.shape[:2]
-    taken, done = np.zeros(groups, np.int64), np.zeros(groups, np.bool_)
-    for group in numba.prange(groups):
-        sent = np.empty((patches, 3), np.float32)
-        for p in range(patches):
-            for c in range(3):
-                other = light[group, paired[p], c] * transmitted[p, c]
-                sent[p, c] = light[group, p, c] * reflected[p, c] + other
-        while taken[group] < sweeps and not done[group]:
-            taken[group] += 1
+    fours = (groups + 3) // 4
+    taken, done = np.zeros(fours, np.int64), np.zeros(fours, np.bool_)
+    for four in numba.prange(fours):
+        first, last = 4 * four, min(4 * four + 4, groups)
+        sent, arrived = np.zeros((patches, 16), np.float32), np.empty(16, np.float32)
+        for group in range(first, last):
+            for p in range(patches):
+                for c in range(3):
+                    other = light[group, paired[p], c] * transmitted[p, c]
+                    sent[p, 4 * (group - first) + c] = light[group, p, c] * reflected[p, c] + other
+        while taken[four] < sweeps and not done[four]:
+            taken[four] += 1
             stands = True
             for p in range(patches):
-                red = green = blue = np.float32(0)
-                for k in range(starts[group, p], ends[group, p]):
+                a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = np.float32(0)
+                a8 = a9 = a10 = a11 = a12 = a13 = a14 = a15 = np.float32(0)
+                for k in range(starts[p], ends[p]):
                     q, share = senders[k], shares[k]
-                    red += share * sent[q, 0]
-                    green += share * sent[q, 1]
-                    blue += share * sent[q, 2]
+                    a0 += share * sent[q, 0]
+                    a1 += share * sent[q, 1]
+                    a2 += share * sent[q, 2]
+                    a3 += share * sent[q, 3]
+                    a4 += share * sent[q, 4]
+                    a5 += share * sent[q, 5]
+                    a6 += share * sent[q, 6]
+                    a7 += share * sent[q, 7]
+                    a8 += share * sent[q, 8]
+                    a9 += share * sent[q, 9]
+                    a10 += share * sent[q, 10]
+                    a11 += share * sent[q, 11]
+                    a12 += share * sent[q, 12]
+                    a13 += share * sent[q, 13]
+                    a14 += share * sent[q, 14]
+                    a15 += share * sent[q, 15]
+                arrived[0], arrived[1], arrived[2], arrived[3] = a0, a1, a2, a3
+                arrived[4], arrived[5], arrived[6], arrived[7] = a4, a5, a6, a7
+                arrived[8], arrived[9], arrived[10], arrived[11] = a8, a9, a10, a11
+                arrived[12], arrived[13], arrived[14], arrived[15] = a12, a13, a14, a15
                 other = paired[p]
-                for c, arrived in enumerate((red, green, blue)):
-                    new = max(direct[group, p, c] + arrived, np.float32(0))  # an equivalent albedo may be negative
-                    # Not `>`: a difference of infinities, which is not a number, does not stand.
-                    if not abs(new - light[group, p, c]) <= tolerance * new + NO_LIGHT:
-                        stands = False
-                    light[group, p, c] = new
-                    sent[p, c] = new * reflected[p, c] + light[group, other, c] * transmitted[p, c]
-                    if other != p:
-                        sent[other, c] = light[group, other, c] * reflected[other, c] + new * transmitted[other, c]
-            done[group] = stands
+                for group in range(first, last):
+                    for c in range(3):
+                        lane = 4 * (group - first) + c
+                        # An equivalent albedo may be negative.
+                        new = max(direct[group, p, c] + arrived[lane], np.float32(0))
+                        # Not `>`: a difference of infinities, which is not a number, does not stand.
+                        if not abs(new - light[group, p, c]) <= tolerance * new + NO_LIGHT:
+                            stands = False
+                        light[group, p, c] = new
+                        sent[p, lane] = new * reflected[p, c] + light[group, other, c] * transmitted[p, c]
+                        if other != p:
+                            across = light[group, other, c] * reflected[other, c]
+                            sent[other, lane] = across + new * transmitted[other, c]
+            done[four] = stands
     return taken, done
 
 
@@ -150,55 +177,67 @@ def unpack(rays, starts, points, weights):  # type: ignore[no-untyped-def]
 def gather_one(starts, points, weights, table, scale, sent):  # type: ignore[no-untyped-def]
     """Sums (K, 1, 4) of exitance (n, 1, 4) at `points` (N,), those of each k from `starts` (K + 1,) on.
 
-    `table` has the weights that bytes stand for; the sums of each k are times `scale` (K,).
+    `table` has the weights that bytes stand for; the sums of each k are times `scale` (K,). Two rays are added at once:
+    each sum waits for the one before.
     """
     found = np.empty((len(scale), 1, 4), np.float32)
     for k in numba.prange(len(scale)):
-        a0 = a1 = a2 = a3 = np.float32(0)
-        for r in range(starts[k], starts[k + 1]):
+        a0 = a1 = a2 = a3 = b0 = b1 = b2 = b3 = np.float32(0)
+        begin, end = starts[k], starts[k + 1]
+        for r in range(begin, end - 1, 2):
             point, weight = points[r], table[weights[r]]
             a0 += weight * sent[point, 0, 0]
             a1 += weight * sent[point, 0, 1]
             a2 += weight * sent[point, 0, 2]
             a3 += weight * sent[point, 0, 3]
+            point, weight = points[r + 1], table[weights[r + 1]]
+            b0 += weight * sent[point, 0, 0]
+            b1 += weight * sent[point, 0, 1]
+            b2 += weight * sent[point, 0, 2]
+            b3 += weight * sent[point, 0, 3]
+        if (end - begin) % 2:
+            point, weight = points[end - 1], table[weights[end - 1]]
+            a0 += weight * sent[point, 0, 0]
+            a1 += weight * sent[point, 0, 1]
+            a2 += weight * sent[point, 0, 2]
+            a3 += weight * sent[point, 0, 3]
         by = scale[k]
-        found[k, 0, 0], found[k, 0, 1], found[k, 0, 2], found[k, 0, 3] = a0 * by, a1 * by, a2 * by, a3 * by
+        found[k, 0, 0], found[k, 0, 1] = (a0 + b0) * by, (a1 + b1) * by
+        found[k, 0, 2], found[k, 0, 3] = (a2 + b2) * by, (a3 + b3) * by
     return found
 
 
 @by_lanes
-def gather_four(starts, points, weights, table, scale, sent, first, found):  # type: ignore[no-untyped-def]
-    """The same for four groups from `first` on, into found (K, G, 4); where there are fewer, the last once more."""
-    last = sent.shape[1] - 1
-    two, three, four = min(first + 1, last), min(first + 2, last), min(first + 3, last)
+def gather_four(starts, points, weights, table, scale, sent):  # type: ignore[no-untyped-def]
+    """The same of four groups side by side: sums (K, 16) of exitance (n, 16)."""
+    found = np.empty((len(scale), 16), np.float32)
     for k in numba.prange(len(scale)):
-        a0 = a1 = a2 = a3 = b0 = b1 = b2 = b3 = np.float32(0)
-        c0 = c1 = c2 = c3 = d0 = d1 = d2 = d3 = np.float32(0)
+        a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = np.float32(0)
+        a8 = a9 = a10 = a11 = a12 = a13 = a14 = a15 = np.float32(0)
         for r in range(starts[k], starts[k + 1]):
             point, weight = points[r], table[weights[r]]
-            a0 += weight * sent[point, first, 0]
-            a1 += weight * sent[point, first, 1]
-            a2 += weight * sent[point, first, 2]
-            a3 += weight * sent[point, first, 3]
-            b0 += weight * sent[point, two, 0]
-            b1 += weight * sent[point, two, 1]
-            b2 += weight * sent[point, two, 2]
-            b3 += weight * sent[point, two, 3]
-            c0 += weight * sent[point, three, 0]
-            c1 += weight * sent[point, three, 1]
-            c2 += weight * sent[point, three, 2]
-            c3 += weight * sent[point, three, 3]
-            d0 += weight * sent[point, four, 0]
-            d1 += weight * sent[point, four, 1]
-            d2 += weight * sent[point, four, 2]
-            d3 += weight * sent[point, four, 3]
+            a0 += weight * sent[point, 0]
+            a1 += weight * sent[point, 1]
+            a2 += weight * sent[point, 2]
+            a3 += weight * sent[point, 3]
+            a4 += weight * sent[point, 4]
+            a5 += weight * sent[point, 5]
+            a6 += weight * sent[point, 6]
+            a7 += weight * sent[point, 7]
+            a8 += weight * sent[point, 8]
+            a9 += weight * sent[point, 9]
+            a10 += weight * sent[point, 10]
+            a11 += weight * sent[point, 11]
+            a12 += weight * sent[point, 12]
+            a13 += weight * sent[point, 13]
+            a14 += weight * sent[point, 14]
+            a15 += weight * sent[point, 15]
         by = scale[k]
-        found[k, four, 0], found[k, four, 1], found[k, four, 2], found[k, four, 3] = d0 * by, d1 * by, d2 * by, d3 * by
-        found[k, three, 0], found[k, three, 1] = c0 * by, c1 * by
-        found[k, three, 2], found[k, three, 3] = c2 * by, c3 * by
-        found[k, two, 0], found[k, two, 1], found[k, two, 2], found[k, two, 3] = b0 * by, b1 * by, b2 * by, b3 * by
-        found[k, first, 0], found[k, first, 1] = a0 * by, a1 * by
-        found[k, first, 2], found[k, first, 3] = a2 * by, a3 * by
+        found[k, 0], found[k, 1], found[k, 2], found[k, 3] = a0 * by, a1 * by, a2 * by, a3 * by
+        found[k, 4], found[k, 5], found[k, 6], found[k, 7] = a4 * by, a5 * by, a6 * by, a7 * by
+        found[k, 8], found[k, 9], found[k, 10], found[k, 11] = a8 * by, a9 * by, a10 * by, a11 * by
+        found[k, 12], found[k, 13], found[k, 14], found[k, 15] = a12 * by, a13 * by, a14 * by, a15 * by
+    return found
 
 
 @by_lanes
@@ -225,29 +264,35 @@ def upsampled(light, points, shares):  # type: ignore[no-untyped-def]
 @by_lanes
 def texel_light(points, shares, edited, reference, direct, baked, least, most_ratio, most_excess):  # type: ignore[no-untyped-def]
     """`answer.answered` at texels (G, T, 3), of means over the points near each of `edited` (K, G, 4)."""
-    found = np.empty(direct.shape, np.float32)
-    groups, near = direct.shape[0], points.shape[1]
-    for t in numba.prange(direct.shape[1]):
-        total = np.float32(0)
-        for n in range(near):
-            total += np.float32(shares[t, n])
-        for group in range(groups):
-            a0 = a1 = a2 = a3 = np.float32(0)
+    groups, texels, near = direct.shape[0], direct.shape[1], points.shape[1]
+    found = np.empty((groups, 3 * texels), np.float32)
+    before, straight, whole = reference.reshape(groups, -1), direct.reshape(groups, -1), baked.reshape(groups, -1)
+    for block in numba.prange((texels + BLOCK - 1) // BLOCK):
+        first = BLOCK * block
+        count = min(BLOCK, texels - first)
+        mean = np.empty((groups, 3 * BLOCK + 1), np.float32)  # the padding of a texel is where the next one begins
+        for t in range(count):
+            total = np.float32(0)
             for n in range(near):
-                place, share = points[t, n], np.float32(shares[t, n])
-                a0 += share * edited[place, group, 0]
-                a1 += share * edited[place, group, 1]
-                a2 += share * edited[place, group, 2]
-                a3 += share * edited[place, group, 3]
-            for c, now in enumerate((a0, a1, a2)):
-                then, at = reference[group, t, c], direct[group, t, c]
-                ratio = np.float32(1)
-                if then > least[group]:
-                    ratio = min(max(now / (total * then), np.float32(0)), most_ratio)
-                indirect = baked[group, t, c] - at
-                light = at + indirect * ratio
-                excess = indirect - most_excess * then
-                if excess > 0 and ratio > 1:
-                    light -= excess * (ratio - np.float32(1))
-                found[group, t, c] = light
-    return found
+                total += np.float32(shares[first + t, n])
+            by, lane = np.float32(1) / total, 3 * t
+            for group in range(groups):
+                a0 = a1 = a2 = a3 = np.float32(0)
+                for n in range(near):
+                    place, share = points[first + t, n], np.float32(shares[first + t, n])
+                    a0 += share * edited[place, group, 0]
+                    a1 += share * edited[place, group, 1]
+                    a2 += share * edited[place, group, 2]
+                    a3 += share * edited[place, group, 3]
+                mean[group, lane], mean[group, lane + 1] = a0 * by, a1 * by
+                mean[group, lane + 2], mean[group, lane + 3] = a2 * by, a3 * by
+        for group in range(groups):
+            for i in range(3 * count):
+                value = 3 * first + i
+                then, at = before[group, value], straight[group, value]
+                ratio = min(max(mean[group, i] / max(then, NO_LIGHT), np.float32(0)), most_ratio)
+                ratio = ratio if then > least[group] else np.float32(1)
+                indirect = whole[group, value] - at
+                excess = max(indirect - most_excess * then, np.float32(0)) * max(ratio - np.float32(1), np.float32(0))
+                found[group, value] = at + indirect * ratio - excess
+    return found.reshape(direct.shape)

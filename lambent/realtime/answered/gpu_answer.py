@@ -130,6 +130,11 @@ class _Shared:
         self._stages = stages
         self.albedos = stages.empty(2 * 16 * len(answer.albedos.reflected))
         self.patches = stages.buffer(np.stack([patches.material, patches.paired], axis=1).astype(np.uint32))
+        rows = patches.rows
+        starts = np.append(rows.starts, rows.ends[-1:]).astype(np.uint32)
+        entries = rows.senders.astype(np.uint32), rows.shares.astype(np.float32).view(np.uint32)
+        self.row_starts, self.row_entries = stages.buffer(starts), stages.buffer(np.stack(entries, axis=1))
+        self.longest_row = int((rows.ends - rows.starts).max(initial=0))
         about = [points.patch, points.material, points.other, np.zeros(len(points.patch))]
         self.points = stages.buffer(np.stack(about, axis=1).astype(np.uint32))
         self.ray_starts, self.ray_ends = stages.buffer(rays.starts.astype(np.uint32)), stages.buffer(rays.points)
@@ -147,16 +152,12 @@ class _Solver:
 
     def __init__(self, stages: Stages, shared: _Shared, answer: Answer, group: int) -> None:
         self._stages, self._patches = stages, answer.patches.direct.shape[1]
-        rows, size = answer.patches.rows, self._patches * LIGHT_BYTES
-        first, last = (int(rows.starts[group, 0]), int(rows.ends[group, -1])) if self._patches else (0, 0)
-        starts = np.append(rows.starts[group], last) - first
-        both = rows.senders[first:last].astype(np.uint32), rows.shares[first:last].astype(np.float32).view(np.uint32)
+        size = self._patches * LIGHT_BYTES
         direct = np.asarray(answer.patches.direct[group], np.float32)
         self.indirect, sent, self._outcome = stages.empty(size), stages.empty(size), stages.empty(8)
-        given = (stages.buffer(starts.astype(np.uint32)), stages.buffer(np.stack(both, axis=1)), shared.patches,
-                 shared.albedos, stages.buffer(direct), self.indirect, sent, self._outcome)  # fmt: skip
-        longest = int((rows.ends[group] - rows.starts[group]).max(initial=0))
-        steps = -(-self._patches // GROUP) * (longest + 3)  # of a thread in a sweep
+        given = (shared.row_starts, shared.row_entries, shared.patches, shared.albedos, stages.buffer(direct),
+                 self.indirect, sent, self._outcome)  # fmt: skip
+        steps = -(-self._patches // GROUP) * (shared.longest_row + 3)  # of a thread in a sweep
         sweeps = max(1, min(SWEEPS_AT_ONCE, GPU_SWEEPS, STEPS_AT_ONCE // max(1, steps)))
         self.submissions = -(-GPU_SWEEPS // sweeps)  # at most
         self.begins, self.goes_on = (
