@@ -7,7 +7,8 @@
 
 B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, a and t their diffuse albedos of reflection and
 transmission, F (P, P) the share of what a patch receives that comes from each other one. Patches have most bounces; the
-last PASSES are gathered among some thirty times as many points, each with its own direct light. Beside contacts, where
+last PASSES are gathered among some thirty times as many points, each with its own direct light, by few rays until the
+last: in gaps, which patches do not resolve, light is reflected many times. Beside contacts, where
 light changes from texel to texel, more points gather in the last pass, and send nothing. Light is linear, so D,
 E and I have a leading axis of light groups. A ratio, and not a difference, is applied to the baked
 light, so that it keeps its detail and the error is relative; with albedos as baked the ratio is 1 and nothing changes.
@@ -29,13 +30,11 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from lambent.core import answer_loops as loops
+from lambent.core.answer_rays import Rays, gathered
 from lambent.core.arrays import Floats
 
-BYTE = 255
-MOST_POINTS = 1 << 16
-PASSES = 2
-WEIGHT_STEPS = 4  # of weights in an octave: each byte stands for one
-WEIGHT_ONE = 128  # the byte of weight 1
+PASSES = 6
+FEW_RAYS = 32  # of each point, in all passes but the last
 TOLERANCE = 1e-3  # relative change of every patch in a sweep, below which a solution stands
 SWEEPS = 400  # at most: with albedos up to MOST_ALBEDO even a closed box is done before
 MOST_ALBEDO = 0.97  # of an edited surface
@@ -154,17 +153,26 @@ class Points:
     direct: NDArray[np.float32]
     light: NDArray[np.float32]
 
-    def exitance(self, albedos: Albedos, ratio: Floats, of: NDArray[np.integer] | None = None) -> NDArray[np.float32]:
-        """Exitance (K, G, 4), W/m^2, where indirect light is `ratio` (n, G, 4) times as baked.
+    def exitance(
+        self, albedos: Albedos, now: NDArray[np.float32], inverse: NDArray[np.float32], grows: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """Exitance (K, G, 4), W/m^2, where indirect light is `now` times `inverse` (K, G, 4) times as bright as baked.
 
-        The ratio of point k is number `of` (K,) of these, by default number k.
+        Of the light as baked, `grows` (K, G, 4) gets brighter. `inverse` is of `inverses`.
         """
-        number = np.arange(len(self.other)) if of is None else of
-        reflected, transmitted = (
-            np.asarray(one, np.float32)[self.material] for one in (albedos.reflected, albedos.transmitted)
-        )
-        direct, light = (np.ascontiguousarray(one, np.float32) for one in (self.direct, self.light))
-        return np.asarray(loops.exitance(direct, light, ratio, number, self.other, reflected, transmitted))
+        tables = (np.pad(one, ((0, 0), (0, 1))) for one in (albedos.reflected, albedos.transmitted))
+        reflected, transmitted = (np.asarray(one, np.float32) for one in tables)
+        given = self._direct, self.indirect, grows, now, inverse, np.float32(MOST_RATIO)
+        return np.asarray(loops.exitance(*given, self.material, self.other, reflected, transmitted))
+
+    @cached_property
+    def indirect(self) -> NDArray[np.float32]:
+        """Indirect light (K, G, 4) as baked."""
+        return side_by_side(self.light - self.direct)
+
+    @cached_property
+    def _direct(self) -> NDArray[np.float32]:
+        return side_by_side(self.direct)
 
 
 def side_by_side(light: Floats) -> NDArray[np.float32]:
@@ -172,87 +180,6 @@ def side_by_side(light: Floats) -> NDArray[np.float32]:
     found = np.zeros((light.shape[1], light.shape[0], 4), np.float32)
     found[..., :3] = np.moveaxis(light, 0, 1)
     return found
-
-
-def packed_rays(point: NDArray[np.integer], weight: Floats) -> NDArray[np.uint8]:
-    """Rays (K, R, 3) bytes: the point near which each ends, and its weight (K, R).
-
-    Rays that end near the same point are one, in the order of points, each of which is the step from the one before,
-    low byte first. Weights are 0 or powers of two by WEIGHT_STEPS. Rows are filled up with 0. Points are less than
-    MOST_POINTS.
-    """
-    rays = np.zeros((*point.shape, 3), np.uint8)
-    numbers, weights = np.ascontiguousarray(point, np.int64), np.ascontiguousarray(weight, np.float32)
-    loops.pack(numbers, weights, np.float32(WEIGHT_STEPS), np.float32(WEIGHT_ONE), rays)
-    return rays
-
-
-def weights_of_bytes() -> NDArray[np.float32]:
-    """(256,) the weights that bytes of `packed_rays` stand for."""
-    found = 2.0 ** ((np.arange(BYTE + 1) - WEIGHT_ONE) / WEIGHT_STEPS)
-    found[0] = 0
-    return np.asarray(found, np.float32)
-
-
-def last_points(rays: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """(K,) the largest number of a point near which the `packed_rays` of each end."""
-    return np.asarray((rays[..., 0] + 256 * rays[..., 1].astype(np.int64)).sum(axis=1))
-
-
-@dataclass(frozen=True, eq=False)
-class Rays:
-    """Where the rays of K points end: those of a point that end near the same one are one.
-
-    Attributes
-    ----------
-    starts : (K + 1,) int64
-        The rays of point k go from starts[k] on to starts[k + 1].
-    points : (N,) uint16
-        The point near which each ends.
-    weights : (N,) uint8
-        `weights_of_bytes`.
-    scale : (K,) float32
-        One over the number of each point's rays, those included that end nowhere.
-    """
-
-    starts: NDArray[np.int64]
-    points: NDArray[np.uint16]
-    weights: NDArray[np.uint8]
-    scale: NDArray[np.float32]
-
-    @classmethod
-    def of(cls, packed: NDArray[np.uint8]) -> Rays:
-        """Of `packed_rays` (K, R, 3)."""
-        size, count = packed.shape[:2]
-        starts = np.append(0, np.cumsum(np.count_nonzero(packed[..., 2], axis=1))).astype(np.int64)
-        points, weights = np.zeros(starts[-1], np.uint16), np.zeros(starts[-1], np.uint8)
-        loops.unpack(np.ascontiguousarray(packed), starts, points, weights)
-        return cls(starts, points, weights, np.full(size, 1 / max(count, 1), np.float32))
-
-    def followed_by(self, other: Rays) -> Rays:
-        """These rays, and those of other points after them."""
-        starts = np.concatenate([self.starts, other.starts[1:] + self.starts[-1]])
-        points, weights = (np.concatenate([self.points, other.points]), np.concatenate([self.weights, other.weights]))
-        return Rays(starts, points, weights, np.concatenate([self.scale, other.scale]))
-
-    def of_first(self, count: int) -> Rays:
-        """The rays of the first `count` points."""
-        return Rays(self.starts[: count + 1], self.points, self.weights, self.scale[:count])
-
-
-def gathered(rays: Rays, exitance: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Indirect irradiance (K, G, 4) at points with such rays, from exitance (n, G, 4).
-
-    Rays are cosine distributed: it is pi times the mean of the radiance exitance/pi.
-    """
-    given = rays.starts, rays.points, rays.weights, weights_of_bytes(), rays.scale
-    count, groups = exitance.shape[:2]
-    if groups == 1:
-        return np.asarray(loops.gather_one(*given, exitance))
-    padded = np.pad(exitance, ((0, 0), (0, -groups % 4), (0, 0))) if groups % 4 else exitance
-    fours = (padded[:, first : first + 4].reshape(count, 16) for first in range(0, groups, 4))
-    found = [loops.gather_four(*given, four).reshape(-1, 4, 4) for four in fours]
-    return np.ascontiguousarray(found[0] if groups == 4 else np.concatenate(found, axis=1)[:, :groups])
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,10 +210,10 @@ def ratios(edited: Floats, reference: Floats) -> NDArray[np.float32]:
     return np.clip(ratio, 0, MOST_RATIO)
 
 
-def point_ratios(now: NDArray[np.float32], baked: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The same of light of points (K, G, 4)."""
-    least = np.array([least_light(baked[None, :, group, :3])[0, 0, 0] for group in range(baked.shape[1])], np.float32)
-    return np.asarray(loops.ratios(now, baked, least, np.float32(MOST_RATIO)))
+def inverses(baked: NDArray[np.float32]) -> NDArray[np.float32]:
+    """One over light (K, G, 4) as baked; 0 where there was next to none, and a ratio is 1."""
+    known = baked > np.moveaxis(least_light(np.moveaxis(baked, 1, 0)[..., :3]), 0, 1)
+    return np.divide(1, baked, out=np.zeros_like(baked), where=known)
 
 
 def least_light(reference: Floats) -> Floats:
@@ -326,29 +253,46 @@ class Answer:
 
         `solution` is that of the patches, if there is one already.
         """
-        found = self._gathered_as_baked
+        seen = self._gathered_as_baked
         if albedos.same_as(self.albedos):
-            return found
-        now = (solution or solved(self.patches, albedos)).irradiance - self.patches.direct
-        ratio, of = point_ratios(side_by_side(now), self._patches_as_baked), self.points.patch
-        for step in range(PASSES - 1):
-            among = gathered(self._senders_rays, self.points.exitance(albedos, ratio, of if step == 0 else None))
-            ratio = point_ratios(among, self._gathered_as_baked[: len(among)])
-        return gathered(self.rays, self.points.exitance(albedos, ratio))
+            return seen
+        patch, grows = self.points.patch, self._grows
+        now = side_by_side((solution or solved(self.patches, albedos)).irradiance - self.patches.direct)
+        sent = self.points.exitance(albedos, now[patch], self._inverse_of_patches[patch], grows)
+        for _ in range(PASSES - 1):
+            sent = self.points.exitance(albedos, gathered(self.few_rays, sent), self._inverse_of_few, grows)
+        return gathered(self.rays, sent)
 
     @cached_property
-    def _senders_rays(self) -> Rays:
-        return self.rays.of_first(len(self.points.other))
+    def few_rays(self) -> Rays:
+        """Some rays of the points that send, for all passes but the last."""
+        return self.rays.of_first(len(self.points.other)).thinned(FEW_RAYS, self._sent_as_baked.mean(axis=(1, 2)))
 
     @cached_property
-    def _patches_as_baked(self) -> NDArray[np.float32]:
-        return side_by_side(solved(self.patches, self.albedos).irradiance - self.patches.direct)
+    def few_as_baked(self) -> NDArray[np.float32]:
+        """Indirect irradiance (K, G, 4) that these gather as baked."""
+        return gathered(self.few_rays, self._sent_as_baked)
+
+    @cached_property
+    def _inverse_of_few(self) -> NDArray[np.float32]:
+        return inverses(self.few_as_baked)
+
+    @cached_property
+    def _inverse_of_patches(self) -> NDArray[np.float32]:
+        return inverses(side_by_side(solved(self.patches, self.albedos).irradiance - self.patches.direct))
+
+    @cached_property
+    def _grows(self) -> NDArray[np.float32]:
+        return np.minimum(self.points.indirect, MOST_EXCESS * self._gathered_as_baked[: len(self.points.other)])
+
+    @cached_property
+    def _sent_as_baked(self) -> NDArray[np.float32]:
+        same = np.ones_like(self.points.indirect)
+        return self.points.exitance(self.albedos, same, same, self.points.indirect)
 
     @cached_property
     def _gathered_as_baked(self) -> NDArray[np.float32]:
-        shape = 1, len(self.points.direct), 4
-        none = np.zeros(len(self.points.other), np.int64)
-        return gathered(self.rays, self.points.exitance(self.albedos, np.ones(shape, np.float32), none))
+        return gathered(self.rays, self._sent_as_baked)
 
     def reference(self) -> NDArray[np.float32]:
         """Indirect irradiance (G, T, 3) at the texels as this computes it for the baked materials."""

@@ -15,6 +15,7 @@ import numba
 import numpy as np
 
 NO_LIGHT = np.float32(1e-30)
+LANES = 2048  # of points' light, that a thread computes at once
 BLOCK = 128  # texels whose light stays in a processor's nearest cache
 _COMPILING, _NUMBA = Lock(), cast(Any, numba.config)
 
@@ -41,9 +42,9 @@ def by_lanes(loop: Callable[..., Any]) -> Callable[..., Any]:
 def solve(starts, ends, senders, shares, direct, reflected, transmitted, paired, tolerance, sweeps, light):  # type: ignore[no-untyped-def]
     """Bring light (G, P, 3) to B = F (a (D + B) + t (D + B) of the other side) + D by Gauss and Seidel's method.
 
-    F is sparse: `senders` and `shares` of row p from `starts` to `ends` (P,). Four groups are summed in one pass over its
-    rows, and stop together, when no patch changes by more than `tolerance` of its light. Returns the sweeps of each four,
-    and whether they stopped.
+    F is sparse: `senders` and `shares` of row p from `starts` to `ends` (P,). Four groups are summed in one pass over
+    its rows, and stop together, when no patch changes by more than `tolerance` of its light. Returns the sweeps of each
+    four, and whether they stopped.
     """
     groups, patches = light.shape[:2]
     fours = (groups + 3) // 4
@@ -102,41 +103,40 @@ def solve(starts, ends, senders, shares, direct, reflected, transmitted, paired,
     return taken, done
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
-def exitance(direct, light, ratio, of, other, reflected, transmitted):  # type: ignore[no-untyped-def]
-    """Exitance (K, G, 4) of points whose indirect light is ratio (n, G, 4) at `of` (K,) times as baked."""
-    groups, points = direct.shape[:2]
-    found = np.zeros((points, groups, 4), np.float32)
+@by_lanes
+def exitance(direct, indirect, grows, now, inverse, most_ratio, material, other, reflected, transmitted):  # type: ignore[no-untyped-def]
+    """Exitance (K, G, 4) of points with albedos (M, 4), whose indirect light is now times inverse as bright as baked.
+
+    All light is (K, G, 4). `inverse` is one over that as baked, 0 where a ratio says nothing; `grows` is the part of
+    `indirect` that gets brighter.
+    """
+    points, groups = direct.shape[:2]
+    lanes = points * groups * 4
+    light, found = np.empty(lanes, np.float32), np.empty(direct.shape, np.float32)
+    straight, shone, more = direct.reshape(-1), indirect.reshape(-1), grows.reshape(-1)
+    bright, dimmed = now.reshape(-1), inverse.reshape(-1)
+    for block in numba.prange((lanes + LANES - 1) // LANES):
+        for i in range(LANES * block, min(LANES * block + LANES, lanes)):
+            ratio = min(max(bright[i] * dimmed[i], np.float32(0)), most_ratio)
+            ratio = ratio if dimmed[i] > 0 else np.float32(1)
+            growth = max(ratio - np.float32(1), np.float32(0))
+            light[i] = straight[i] + shone[i] * min(ratio, np.float32(1)) + more[i] * growth
     for k in numba.prange(points):
-        there = other[k]
+        one, there = material[k], other[k]
         for group in range(groups):
-            for c in range(3):
-                at = direct[group, k, c]
-                sent = reflected[k, c] * (at + (light[group, k, c] - at) * ratio[of[k], group, c])
-                if there != k:
-                    at = direct[group, there, c]
-                    now = at + (light[group, there, c] - at) * ratio[of[there], group, c]
-                    sent += transmitted[k, c] * now
-                found[k, group, c] = sent
-    return found
-
-
-@numba.njit(parallel=True, cache=True, nogil=True)
-def ratios(now, baked, least, most_ratio):  # type: ignore[no-untyped-def]
-    """`answer.ratios` of light of points (K, G, 4); a ratio is 1 where as baked there was `least` (G,) or less."""
-    found = np.ones(now.shape, np.float32)
-    for k in numba.prange(len(now)):
-        for group in range(now.shape[1]):
-            for c in range(3):
-                if baked[k, group, c] > least[group]:
-                    ratio = now[k, group, c] / baked[k, group, c]
-                    found[k, group, c] = min(max(ratio, np.float32(0)), most_ratio)
+            at = 4 * (k * groups + group)
+            for c in range(4):
+                found[k, group, c] = reflected[one, c] * light[at + c]
+            if there != k:
+                at = 4 * (there * groups + group)
+                for c in range(4):
+                    found[k, group, c] += transmitted[one, c] * light[at + c]
     return found
 
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
-    """`answer.packed_rays` (K, R, 3), all 0 before, of rays to `numbers` (K, R) that weigh (K, R)."""
+    """`answer_rays.packed_rays` (K, R, 3), all 0 before, of rays to `numbers` (K, R) that weigh (K, R)."""
     for k in numba.prange(len(numbers)):
         order = np.argsort(numbers[k])
         sums = np.zeros(len(order), np.float32)
@@ -159,6 +159,37 @@ def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
                 rays[k, place, 0], rays[k, place, 1] = np.uint8(step & 255), np.uint8(step >> 8)
                 rays[k, place, 2] = np.uint8(min(code, np.float32(255)))
                 last = ends[n]
+                place += 1
+
+
+@numba.njit(parallel=True, cache=True, nogil=True)
+def thin(starts, points, weights, table, light, steps, one, chosen, codes):  # type: ignore[no-untyped-def]
+    """Choose rays of each k, from `starts` (K + 1,) on, that stand for all: numbers and weights (K, n), 0 of no ray.
+
+    Chances are half by weight and half by the exitance light (m,) that a ray brings; choices are systematic.
+    """
+    count = chosen.shape[1]
+    for k in numba.prange(len(chosen)):
+        weighed = lit = np.float32(0)
+        for r in range(starts[k], starts[k + 1]):
+            weighed += table[weights[r]]
+            lit += table[weights[r]] * light[points[r]]
+        shift = (k * 0.6180339887) % 1
+        total, taken, place = 0.0, 0, 0
+        for r in range(starts[k], starts[k + 1]):
+            weight = table[weights[r]]
+            chance = weight / weighed
+            if lit > 0:
+                chance = 0.5 * chance + 0.5 * weight * light[points[r]] / lit
+            total += chance
+            before = taken
+            while taken < count and taken + shift < total * count:
+                taken += 1
+            if taken > before:
+                value = weight * (taken - before) / (count * chance)
+                code = np.floor(np.log2(value) * steps + (r * 0.7548776662) % 1) + one
+                chosen[k, place] = r
+                codes[k, place] = np.uint8(min(max(code, 1.0), 255.0))
                 place += 1
 
 

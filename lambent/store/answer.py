@@ -9,7 +9,7 @@ answer/direct, direct_back (G, H, W, 3) float16, direct irradiance of texels wit
                            light map; light that only lobes have sent on counts as direct. Absent where the light map
                            keeps it as light_map/direct, direct_back; meta["direct"] of answer/patch names the arrays
 answer/transfer            (P, P) float16, share of the light of patches that reaches each: rows receive
-answer/rays                (3, K, R) uint8, `core.answer.packed_rays` of the points that send and gather light
+answer/rays                (3, K, R) uint8, `core.answer_rays.packed_rays` of the points that send and gather light
 answer/receiver_rays       (3, F, S) uint8, of points beside contacts, which gather and do not send
 answer/points              (K + F,) numbers, the texel and side of each, as below; those that do not send are last
 answer/point_sun           (K + F, 3) float32, direct irradiance of the sun there, W/m^2
@@ -37,7 +37,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.answer import Answer, Neighbours, Patches, Points, Rays, last_points
+from lambent.core.answer import Answer, Neighbours, Patches, Points
+from lambent.core.answer_rays import Rays, last_points
 from lambent.core.arrays import Floats
 from lambent.core.delta_bytes import PLACES, from_delta_bytes
 from lambent.core.errors import UserError

@@ -8,7 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.answer import MOST_ALBEDO, Albedos, Answer, Neighbours, Patches, Points, Rays, packed_rays, solved
+from lambent.core.answer import (
+    MOST_ALBEDO,
+    Albedos,
+    Answer,
+    Neighbours,
+    Patches,
+    Points,
+    solved,
+)
+from lambent.core.answer_rays import Rays, packed_rays
 from lambent.realtime.answered import stages
 from lambent.realtime.answered.gpu_answer import GpuAnswer, Unsolved, gpu_answer
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.answer import PASSES, SWEEPS, Albedos, Answer, Neighbours, least_light
+from lambent.core.answer_rays import Rays
 from lambent.core.arrays import Floats
 from lambent.realtime.answered.stages import GROUP, Call, NoRoom, Stages
 
@@ -137,9 +138,11 @@ class _Shared:
         self.longest_row = int((rows.ends - rows.starts).max(initial=0))
         about = [points.patch, points.material, points.other, np.zeros(len(points.patch))]
         self.points = stages.buffer(np.stack(about, axis=1).astype(np.uint32))
-        self.ray_starts, self.ray_ends = stages.buffer(rays.starts.astype(np.uint32)), stages.buffer(rays.points)
-        self.ray_weights, self.ray_scale = stages.buffer(rays.weights), stages.buffer(rays.scale)
+        self.rays, self.few_rays = (self._buffers(one) for one in (rays, answer.few_rays))
         self.near = stages.buffer(packed_near(answer.near))
+
+    def _buffers(self, rays: Rays) -> tuple[Any, ...]:
+        return tuple(map(self._stages.buffer, (rays.starts.astype(np.uint32), rays.points, rays.weights, rays.scale)))
 
     def colour(self, albedos: Albedos) -> None:
         """Send albedos for the next calls."""
@@ -192,16 +195,17 @@ class _Group:
         reference: Floats,
     ) -> None:  # fmt: skip
         self._stages, self._shared = stages, shared
-        points, rays = answer.points, answer.rays
-        self._points, self._gathering, self._texels = len(points.other), len(rays.scale), len(reference)
+        points = answer.points
+        self._points, self._gathering, self._texels = len(points.other), len(answer.rays.scale), len(reference)
         self._sent = stages.empty(self._points * LIGHT_BYTES)
         self._found = stages.empty(self._gathering * LIGHT_BYTES)
         lights = stages.buffer(np.concatenate([points.direct[group], points.light[group]], axis=1).astype(np.float32))
-        self._first = self._exitance(lights, True, solver.indirect, solver.light())
-        self._next = self._exitance(lights, False, self._found, gathered[: self._points])
-        given = (shared.ray_starts, shared.ray_ends, shared.ray_weights, shared.ray_scale, self._sent, self._found)
+        both = lights, stages.buffer(np.asarray(gathered[: self._points], np.float32))
+        self._first = self._exitance(*both, True, solver.indirect, solver.light())
+        self._next = self._exitance(*both, False, self._found, answer.few_as_baked[:, group, :3])
         self._gathers, self._gathers_last = (
-            stages.call("gather", (count,), *given, threads=count) for count in (self._points, self._gathering)
+            stages.call("gather", (count,), *rays, self._sent, self._found, threads=count)
+            for count, rays in ((self._points, shared.few_rays), (self._gathering, shared.rays))
         )
         arrays = reference, answer.direct[group], answer.baked[group]
         self._of_texels = [stages.buffer(np.asarray(one, np.float32)) for one in arrays]
@@ -215,9 +219,9 @@ class _Group:
         given = self._shared.near, self._found, *self._of_texels, found
         yield self._stages.call("texels", (self._texels, self._least), *given, threads=self._texels)
 
-    def _exitance(self, lights: Any, by_patch: bool, now: Any, baked: Floats) -> Call:
+    def _exitance(self, lights: Any, seen: Any, by_patch: bool, now: Any, baked: Floats) -> Call:
         before = self._stages.buffer(np.asarray(baked, np.float32))
-        given = self._shared.points, lights, self._shared.albedos, now, before, self._sent
+        given = self._shared.points, lights, self._shared.albedos, now, before, seen, self._sent
         return self._stages.call(
             "exitance", (self._points, int(by_patch), _least(baked)), *given, threads=self._points
         )  # fmt: skip
