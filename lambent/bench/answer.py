@@ -13,33 +13,28 @@ figure, `p95_contacts_noise` is that of noise alone. `naive` is the light
 as it was baked. `likely_error` is the bound on `rms` that the window shows.
 
 Contacts are texels from which a quarter of cosine distributed rays meet something within CONTACT_M.
-Times are medians of turns through all edits; `edit_to_picture_ms` is that of solving, gathering, upsampling and upload,
-after which the next frame shows the light.
+Times are those of `answer_times`. `everything white` has albedos of .85, light that surfaces let through included:
+more than 1 together would be no surface.
 """
 
 from __future__ import annotations
 
-import statistics
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lambent.bench.answer_times import Edit, changed, darkened, dragged, timed
 from lambent.bench.views import given_or_baked
-from lambent.core.answer import Answer, answered, solved, upsampled
+from lambent.core.answer import answered, upsampled
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.geometry import triangle_areas
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.materials.diffuse_albedos import edited_albedos
 from lambent.materials.document import Material
-from lambent.realtime.answering import AnsweredLight
-from lambent.realtime.baked import read_baked
-from lambent.realtime.device import open_device
-from lambent.realtime.renderer import Renderer
 from lambent.scenes.scene import Scene
 from lambent.store.answer import StoredAnswer, answer_name, read_answer
 from lambent.store.contract import PROCESSOR_TIMINGS, TIMINGS
@@ -52,25 +47,26 @@ NAME = "answer"
 LEAST = 0.01  # of the mean light, in relative errors
 CONTACT_M, CONTACT_SHARE, CONTACT_RAYS = 0.1, 0.25, 64
 SEED = 1
-Edit = Mapping[str, Triple]  # diffuse colours, linear RGB, by material
+WHITE = 0.85  # albedo, light that goes through included
 
 
 @dataclass(frozen=True)
 class Effort:
     """Texels that are compared, paths from each, edits at most, turns of timing, and the scene baked without inputs.
 
-    Contacts among the texels get `contact_paths` besides.
+    Contacts among the texels get `contact_paths` besides. A colour is dragged for `drag_s` seconds.
     """
 
-    texels: int = 5000
-    paths: int = 2048
+    texels: int = 3000
+    paths: int = 1024
     edits: int = 6
     turns: int = 5
     scene: str = "builtin:room"
-    contact_paths: int = 8192
+    contact_paths: int = 4096
+    drag_s: float = 5.0
 
 
-FULL, QUICK = Effort(), Effort(300, 256, 2, 5, "builtin:box", 1024)
+FULL, QUICK = Effort(), Effort(300, 256, 2, 5, "builtin:box", 1024, 2.0)
 
 
 def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
@@ -84,8 +80,12 @@ def edits_of(scene: Scene, most: int) -> dict[str, Edit]:
     """Edits of the spec's scenes by name; elsewhere some colours for the materials of the largest area."""
     known = ROOM if scene.materials.keys() >= ROOM_MATERIALS else {}
     whole = {
-        "everything half": {name: _times(m.kd, 0.5) for name, m in scene.materials.items()},
-        "everything white": {name: (0.85, 0.85, 0.85) for name, m in scene.materials.items() if any(m.kd)},
+        "everything half": {name: darkened(m.kd, 0.5) for name, m in scene.materials.items()},
+        "everything white": {
+            name: (WHITE - m.kt_d[0], WHITE - m.kt_d[1], WHITE - m.kt_d[2])
+            for name, m in scene.materials.items()
+            if any(m.kd) and max(m.kt_d) < WHITE
+        },
     }
     if known:
         return dict(list({**known, **whole}.items())[:most])
@@ -107,16 +107,13 @@ ROOM: dict[str, Edit] = {
 ROOM_MATERIALS = {name for edit in ROOM.values() for name in edit}
 
 
-def _times(colour: Triple, factor: float) -> Triple:
-    return colour[0] * factor, colour[1] * factor, colour[2] * factor
-
-
 def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[dict[str, Any]]:
     """One row per edit of a store's scene."""
     stored = read_answer(store)
     truth = Truth(store, stored, effort, progress)
     edits = edits_of(truth.scene, effort.edits)
     times = timed(store, stored, truth.scene.materials, edits, effort.turns)
+    drag = dragged(store, truth.scene.materials, next(iter(edits.values())), effort.drag_s)
     seconds = {name: store.documents.get(name, {}) for name in (TIMINGS, PROCESSOR_TIMINGS)}
     cost = {
         "precompute_s": seconds[TIMINGS].get("answer"),
@@ -130,13 +127,8 @@ def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[d
     rows = []
     for number, (name, edit) in enumerate(edits.items()):
         progress(number, len(edits), name)
-        rows.append({"scene": truth.scene.name, "edit": name, **truth.errors(edit), **times[name], **cost})
+        rows.append({"scene": truth.scene.name, "edit": name, **truth.errors(edit), **times[name], **drag, **cost})
     return rows
-
-
-def changed(materials: Mapping[str, Material], edit: Edit) -> dict[str, Material]:
-    """The materials of an edit."""
-    return {name: materials[name].model_copy(update={"kd": colour}) for name, colour in edit.items()}
 
 
 class Truth:
@@ -279,47 +271,3 @@ def context_of(store: Store) -> BakeContext:
     ready = replace(scene, textures=prepared(scene.textures))
     as_baked = cut_for_viewers(divided(ready, store, silent, untimed), store, untimed)
     return BakeContext(as_baked, store, found(), quality_named("preview"), store.documents.get(METHODS, {}))
-
-
-def timed(
-    store: Store, stored: StoredAnswer, materials: Mapping[str, Material], edits: Mapping[str, Edit], turns: int
-) -> dict[str, dict[str, float]]:
-    """Medians of milliseconds of each edit's steps, after a turn that compiles them."""
-    baked = read_baked(store)
-    reference = stored.answer.reference()
-    renderer, light = Renderer(open_device(), baked), AnsweredLight(baked, stored)
-    found: dict[str, list[dict[str, float]]] = {name: [] for name in edits}
-    for _ in range(turns + 1):
-        for name, edit in edits.items():
-            edited = changed(materials, edit)
-            now = [edited.get(one, materials[one]) for one in stored.materials]
-            found[name].append(_steps(stored.answer, reference, now, [materials[one] for one in stored.materials]))
-            begun = time.perf_counter()
-            lit = light.lit(edited)
-            groups = light.groups(lit)
-            layers = light.layers(lit) if groups is None else groups.light_map(np.ones((len(groups.records), 3)))
-            computed = time.perf_counter()
-            renderer.resources.show_light_map(list(layers))
-            renderer.finish()
-            ended = time.perf_counter()
-            found[name][-1] |= {"upload_ms": 1e3 * (ended - computed), "edit_to_picture_ms": 1e3 * (ended - begun)}
-    bounds = {name: {"likely_error": percent(light.likely_error(light.lit(changed(materials, edit))))}
-              for name, edit in edits.items()}  # fmt: skip
-    return {
-        name: bounds[name] | {key: round(statistics.median(run[key] for run in runs[1:]), 2) for key in runs[0]}
-        for name, runs in found.items()
-    }
-
-
-def _steps(answer: Answer, reference: Floats, now: list[Material], given: list[Material]) -> dict[str, float]:
-    """Milliseconds of solving, gathering and upsampling, and the sweeps of the solution."""
-    marks = [time.perf_counter()]
-    albedos = edited_albedos(given, now)
-    solution = solved(answer.patches, albedos)
-    marks.append(time.perf_counter())
-    light = answer.indirect(albedos, solution)
-    marks.append(time.perf_counter())
-    answer.at_texels(light, reference)
-    marks.append(time.perf_counter())
-    steps = dict(zip(("solve_ms", "gather_ms", "upsample_ms"), (1e3 * np.diff(marks)).tolist(), strict=True))
-    return {**steps, "sweeps": float(solution.sweeps)}

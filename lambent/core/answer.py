@@ -283,7 +283,9 @@ class Answer:
 
     @cached_property
     def _grows(self) -> NDArray[np.float32]:
-        return np.minimum(self.points.indirect, MOST_EXCESS * self._gathered_as_baked[: len(self.points.other)])
+        return np.asarray(
+            np.minimum(self.points.indirect, MOST_EXCESS * self._gathered_as_baked[: len(self.points.other)])
+        )
 
     @cached_property
     def _sent_as_baked(self) -> NDArray[np.float32]:

@@ -142,7 +142,8 @@ class _Shared:
         self.near = stages.buffer(packed_near(answer.near))
 
     def _buffers(self, rays: Rays) -> tuple[Any, ...]:
-        return tuple(map(self._stages.buffer, (rays.starts.astype(np.uint32), rays.points, rays.weights, rays.scale)))
+        arrays = rays.starts.astype(np.uint32), rays.points, rays.weights, rays.scale
+        return tuple(self._stages.buffer(one) for one in arrays)
 
     def colour(self, albedos: Albedos) -> None:
         """Send albedos for the next calls."""
