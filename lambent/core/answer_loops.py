@@ -208,33 +208,19 @@ def unpack(rays, starts, points, weights):  # type: ignore[no-untyped-def]
 def gather_one(starts, points, weights, table, scale, sent):  # type: ignore[no-untyped-def]
     """Sums (K, 1, 4) of exitance (n, 1, 4) at `points` (N,), those of each k from `starts` (K + 1,) on.
 
-    `table` has the weights that bytes stand for; the sums of each k are times `scale` (K,). Two rays are added at once:
-    each sum waits for the one before.
+    `table` has the weights that bytes stand for; the sums of each k are times `scale` (K,).
     """
     found = np.empty((len(scale), 1, 4), np.float32)
     for k in numba.prange(len(scale)):
-        a0 = a1 = a2 = a3 = b0 = b1 = b2 = b3 = np.float32(0)
-        begin, end = starts[k], starts[k + 1]
-        for r in range(begin, end - 1, 2):
+        a0 = a1 = a2 = a3 = np.float32(0)
+        for r in range(starts[k], starts[k + 1]):
             point, weight = points[r], table[weights[r]]
             a0 += weight * sent[point, 0, 0]
             a1 += weight * sent[point, 0, 1]
             a2 += weight * sent[point, 0, 2]
             a3 += weight * sent[point, 0, 3]
-            point, weight = points[r + 1], table[weights[r + 1]]
-            b0 += weight * sent[point, 0, 0]
-            b1 += weight * sent[point, 0, 1]
-            b2 += weight * sent[point, 0, 2]
-            b3 += weight * sent[point, 0, 3]
-        if (end - begin) % 2:
-            point, weight = points[end - 1], table[weights[end - 1]]
-            a0 += weight * sent[point, 0, 0]
-            a1 += weight * sent[point, 0, 1]
-            a2 += weight * sent[point, 0, 2]
-            a3 += weight * sent[point, 0, 3]
         by = scale[k]
-        found[k, 0, 0], found[k, 0, 1] = (a0 + b0) * by, (a1 + b1) * by
-        found[k, 0, 2], found[k, 0, 3] = (a2 + b2) * by, (a3 + b3) * by
+        found[k, 0, 0], found[k, 0, 1], found[k, 0, 2], found[k, 0, 3] = a0 * by, a1 * by, a2 * by, a3 * by
     return found
 
 
