@@ -1,44 +1,40 @@
-"""`answer`: accuracy and speed of updating baked light after colour edits, against path tracing with those colours.
+"""`answer`: how exactly and how fast baked light answers other colours, against path tracing with those colours.
 
-Rows are scene x edit. Errors are evaluated at random texels that viewers see, over all channels, in percent: `rms` and
-`mean_error` relative to the mean of the truth, the others relative to each texel (to at least LEAST of that mean). The
-truth includes the direct sun, which texels show in addition to the light map and which no edit changes. The baked light
-is path traced here too, with the same random numbers, so that errors are those of the answer alone; its direct part is
-the light map's, which may be a texel off at edges of light. `shown_rms` adds the light map's own error, which is
-`baked_rms` before any edit; for light separated by group, it refers to the sum of the groups' own answers. `rms`,
-`relative_rms` and `relative_rms_contacts` are roots of mean products of the errors in two independent halves of the
-paths, which cancels noise (`noise`, of both halves together). 95 % of contacts have an error below `p95_contacts`, with
-`contact_paths` paths each; it includes noise, and `p95_contacts_noise` is its value for noise alone. `naive` is the
-error of keeping the baked light. `likely_error` is the bound on `rms` that the window shows.
+Rows are scene x edit. Errors are those at texels that viewers see, drawn at random, all channels alike, in percent:
+`rms` and `mean_error` over the mean of the truth, the others texel by texel (over at least LEAST of that mean). The
+truth has the direct sun, which texels show beside the light map and no edit changes. The light that is answered from is
+path traced, too, with the same random numbers, so that errors are those of the answer alone;
+of it, as much is direct as of the light map, which may lie a texel beside it at edges of light.
+`shown_rms` has those of the light map besides, of which `baked_rms` is there before any edit. Where light is sorted by
+group, `shown_rms` is of the sum of the groups' own answers. `rms` and `relative_rms` are roots of mean products of the
+errors in two independent halves of the paths, which noise (`noise`, of one whole) does not enter; so is
+`relative_rms_contacts`. 95 % of contacts err less than `p95_contacts`, by `contact_paths` from each: noise is in this
+figure, `p95_contacts_noise` is that of noise alone. `naive` is the light
+as it was baked. `likely_error` is the bound on `rms` that the window shows.
 
-Contacts are texels from which a quarter of cosine-distributed rays hit something within CONTACT_M. Times are medians
-over rounds through all edits; `edit_to_picture_ms` covers solving, gathering, upsampling and upload, after which the
-next frame shows the light.
+Contacts are texels from which a quarter of cosine distributed rays meet something within CONTACT_M.
+Times are those of `answer_times`. `everything white` has albedos of .85, light that surfaces let through included:
+more than 1 together would be no surface.
 """
 
 from __future__ import annotations
 
-import statistics
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lambent.bench.answer_times import Edit, changed, darkened, dragged, timed
 from lambent.bench.views import given_or_baked
-from lambent.core.answer import Answer, answered, solved, upsampled
+from lambent.core.answer import answered, upsampled
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.geometry import triangle_areas
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.materials.diffuse_albedos import edited_albedos
 from lambent.materials.document import Material
-from lambent.realtime.answering import AnsweredLight
-from lambent.realtime.baked import read_baked
-from lambent.realtime.device import open_device
-from lambent.realtime.renderer import Renderer
 from lambent.scenes.scene import Scene
 from lambent.store.answer import StoredAnswer, answer_name, read_answer
 from lambent.store.contract import PROCESSOR_TIMINGS, TIMINGS
@@ -48,43 +44,48 @@ if TYPE_CHECKING:
     from lambent.bake.context import BakeContext
 
 NAME = "answer"
-LEAST = 0.01  # of the mean light, the least denominator of relative errors
+LEAST = 0.01  # of the mean light, in relative errors
 CONTACT_M, CONTACT_SHARE, CONTACT_RAYS = 0.1, 0.25, 64
 SEED = 1
-Edit = Mapping[str, Triple]  # diffuse colours, linear RGB, by material
+WHITE = 0.85  # albedo, light that goes through included
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Compared texels, paths per texel, the most edits, rounds of timing, and the scene that is baked without inputs.
+    """Texels that are compared, paths from each, edits at most, turns of timing, and the scene baked without inputs.
 
-    Contacts among the texels get `contact_paths` in addition.
+    Contacts among the texels get `contact_paths` besides. A colour is dragged for `drag_s` seconds.
     """
 
-    texels: int = 5000
-    paths: int = 2048
+    texels: int = 3000
+    paths: int = 1024
     edits: int = 6
     turns: int = 5
     scene: str = "builtin:room"
-    contact_paths: int = 8192
+    contact_paths: int = 4096
+    drag_s: float = 5.0
 
 
-FULL, QUICK = Effort(), Effort(300, 256, 2, 5, "builtin:box", 1024)
+FULL, QUICK = Effort(), Effort(300, 256, 2, 5, "builtin:box", 1024, 2.0)
 
 
 def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
-    """Rows of the inputs, which are baked stores; without inputs, of a scene baked here in `preview`."""
+    """Rows of the inputs, baked stores; without one, of a scene that is baked here in `preview`."""
     with given_or_baked(inputs, effort.scene, progress) as stores:
         rows = [row for store in stores for row in rows_of(store, effort, progress)]
     return {"rows": rows, "summary": {f"{row['scene']} {row['edit']}": row["rms"] for row in rows}}
 
 
 def edits_of(scene: Scene, most: int) -> dict[str, Edit]:
-    """Named edits of the spec's scenes; for other scenes, some colours for the materials of largest area."""
+    """Edits of the spec's scenes by name; elsewhere some colours for the materials of the largest area."""
     known = ROOM if scene.materials.keys() >= ROOM_MATERIALS else {}
     whole = {
-        "everything half": {name: _times(m.kd, 0.5) for name, m in scene.materials.items()},
-        "everything white": {name: (0.85, 0.85, 0.85) for name, m in scene.materials.items() if any(m.kd)},
+        "everything half": {name: darkened(m.kd, 0.5) for name, m in scene.materials.items()},
+        "everything white": {
+            name: (WHITE - m.kt_d[0], WHITE - m.kt_d[1], WHITE - m.kt_d[2])
+            for name, m in scene.materials.items()
+            if any(m.kd) and max(m.kt_d) < WHITE
+        },
     }
     if known:
         return dict(list({**known, **whole}.items())[:most])
@@ -106,16 +107,13 @@ ROOM: dict[str, Edit] = {
 ROOM_MATERIALS = {name for edit in ROOM.values() for name in edit}
 
 
-def _times(colour: Triple, factor: float) -> Triple:
-    return colour[0] * factor, colour[1] * factor, colour[2] * factor
-
-
 def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[dict[str, Any]]:
     """One row per edit of a store's scene."""
     stored = read_answer(store)
     truth = Truth(store, stored, effort, progress)
     edits = edits_of(truth.scene, effort.edits)
     times = timed(store, stored, truth.scene.materials, edits, effort.turns)
+    drag = dragged(store, truth.scene.materials, next(iter(edits.values())), effort.drag_s)
     seconds = {name: store.documents.get(name, {}) for name in (TIMINGS, PROCESSOR_TIMINGS)}
     cost = {
         "precompute_s": seconds[TIMINGS].get("answer"),
@@ -129,17 +127,12 @@ def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[d
     rows = []
     for number, (name, edit) in enumerate(edits.items()):
         progress(number, len(edits), name)
-        rows.append({"scene": truth.scene.name, "edit": name, **truth.errors(edit), **times[name], **cost})
+        rows.append({"scene": truth.scene.name, "edit": name, **truth.errors(edit), **times[name], **drag, **cost})
     return rows
 
 
-def changed(materials: Mapping[str, Material], edit: Edit) -> dict[str, Material]:
-    """The materials after an edit."""
-    return {name: materials[name].model_copy(update={"kd": colour}) for name, colour in edit.items()}
-
-
 class Truth:
-    """Some texels of a store, with their light path traced before and after edits."""
+    """Some texels of a store, and their light path traced before edits and after."""
 
     def __init__(self, store: Store, stored: StoredAnswer, effort: Effort, progress: Progress) -> None:
         self._context, self._stored, self._effort, self._progress = context_of(store), stored, effort, progress
@@ -160,11 +153,11 @@ class Truth:
         self._share = np.divide(direct, light, out=np.ones_like(light), where=light > 0)
 
     def _traced(self, edited: dict[str, Material]) -> Floats:
-        """Path traced irradiance in two halves (2, n, 3)."""
+        """Halves (2, n, 3) of path traced irradiance."""
         return self._halves(self._chosen, edited, self._effort.paths, SEED)
 
     def _traced_contacts(self, edited: dict[str, Material]) -> Floats:
-        """Likewise for contacts, with more paths."""
+        """The same of contacts, by more paths."""
         return self._halves(self._chosen[self._contact], edited, self._effort.contact_paths, SEED + 1)
 
     def _halves(self, texels: Indices, edited: dict[str, Material], paths: int, seed: int) -> Floats:
@@ -176,13 +169,13 @@ class Truth:
         return traced.halves.astype(float)
 
     def _direct_sun(self) -> Floats:
-        """Direct irradiance of the sun (n, 3), W/m^2."""
+        """(n, 3) W/m^2."""
         from lambent.bake.answering.spots import sun_at
 
         return np.asarray(sun_at(self._context.traced)[0][self._chosen])
 
     def _contacts(self) -> Flags:
-        """(n,) whether each texel is a contact."""
+        """(n,) texels that touch something."""
         from lambent.bake.tracing.rays import cosine_directions, distances, leaving
 
         t, whole = self._sides.texels, self._context.traced.whole(diffuse=True)
@@ -194,7 +187,7 @@ class Truth:
         return np.asarray((found.reshape(-1, CONTACT_RAYS) < CONTACT_M).mean(axis=1) > CONTACT_SHARE)
 
     def errors(self, edit: Edit) -> dict[str, Any]:
-        """The error fields of a row."""
+        """The fields of a row that are errors."""
         given, names = self.scene.materials, self._stored.materials
         edited = changed(given, edit)
         albedos = edited_albedos([given[name] for name in names], [edited.get(name, given[name]) for name in names])
@@ -206,7 +199,7 @@ class Truth:
         now, then = (light.sum(axis=0) for light in by_group[2:])
 
         def answer_errors(lit: Floats, true: Floats, some: Flags | slice) -> list[Floats]:
-            """Errors (n, 3) per half, of texels `some` whose light was `lit` (2, n, 3) and is `true`."""
+            """Errors (n, 3) by halves, of some texels whose light was `lit` (2, n, 3) and is `true`."""
             given = now[some][None], then[some][None]
             found = (answered((self._share[some] * half)[None], half[None], *given)[0] for half in lit)
             return [light - half for light, half in zip(found, true, strict=True)]
@@ -239,12 +232,12 @@ class Truth:
 
 
 def percent(share: float) -> float:
-    """A share in percent, with two decimals."""
+    """With two decimals."""
     return round(100 * float(share), 2)
 
 
 def figures(one: Floats, other: Floats, mean: float, local: Floats) -> dict[str, float]:
-    """rms and relative_rms of the error common to two halves (n, 3); 0 if it is lost in noise."""
+    """rms and relative_rms of the error that two halves (n, 3) have in common; 0 where that is lost in noise."""
     both = one * other
     return {
         "rms": percent(np.sqrt(max(float(both.mean()), 0.0)) / mean),
@@ -253,7 +246,7 @@ def figures(one: Floats, other: Floats, mean: float, local: Floats) -> dict[str,
 
 
 def _drawn(lit: Flags, label: Indices, count: int) -> Indices:
-    """Random texels among those that viewers see."""
+    """Texels drawn at random of those that viewers see."""
     from lambent.bake.surfaces.texels import BEYOND
 
     seen = np.flatnonzero(lit & (label < BEYOND))
@@ -279,47 +272,3 @@ def context_of(store: Store) -> BakeContext:
     ready = replace(scene, textures=prepared(scene.textures))
     as_baked = cut_for_viewers(divided(Sight(ready), store, silent, untimed), store, untimed).scene
     return BakeContext(as_baked, store, found(), quality_named("preview"), store.documents.get(METHODS, {}))
-
-
-def timed(
-    store: Store, stored: StoredAnswer, materials: Mapping[str, Material], edits: Mapping[str, Edit], turns: int
-) -> dict[str, dict[str, float]]:
-    """Median milliseconds of each edit's steps, after a round that compiles them."""
-    baked = read_baked(store)
-    reference = stored.answer.reference()
-    renderer, light = Renderer(open_device(), baked), AnsweredLight(baked, stored)
-    found: dict[str, list[dict[str, float]]] = {name: [] for name in edits}
-    for _ in range(turns + 1):
-        for name, edit in edits.items():
-            edited = changed(materials, edit)
-            now = [edited.get(one, materials[one]) for one in stored.materials]
-            found[name].append(_steps(stored.answer, reference, now, [materials[one] for one in stored.materials]))
-            begun = time.perf_counter()
-            lit = light.lit(edited)
-            groups = light.groups(lit)
-            layers = light.layers(lit) if groups is None else groups.light_map(np.ones((len(groups.records), 3)))
-            computed = time.perf_counter()
-            renderer.resources.show_light_map(list(layers))
-            renderer.finish()
-            ended = time.perf_counter()
-            found[name][-1] |= {"upload_ms": 1e3 * (ended - computed), "edit_to_picture_ms": 1e3 * (ended - begun)}
-    bounds = {name: {"likely_error": percent(light.likely_error(light.lit(changed(materials, edit))))}
-              for name, edit in edits.items()}  # fmt: skip
-    return {
-        name: bounds[name] | {key: round(statistics.median(run[key] for run in runs[1:]), 2) for key in runs[0]}
-        for name, runs in found.items()
-    }
-
-
-def _steps(answer: Answer, reference: Floats, now: list[Material], given: list[Material]) -> dict[str, float]:
-    """Milliseconds of solving, gathering and upsampling, and the number of sweeps of the solution."""
-    marks = [time.perf_counter()]
-    albedos = edited_albedos(given, now)
-    solution = solved(answer.patches, albedos)
-    marks.append(time.perf_counter())
-    light = answer.indirect(albedos, solution)
-    marks.append(time.perf_counter())
-    answer.at_texels(light, reference)
-    marks.append(time.perf_counter())
-    steps = dict(zip(("solve_ms", "gather_ms", "upsample_ms"), (1e3 * np.diff(marks)).tolist(), strict=True))
-    return {**steps, "sweeps": float(solution.sweeps)}

@@ -1,21 +1,22 @@
-"""Indirect light after edits of materials: radiosity between patches, gathered at points of the light map.
+"""Light that answers when surfaces get other colours: radiosity between patches, gathered at points of the light map.
 
     B = F (a (D + B) + t (D + B) on the other side)                                          (solve, patches)
     E(edited) = D + (E - D) ratio                                                            (points, texels)
     I = mean over rays of weight (a E + t E on the other side) at the point near their end   (gather, points)
     ratio = B(edited) / B(as baked) of the patch, then I(edited) / I(as baked)
 
-B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, a and t are their diffuse albedos of reflection
-and transmission, and F (P, P) is the share of a patch's irradiance that comes from each other patch. Patches carry most
-bounces. The last PASSES bounces are gathered among some thirty times as many points, each with its own direct light.
-Near contacts, where light changes from texel to texel, more points gather in the last pass and send nothing. Light is
-linear, so D, E and I have a leading axis of light groups; F may have one. The baked light is multiplied by a ratio, not
-corrected by a difference: it keeps its detail, the error is relative, and baked albedos give the ratio 1 exactly.
+B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, a and t their diffuse albedos of reflection and
+transmission, F (P, P) the share of what a patch receives that comes from each other one. Patches have most bounces; the
+last PASSES are gathered among some thirty times as many points, each with its own direct light, by few rays until the
+last: in gaps, which patches do not resolve, light is reflected many times. Beside contacts, where
+light changes from texel to texel, more points gather in the last pass, and send nothing. Light is linear, so D,
+E and I have a leading axis of light groups. A ratio, and not a difference, is applied to the baked
+light, so that it keeps its detail and the error is relative; with albedos as baked the ratio is 1 and nothing changes.
 
-Weights of rays include textures and chains of specular lobes. Points send the mean light around them: when the weights
-held the pattern of the baked light, indirect light from a sunlit spot grew as if it were the sun's.
+Rays that lobes have sent on, and textures, are in the weights of rays. Points send the mean light around them. With the
+shape of baked light in the weights, a sunlit spot's indirect light grew as if it were the sun's.
 
-Rays read light as (K, G, 4): `side_by_side`.
+Light that rays read is (K, G, 4): `side_by_side`.
 """
 
 from __future__ import annotations
@@ -29,20 +30,18 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from lambent.core import answer_loops as loops
+from lambent.core.answer_rays import Rays, gathered
 from lambent.core.arrays import Floats
 
-BYTE = 255
-MOST_POINTS = 1 << 16
-PASSES = 2
-WEIGHT_STEPS = 4  # per octave of weights: each byte stands for one step
-WEIGHT_ONE = 128  # the byte of weight 1
-TOLERANCE = 1e-3  # relative change of a patch in one sweep, below which the solution has converged
-SWEEPS = 400  # at most: with albedos up to MOST_ALBEDO even a closed box converges sooner
+PASSES = 6
+FEW_RAYS = 32  # of each point, in all passes but the last
+TOLERANCE = 1e-3  # relative change of every patch in a sweep, below which a solution stands
+SWEEPS = 400  # at most: with albedos up to MOST_ALBEDO even a closed box is done before
 MOST_ALBEDO = 0.97  # of an edited surface
-MOST_RATIO = 64.0  # the light after an edit over the light before it
-MOST_EXCESS = 1.25  # baked over gathered indirect light: the most that an edit may brighten
-MOST_SHARES = 1.3  # sum of a row of F: the light that reaches a patch from all others; weights can make it more than 1
-DARK = 1e-6  # of the mean indirect light: below it the ratio is 1
+MOST_RATIO = 64.0  # of the light after an edit, and one over it before
+MOST_EXCESS = 1.25  # of the baked indirect light over what is gathered, as far as an edit makes it brighter
+MOST_SHARES = 1.3  # of the light of all others that reaches a patch; by weights it can be more than 1
+DARK = 1e-6  # of the mean indirect light: below it a ratio is 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +55,9 @@ class Patches:
     paired : (P,) integers
         The patch on the other side; its own number on surfaces that no light crosses.
     direct : (G, P, 3) float32
-        Direct irradiance by light group, W/m^2, the sun's included.
-    transfer : (P, P) or (G, P, P) float32
-        F, one row per receiving patch; one matrix for all groups, or one per group.
+        Direct irradiance by group of lights, W/m^2, the sun's included.
+    transfer : (P, P) float32
+        F, rows by the patch that receives.
     """
 
     material: NDArray[np.integer]
@@ -68,29 +67,25 @@ class Patches:
 
     @cached_property
     def rows(self) -> SparseRows:
-        """F as sparse rows, each scaled to a sum of at most MOST_SHARES; four of five entries are 0."""
+        """F as sparse rows, whose sums are at most MOST_SHARES: four of five entries are 0."""
         return self._rows(MOST_SHARES)
 
     @cached_property
     def passive_rows(self) -> SparseRows:
-        """F with rows scaled to a sum of at most 1: light then decays, whatever the albedos."""
+        """F whose rows sum to 1 at most: with it no light grows, whatever the albedos."""
         return self._rows(1.0)
 
     def _rows(self, most: float) -> SparseRows:
-        groups = len(self.direct)
-        bounded = self.transfer * np.minimum(1, most / np.maximum(self.transfer.sum(axis=-1, keepdims=True), most))
-        each = [csr_matrix(one) for one in np.broadcast_to(bounded, (groups, *bounded.shape[-2:]))]
-        first = np.cumsum([0, *(one.nnz for one in each[:-1])])
-        bounds = np.stack([one.indptr.astype(np.int64) + at for one, at in zip(each, first, strict=True)])
-        senders, shares = (np.concatenate([getattr(one, part) for one in each]) for part in ("indices", "data"))
-        return SparseRows(bounds[:, :-1], bounds[:, 1:], senders, shares)
+        sums = self.transfer.sum(axis=1, keepdims=True)
+        rows = csr_matrix(self.transfer * np.minimum(1, most / np.maximum(sums, most)))
+        return SparseRows(rows.indptr[:-1], rows.indptr[1:], rows.indices, rows.data)
 
 
 class SparseRows(NamedTuple):
-    """Sparse rows: entries `senders`, `shares` (n,); a row's run from `starts` to `ends` (G, P)."""
+    """Entries `senders`, `shares` (n,) of rows that go from `starts` to `ends` (P,)."""
 
-    starts: NDArray[np.int64]
-    ends: NDArray[np.int64]
+    starts: NDArray[np.int32]
+    ends: NDArray[np.int32]
     senders: NDArray[np.int32]
     shares: NDArray[np.float32]
 
@@ -103,14 +98,14 @@ class Albedos:
     transmitted: Floats
 
     def same_as(self, other: Albedos) -> bool:
-        """Whether both are equal, bit for bit."""
+        """Whether they are equal, to the bit."""
         mine, others = (self.reflected, self.transmitted), (other.reflected, other.transmitted)
         return all(np.array_equal(a, b) for a, b in zip(mine, others, strict=True))
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Irradiance (G, P, 3) of patches, W/m^2, the number of sweeps, and whether it converged."""
+    """Irradiance (G, P, 3) of patches, W/m^2, the sweeps it took, and whether it stands."""
 
     irradiance: NDArray[np.float32]
     sweeps: int
@@ -118,10 +113,10 @@ class Solution:
 
 
 def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> Solution:
-    """Solve for the light between patches by Gauss-Seidel sweeps.
+    """Solve for the light between patches by the method of Gauss and Seidel.
 
-    The sweeps end when no patch of any group changes by more than `tolerance` of its own light; a bound relative to the
-    brightest patch would leave dark corners unsolved. If they diverge, `passive_rows` replace the rows.
+    It ends when no patch of any group changes by more than `tolerance` of its own light: a bound on the brightest
+    change would leave dark corners unsolved. Where light would grow without end, it is solved by `passive_rows`.
     """
     crossing = (patches.paired != np.arange(patches.direct.shape[1]))[:, None]
     reflected = albedos.reflected[patches.material].astype(np.float32)
@@ -139,17 +134,17 @@ def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points that send light to the rays that end near them, and gather light; each stands for several texels.
+    """Points of texels, which send light to rays that end near them, and gather it.
 
     Attributes
     ----------
     patch, material : (K,) integers
-        The patch and the material of each point.
+        That each lies in, and that it has.
     other : (K,) integers
-        The point on the other side of the surface; its own number where no light crosses.
+        The point on the other side of the surface; its own number where no light crosses it.
     direct, light : (G, K, 3) float32
-        Direct irradiance and all baked irradiance by light group, W/m^2, the sun's included: means over the texels that
-        the point stands for.
+        Direct and all baked irradiance by group of lights, W/m^2, the sun's included: means over the texels for which
+        a point sends.
     """
 
     patch: NDArray[np.integer]
@@ -158,110 +153,38 @@ class Points:
     direct: NDArray[np.float32]
     light: NDArray[np.float32]
 
-    def exitance(self, albedos: Albedos, ratio: Floats, of: NDArray[np.integer] | None = None) -> NDArray[np.float32]:
-        """Exitance (K, G, 4), W/m^2, for indirect light that is `ratio` (n, G, 4) times the baked.
+    def exitance(
+        self, albedos: Albedos, now: NDArray[np.float32], inverse: NDArray[np.float32], grows: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """Exitance (K, G, 4), W/m^2, where indirect light is `now` times `inverse` (K, G, 4) times as bright as baked.
 
-        `of` (K,) is the index into `ratio` for each point; by default point k uses ratio k.
+        Of the light as baked, `grows` (K, G, 4) gets brighter. `inverse` is of `inverses`.
         """
-        number = np.arange(len(self.other)) if of is None else of
-        reflected, transmitted = (
-            np.asarray(one, np.float32)[self.material] for one in (albedos.reflected, albedos.transmitted)
-        )
-        direct, light = (np.ascontiguousarray(one, np.float32) for one in (self.direct, self.light))
-        return np.asarray(loops.exitance(direct, light, ratio, number, self.other, reflected, transmitted))
+        tables = (np.pad(one, ((0, 0), (0, 1))) for one in (albedos.reflected, albedos.transmitted))
+        reflected, transmitted = (np.asarray(one, np.float32) for one in tables)
+        given = self._direct, self.indirect, grows, now, inverse, np.float32(MOST_RATIO)
+        return np.asarray(loops.exitance(*given, self.material, self.other, reflected, transmitted))
+
+    @cached_property
+    def indirect(self) -> NDArray[np.float32]:
+        """Indirect light (K, G, 4) as baked."""
+        return side_by_side(self.light - self.direct)
+
+    @cached_property
+    def _direct(self) -> NDArray[np.float32]:
+        return side_by_side(self.direct)
 
 
 def side_by_side(light: Floats) -> NDArray[np.float32]:
-    """Light (G, K, 3) as (K, G, 4): groups side by side, plus a padding channel."""
+    """Light (K, G, 4) of points from (G, K, 3): groups beside each other, and a channel of padding."""
     found = np.zeros((light.shape[1], light.shape[0], 4), np.float32)
     found[..., :3] = np.moveaxis(light, 0, 1)
     return found
 
 
-def packed_rays(point: NDArray[np.integer], weight: Floats) -> NDArray[np.uint8]:
-    """Rays (K, R, 3) bytes: the point near each ray's end, and its weight (K, R).
-
-    Rays that end near the same point are merged and sorted by point. Each ray stores the difference from the previous
-    point in two bytes, low byte first, and its weight in one. Weights are 0 or powers of two in WEIGHT_STEPS per
-    octave. Rows are padded with 0. Point numbers stay below MOST_POINTS.
-    """
-    rays = np.zeros((*point.shape, 3), np.uint8)
-    numbers, weights = np.ascontiguousarray(point, np.int64), np.ascontiguousarray(weight, np.float32)
-    loops.pack(numbers, weights, np.float32(WEIGHT_STEPS), np.float32(WEIGHT_ONE), rays)
-    return rays
-
-
-def weights_of_bytes() -> NDArray[np.float32]:
-    """(256,) weights that the bytes of `packed_rays` stand for."""
-    found = 2.0 ** ((np.arange(BYTE + 1) - WEIGHT_ONE) / WEIGHT_STEPS)
-    found[0] = 0
-    return np.asarray(found, np.float32)
-
-
-def last_points(rays: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """(K,) largest point number among the `packed_rays` of each point."""
-    return np.asarray((rays[..., 0] + 256 * rays[..., 1].astype(np.int64)).sum(axis=1))
-
-
-@dataclass(frozen=True, eq=False)
-class Rays:
-    """Where the rays of K points end; rays of one point that end near the same point are merged.
-
-    Attributes
-    ----------
-    starts : (K + 1,) int64
-        The rays of point k are those from starts[k] up to starts[k + 1].
-    points : (N,) uint16
-        The point near the end of each ray.
-    weights : (N,) uint8
-        Bytes, decoded by `weights_of_bytes`.
-    scale : (K,) float32
-        One over the number of rays of each point, rays that hit nothing included.
-    """
-
-    starts: NDArray[np.int64]
-    points: NDArray[np.uint16]
-    weights: NDArray[np.uint8]
-    scale: NDArray[np.float32]
-
-    @classmethod
-    def of(cls, packed: NDArray[np.uint8]) -> Rays:
-        """Unpack `packed_rays` (K, R, 3)."""
-        size, count = packed.shape[:2]
-        starts = np.append(0, np.cumsum(np.count_nonzero(packed[..., 2], axis=1))).astype(np.int64)
-        points, weights = np.zeros(starts[-1], np.uint16), np.zeros(starts[-1], np.uint8)
-        loops.unpack(np.ascontiguousarray(packed), starts, points, weights)
-        return cls(starts, points, weights, np.full(size, 1 / max(count, 1), np.float32))
-
-    def followed_by(self, other: Rays) -> Rays:
-        """These rays, followed by those of other points."""
-        starts = np.concatenate([self.starts, other.starts[1:] + self.starts[-1]])
-        points, weights = (np.concatenate([self.points, other.points]), np.concatenate([self.weights, other.weights]))
-        return Rays(starts, points, weights, np.concatenate([self.scale, other.scale]))
-
-    def of_first(self, count: int) -> Rays:
-        """The rays of the first `count` points."""
-        return Rays(self.starts[: count + 1], self.points, self.weights, self.scale[:count])
-
-
-def gathered(rays: Rays, exitance: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Indirect irradiance (K, G, 4) at points with `rays`, from exitance (n, G, 4).
-
-    Rays are cosine-distributed, so irradiance is pi times the mean radiance, exitance/pi.
-    """
-    given = rays.starts, rays.points, rays.weights, weights_of_bytes(), rays.scale, exitance
-    groups = exitance.shape[1]
-    if groups == 1:
-        return np.asarray(loops.gather_one(*given))
-    found = np.empty((len(rays.scale), groups, 4), np.float32)
-    for first in range(0, groups, 4):
-        loops.gather_four(*given, first, found)
-    return found
-
-
 @dataclass(frozen=True, eq=False)
 class Neighbours:
-    """Points (T, 8) uint32 near each texel, and their weights (T, 8) uint8, normalized by their sum, at least 1."""
+    """Points (T, 8) uint32 near each texel, and their shares (T, 8) uint8, which count by their sum, at least 1."""
 
     points: NDArray[np.uint32]
     shares: NDArray[np.uint8]
@@ -271,50 +194,50 @@ class Neighbours:
 
     @property
     def closest(self) -> NDArray[np.int64]:
-        """(T,) the point of the largest weight for each texel."""
+        """(T,) the point that counts most for each texel."""
         most = self.shares.argmax(axis=1)[:, None]
         return np.take_along_axis(self.points, most, axis=1)[:, 0].astype(np.int64)
 
 
 def upsampled(light: NDArray[np.float32], near: Neighbours) -> NDArray[np.float32]:
-    """Weighted means (G, T, 3), over the points near each texel, of light (K, G, 4)."""
+    """Means (G, T, 3) over the points near each texel of light (K, G, 4)."""
     return np.asarray(loops.upsampled(light, near.points, near.shares))
 
 
 def ratios(edited: Floats, reference: Floats) -> NDArray[np.float32]:
-    """I(edited) / I(reference) of light (G, ..., 3), within [0, MOST_RATIO]; 1 where the reference is nearly black."""
+    """I(edited) / I(reference) of light (G, ..., 3), within [0, MOST_RATIO]; 1 where there was next to none."""
     ratio = np.divide(edited, reference, out=np.ones_like(reference), where=reference > least_light(reference))
     return np.clip(ratio, 0, MOST_RATIO)
 
 
-def point_ratios(now: NDArray[np.float32], baked: NDArray[np.float32]) -> NDArray[np.float32]:
-    """`ratios` of light of points (K, G, 4)."""
-    least = np.array([least_light(baked[None, :, group, :3])[0, 0, 0] for group in range(baked.shape[1])], np.float32)
-    return np.asarray(loops.ratios(now, baked, least, np.float32(MOST_RATIO)))
+def inverses(baked: NDArray[np.float32]) -> NDArray[np.float32]:
+    """One over light (K, G, 4) as baked; 0 where there was next to none, and a ratio is 1."""
+    known = baked > np.moveaxis(least_light(np.moveaxis(baked, 1, 0)[..., :3]), 0, 1)
+    return np.divide(1, baked, out=np.zeros_like(baked), where=known)
 
 
 def least_light(reference: Floats) -> Floats:
-    """Light (G, 1, ...) of each group below which a ratio is meaningless."""
+    """Light (G, 1, ...) of each group below which a ratio says nothing."""
     axes = tuple(range(1, reference.ndim))
     return np.asarray(DARK * np.maximum(reference.mean(axis=axes, keepdims=True), 1e-30))
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Everything needed to update the light of a scene's texels after an edit of materials.
+    """Everything that the light of a scene's texels answers with.
 
     Attributes
     ----------
     points : Points
         K points that send and gather light.
     rays : Rays
-        Of K + F points: those K, then F points that only gather.
+        Theirs, then those of F points that gather alone: of K + F.
     near : Neighbours
-        Of T texels, among all K + F points.
+        Of the T texels, among all of these.
     direct, baked : (G, T, 3) float32
-        Direct and total irradiance of the texels as in the light map, W/m^2, direct sun left out.
+        Direct irradiance of the texels, and all of it, as the light map has them: W/m^2, direct sun left out.
     albedos : Albedos
-        As baked.
+        As they were baked.
     """
 
     patches: Patches
@@ -328,38 +251,57 @@ class Answer:
     def indirect(self, albedos: Albedos, solution: Solution | None = None) -> NDArray[np.float32]:
         """Indirect irradiance (K + F, G, 4) at the points, as far as their rays see it.
 
-        `solution` is the solution of the patches, if already known.
+        `solution` is that of the patches, if there is one already.
         """
-        found = self._gathered_as_baked
+        seen = self._gathered_as_baked
         if albedos.same_as(self.albedos):
-            return found
-        now = (solution or solved(self.patches, albedos)).irradiance - self.patches.direct
-        ratio, of = point_ratios(side_by_side(now), self._patches_as_baked), self.points.patch
-        for step in range(PASSES - 1):
-            among = gathered(self._senders_rays, self.points.exitance(albedos, ratio, of if step == 0 else None))
-            ratio = point_ratios(among, self._gathered_as_baked[: len(among)])
-        return gathered(self.rays, self.points.exitance(albedos, ratio))
+            return seen
+        patch, grows = self.points.patch, self._grows
+        now = side_by_side((solution or solved(self.patches, albedos)).irradiance - self.patches.direct)
+        sent = self.points.exitance(albedos, now[patch], self._inverse_of_patches[patch], grows)
+        for _ in range(PASSES - 1):
+            sent = self.points.exitance(albedos, gathered(self.few_rays, sent), self._inverse_of_few, grows)
+        return gathered(self.rays, sent)
 
     @cached_property
-    def _senders_rays(self) -> Rays:
-        return self.rays.of_first(len(self.points.other))
+    def few_rays(self) -> Rays:
+        """Some rays of the points that send, for all passes but the last."""
+        return self.rays.of_first(len(self.points.other)).thinned(FEW_RAYS, self._sent_as_baked.mean(axis=(1, 2)))
 
     @cached_property
-    def _patches_as_baked(self) -> NDArray[np.float32]:
-        return side_by_side(solved(self.patches, self.albedos).irradiance - self.patches.direct)
+    def few_as_baked(self) -> NDArray[np.float32]:
+        """Indirect irradiance (K, G, 4) that these gather as baked."""
+        return gathered(self.few_rays, self._sent_as_baked)
+
+    @cached_property
+    def _inverse_of_few(self) -> NDArray[np.float32]:
+        return inverses(self.few_as_baked)
+
+    @cached_property
+    def _inverse_of_patches(self) -> NDArray[np.float32]:
+        return inverses(side_by_side(solved(self.patches, self.albedos).irradiance - self.patches.direct))
+
+    @cached_property
+    def _grows(self) -> NDArray[np.float32]:
+        return np.asarray(
+            np.minimum(self.points.indirect, MOST_EXCESS * self._gathered_as_baked[: len(self.points.other)])
+        )
+
+    @cached_property
+    def _sent_as_baked(self) -> NDArray[np.float32]:
+        same = np.ones_like(self.points.indirect)
+        return self.points.exitance(self.albedos, same, same, self.points.indirect)
 
     @cached_property
     def _gathered_as_baked(self) -> NDArray[np.float32]:
-        shape = 1, len(self.points.direct), 4
-        none = np.zeros(len(self.points.other), np.int64)
-        return gathered(self.rays, self.points.exitance(self.albedos, np.ones(shape, np.float32), none))
+        return gathered(self.rays, self._sent_as_baked)
 
     def reference(self) -> NDArray[np.float32]:
-        """Indirect irradiance (G, T, 3) at the texels, computed the same way for the baked materials."""
+        """Indirect irradiance (G, T, 3) at the texels as this computes it for the baked materials."""
         return upsampled(self._gathered_as_baked, self.near)
 
     def irradiance(self, albedos: Albedos, reference: Floats) -> NDArray[np.float32]:
-        """Irradiance (G, T, 3) of the texels with other albedos; `baked` itself if the albedos are unchanged."""
+        """Irradiance (G, T, 3) of the texels with other albedos; `baked` itself where they are as baked."""
         if albedos.same_as(self.albedos):
             return self.baked
         return self.at_texels(self.indirect(albedos), reference)
@@ -376,8 +318,8 @@ class Answer:
 def answered(direct: Floats, baked: Floats, edited: Floats, reference: Floats) -> NDArray[np.float32]:
     """D + (E - D) times the ratio of the gathered light `edited` over `reference`, all (G, ..., 3).
 
-    Indirect light above MOST_EXCESS times the gathered light does not brighten with edits: lobes focused it, or it
-    comes from a surface too near for the points to see.
+    Of indirect light that is more than MOST_EXCESS times what was gathered, the rest grows with no edit: lobes have
+    focused it, or it comes from something so near that the points that gather do not see it.
     """
     ratio, indirect = ratios(edited, reference), baked - direct
     excess = np.maximum(indirect - MOST_EXCESS * reference, 0)

@@ -1,7 +1,7 @@
-"""Compiled loops of `answer`: light between patches, exitance of points, gathering, and interpolation at texels.
+"""Compiled loops of `answer`: light between patches, exitance of points, gathering, and the light of texels.
 
 Light of points is (K, G, 4) float32, groups side by side, so that a ray reads the light of all groups from one place.
-The fourth channel is padding; it lets the processor add all channels of a group in one vector (`by_lanes`).
+The fourth channel is padding, with which a processor adds the channels of a group at once (`by_lanes`).
 """
 
 from __future__ import annotations
@@ -15,11 +15,13 @@ import numba
 import numpy as np
 
 NO_LIGHT = np.float32(1e-30)
+LANES = 2048  # of points' light, that a thread computes at once
+BLOCK = 128  # texels whose light stays in a processor's nearest cache
 _COMPILING, _NUMBA = Lock(), cast(Any, numba.config)
 
 
 def by_lanes(loop: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a loop with LLVM's SLP vectorizer, which Numba leaves out: sums over channels become vector sums."""
+    """Compile a loop whose sums over neighbouring channels are vectors: a pass of LLVM that Numba leaves out."""
     compiled = numba.njit(parallel=True, cache=True, nogil=True)(loop)
 
     @wraps(loop)
@@ -36,80 +38,105 @@ def by_lanes(loop: Callable[..., Any]) -> Callable[..., Any]:
     return called
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+@by_lanes
 def solve(starts, ends, senders, shares, direct, reflected, transmitted, paired, tolerance, sweeps, light):  # type: ignore[no-untyped-def]
-    """Bring light (G, P, 3) to B = F (a (D + B) + t (D + B) of the other side) + D by Gauss-Seidel sweeps.
+    """Bring light (G, P, 3) to B = F (a (D + B) + t (D + B) of the other side) + D by Gauss and Seidel's method.
 
-    F is sparse by group and row: `senders` and `shares` from `starts` to `ends` (G, P). Each group stops when no patch
-    changes by more than `tolerance` of its light. Returns (G,) the number of sweeps, and (G,) whether each converged.
+    F is sparse: `senders` and `shares` of row p from `starts` to `ends` (P,). Four groups are summed in one pass over
+    its rows, and stop together, when no patch changes by more than `tolerance` of its light. Returns the sweeps of each
+    four, and whether they stopped.
     """
     groups, patches = light.shape[:2]
-    taken, done = np.zeros(groups, np.int64), np.zeros(groups, np.bool_)
-    for group in numba.prange(groups):
-        sent = np.empty((patches, 3), np.float32)
-        for p in range(patches):
-            for c in range(3):
-                other = light[group, paired[p], c] * transmitted[p, c]
-                sent[p, c] = light[group, p, c] * reflected[p, c] + other
-        while taken[group] < sweeps and not done[group]:
-            taken[group] += 1
+    fours = (groups + 3) // 4
+    taken, done = np.zeros(fours, np.int64), np.zeros(fours, np.bool_)
+    for four in numba.prange(fours):
+        first, last = 4 * four, min(4 * four + 4, groups)
+        sent, arrived = np.zeros((patches, 16), np.float32), np.empty(16, np.float32)
+        for group in range(first, last):
+            for p in range(patches):
+                for c in range(3):
+                    other = light[group, paired[p], c] * transmitted[p, c]
+                    sent[p, 4 * (group - first) + c] = light[group, p, c] * reflected[p, c] + other
+        while taken[four] < sweeps and not done[four]:
+            taken[four] += 1
             stands = True
             for p in range(patches):
-                red = green = blue = np.float32(0)
-                for k in range(starts[group, p], ends[group, p]):
+                a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = np.float32(0)
+                a8 = a9 = a10 = a11 = a12 = a13 = a14 = a15 = np.float32(0)
+                for k in range(starts[p], ends[p]):
                     q, share = senders[k], shares[k]
-                    red += share * sent[q, 0]
-                    green += share * sent[q, 1]
-                    blue += share * sent[q, 2]
+                    a0 += share * sent[q, 0]
+                    a1 += share * sent[q, 1]
+                    a2 += share * sent[q, 2]
+                    a3 += share * sent[q, 3]
+                    a4 += share * sent[q, 4]
+                    a5 += share * sent[q, 5]
+                    a6 += share * sent[q, 6]
+                    a7 += share * sent[q, 7]
+                    a8 += share * sent[q, 8]
+                    a9 += share * sent[q, 9]
+                    a10 += share * sent[q, 10]
+                    a11 += share * sent[q, 11]
+                    a12 += share * sent[q, 12]
+                    a13 += share * sent[q, 13]
+                    a14 += share * sent[q, 14]
+                    a15 += share * sent[q, 15]
+                arrived[0], arrived[1], arrived[2], arrived[3] = a0, a1, a2, a3
+                arrived[4], arrived[5], arrived[6], arrived[7] = a4, a5, a6, a7
+                arrived[8], arrived[9], arrived[10], arrived[11] = a8, a9, a10, a11
+                arrived[12], arrived[13], arrived[14], arrived[15] = a12, a13, a14, a15
                 other = paired[p]
-                for c, arrived in enumerate((red, green, blue)):
-                    new = max(direct[group, p, c] + arrived, np.float32(0))  # an equivalent albedo may be negative
-                    # `not <=` instead of `>`: NaN, the difference of infinities, must not count as converged.
-                    if not abs(new - light[group, p, c]) <= tolerance * new + NO_LIGHT:
-                        stands = False
-                    light[group, p, c] = new
-                    sent[p, c] = new * reflected[p, c] + light[group, other, c] * transmitted[p, c]
-                    if other != p:
-                        sent[other, c] = light[group, other, c] * reflected[other, c] + new * transmitted[other, c]
-            done[group] = stands
+                for group in range(first, last):
+                    for c in range(3):
+                        lane = 4 * (group - first) + c
+                        # An equivalent albedo may be negative.
+                        new = max(direct[group, p, c] + arrived[lane], np.float32(0))
+                        # Not `>`: a difference of infinities, which is not a number, does not stand.
+                        if not abs(new - light[group, p, c]) <= tolerance * new + NO_LIGHT:
+                            stands = False
+                        light[group, p, c] = new
+                        sent[p, lane] = new * reflected[p, c] + light[group, other, c] * transmitted[p, c]
+                        if other != p:
+                            across = light[group, other, c] * reflected[other, c]
+                            sent[other, lane] = across + new * transmitted[other, c]
+            done[four] = stands
     return taken, done
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
-def exitance(direct, light, ratio, of, other, reflected, transmitted):  # type: ignore[no-untyped-def]
-    """Exitance (K, G, 4) of points whose indirect light is the baked times ratio (n, G, 4) at index `of` (K,)."""
-    groups, points = direct.shape[:2]
-    found = np.zeros((points, groups, 4), np.float32)
+@by_lanes
+def exitance(direct, indirect, grows, now, inverse, most_ratio, material, other, reflected, transmitted):  # type: ignore[no-untyped-def]
+    """Exitance (K, G, 4) of points with albedos (M, 4), whose indirect light is now times inverse as bright as baked.
+
+    All light is (K, G, 4). `inverse` is one over that as baked, 0 where a ratio says nothing; `grows` is the part of
+    `indirect` that gets brighter.
+    """
+    points, groups = direct.shape[:2]
+    lanes = points * groups * 4
+    light, found = np.empty(lanes, np.float32), np.empty(direct.shape, np.float32)
+    straight, shone, more = direct.reshape(-1), indirect.reshape(-1), grows.reshape(-1)
+    bright, dimmed = now.reshape(-1), inverse.reshape(-1)
+    for block in numba.prange((lanes + LANES - 1) // LANES):
+        for i in range(LANES * block, min(LANES * block + LANES, lanes)):
+            ratio = min(max(bright[i] * dimmed[i], np.float32(0)), most_ratio)
+            ratio = ratio if dimmed[i] > 0 else np.float32(1)
+            growth = max(ratio - np.float32(1), np.float32(0))
+            light[i] = straight[i] + shone[i] * min(ratio, np.float32(1)) + more[i] * growth
     for k in numba.prange(points):
-        there = other[k]
+        one, there = material[k], other[k]
         for group in range(groups):
-            for c in range(3):
-                at = direct[group, k, c]
-                sent = reflected[k, c] * (at + (light[group, k, c] - at) * ratio[of[k], group, c])
-                if there != k:
-                    at = direct[group, there, c]
-                    now = at + (light[group, there, c] - at) * ratio[of[there], group, c]
-                    sent += transmitted[k, c] * now
-                found[k, group, c] = sent
-    return found
-
-
-@numba.njit(parallel=True, cache=True, nogil=True)
-def ratios(now, baked, least, most_ratio):  # type: ignore[no-untyped-def]
-    """`answer.ratios` of light of points (K, G, 4); 1 where the baked light is at most `least` (G,)."""
-    found = np.ones(now.shape, np.float32)
-    for k in numba.prange(len(now)):
-        for group in range(now.shape[1]):
-            for c in range(3):
-                if baked[k, group, c] > least[group]:
-                    ratio = now[k, group, c] / baked[k, group, c]
-                    found[k, group, c] = min(max(ratio, np.float32(0)), most_ratio)
+            at = 4 * (k * groups + group)
+            for c in range(4):
+                found[k, group, c] = reflected[one, c] * light[at + c]
+            if there != k:
+                at = 4 * (there * groups + group)
+                for c in range(4):
+                    found[k, group, c] += transmitted[one, c] * light[at + c]
     return found
 
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
-    """`answer.packed_rays` into `rays` (K, R, 3), zeroed before, for rays to `numbers` (K, R) with `weights` (K, R)."""
+    """`answer_rays.packed_rays` (K, R, 3), all 0 before, of rays to `numbers` (K, R) that weigh (K, R)."""
     for k in numba.prange(len(numbers)):
         order = np.argsort(numbers[k])
         sums = np.zeros(len(order), np.float32)
@@ -124,7 +151,7 @@ def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
                 sums[count - 1] += weights[k, r]
         place, last = 0, np.int64(0)
         for n in range(count):
-            # Steps are wide; dithered rounding to the byte above or below keeps sums of many weights right.
+            # Steps are wide, so that a byte is the one below or above as chance has it: sums of many stay right.
             dither = np.float32((n * 0.6180339887 + ends[n] * 0.7548776662) % 1)
             code = np.floor(np.log2(sums[n]) * steps + dither) + one
             if code >= 1:
@@ -136,8 +163,39 @@ def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(parallel=True, cache=True, nogil=True)
+def thin(starts, points, weights, table, light, steps, one, chosen, codes):  # type: ignore[no-untyped-def]
+    """Choose rays of each k, from `starts` (K + 1,) on, that stand for all: numbers and weights (K, n), 0 of no ray.
+
+    Chances are half by weight and half by the exitance light (m,) that a ray brings; choices are systematic.
+    """
+    count = chosen.shape[1]
+    for k in numba.prange(len(chosen)):
+        weighed = lit = np.float32(0)
+        for r in range(starts[k], starts[k + 1]):
+            weighed += table[weights[r]]
+            lit += table[weights[r]] * light[points[r]]
+        shift = (k * 0.6180339887) % 1
+        total, taken, place = 0.0, 0, 0
+        for r in range(starts[k], starts[k + 1]):
+            weight = table[weights[r]]
+            chance = weight / weighed
+            if lit > 0:
+                chance = 0.5 * chance + 0.5 * weight * light[points[r]] / lit
+            total += chance
+            before = taken
+            while taken < count and taken + shift < total * count:
+                taken += 1
+            if taken > before:
+                value = weight * (taken - before) / (count * chance)
+                code = np.floor(np.log2(value) * steps + (r * 0.7548776662) % 1) + one
+                chosen[k, place] = r
+                codes[k, place] = np.uint8(min(max(code, 1.0), 255.0))
+                place += 1
+
+
+@numba.njit(parallel=True, cache=True, nogil=True)
 def unpack(rays, starts, points, weights):  # type: ignore[no-untyped-def]
-    """Points and weights (N,) of packed rays (K, R, 3); those of row k begin at `starts` (K + 1,)."""
+    """Points and weights (N,) of packed rays (K, R, 3), those of each k from `starts` (K + 1,) on."""
     for k in numba.prange(len(rays)):
         last = np.int64(0)
         for n in range(starts[k + 1] - starts[k]):
@@ -148,9 +206,9 @@ def unpack(rays, starts, points, weights):  # type: ignore[no-untyped-def]
 
 @by_lanes
 def gather_one(starts, points, weights, table, scale, sent):  # type: ignore[no-untyped-def]
-    """Sums (K, 1, 4) of exitance (n, 1, 4) at `points` (N,); those of row k begin at `starts` (K + 1,).
+    """Sums (K, 1, 4) of exitance (n, 1, 4) at `points` (N,), those of each k from `starts` (K + 1,) on.
 
-    `table` maps bytes to weights; `scale` (K,) multiplies the sums.
+    `table` has the weights that bytes stand for; the sums of each k are times `scale` (K,).
     """
     found = np.empty((len(scale), 1, 4), np.float32)
     for k in numba.prange(len(scale)):
@@ -167,43 +225,41 @@ def gather_one(starts, points, weights, table, scale, sent):  # type: ignore[no-
 
 
 @by_lanes
-def gather_four(starts, points, weights, table, scale, sent, first, found):  # type: ignore[no-untyped-def]
-    """Likewise for four groups from `first` on, into found (K, G, 4); the last group repeats if fewer are left."""
-    last = sent.shape[1] - 1
-    two, three, four = min(first + 1, last), min(first + 2, last), min(first + 3, last)
+def gather_four(starts, points, weights, table, scale, sent):  # type: ignore[no-untyped-def]
+    """The same of four groups side by side: sums (K, 16) of exitance (n, 16)."""
+    found = np.empty((len(scale), 16), np.float32)
     for k in numba.prange(len(scale)):
-        a0 = a1 = a2 = a3 = b0 = b1 = b2 = b3 = np.float32(0)
-        c0 = c1 = c2 = c3 = d0 = d1 = d2 = d3 = np.float32(0)
+        a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = np.float32(0)
+        a8 = a9 = a10 = a11 = a12 = a13 = a14 = a15 = np.float32(0)
         for r in range(starts[k], starts[k + 1]):
             point, weight = points[r], table[weights[r]]
-            a0 += weight * sent[point, first, 0]
-            a1 += weight * sent[point, first, 1]
-            a2 += weight * sent[point, first, 2]
-            a3 += weight * sent[point, first, 3]
-            b0 += weight * sent[point, two, 0]
-            b1 += weight * sent[point, two, 1]
-            b2 += weight * sent[point, two, 2]
-            b3 += weight * sent[point, two, 3]
-            c0 += weight * sent[point, three, 0]
-            c1 += weight * sent[point, three, 1]
-            c2 += weight * sent[point, three, 2]
-            c3 += weight * sent[point, three, 3]
-            d0 += weight * sent[point, four, 0]
-            d1 += weight * sent[point, four, 1]
-            d2 += weight * sent[point, four, 2]
-            d3 += weight * sent[point, four, 3]
+            a0 += weight * sent[point, 0]
+            a1 += weight * sent[point, 1]
+            a2 += weight * sent[point, 2]
+            a3 += weight * sent[point, 3]
+            a4 += weight * sent[point, 4]
+            a5 += weight * sent[point, 5]
+            a6 += weight * sent[point, 6]
+            a7 += weight * sent[point, 7]
+            a8 += weight * sent[point, 8]
+            a9 += weight * sent[point, 9]
+            a10 += weight * sent[point, 10]
+            a11 += weight * sent[point, 11]
+            a12 += weight * sent[point, 12]
+            a13 += weight * sent[point, 13]
+            a14 += weight * sent[point, 14]
+            a15 += weight * sent[point, 15]
         by = scale[k]
-        found[k, four, 0], found[k, four, 1], found[k, four, 2], found[k, four, 3] = d0 * by, d1 * by, d2 * by, d3 * by
-        found[k, three, 0], found[k, three, 1] = c0 * by, c1 * by
-        found[k, three, 2], found[k, three, 3] = c2 * by, c3 * by
-        found[k, two, 0], found[k, two, 1], found[k, two, 2], found[k, two, 3] = b0 * by, b1 * by, b2 * by, b3 * by
-        found[k, first, 0], found[k, first, 1] = a0 * by, a1 * by
-        found[k, first, 2], found[k, first, 3] = a2 * by, a3 * by
+        found[k, 0], found[k, 1], found[k, 2], found[k, 3] = a0 * by, a1 * by, a2 * by, a3 * by
+        found[k, 4], found[k, 5], found[k, 6], found[k, 7] = a4 * by, a5 * by, a6 * by, a7 * by
+        found[k, 8], found[k, 9], found[k, 10], found[k, 11] = a8 * by, a9 * by, a10 * by, a11 * by
+        found[k, 12], found[k, 13], found[k, 14], found[k, 15] = a12 * by, a13 * by, a14 * by, a15 * by
+    return found
 
 
 @by_lanes
 def upsampled(light, points, shares):  # type: ignore[no-untyped-def]
-    """Weighted means (G, T, 3), over the points (T, 8) near each texel, of light (K, G, 4)."""
+    """Means (G, T, 3) over the points near each texel (T, 8) of light (K, G, 4)."""
     groups = light.shape[1]
     found = np.empty((groups, len(points), 3), np.float32)
     for t in numba.prange(len(points)):
@@ -224,30 +280,36 @@ def upsampled(light, points, shares):  # type: ignore[no-untyped-def]
 
 @by_lanes
 def texel_light(points, shares, edited, reference, direct, baked, least, most_ratio, most_excess):  # type: ignore[no-untyped-def]
-    """`answer.answered` at texels (G, T, 3), from means of `edited` (K, G, 4) over the points near each texel."""
-    found = np.empty(direct.shape, np.float32)
-    groups, near = direct.shape[0], points.shape[1]
-    for t in numba.prange(direct.shape[1]):
-        total = np.float32(0)
-        for n in range(near):
-            total += np.float32(shares[t, n])
-        for group in range(groups):
-            a0 = a1 = a2 = a3 = np.float32(0)
+    """`answer.answered` at texels (G, T, 3), of means over the points near each of `edited` (K, G, 4)."""
+    groups, texels, near = direct.shape[0], direct.shape[1], points.shape[1]
+    found = np.empty((groups, 3 * texels), np.float32)
+    before, straight, whole = reference.reshape(groups, -1), direct.reshape(groups, -1), baked.reshape(groups, -1)
+    for block in numba.prange((texels + BLOCK - 1) // BLOCK):
+        first = BLOCK * block
+        count = min(BLOCK, texels - first)
+        mean = np.empty((groups, 3 * BLOCK + 1), np.float32)  # the padding of a texel is where the next one begins
+        for t in range(count):
+            total = np.float32(0)
             for n in range(near):
-                place, share = points[t, n], np.float32(shares[t, n])
-                a0 += share * edited[place, group, 0]
-                a1 += share * edited[place, group, 1]
-                a2 += share * edited[place, group, 2]
-                a3 += share * edited[place, group, 3]
-            for c, now in enumerate((a0, a1, a2)):
-                then, at = reference[group, t, c], direct[group, t, c]
-                ratio = np.float32(1)
-                if then > least[group]:
-                    ratio = min(max(now / (total * then), np.float32(0)), most_ratio)
-                indirect = baked[group, t, c] - at
-                light = at + indirect * ratio
-                excess = indirect - most_excess * then
-                if excess > 0 and ratio > 1:
-                    light -= excess * (ratio - np.float32(1))
-                found[group, t, c] = light
-    return found
+                total += np.float32(shares[first + t, n])
+            by, lane = np.float32(1) / total, 3 * t
+            for group in range(groups):
+                a0 = a1 = a2 = a3 = np.float32(0)
+                for n in range(near):
+                    place, share = points[first + t, n], np.float32(shares[first + t, n])
+                    a0 += share * edited[place, group, 0]
+                    a1 += share * edited[place, group, 1]
+                    a2 += share * edited[place, group, 2]
+                    a3 += share * edited[place, group, 3]
+                mean[group, lane], mean[group, lane + 1] = a0 * by, a1 * by
+                mean[group, lane + 2], mean[group, lane + 3] = a2 * by, a3 * by
+        for group in range(groups):
+            for i in range(3 * count):
+                value = 3 * first + i
+                then, at = before[group, value], straight[group, value]
+                ratio = min(max(mean[group, i] / max(then, NO_LIGHT), np.float32(0)), most_ratio)
+                ratio = ratio if then > least[group] else np.float32(1)
+                indirect = whole[group, value] - at
+                excess = max(indirect - most_excess * then, np.float32(0)) * max(ratio - np.float32(1), np.float32(0))
+                found[group, value] = at + indirect * ratio - excess
+    return found.reshape(direct.shape)

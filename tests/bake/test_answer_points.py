@@ -17,7 +17,7 @@ from lambent.bake.answering.points import (
 )
 from lambent.bake.answering.spots import Spots
 from lambent.bake.answering.transfer import chosen_rays, sender_means, transfer_of
-from lambent.core.answer import BYTE, Rays, packed_rays
+from lambent.core.answer_rays import BYTE, Rays, packed_rays
 
 SIZE = 32
 

@@ -22,7 +22,7 @@ SMALL = quality_named("preview").changed(
     probe={"texels": 16, "samples": 8},
     answer={"patches": 100, "gather_rays": 64},
 )
-EFFORT = answer.Effort(texels=60, paths=128, edits=2, turns=1, contact_paths=512)
+EFFORT = answer.Effort(texels=60, paths=128, edits=2, turns=1, contact_paths=512, drag_s=0.5)
 
 
 @pytest.mark.usefixtures("adapter", "mi")
@@ -40,6 +40,8 @@ def test_rows_of_a_store(tmp_path: Path, groups: str) -> None:
         assert 0 < row["noise"] < row["naive_rms"] and row["shown_rms"] < row["naive_rms"] + row["baked_rms"]
         parts = [row[name] for name in ("solve_ms", "gather_ms", "upsample_ms", "upload_ms")]
         assert min(parts) > 0 and row["edit_to_picture_ms"] > row["upload_ms"] and row["sweeps"] >= 1
+        assert row["edit_to_picture_cpu_ms"] > 0 and (row["dimming_ms"] is None) == (groups == "none")
+        assert row["drag_frames_per_s"] > 0 and row["drag_edits_per_s"] > 0
         assert row["rms"] < row["likely_error"] < row["naive_rms"]
         assert row["bytes"] > 1000 and row["precompute_s"] > 0
         assert row["precompute_cpu_s"] > 0 and row["light_map_cpu_s"] > 0
@@ -52,7 +54,10 @@ def test_edits_of_a_scene_are_of_its_largest_materials() -> None:
     edits = answer.edits_of(scene, 4)
     assert len(edits) == 4 and "everything white" in edits and all(edit.keys() <= scene.materials.keys()
                                                                    for edit in edits.values())  # fmt: skip
-    assert "walls dark blue" in answer.edits_of(load_scene("builtin:room"), 6)
+    room = load_scene("builtin:room")
+    white = answer.edits_of(room, 6)["everything white"]
+    assert "walls dark blue" in answer.edits_of(room, 6)
+    assert white["curtain"] == pytest.approx([0.85 - t for t in room.materials["curtain"].kt_d])
 
 
 def test_a_store_without_an_answer_is_refused(tmp_path: Path) -> None:

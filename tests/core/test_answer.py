@@ -7,30 +7,26 @@ import pytest
 
 from lambent.core.answer import (
     MOST_EXCESS,
-    MOST_POINTS,
     MOST_SHARES,
     Albedos,
     Answer,
     Neighbours,
     Patches,
     Points,
-    Rays,
     answered,
-    gathered,
-    last_points,
-    packed_rays,
-    point_ratios,
+    inverses,
     ratios,
     side_by_side,
     solved,
     upsampled,
 )
+from lambent.core.answer_rays import MOST_POINTS, Rays, gathered, last_points, packed_rays
 
 
 def patches(groups: int = 2, count: int = 30, paired: bool = False) -> Patches:
     rng = np.random.default_rng(3)
-    transfer = rng.random((groups, count, count)) ** 4
-    transfer /= transfer.sum(axis=2, keepdims=True)  # a closed room
+    transfer = rng.random((count, count)) ** 4
+    transfer /= transfer.sum(axis=1, keepdims=True)  # a closed room
     other = np.arange(count)
     if paired:
         other[:10] = np.roll(np.arange(10), 5)
@@ -44,16 +40,17 @@ def albedos(seed: int = 5) -> Albedos:
 
 
 @pytest.mark.parametrize("paired", [False, True])
-def test_the_solution_is_that_of_the_linear_system(paired: bool) -> None:
-    room, colours = patches(paired=paired), albedos()
+@pytest.mark.parametrize("groups", [1, 2, 6])
+def test_the_solution_is_that_of_the_linear_system(paired: bool, groups: int) -> None:
+    room, colours = patches(groups, paired=paired), albedos()
     found = solved(room, colours, tolerance=1e-6)
     assert found.converged
-    for group in range(2):
+    for group in range(groups):
         for channel in range(3):
             across = np.eye(30)[room.paired] * (room.paired != np.arange(30))[:, None]
             sends = np.diag(colours.reflected[room.material, channel])
             sends = sends + np.diag(colours.transmitted[room.material, channel]) @ across
-            light = np.linalg.solve(np.eye(30) - room.transfer[group] @ sends, room.direct[group, :, channel])
+            light = np.linalg.solve(np.eye(30) - room.transfer @ sends, room.direct[group, :, channel])
             assert np.allclose(found.irradiance[group, :, channel], light, rtol=2e-4)
 
 
@@ -139,11 +136,16 @@ def test_points_send_the_light_of_both_their_sides() -> None:
     light = np.array([[[10.0] * 3, [4.0] * 3]], np.float32)
     points = Points(np.zeros(2, int), np.zeros(2, int), np.array([1, 0]), np.float32(0.5) * light, light)
     sheet = Albedos(np.full((1, 3), 0.2), np.full((1, 3), 0.5))
-    as_baked = points.exitance(sheet, np.ones((1, 1, 4), np.float32), np.zeros(2, int))
+    same = np.ones((2, 1, 4), np.float32)
+    as_baked = points.exitance(sheet, same, same, points.indirect)
     assert as_baked.shape == (2, 1, 4) and not as_baked[..., 3].any()
     assert np.allclose(as_baked[:, 0, 0], [0.2 * 10 + 0.5 * 4, 0.2 * 4 + 0.5 * 10])
-    doubled = points.exitance(sheet, np.full((2, 1, 4), 2, np.float32))
+    doubled = points.exitance(sheet, 2 * same, same, points.indirect)
     assert np.allclose(doubled[:, 0, 0], 1.5 * as_baked[:, 0, 0]), "direct light stays"
+    bounded = points.exitance(sheet, 2 * same, same, 0 * points.indirect)
+    assert np.allclose(bounded, as_baked), "light that was not gathered does not grow"
+    halved = points.exitance(sheet, 0.5 * same, same, 0 * points.indirect)
+    assert np.allclose(halved[:, 0, 0], 0.75 * as_baked[:, 0, 0]), "but gets darker"
 
 
 def test_two_points_in_a_furnace_have_the_light_of_its_series() -> None:
@@ -160,6 +162,42 @@ def test_two_points_in_a_furnace_have_the_light_of_its_series() -> None:
         assert np.allclose(found, 1 / (1 - albedo), rtol=0.01)
 
 
+def test_light_in_a_gap_that_patches_do_not_resolve_is_reflected_many_times() -> None:
+    """A patch has a lit point and seven in a gap, whose rays end on all eight alike: I = a (7 I + 1) / 8."""
+    weight = np.ones((8, 64))
+    weight[0] = 0
+
+    def gap(albedo: float) -> float:
+        return albedo / (8 - 7 * albedo)
+
+    def grey(albedo: float) -> Albedos:
+        return Albedos(np.full((1, 3), albedo), np.zeros((1, 3)))
+
+    direct, light = np.zeros((1, 8, 3), np.float32), np.full((1, 8, 3), gap(0.2), np.float32)
+    direct[:, 0] = light[:, 0] = 1
+    patch = Patches(np.zeros(1, int), np.zeros(1, int), direct.mean(axis=1, keepdims=True), np.full((1, 1), 0.5))
+    points = Points(np.zeros(8, int), np.zeros(8, int), np.arange(8), direct, light)
+    near = Neighbours(np.full((1, 8), 1, np.uint32), np.full((1, 8), 255, np.uint8))
+    rays = Rays.of(packed_rays(np.tile(np.arange(64) % 8, (8, 1)), weight))
+    answer = Answer(patch, points, rays, near, direct[:, 1:2], light[:, 1:2], grey(0.2))
+    assert answer.reference() == pytest.approx(gap(0.2))
+    assert answer.irradiance(grey(0.8), answer.reference()) == pytest.approx(gap(0.8), rel=0.12)
+
+
+def test_few_rays_stand_for_all_of_a_point() -> None:
+    rng = np.random.default_rng(4)
+    point, weight, light = rng.integers(0, 500, (40, 256)), rng.random((40, 256)) ** 3, rng.random((500, 1, 3)) ** 3
+    weight[3] = 0  # a point that sees nothing
+    rays, sent = Rays.of(packed_rays(point, weight)), padded(np.asarray(light, np.float32).reshape(500, 1, 3))
+    few = rays.thinned(32, light.mean(axis=(1, 2)))
+    each = np.diff(few.starts)
+    assert each.max() <= 32 and each[3] == 0 and len(few.points) == len(few.weights) == each.sum()
+    ratio = gathered(few, sent)[..., :3].sum(axis=(1, 2)) / np.maximum(
+        gathered(rays, sent)[..., :3].sum(axis=(1, 2)), 1e-9
+    )
+    assert np.delete(ratio, 3).std() < 0.15 and np.delete(ratio, 3).mean() == pytest.approx(1, abs=0.03)
+
+
 def test_texels_show_means_of_their_points() -> None:
     near = Neighbours(np.array([[0, 1], [2, 2]], np.uint32), np.array([[255, 85], [10, 0]], np.uint8))
     light = np.arange(9, dtype=np.float32).reshape(1, 3, 3)
@@ -169,8 +207,7 @@ def test_texels_show_means_of_their_points() -> None:
 def test_ratios_of_no_light_are_one_and_bounded() -> None:
     reference = np.array([[[1.0, 2.0, 0.0]]])
     assert ratios(np.array([[[0.5, 4e9, 5.0]]]), reference).tolist() == [[[0.5, 64.0, 1.0]]]
-    of_points = (side_by_side(np.array(one, np.float32)) for one in ([[[0.5, 4e9, 5.0]]], reference))
-    assert point_ratios(*of_points)[..., :3].tolist() == [[[0.5, 64.0, 1.0]]]
+    assert inverses(side_by_side(reference.astype(np.float32)))[..., :3].tolist() == [[[1.0, 0.5, 0.0]]]
 
 
 def test_direct_light_stays_and_light_that_was_not_gathered_never_grows() -> None:

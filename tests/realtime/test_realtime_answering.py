@@ -47,6 +47,15 @@ def test_red_walls_redden_the_room_and_its_reflection(store: Store) -> None:
     assert 0 < AnsweredLight(baked, stored).likely_error(AnsweredLight(baked, stored).lit(edited)) < 0.3
 
 
+def test_the_error_of_some_texels_stands_for_that_of_all(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    baked, stored = read_baked(store), read_answer(store)
+    answer = AnsweredLight(baked, stored)
+    light = answer.lit(recoloured(baked.record.materials, {"grey": (0.5, 0.05, 0.05)}))
+    of_all = answer.likely_error(light)
+    monkeypatch.setattr("lambent.realtime.answering.ERROR_TEXELS", len(stored.texels) // 3)
+    assert answer.likely_error(light) == pytest.approx(of_all, rel=0.3) and answer.likely_error(light) != of_all
+
+
 def test_light_that_is_changed_on_the_gpu_is_that_of_a_new_scene(store: Store) -> None:
     baked, stored = read_baked(store), read_answer(store)
     edited = recoloured(baked.record.materials, {"grey": (0.5, 0.05, 0.05)})

@@ -8,7 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.answer import MOST_ALBEDO, Albedos, Answer, Neighbours, Patches, Points, Rays, packed_rays, solved
+from lambent.core.answer import (
+    MOST_ALBEDO,
+    Albedos,
+    Answer,
+    Neighbours,
+    Patches,
+    Points,
+    solved,
+)
+from lambent.core.answer_rays import Rays, packed_rays
 from lambent.realtime.answered import stages
 from lambent.realtime.answered.gpu_answer import GpuAnswer, Unsolved, gpu_answer
 
@@ -24,8 +33,8 @@ PATCHES, POINTS, RECEIVERS, TEXELS, MATERIALS = (
 def room(groups: int, seed: int = 3) -> Answer:
     """A closed room of random shares and rays, in which light crosses some surfaces."""
     rng = np.random.default_rng(seed)
-    transfer = np.where(rng.random((groups, PATCHES, PATCHES)) < 0.3, rng.random((groups, PATCHES, PATCHES)), 0)
-    transfer /= transfer.sum(axis=2, keepdims=True)
+    transfer = np.where(rng.random((PATCHES, PATCHES)) < 0.3, rng.random((PATCHES, PATCHES)), 0)
+    transfer /= transfer.sum(axis=1, keepdims=True)
     paired, other = np.arange(PATCHES), np.arange(POINTS)
     paired[:20], other[:50] = np.roll(paired[:20], 10), np.roll(other[:50], 25)
     direct = rng.random((groups, PATCHES, 3)) ** 4
@@ -144,8 +153,8 @@ def test_sweeps_in_many_submissions_are_those_of_one(device: Any, monkeypatch: p
 def test_many_patches_with_long_rows_are_solved(device: Any) -> None:
     """More steps of a thread than a software adapter lets one submission take."""
     rng, count = np.random.default_rng(2), 1000
-    transfer = rng.random((1, count, count)).astype(np.float32)
-    transfer /= transfer.sum(axis=2, keepdims=True)
+    transfer = rng.random((count, count)).astype(np.float32)
+    transfer /= transfer.sum(axis=1, keepdims=True)
     small = room(1)
     direct = (rng.random((1, count, 3)) ** 4).astype(np.float32)
     large = Patches(rng.integers(0, MATERIALS, count), np.arange(count), direct, transfer)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.answering.spots import Spots
-from lambent.core.answer import BYTE, MOST_POINTS, Neighbours
+from lambent.core.answer import Neighbours
+from lambent.core.answer_rays import BYTE, MOST_POINTS
 from lambent.core.arrays import Floats, Indices
 from lambent.core.colour import luminance
 

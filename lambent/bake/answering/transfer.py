@@ -12,7 +12,7 @@ from lambent.bake.answering.rays import NOWHERE, RayEnds
 from lambent.bake.answering.spots import Spots
 from lambent.bake.surfaces.texels import Sides
 from lambent.bake.tiles import seed_of
-from lambent.core.answer import Rays, packed_rays, weights_of_bytes
+from lambent.core.answer_rays import Rays, packed_rays, weights_of_bytes
 from lambent.core.arrays import Floats, Indices
 
 STRIDE = 8  # of the texels that viewers see, whose rays count for how important others are

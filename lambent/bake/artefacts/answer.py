@@ -17,7 +17,7 @@ from lambent.bake.keys import key_of
 from lambent.bake.methods import sorts_light
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles
-from lambent.core.answer import Rays
+from lambent.core.answer_rays import Rays
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.delta_bytes import delta_bytes
 from lambent.store.answer import DIRECT, NO_PATCH, answer_name, probe_spots_name

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.answer import PASSES, SWEEPS, Albedos, Answer, Neighbours, least_light
+from lambent.core.answer_rays import Rays
 from lambent.core.arrays import Floats
 from lambent.realtime.answered.stages import GROUP, Call, NoRoom, Stages
 
@@ -130,11 +131,19 @@ class _Shared:
         self._stages = stages
         self.albedos = stages.empty(2 * 16 * len(answer.albedos.reflected))
         self.patches = stages.buffer(np.stack([patches.material, patches.paired], axis=1).astype(np.uint32))
+        rows = patches.rows
+        starts = np.append(rows.starts, rows.ends[-1:]).astype(np.uint32)
+        entries = rows.senders.astype(np.uint32), rows.shares.astype(np.float32).view(np.uint32)
+        self.row_starts, self.row_entries = stages.buffer(starts), stages.buffer(np.stack(entries, axis=1))
+        self.longest_row = int((rows.ends - rows.starts).max(initial=0))
         about = [points.patch, points.material, points.other, np.zeros(len(points.patch))]
         self.points = stages.buffer(np.stack(about, axis=1).astype(np.uint32))
-        self.ray_starts, self.ray_ends = stages.buffer(rays.starts.astype(np.uint32)), stages.buffer(rays.points)
-        self.ray_weights, self.ray_scale = stages.buffer(rays.weights), stages.buffer(rays.scale)
+        self.rays, self.few_rays = (self._buffers(one) for one in (rays, answer.few_rays))
         self.near = stages.buffer(packed_near(answer.near))
+
+    def _buffers(self, rays: Rays) -> tuple[Any, ...]:
+        arrays = rays.starts.astype(np.uint32), rays.points, rays.weights, rays.scale
+        return tuple(self._stages.buffer(one) for one in arrays)
 
     def colour(self, albedos: Albedos) -> None:
         """Send albedos for the next calls."""
@@ -147,16 +156,12 @@ class _Solver:
 
     def __init__(self, stages: Stages, shared: _Shared, answer: Answer, group: int) -> None:
         self._stages, self._patches = stages, answer.patches.direct.shape[1]
-        rows, size = answer.patches.rows, self._patches * LIGHT_BYTES
-        first, last = (int(rows.starts[group, 0]), int(rows.ends[group, -1])) if self._patches else (0, 0)
-        starts = np.append(rows.starts[group], last) - first
-        both = rows.senders[first:last].astype(np.uint32), rows.shares[first:last].astype(np.float32).view(np.uint32)
+        size = self._patches * LIGHT_BYTES
         direct = np.asarray(answer.patches.direct[group], np.float32)
         self.indirect, sent, self._outcome = stages.empty(size), stages.empty(size), stages.empty(8)
-        given = (stages.buffer(starts.astype(np.uint32)), stages.buffer(np.stack(both, axis=1)), shared.patches,
-                 shared.albedos, stages.buffer(direct), self.indirect, sent, self._outcome)  # fmt: skip
-        longest = int((rows.ends[group] - rows.starts[group]).max(initial=0))
-        steps = -(-self._patches // GROUP) * (longest + 3)  # of a thread in a sweep
+        given = (shared.row_starts, shared.row_entries, shared.patches, shared.albedos, stages.buffer(direct),
+                 self.indirect, sent, self._outcome)  # fmt: skip
+        steps = -(-self._patches // GROUP) * (shared.longest_row + 3)  # of a thread in a sweep
         sweeps = max(1, min(SWEEPS_AT_ONCE, GPU_SWEEPS, STEPS_AT_ONCE // max(1, steps)))
         self.submissions = -(-GPU_SWEEPS // sweeps)  # at most
         self.begins, self.goes_on = (
@@ -191,16 +196,17 @@ class _Group:
         reference: Floats,
     ) -> None:  # fmt: skip
         self._stages, self._shared = stages, shared
-        points, rays = answer.points, answer.rays
-        self._points, self._gathering, self._texels = len(points.other), len(rays.scale), len(reference)
+        points = answer.points
+        self._points, self._gathering, self._texels = len(points.other), len(answer.rays.scale), len(reference)
         self._sent = stages.empty(self._points * LIGHT_BYTES)
         self._found = stages.empty(self._gathering * LIGHT_BYTES)
         lights = stages.buffer(np.concatenate([points.direct[group], points.light[group]], axis=1).astype(np.float32))
-        self._first = self._exitance(lights, True, solver.indirect, solver.light())
-        self._next = self._exitance(lights, False, self._found, gathered[: self._points])
-        given = (shared.ray_starts, shared.ray_ends, shared.ray_weights, shared.ray_scale, self._sent, self._found)
+        both = lights, stages.buffer(np.asarray(gathered[: self._points], np.float32))
+        self._first = self._exitance(*both, True, solver.indirect, solver.light())
+        self._next = self._exitance(*both, False, self._found, answer.few_as_baked[:, group, :3])
         self._gathers, self._gathers_last = (
-            stages.call("gather", (count,), *given, threads=count) for count in (self._points, self._gathering)
+            stages.call("gather", (count,), *rays, self._sent, self._found, threads=count)
+            for count, rays in ((self._points, shared.few_rays), (self._gathering, shared.rays))
         )
         arrays = reference, answer.direct[group], answer.baked[group]
         self._of_texels = [stages.buffer(np.asarray(one, np.float32)) for one in arrays]
@@ -214,9 +220,9 @@ class _Group:
         given = self._shared.near, self._found, *self._of_texels, found
         yield self._stages.call("texels", (self._texels, self._least), *given, threads=self._texels)
 
-    def _exitance(self, lights: Any, by_patch: bool, now: Any, baked: Floats) -> Call:
+    def _exitance(self, lights: Any, seen: Any, by_patch: bool, now: Any, baked: Floats) -> Call:
         before = self._stages.buffer(np.asarray(baked, np.float32))
-        given = self._shared.points, lights, self._shared.albedos, now, before, self._sent
+        given = self._shared.points, lights, self._shared.albedos, now, before, seen, self._sent
         return self._stages.call(
             "exitance", (self._points, int(by_patch), _least(baked)), *given, threads=self._points
         )  # fmt: skip

@@ -10,8 +10,9 @@ import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
-from lambent.core.answer import MOST_EXCESS, MOST_RATIO, WEIGHT_ONE, WEIGHT_STEPS
+from lambent.core.answer import MOST_EXCESS, MOST_RATIO
 from lambent.core.answer_loops import NO_LIGHT
+from lambent.core.answer_rays import WEIGHT_ONE, WEIGHT_STEPS
 from lambent.core.colour import HALF_MAX
 from lambent.realtime.device import adapter_info
 from lambent.realtime.layouts import Layouts
@@ -22,7 +23,7 @@ GROUP = 256  # threads of a workgroup, as the shaders say
 READ, WRITTEN = "storage", "written storage"
 BINDINGS = {
     "solve": ("uniform", READ, READ, READ, READ, READ, WRITTEN, WRITTEN, WRITTEN),
-    "exitance": ("uniform", READ, READ, READ, READ, READ, WRITTEN),
+    "exitance": ("uniform", READ, READ, READ, READ, READ, READ, WRITTEN),
     "gather": ("uniform", READ, READ, READ, READ, READ, WRITTEN),
     "texels": ("uniform", READ, READ, READ, READ, READ, WRITTEN),
     "show": ("uniform", READ, READ, "written half layers"),

@@ -14,7 +14,8 @@ struct Exitance {
 @group(0) @binding(3) var<storage, read> albedos: array<vec4f>;  // reflected by material, then transmitted
 @group(0) @binding(4) var<storage, read> now: array<f32>;  // indirect light
 @group(0) @binding(5) var<storage, read> baked: array<f32>;
-@group(0) @binding(6) var<storage, read_write> sent: array<f32>;
+@group(0) @binding(6) var<storage, read> seen: array<f32>;  // indirect light that points gather, as baked
+@group(0) @binding(7) var<storage, read_write> sent: array<f32>;
 
 fn light_of(point: u32) -> vec3f {
     let at = 3u * select(point, points[point].x, exitance.by_patch != 0u);
@@ -22,7 +23,10 @@ fn light_of(point: u32) -> vec3f {
                          vec3f(baked[at], baked[at + 1u], baked[at + 2u]), exitance.least);
     let k = 6u * point;
     let direct = vec3f(lights[k], lights[k + 1u], lights[k + 2u]);
-    return direct + (vec3f(lights[k + 3u], lights[k + 4u], lights[k + 5u]) - direct) * ratio;
+    let indirect = vec3f(lights[k + 3u], lights[k + 4u], lights[k + 5u]) - direct;
+    let most = MOST_EXCESS * vec3f(seen[3u * point], seen[3u * point + 1u], seen[3u * point + 2u]);
+    let excess = max(indirect - most, vec3f(0.0));  // does not grow
+    return direct + indirect * ratio - excess * max(ratio - 1.0, vec3f(0.0));
 }
 
 @compute @workgroup_size(256) fn exitance_main(@builtin(global_invocation_id) id: vec3u) {

@@ -1,4 +1,4 @@
-// Indirect light at points: sums of exitance where their rays end (`lambent.core.answer.gathered`).
+// Indirect light at points: sums of exitance where their rays end (`lambent.core.answer_rays.gathered`).
 
 #include "answer_constants.wgsl"
 

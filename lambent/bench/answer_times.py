@@ -1,0 +1,137 @@
+"""How long edits take that baked light answers: part by part, dimming, and while a colour is dragged.
+
+Times are medians of turns through all edits, in milliseconds of wall clock; `edit_to_picture_ms` is that of solving,
+gathering, upsampling and upload, after which the next frame shows the light, and `edit_to_picture_cpu_ms` the
+processor time of all threads meanwhile. `dimming_ms` is that of mixing light groups anew, with the light map that
+answers an edit, and of its upload: only where light is sorted by group. While a colour is dragged, the window's own
+thread answers, and frames of DRAG_WIDTH x DRAG_HEIGHT pixels are drawn of a camera that moves.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from lambent.bench.views import first_camera
+from lambent.core.answer import Answer, solved
+from lambent.core.arrays import Floats
+from lambent.core.plain import Triple
+from lambent.materials.diffuse_albedos import edited_albedos
+from lambent.materials.document import Material
+from lambent.realtime.answering import AnsweredLight
+from lambent.realtime.baked import read_baked
+from lambent.realtime.device import open_device
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
+from lambent.store.answer import StoredAnswer
+from lambent.store.store import Store
+from lambent.viewer.modes.walk.answering import Answering, AnsweringLight
+
+DRAG_WIDTH, DRAG_HEIGHT = 320, 180
+DRAG_STEP_M = 0.002  # along x, of the camera in a frame
+DRAG_TURN = 40  # frames, in which the colour goes to black and back
+DIMMED = 0.5
+Edit = Mapping[str, Triple]  # diffuse colours, linear RGB, by material
+
+
+def changed(materials: Mapping[str, Material], edit: Edit) -> dict[str, Material]:
+    """The materials of an edit."""
+    return {name: materials[name].model_copy(update={"kd": colour}) for name, colour in edit.items()}
+
+
+def darkened(colour: Triple, factor: float) -> Triple:
+    """A colour times a factor."""
+    return colour[0] * factor, colour[1] * factor, colour[2] * factor
+
+
+def timed(
+    store: Store, stored: StoredAnswer, materials: Mapping[str, Material], edits: Mapping[str, Edit], turns: int
+) -> dict[str, dict[str, float | None]]:
+    """Medians of each edit's times, after a turn that compiles, and the bound on its error that the window shows."""
+    baked = read_baked(store)
+    reference = stored.answer.reference()
+    renderer, light = Renderer(open_device(), baked), AnsweredLight(baked, stored)
+    found: dict[str, list[dict[str, float]]] = {name: [] for name in edits}
+    for _ in range(turns + 1):
+        for name, edit in edits.items():
+            edited = changed(materials, edit)
+            now = [edited.get(one, materials[one]) for one in stored.materials]
+            steps = _steps(stored.answer, reference, now, [materials[one] for one in stored.materials])
+            found[name].append(steps | _shown(renderer, light, edited))
+    bounds = {name: light.likely_error(light.lit(changed(materials, edit))) for name, edit in edits.items()}
+    medians = {
+        name: {key: round(statistics.median(run[key] for run in runs[1:]), 2) for key in runs[0]}
+        for name, runs in found.items()
+    }
+    none = {} if baked.groups is not None else {"dimming_ms": None}
+    return {name: {"likely_error": round(100 * bounds[name], 2), **medians[name], **none} for name in edits}
+
+
+def _shown(renderer: Renderer, light: AnsweredLight, edited: Mapping[str, Material]) -> dict[str, float]:
+    """Times from an edit to the light on the GPU, and of dimming it there."""
+    begun, busy = time.perf_counter(), time.process_time()
+    lit = light.lit(edited)
+    groups = light.groups(lit)
+    factors = np.ones((0 if groups is None else len(groups.records), 3))
+    layers = light.layers(lit) if groups is None else groups.light_map(factors)
+    computed = time.perf_counter()
+    renderer.resources.show_light_map(list(layers))
+    renderer.finish()
+    ended = time.perf_counter()
+    found = {
+        "upload_ms": 1e3 * (ended - computed),
+        "edit_to_picture_ms": 1e3 * (ended - begun),
+        "edit_to_picture_cpu_ms": 1e3 * (time.process_time() - busy),
+    }
+    if groups is None:
+        return found
+    begun = time.perf_counter()
+    renderer.resources.show_light_map(list(groups.light_map(DIMMED * factors)))
+    renderer.finish()
+    return found | {"dimming_ms": 1e3 * (time.perf_counter() - begun)}
+
+
+def _steps(answer: Answer, reference: Floats, now: list[Material], given: list[Material]) -> dict[str, float]:
+    """Milliseconds of solving, gathering and upsampling, and the sweeps of the solution."""
+    marks = [time.perf_counter()]
+    albedos = edited_albedos(given, now)
+    solution = solved(answer.patches, albedos)
+    marks.append(time.perf_counter())
+    light = answer.indirect(albedos, solution)
+    marks.append(time.perf_counter())
+    answer.at_texels(light, reference)
+    marks.append(time.perf_counter())
+    steps = dict(zip(("solve_ms", "gather_ms", "upsample_ms"), (1e3 * np.diff(marks)).tolist(), strict=True))
+    return {**steps, "sweeps": float(solution.sweeps)}
+
+
+def dragged(store: Store, materials: Mapping[str, Material], edit: Edit, seconds: float) -> dict[str, float | None]:
+    """Frames per second while an edit's colours are dragged and the camera moves, and how often their light changes."""
+    baked = read_baked(store)
+    if not baked.record.cameras:
+        return {"drag_frames_per_s": None, "drag_edits_per_s": None}
+    renderer, camera = Renderer(open_device(), baked), first_camera(store, baked.record)
+    answering = AnsweringLight(store, renderer, Answering())
+
+    def draw(frame: int) -> None:
+        share = abs(2 * (frame / DRAG_TURN % 1) - 1)
+        edited = changed(materials, {name: darkened(colour, share) for name, colour in edit.items()})
+        answering.update(edited)
+        x, y, z = camera.position
+        moved = replace(camera, position=(x + frame * DRAG_STEP_M, y, z))
+        renderer.draw(FrameState(moved, DRAG_WIDTH, DRAG_HEIGHT, materials=edited))
+        renderer.finish()
+
+    for frame in range(DRAG_TURN):  # loads what the first edit needs
+        draw(frame)
+    frames, changes, begun = 0, renderer.resources.light_version, time.perf_counter()
+    while (passed := time.perf_counter() - begun) < seconds:
+        draw(frames)
+        frames += 1
+    answering.close()
+    shown = renderer.resources.light_version - changes
+    return {"drag_frames_per_s": round(frames / passed, 1), "drag_edits_per_s": round(shown / passed, 1)}
