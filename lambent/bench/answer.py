@@ -1,20 +1,19 @@
-"""`answer`: how exactly and how fast baked light answers other colours, against path tracing with those colours.
+"""`answer`: accuracy and speed of updating baked light after colour edits, against path tracing with those colours.
 
-Rows are scene x edit. Errors are those at texels that viewers see, drawn at random, all channels alike, in percent:
-`rms` and `mean_error` over the mean of the truth, the others texel by texel (over at least LEAST of that mean). The
-truth has the direct sun, which texels show beside the light map and no edit changes. The light that is answered from is
-path traced, too, with the same random numbers, so that errors are those of the answer alone;
-of it, as much is direct as of the light map, which may lie a texel beside it at edges of light.
-`shown_rms` has those of the light map besides, of which `baked_rms` is there before any edit. Where light is sorted by
-group, `shown_rms` is of the sum of the groups' own answers. `rms` and `relative_rms` are roots of mean products of the
-errors in two independent halves of the paths, which noise (`noise`, of one whole) does not enter; so is
-`relative_rms_contacts`. 95 % of contacts err less than `p95_contacts`, by `contact_paths` from each: noise is in this
-figure, `p95_contacts_noise` is that of noise alone. `naive` is the light
-as it was baked. `likely_error` is the bound on `rms` that the window shows.
+Rows are scene x edit. Errors are evaluated at random texels that viewers see, over all channels, in percent: `rms` and
+`mean_error` relative to the mean of the truth, the others relative to each texel (to at least LEAST of that mean). The
+truth includes the direct sun, which texels show in addition to the light map and which no edit changes. The baked light
+is path traced here too, with the same random numbers, so that errors are those of the answer alone; its direct share
+is the light map's, which may be a texel off at edges of light. `shown_rms` adds the light map's own error, which is
+`baked_rms` before any edit; for light separated by group, it refers to the sum of the groups' own answers. `rms`,
+`relative_rms` and `relative_rms_contacts` are roots of mean products of the errors in two independent halves of the
+paths, which cancels noise (`noise`, of both halves together). 95 % of contacts have an error below `p95_contacts`, with
+`contact_paths` paths each; it includes noise, and `p95_contacts_noise` is its value for noise alone. `naive` is the
+error of keeping the baked light. `likely_error` is the bound on `rms` that the window shows.
 
-Contacts are texels from which a quarter of cosine distributed rays meet something within CONTACT_M.
-Times are those of `answer_times`. `everything white` has albedos of .85, light that surfaces let through included:
-more than 1 together would be no surface.
+Contacts are texels from which a quarter of cosine-distributed rays hit something within CONTACT_M. `answer_times`
+describes the times. In `everything white`, the albedos of reflection and transmission sum to WHITE, since no surface
+can exceed 1.
 """
 
 from __future__ import annotations
@@ -44,17 +43,17 @@ if TYPE_CHECKING:
     from lambent.bake.context import BakeContext
 
 NAME = "answer"
-LEAST = 0.01  # of the mean light, in relative errors
+LEAST = 0.01  # of the mean light, the least denominator of relative errors
 CONTACT_M, CONTACT_SHARE, CONTACT_RAYS = 0.1, 0.25, 64
 SEED = 1
-WHITE = 0.85  # albedo, light that goes through included
+WHITE = 0.85  # albedo of reflection plus transmission
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Texels that are compared, paths from each, edits at most, turns of timing, and the scene baked without inputs.
+    """Compared texels, paths per texel, the most edits, rounds of timing, and the scene that is baked without inputs.
 
-    Contacts among the texels get `contact_paths` besides. A colour is dragged for `drag_s` seconds.
+    Contacts among the texels get `contact_paths` in addition. A colour is dragged for `drag_s` seconds.
     """
 
     texels: int = 3000
@@ -70,14 +69,14 @@ FULL, QUICK = Effort(), Effort(300, 256, 2, 5, "builtin:box", 1024, 2.0)
 
 
 def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
-    """Rows of the inputs, baked stores; without one, of a scene that is baked here in `preview`."""
+    """Rows of the inputs, which are baked stores; without inputs, of a scene baked here in `preview`."""
     with given_or_baked(inputs, effort.scene, progress) as stores:
         rows = [row for store in stores for row in rows_of(store, effort, progress)]
     return {"rows": rows, "summary": {f"{row['scene']} {row['edit']}": row["rms"] for row in rows}}
 
 
 def edits_of(scene: Scene, most: int) -> dict[str, Edit]:
-    """Edits of the spec's scenes by name; elsewhere some colours for the materials of the largest area."""
+    """Named edits of the spec's scenes; for other scenes, some colours for the materials of largest area."""
     known = ROOM if scene.materials.keys() >= ROOM_MATERIALS else {}
     whole = {
         "everything half": {name: darkened(m.kd, 0.5) for name, m in scene.materials.items()},
@@ -132,7 +131,7 @@ def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[d
 
 
 class Truth:
-    """Some texels of a store, and their light path traced before edits and after."""
+    """Some texels of a store, with their light path traced before and after edits."""
 
     def __init__(self, store: Store, stored: StoredAnswer, effort: Effort, progress: Progress) -> None:
         self._context, self._stored, self._effort, self._progress = context_of(store), stored, effort, progress
@@ -153,11 +152,11 @@ class Truth:
         self._share = np.divide(direct, light, out=np.ones_like(light), where=light > 0)
 
     def _traced(self, edited: dict[str, Material]) -> Floats:
-        """Halves (2, n, 3) of path traced irradiance."""
+        """Path traced irradiance in two halves (2, n, 3)."""
         return self._halves(self._chosen, edited, self._effort.paths, SEED)
 
     def _traced_contacts(self, edited: dict[str, Material]) -> Floats:
-        """The same of contacts, by more paths."""
+        """Likewise for contacts, with more paths."""
         return self._halves(self._chosen[self._contact], edited, self._effort.contact_paths, SEED + 1)
 
     def _halves(self, texels: Indices, edited: dict[str, Material], paths: int, seed: int) -> Floats:
@@ -169,13 +168,13 @@ class Truth:
         return traced.halves.astype(float)
 
     def _direct_sun(self) -> Floats:
-        """(n, 3) W/m^2."""
+        """Direct irradiance of the sun (n, 3), W/m^2."""
         from lambent.bake.answering.spots import sun_at
 
         return np.asarray(sun_at(self._context.traced)[0][self._chosen])
 
     def _contacts(self) -> Flags:
-        """(n,) texels that touch something."""
+        """(n,) whether each texel is a contact."""
         from lambent.bake.tracing.rays import cosine_directions, distances, leaving
 
         t, whole = self._sides.texels, self._context.traced.whole(diffuse=True)
@@ -187,7 +186,7 @@ class Truth:
         return np.asarray((found.reshape(-1, CONTACT_RAYS) < CONTACT_M).mean(axis=1) > CONTACT_SHARE)
 
     def errors(self, edit: Edit) -> dict[str, Any]:
-        """The fields of a row that are errors."""
+        """The error fields of a row."""
         given, names = self.scene.materials, self._stored.materials
         edited = changed(given, edit)
         albedos = edited_albedos([given[name] for name in names], [edited.get(name, given[name]) for name in names])
@@ -199,7 +198,7 @@ class Truth:
         now, then = (light.sum(axis=0) for light in by_group[2:])
 
         def answer_errors(lit: Floats, true: Floats, some: Flags | slice) -> list[Floats]:
-            """Errors (n, 3) by halves, of some texels whose light was `lit` (2, n, 3) and is `true`."""
+            """Errors (n, 3) per half, of texels `some` whose light was `lit` (2, n, 3) and is `true`."""
             given = now[some][None], then[some][None]
             found = (answered((self._share[some] * half)[None], half[None], *given)[0] for half in lit)
             return [light - half for light, half in zip(found, true, strict=True)]
@@ -232,12 +231,12 @@ class Truth:
 
 
 def percent(share: float) -> float:
-    """With two decimals."""
+    """A share in percent, with two decimals."""
     return round(100 * float(share), 2)
 
 
 def figures(one: Floats, other: Floats, mean: float, local: Floats) -> dict[str, float]:
-    """rms and relative_rms of the error that two halves (n, 3) have in common; 0 where that is lost in noise."""
+    """rms and relative_rms of the error common to two halves (n, 3); 0 if it is lost in noise."""
     both = one * other
     return {
         "rms": percent(np.sqrt(max(float(both.mean()), 0.0)) / mean),
@@ -246,7 +245,7 @@ def figures(one: Floats, other: Floats, mean: float, local: Floats) -> dict[str,
 
 
 def _drawn(lit: Flags, label: Indices, count: int) -> Indices:
-    """Texels drawn at random of those that viewers see."""
+    """Random texels among those that viewers see."""
     from lambent.bake.surfaces.texels import BEYOND
 
     seen = np.flatnonzero(lit & (label < BEYOND))

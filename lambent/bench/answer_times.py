@@ -1,10 +1,10 @@
-"""How long edits take that baked light answers: part by part, dimming, and while a colour is dragged.
+"""Time of colour edits of baked light: step by step, for dimming, and while a colour is dragged.
 
-Times are medians of turns through all edits, in milliseconds of wall clock; `edit_to_picture_ms` is that of solving,
-gathering, upsampling and upload, after which the next frame shows the light, and `edit_to_picture_cpu_ms` the
-processor time of all threads meanwhile. `dimming_ms` is that of mixing light groups anew, with the light map that
-answers an edit, and of its upload: only where light is sorted by group. While a colour is dragged, the window's own
-thread answers, and frames of DRAG_WIDTH x DRAG_HEIGHT pixels are drawn of a camera that moves.
+Times are medians over rounds through all edits, in milliseconds of wall clock. `edit_to_picture_ms` covers solving,
+gathering, upsampling and upload, after which the next frame shows the light; `edit_to_picture_cpu_ms` is the processor
+time of all threads meanwhile. `dimming_ms` covers mixing the light groups again, for the light map of an edit, and its
+upload; it is None if light is not separated by group. While a colour is dragged, the window's background thread
+computes the light, and frames of DRAG_WIDTH x DRAG_HEIGHT pixels are drawn with a moving camera.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from lambent.store.store import Store
 from lambent.viewer.modes.walk.answering import Answering, AnsweringLight
 
 DRAG_WIDTH, DRAG_HEIGHT = 320, 180
-DRAG_STEP_M = 0.002  # along x, of the camera in a frame
-DRAG_TURN = 40  # frames, in which the colour goes to black and back
+DRAG_STEP_M = 0.002  # of the camera along x, per frame
+DRAG_TURN = 40  # frames in which the colour fades to black and back
 DIMMED = 0.5
 Edit = Mapping[str, Triple]  # diffuse colours, linear RGB, by material
 
 
 def changed(materials: Mapping[str, Material], edit: Edit) -> dict[str, Material]:
-    """The materials of an edit."""
+    """The materials after an edit."""
     return {name: materials[name].model_copy(update={"kd": colour}) for name, colour in edit.items()}
 
 
@@ -51,7 +51,7 @@ def darkened(colour: Triple, factor: float) -> Triple:
 def timed(
     store: Store, stored: StoredAnswer, materials: Mapping[str, Material], edits: Mapping[str, Edit], turns: int
 ) -> dict[str, dict[str, float | None]]:
-    """Medians of each edit's times, after a turn that compiles, and the bound on its error that the window shows."""
+    """Median times of each edit, after a round that compiles the code, and the bound on its error in percent."""
     baked = read_baked(store)
     reference = stored.answer.reference()
     renderer, light = Renderer(open_device(), baked), AnsweredLight(baked, stored)
@@ -72,7 +72,7 @@ def timed(
 
 
 def _shown(renderer: Renderer, light: AnsweredLight, edited: Mapping[str, Material]) -> dict[str, float]:
-    """Times from an edit to the light on the GPU, and of dimming it there."""
+    """Milliseconds from an edit until its light is on the GPU, and of dimming that light."""
     begun, busy = time.perf_counter(), time.process_time()
     lit = light.lit(edited)
     groups = light.groups(lit)
@@ -96,7 +96,7 @@ def _shown(renderer: Renderer, light: AnsweredLight, edited: Mapping[str, Materi
 
 
 def _steps(answer: Answer, reference: Floats, now: list[Material], given: list[Material]) -> dict[str, float]:
-    """Milliseconds of solving, gathering and upsampling, and the sweeps of the solution."""
+    """Milliseconds of solving, gathering and upsampling, and the number of sweeps of the solution."""
     marks = [time.perf_counter()]
     albedos = edited_albedos(given, now)
     solution = solved(answer.patches, albedos)
@@ -110,7 +110,7 @@ def _steps(answer: Answer, reference: Floats, now: list[Material], given: list[M
 
 
 def dragged(store: Store, materials: Mapping[str, Material], edit: Edit, seconds: float) -> dict[str, float | None]:
-    """Frames per second while an edit's colours are dragged and the camera moves, and how often their light changes."""
+    """Frames and updates of the light per second while an edit's colours are dragged and the camera moves."""
     baked = read_baked(store)
     if not baked.record.cameras:
         return {"drag_frames_per_s": None, "drag_edits_per_s": None}
@@ -126,7 +126,7 @@ def dragged(store: Store, materials: Mapping[str, Material], edit: Edit, seconds
         renderer.draw(FrameState(moved, DRAG_WIDTH, DRAG_HEIGHT, materials=edited))
         renderer.finish()
 
-    for frame in range(DRAG_TURN):  # loads what the first edit needs
+    for frame in range(DRAG_TURN):  # the first edit loads the answer
         draw(frame)
     frames, changes, begun = 0, renderer.resources.light_version, time.perf_counter()
     while (passed := time.perf_counter() - begun) < seconds:

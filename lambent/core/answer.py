@@ -1,22 +1,22 @@
-"""Light that answers when surfaces get other colours: radiosity between patches, gathered at points of the light map.
+"""Indirect light after edits of materials: radiosity between patches, gathered at points of the light map.
 
     B = F (a (D + B) + t (D + B) on the other side)                                          (solve, patches)
     E(edited) = D + (E - D) ratio                                                            (points, texels)
     I = mean over rays of weight (a E + t E on the other side) at the point near their end   (gather, points)
     ratio = B(edited) / B(as baked) of the patch, then I(edited) / I(as baked)
 
-B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, a and t their diffuse albedos of reflection and
-transmission, F (P, P) the share of what a patch receives that comes from each other one. Patches have most bounces; the
-last PASSES are gathered among some thirty times as many points, each with its own direct light, by few rays until the
-last: in gaps, which patches do not resolve, light is reflected many times. Beside contacts, where
-light changes from texel to texel, more points gather in the last pass, and send nothing. Light is linear, so D,
-E and I have a leading axis of light groups. A ratio, and not a difference, is applied to the baked
-light, so that it keeps its detail and the error is relative; with albedos as baked the ratio is 1 and nothing changes.
+B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, a and t are their diffuse albedos of reflection
+and transmission, and F (P, P) is the share of a patch's irradiance that comes from each other patch. Patches carry most
+bounces. The last PASSES bounces are gathered among some thirty times as many points, each with its own direct light,
+along few rays until the last pass: in gaps, which patches do not resolve, light is reflected many times. Near contacts,
+where light changes from texel to texel, more points gather in the last pass and send nothing. Light is linear, so D, E
+and I have a leading axis of light groups. The baked light is multiplied by a ratio, not corrected by a difference: it
+keeps its detail, the error is relative, and baked albedos give the ratio 1 exactly.
 
-Rays that lobes have sent on, and textures, are in the weights of rays. Points send the mean light around them. With the
-shape of baked light in the weights, a sunlit spot's indirect light grew as if it were the sun's.
+Weights of rays include textures and chains of specular lobes. Points send the mean light around them: when the weights
+held the pattern of the baked light, indirect light from a sunlit spot grew as if it were the sun's.
 
-Light that rays read is (K, G, 4): `side_by_side`.
+Rays read light as (K, G, 4): `side_by_side`.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from lambent.core.answer_rays import Rays, gathered
 from lambent.core.arrays import Floats
 
 PASSES = 6
-FEW_RAYS = 32  # of each point, in all passes but the last
-TOLERANCE = 1e-3  # relative change of every patch in a sweep, below which a solution stands
-SWEEPS = 400  # at most: with albedos up to MOST_ALBEDO even a closed box is done before
+FEW_RAYS = 32  # per point, in all passes but the last
+TOLERANCE = 1e-3  # relative change of a patch in one sweep, below which the solution has converged
+SWEEPS = 400  # at most: with albedos up to MOST_ALBEDO even a closed box converges sooner
 MOST_ALBEDO = 0.97  # of an edited surface
-MOST_RATIO = 64.0  # of the light after an edit, and one over it before
-MOST_EXCESS = 1.25  # of the baked indirect light over what is gathered, as far as an edit makes it brighter
-MOST_SHARES = 1.3  # of the light of all others that reaches a patch; by weights it can be more than 1
-DARK = 1e-6  # of the mean indirect light: below it a ratio is 1
+MOST_RATIO = 64.0  # the light after an edit over the light before it
+MOST_EXCESS = 1.25  # baked over gathered indirect light: the most that an edit may brighten
+MOST_SHARES = 1.3  # sum of a row of F: the light that reaches a patch from all others; weights can make it more than 1
+DARK = 1e-6  # of the mean indirect light: below it the ratio is 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +55,9 @@ class Patches:
     paired : (P,) integers
         The patch on the other side; its own number on surfaces that no light crosses.
     direct : (G, P, 3) float32
-        Direct irradiance by group of lights, W/m^2, the sun's included.
+        Direct irradiance by light group, W/m^2, the sun's included.
     transfer : (P, P) float32
-        F, rows by the patch that receives.
+        F, one row per receiving patch.
     """
 
     material: NDArray[np.integer]
@@ -67,12 +67,12 @@ class Patches:
 
     @cached_property
     def rows(self) -> SparseRows:
-        """F as sparse rows, whose sums are at most MOST_SHARES: four of five entries are 0."""
+        """F as sparse rows, each scaled to a sum of at most MOST_SHARES; four of five entries are 0."""
         return self._rows(MOST_SHARES)
 
     @cached_property
     def passive_rows(self) -> SparseRows:
-        """F whose rows sum to 1 at most: with it no light grows, whatever the albedos."""
+        """F with rows scaled to a sum of at most 1: light then decays, whatever the albedos."""
         return self._rows(1.0)
 
     def _rows(self, most: float) -> SparseRows:
@@ -82,7 +82,7 @@ class Patches:
 
 
 class SparseRows(NamedTuple):
-    """Entries `senders`, `shares` (n,) of rows that go from `starts` to `ends` (P,)."""
+    """Sparse rows: entries `senders`, `shares` (n,); a row's run from `starts` to `ends` (P,)."""
 
     starts: NDArray[np.int32]
     ends: NDArray[np.int32]
@@ -98,14 +98,14 @@ class Albedos:
     transmitted: Floats
 
     def same_as(self, other: Albedos) -> bool:
-        """Whether they are equal, to the bit."""
+        """Whether both are equal, bit for bit."""
         mine, others = (self.reflected, self.transmitted), (other.reflected, other.transmitted)
         return all(np.array_equal(a, b) for a, b in zip(mine, others, strict=True))
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Irradiance (G, P, 3) of patches, W/m^2, the sweeps it took, and whether it stands."""
+    """Irradiance (G, P, 3) of patches, W/m^2, the number of sweeps, and whether it converged."""
 
     irradiance: NDArray[np.float32]
     sweeps: int
@@ -113,10 +113,10 @@ class Solution:
 
 
 def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> Solution:
-    """Solve for the light between patches by the method of Gauss and Seidel.
+    """Solve for the light between patches by Gauss-Seidel sweeps.
 
-    It ends when no patch of any group changes by more than `tolerance` of its own light: a bound on the brightest
-    change would leave dark corners unsolved. Where light would grow without end, it is solved by `passive_rows`.
+    The sweeps end when no patch of any group changes by more than `tolerance` of its own light; a bound relative to the
+    brightest patch would leave dark corners unsolved. If they diverge, `passive_rows` replace the rows.
     """
     crossing = (patches.paired != np.arange(patches.direct.shape[1]))[:, None]
     reflected = albedos.reflected[patches.material].astype(np.float32)
@@ -134,17 +134,17 @@ def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points of texels, which send light to rays that end near them, and gather it.
+    """Points that send light to the rays that end near them, and gather light; each stands for several texels.
 
     Attributes
     ----------
     patch, material : (K,) integers
-        That each lies in, and that it has.
+        The patch and the material of each point.
     other : (K,) integers
-        The point on the other side of the surface; its own number where no light crosses it.
+        The point on the other side of the surface; its own number where no light crosses.
     direct, light : (G, K, 3) float32
-        Direct and all baked irradiance by group of lights, W/m^2, the sun's included: means over the texels for which
-        a point sends.
+        Direct irradiance and all baked irradiance by light group, W/m^2, the sun's included: means over the texels that
+        the point stands for.
     """
 
     patch: NDArray[np.integer]
@@ -156,9 +156,9 @@ class Points:
     def exitance(
         self, albedos: Albedos, now: NDArray[np.float32], inverse: NDArray[np.float32], grows: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """Exitance (K, G, 4), W/m^2, where indirect light is `now` times `inverse` (K, G, 4) times as bright as baked.
+        """Exitance (K, G, 4), W/m^2, for indirect light that is `now` times `inverse` (K, G, 4) times the baked.
 
-        Of the light as baked, `grows` (K, G, 4) gets brighter. `inverse` is of `inverses`.
+        `inverse` comes from `inverses`. Only the part `grows` (K, G, 4) of the baked light is brightened.
         """
         tables = (np.pad(one, ((0, 0), (0, 1))) for one in (albedos.reflected, albedos.transmitted))
         reflected, transmitted = (np.asarray(one, np.float32) for one in tables)
@@ -167,7 +167,7 @@ class Points:
 
     @cached_property
     def indirect(self) -> NDArray[np.float32]:
-        """Indirect light (K, G, 4) as baked."""
+        """Baked indirect light (K, G, 4)."""
         return side_by_side(self.light - self.direct)
 
     @cached_property
@@ -176,7 +176,7 @@ class Points:
 
 
 def side_by_side(light: Floats) -> NDArray[np.float32]:
-    """Light (K, G, 4) of points from (G, K, 3): groups beside each other, and a channel of padding."""
+    """Light (G, K, 3) as (K, G, 4): groups side by side, plus a padding channel."""
     found = np.zeros((light.shape[1], light.shape[0], 4), np.float32)
     found[..., :3] = np.moveaxis(light, 0, 1)
     return found
@@ -184,7 +184,7 @@ def side_by_side(light: Floats) -> NDArray[np.float32]:
 
 @dataclass(frozen=True, eq=False)
 class Neighbours:
-    """Points (T, 8) uint32 near each texel, and their shares (T, 8) uint8, which count by their sum, at least 1."""
+    """Points (T, 8) uint32 near each texel, and their weights (T, 8) uint8, normalized by their sum, at least 1."""
 
     points: NDArray[np.uint32]
     shares: NDArray[np.uint8]
@@ -194,50 +194,50 @@ class Neighbours:
 
     @property
     def closest(self) -> NDArray[np.int64]:
-        """(T,) the point that counts most for each texel."""
+        """(T,) the point of the largest weight for each texel."""
         most = self.shares.argmax(axis=1)[:, None]
         return np.take_along_axis(self.points, most, axis=1)[:, 0].astype(np.int64)
 
 
 def upsampled(light: NDArray[np.float32], near: Neighbours) -> NDArray[np.float32]:
-    """Means (G, T, 3) over the points near each texel of light (K, G, 4)."""
+    """Weighted means (G, T, 3), over the points near each texel, of light (K, G, 4)."""
     return np.asarray(loops.upsampled(light, near.points, near.shares))
 
 
 def ratios(edited: Floats, reference: Floats) -> NDArray[np.float32]:
-    """I(edited) / I(reference) of light (G, ..., 3), within [0, MOST_RATIO]; 1 where there was next to none."""
+    """I(edited) / I(reference) of light (G, ..., 3), within [0, MOST_RATIO]; 1 where the reference is nearly black."""
     ratio = np.divide(edited, reference, out=np.ones_like(reference), where=reference > least_light(reference))
     return np.clip(ratio, 0, MOST_RATIO)
 
 
 def inverses(baked: NDArray[np.float32]) -> NDArray[np.float32]:
-    """One over light (K, G, 4) as baked; 0 where there was next to none, and a ratio is 1."""
+    """One over the baked light (K, G, 4); 0 where it is nearly black, which makes the ratio 1."""
     known = baked > np.moveaxis(least_light(np.moveaxis(baked, 1, 0)[..., :3]), 0, 1)
     return np.divide(1, baked, out=np.zeros_like(baked), where=known)
 
 
 def least_light(reference: Floats) -> Floats:
-    """Light (G, 1, ...) of each group below which a ratio says nothing."""
+    """Light (G, 1, ...) of each group below which a ratio is meaningless."""
     axes = tuple(range(1, reference.ndim))
     return np.asarray(DARK * np.maximum(reference.mean(axis=axes, keepdims=True), 1e-30))
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Everything that the light of a scene's texels answers with.
+    """Everything needed to update the light of a scene's texels after an edit of materials.
 
     Attributes
     ----------
     points : Points
         K points that send and gather light.
     rays : Rays
-        Theirs, then those of F points that gather alone: of K + F.
+        Of K + F points: those K, then F points that only gather.
     near : Neighbours
-        Of the T texels, among all of these.
+        Of T texels, among all K + F points.
     direct, baked : (G, T, 3) float32
-        Direct irradiance of the texels, and all of it, as the light map has them: W/m^2, direct sun left out.
+        Direct and total irradiance of the texels as in the light map, W/m^2, direct sun left out.
     albedos : Albedos
-        As they were baked.
+        As baked.
     """
 
     patches: Patches
@@ -251,7 +251,7 @@ class Answer:
     def indirect(self, albedos: Albedos, solution: Solution | None = None) -> NDArray[np.float32]:
         """Indirect irradiance (K + F, G, 4) at the points, as far as their rays see it.
 
-        `solution` is that of the patches, if there is one already.
+        `solution` is the solution of the patches, if already known.
         """
         seen = self._gathered_as_baked
         if albedos.same_as(self.albedos):
@@ -265,12 +265,12 @@ class Answer:
 
     @cached_property
     def few_rays(self) -> Rays:
-        """Some rays of the points that send, for all passes but the last."""
+        """A sample of the sending points' rays, for all passes but the last."""
         return self.rays.of_first(len(self.points.other)).thinned(FEW_RAYS, self._sent_as_baked.mean(axis=(1, 2)))
 
     @cached_property
     def few_as_baked(self) -> NDArray[np.float32]:
-        """Indirect irradiance (K, G, 4) that these gather as baked."""
+        """Indirect irradiance (K, G, 4) gathered along `few_rays` for the baked materials."""
         return gathered(self.few_rays, self._sent_as_baked)
 
     @cached_property
@@ -297,11 +297,11 @@ class Answer:
         return gathered(self.rays, self._sent_as_baked)
 
     def reference(self) -> NDArray[np.float32]:
-        """Indirect irradiance (G, T, 3) at the texels as this computes it for the baked materials."""
+        """Indirect irradiance (G, T, 3) at the texels, computed the same way for the baked materials."""
         return upsampled(self._gathered_as_baked, self.near)
 
     def irradiance(self, albedos: Albedos, reference: Floats) -> NDArray[np.float32]:
-        """Irradiance (G, T, 3) of the texels with other albedos; `baked` itself where they are as baked."""
+        """Irradiance (G, T, 3) of the texels with other albedos; `baked` itself if the albedos are unchanged."""
         if albedos.same_as(self.albedos):
             return self.baked
         return self.at_texels(self.indirect(albedos), reference)
@@ -318,8 +318,8 @@ class Answer:
 def answered(direct: Floats, baked: Floats, edited: Floats, reference: Floats) -> NDArray[np.float32]:
     """D + (E - D) times the ratio of the gathered light `edited` over `reference`, all (G, ..., 3).
 
-    Of indirect light that is more than MOST_EXCESS times what was gathered, the rest grows with no edit: lobes have
-    focused it, or it comes from something so near that the points that gather do not see it.
+    Indirect light above MOST_EXCESS times the gathered light does not brighten with edits: lobes focused it, or it
+    comes from a surface too near for the points to see.
     """
     ratio, indirect = ratios(edited, reference), baked - direct
     excess = np.maximum(indirect - MOST_EXCESS * reference, 0)

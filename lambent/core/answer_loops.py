@@ -1,7 +1,7 @@
-"""Compiled loops of `answer`: light between patches, exitance of points, gathering, and the light of texels.
+"""Compiled loops of `answer`: light between patches, exitance of points, gathering, and interpolation at texels.
 
 Light of points is (K, G, 4) float32, groups side by side, so that a ray reads the light of all groups from one place.
-The fourth channel is padding, with which a processor adds the channels of a group at once (`by_lanes`).
+The fourth channel is padding; it lets the processor add all channels of a group in one vector (`by_lanes`).
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ import numba
 import numpy as np
 
 NO_LIGHT = np.float32(1e-30)
-LANES = 2048  # of points' light, that a thread computes at once
-BLOCK = 128  # texels whose light stays in a processor's nearest cache
+LANES = 2048  # channels of points' light that a thread computes at a time
+BLOCK = 128  # texels, whose light fits into the L1 cache
 _COMPILING, _NUMBA = Lock(), cast(Any, numba.config)
 
 
 def by_lanes(loop: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a loop whose sums over neighbouring channels are vectors: a pass of LLVM that Numba leaves out."""
+    """Compile a loop with LLVM's SLP vectorizer, which Numba leaves out: sums over channels become vector sums."""
     compiled = numba.njit(parallel=True, cache=True, nogil=True)(loop)
 
     @wraps(loop)
@@ -40,11 +40,11 @@ def by_lanes(loop: Callable[..., Any]) -> Callable[..., Any]:
 
 @by_lanes
 def solve(starts, ends, senders, shares, direct, reflected, transmitted, paired, tolerance, sweeps, light):  # type: ignore[no-untyped-def]
-    """Bring light (G, P, 3) to B = F (a (D + B) + t (D + B) of the other side) + D by Gauss and Seidel's method.
+    """Bring light (G, P, 3) to B = F (a (D + B) + t (D + B) of the other side) + D by Gauss-Seidel sweeps.
 
-    F is sparse: `senders` and `shares` of row p from `starts` to `ends` (P,). Four groups are summed in one pass over
-    its rows, and stop together, when no patch changes by more than `tolerance` of its light. Returns the sweeps of each
-    four, and whether they stopped.
+    F is sparse: `senders` and `shares` of each row run from `starts` to `ends` (P,). Each pass over the rows sums four
+    groups, which stop together when no patch changes by more than `tolerance` of its light. Returns the number of
+    sweeps of each four groups, and whether they converged.
     """
     groups, patches = light.shape[:2]
     fours = (groups + 3) // 4
@@ -91,7 +91,7 @@ def solve(starts, ends, senders, shares, direct, reflected, transmitted, paired,
                         lane = 4 * (group - first) + c
                         # An equivalent albedo may be negative.
                         new = max(direct[group, p, c] + arrived[lane], np.float32(0))
-                        # Not `>`: a difference of infinities, which is not a number, does not stand.
+                        # `not <=` instead of `>`: NaN, the difference of infinities, must not count as converged.
                         if not abs(new - light[group, p, c]) <= tolerance * new + NO_LIGHT:
                             stands = False
                         light[group, p, c] = new
@@ -105,10 +105,10 @@ def solve(starts, ends, senders, shares, direct, reflected, transmitted, paired,
 
 @by_lanes
 def exitance(direct, indirect, grows, now, inverse, most_ratio, material, other, reflected, transmitted):  # type: ignore[no-untyped-def]
-    """Exitance (K, G, 4) of points with albedos (M, 4), whose indirect light is now times inverse as bright as baked.
+    """Exitance (K, G, 4) of points with albedos (M, 4), for indirect light `now` times `inverse` times the baked.
 
-    All light is (K, G, 4). `inverse` is one over that as baked, 0 where a ratio says nothing; `grows` is the part of
-    `indirect` that gets brighter.
+    All light is (K, G, 4). `indirect` is the baked light, and `grows` the part of it that is brightened. `inverse` is
+    one over the reference of `now`, 0 where a ratio is meaningless.
     """
     points, groups = direct.shape[:2]
     lanes = points * groups * 4
@@ -136,7 +136,7 @@ def exitance(direct, indirect, grows, now, inverse, most_ratio, material, other,
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
-    """`answer_rays.packed_rays` (K, R, 3), all 0 before, of rays to `numbers` (K, R) that weigh (K, R)."""
+    """`answer_rays.packed_rays` into `rays` (K, R, 3), zeroed before, for rays to `numbers` with `weights` (K, R)."""
     for k in numba.prange(len(numbers)):
         order = np.argsort(numbers[k])
         sums = np.zeros(len(order), np.float32)
@@ -151,7 +151,7 @@ def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
                 sums[count - 1] += weights[k, r]
         place, last = 0, np.int64(0)
         for n in range(count):
-            # Steps are wide, so that a byte is the one below or above as chance has it: sums of many stay right.
+            # Steps are wide; dithered rounding to the byte above or below keeps sums of many weights right.
             dither = np.float32((n * 0.6180339887 + ends[n] * 0.7548776662) % 1)
             code = np.floor(np.log2(sums[n]) * steps + dither) + one
             if code >= 1:
@@ -164,9 +164,10 @@ def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def thin(starts, points, weights, table, light, steps, one, chosen, codes):  # type: ignore[no-untyped-def]
-    """Choose rays of each k, from `starts` (K + 1,) on, that stand for all: numbers and weights (K, n), 0 of no ray.
+    """Sample n rays of each row k, which begin at `starts` (K + 1,), into indices `chosen` and weights `codes` (K, n).
 
-    Chances are half by weight and half by the exitance light (m,) that a ray brings; choices are systematic.
+    Systematic sampling merges repeated rays; unused entries stay 0. The probability of a ray is the mean of its share
+    of the row's weights and its share of the gathered light, from exitance `light` (m,).
     """
     count = chosen.shape[1]
     for k in numba.prange(len(chosen)):
@@ -195,7 +196,7 @@ def thin(starts, points, weights, table, light, steps, one, chosen, codes):  # t
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def unpack(rays, starts, points, weights):  # type: ignore[no-untyped-def]
-    """Points and weights (N,) of packed rays (K, R, 3), those of each k from `starts` (K + 1,) on."""
+    """Points and weights (N,) of packed rays (K, R, 3); those of row k begin at `starts` (K + 1,)."""
     for k in numba.prange(len(rays)):
         last = np.int64(0)
         for n in range(starts[k + 1] - starts[k]):
@@ -206,9 +207,9 @@ def unpack(rays, starts, points, weights):  # type: ignore[no-untyped-def]
 
 @by_lanes
 def gather_one(starts, points, weights, table, scale, sent):  # type: ignore[no-untyped-def]
-    """Sums (K, 1, 4) of exitance (n, 1, 4) at `points` (N,), those of each k from `starts` (K + 1,) on.
+    """Sums (K, 1, 4) of exitance (n, 1, 4) at `points` (N,); those of row k begin at `starts` (K + 1,).
 
-    `table` has the weights that bytes stand for; the sums of each k are times `scale` (K,).
+    `table` maps bytes to weights; `scale` (K,) multiplies the sums.
     """
     found = np.empty((len(scale), 1, 4), np.float32)
     for k in numba.prange(len(scale)):
@@ -226,7 +227,7 @@ def gather_one(starts, points, weights, table, scale, sent):  # type: ignore[no-
 
 @by_lanes
 def gather_four(starts, points, weights, table, scale, sent):  # type: ignore[no-untyped-def]
-    """The same of four groups side by side: sums (K, 16) of exitance (n, 16)."""
+    """Likewise for four groups side by side: sums (K, 16) of exitance (n, 16)."""
     found = np.empty((len(scale), 16), np.float32)
     for k in numba.prange(len(scale)):
         a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = np.float32(0)
@@ -259,7 +260,7 @@ def gather_four(starts, points, weights, table, scale, sent):  # type: ignore[no
 
 @by_lanes
 def upsampled(light, points, shares):  # type: ignore[no-untyped-def]
-    """Means (G, T, 3) over the points near each texel (T, 8) of light (K, G, 4)."""
+    """Weighted means (G, T, 3), over the points (T, 8) near each texel, of light (K, G, 4)."""
     groups = light.shape[1]
     found = np.empty((groups, len(points), 3), np.float32)
     for t in numba.prange(len(points)):
@@ -280,14 +281,14 @@ def upsampled(light, points, shares):  # type: ignore[no-untyped-def]
 
 @by_lanes
 def texel_light(points, shares, edited, reference, direct, baked, least, most_ratio, most_excess):  # type: ignore[no-untyped-def]
-    """`answer.answered` at texels (G, T, 3), of means over the points near each of `edited` (K, G, 4)."""
+    """`answer.answered` at texels (G, T, 3), from means of `edited` (K, G, 4) over the points near each texel."""
     groups, texels, near = direct.shape[0], direct.shape[1], points.shape[1]
     found = np.empty((groups, 3 * texels), np.float32)
     before, straight, whole = reference.reshape(groups, -1), direct.reshape(groups, -1), baked.reshape(groups, -1)
     for block in numba.prange((texels + BLOCK - 1) // BLOCK):
         first = BLOCK * block
         count = min(BLOCK, texels - first)
-        mean = np.empty((groups, 3 * BLOCK + 1), np.float32)  # the padding of a texel is where the next one begins
+        mean = np.empty((groups, 3 * BLOCK + 1), np.float32)  # each texel overwrites the padding of the previous one
         for t in range(count):
             total = np.float32(0)
             for n in range(near):

@@ -1,33 +1,33 @@
-"""What a store holds for its light to answer other colours of materials, as `core.answer` computes it.
+"""The arrays from which a store recomputes its indirect light after edits of materials, by `core.answer`.
 
-answer/patch               (2, H, W) uint16, the patch of each texel of the light map on the normal's side and on
-                           the other; NO_PATCH where there is none. meta["materials"]: names, in order
-answer/patch_material      (P,) uint16, number of each patch's material
-answer/patch_paired        (P,) uint16, the patch on the other side; its own where light does not cross
-answer/patch_direct        (G, P, 3) float32, direct irradiance with the sun's, W/m^2, by group of lights
+answer/patch               (2, H, W) uint16, patch of each texel of the light map on the normal's side and on the other;
+                           NO_PATCH without a patch. meta["materials"]: names, in order
+answer/patch_material      (P,) uint16, material number of each patch
+answer/patch_paired        (P,) uint16, the patch on the other side; its own number where no light crosses
+answer/patch_direct        (G, P, 3) float32, direct irradiance with the sun's, W/m^2, by light group
 answer/direct, direct_back (G, H, W, 3) float16, direct irradiance of texels without the sun's, at most that of the
-                           light map; light that only lobes have sent on counts as direct. Absent where the light map
-                           keeps it as light_map/direct, direct_back; meta["direct"] of answer/patch names the arrays
-answer/transfer            (P, P) float16, share of the light of patches that reaches each: rows receive
+                           light map; light that arrives through lobes alone counts as direct. Absent if the light map
+                           holds it as light_map/direct, direct_back; meta["direct"] of answer/patch names the arrays
+answer/transfer            (P, P) float16, share of each patch's light that reaches each other; rows receive
 answer/rays                (3, K, R) uint8, `core.answer_rays.packed_rays` of the points that send and gather light
-answer/receiver_rays       (3, F, S) uint8, of points beside contacts, which gather and do not send
-answer/points              (K + F,) numbers, the texel and side of each, as below; those that do not send are last
-answer/point_sun           (K + F, 3) float32, direct irradiance of the sun there, W/m^2
-answer/point_direct        (G, K, 3) float32, mean direct irradiance, W/m^2, by group, of the texels for which a point
-                           sends, with the sun's; and of all light as baked:
-answer/point_light         (G, K, 3) float32
-answer/point_other         (K,) numbers, the point on the other side of the surface; its own where light does not cross
-answer/texels              (T,) numbers, texels that answer: twice (row * W + column), plus 1 on the other side
-answer/near                (T, 8) numbers, points near each, and
-answer/shares              (T, 8) uint8, what these count
-answer/probe/OBJECT/spots  (6, N, N) numbers, texel that each texel of a probe sees, as above; NO_SPOT for none
-answer/probe/OBJECT/tint   (6, N, N, 3) float16, texture there, relative to the material's colour
-answer/probe/OBJECT/sun    (6, N, N) float16, direct sun there over that on what faces it; negative on the far side
-answer/traced, traced_back (2, H, W, 4) float32, samples of direct light, from which a bake continues; by group too,
-                           traced_by_group, traced_back_by_group (1, H, W, 6 G), where light is sorted
+answer/receiver_rays       (3, F, S) uint8, likewise of points near contacts, which gather and do not send
+answer/points              (K + F,) numbers, texel and side of each, coded as answer/texels; the F come last
+answer/point_sun           (K + F, 3) float32, direct irradiance of the sun at the points, W/m^2
+answer/point_direct        (G, K, 3) float32, W/m^2, direct irradiance by light group with the sun's, averaged over the
+                           texels that a point stands for
+answer/point_light         (G, K, 3) float32, likewise all irradiance as baked
+answer/point_other         (K,) numbers, the point on the other side of the surface; its own where no light crosses
+answer/texels              (T,) numbers, texels with an answer: 2 (row * W + column), plus 1 on the other side
+answer/near                (T, 8) numbers, points near each texel
+answer/shares              (T, 8) uint8, weights of these points
+answer/probe/OBJECT/spots  (6, N, N) numbers, texel seen by each texel of a probe, coded as above; NO_SPOT for none
+answer/probe/OBJECT/tint   (6, N, N, 3) float16, texture at that texel, relative to the material's colour
+answer/probe/OBJECT/sun    (6, N, N) float16, direct sun there over its normal irradiance; negative on the far side
+answer/traced, traced_back (2, H, W, 4) float32, samples of direct light, with which a bake continues; if light is
+                           separated, also by group: traced_by_group, traced_back_by_group (1, H, W, 6 G)
 
 Numbers are `core.delta_bytes` (4, ...) uint8. G is the number of light groups, in the order of `store.light_groups`; 1
-where light was baked as one.
+if all light was baked together.
 """
 
 from __future__ import annotations
@@ -52,21 +52,21 @@ NO_PATCH = 0xFFFF
 NO_SPOT = 0xFFFFFFFF
 DIRECT = ("direct", "direct_back")  # by side
 NO_ANSWER = "the store has no answer data (`lambent bake --only answer`)"
-LAST = "answer/shares"  # written last but for probes
+LAST = "answer/shares"  # written last, except for probes
 
 
 def answer_name(part: str) -> str:
-    """Name of an array."""
+    """Name of an array of the answer."""
     return f"answer/{part}"
 
 
 def probe_spots_name(object_name: str, part: str) -> str:
-    """Name of an array of what a probe sees."""
+    """Name of an array of a probe's visible texels."""
     return f"answer/probe/{object_name}/{part}"
 
 
 def has_answer(store: Store) -> bool:
-    """Whether a store's light can answer other colours of its materials, by group where it is sorted so."""
+    """Whether a store can recompute its light for edited materials, by group if its light is separated."""
     needed = (
         "patch",
         "transfer",
@@ -84,18 +84,18 @@ def has_answer(store: Store) -> bool:
     if LAST not in store or not all(answer_name(part) in store for part in needed):
         return False
     if store.artefact(answer_name("near")).shape[0] != PLACES or not all(one in store for one in _directs(store)):
-        return False  # of an earlier version
+        return False  # baked by an earlier version
     return store.artefact(answer_name("patch_direct")).shape[0] == max(1, len(light_groups(store)))
 
 
 def _directs(store: Store) -> list[str]:
-    """Names of the arrays of direct light, by side."""
+    """Names of the arrays of direct light, one per side."""
     return list(map(str, store.artefact(answer_name("patch")).meta.get("direct", ())))
 
 
 @dataclass(frozen=True, eq=False)
 class SeenSpots:
-    """What one probe sees: numbers (6, N, N) of the answer's texels, -1 for none, tint (6, N, N, 3), sun (6, N, N)."""
+    """What one probe sees: answer texel (6, N, N), -1 for none; tint (6, N, N, 3); sun (6, N, N)."""
 
     texel: NDArray[np.int64]
     tint: NDArray[np.float16]
@@ -104,18 +104,18 @@ class SeenSpots:
 
 @dataclass(frozen=True, eq=False)
 class StoredAnswer:
-    """The answer of a store.
+    """The answer of a store, decoded.
 
     Attributes
     ----------
-    texels : (T,) uint32, twice the texel of the light map, plus 1 on the other side
-    other : (T,) number of the same texel on the other side, -1 without
-    material : (T,) number of each one's material
+    texels : (T,) uint32, 2 x the texel of the light map, plus 1 on the other side
+    other : (T,) index of the same texel on the other side, -1 if absent
+    material : (T,) material number of each
     materials : names, by number
-    seen : what probes see, by object
-    sun : (3,) W/m^2 on what faces it
+    seen : what each probe sees, by object
+    sun : (3,) normal irradiance of the sun, W/m^2
     of_sun : number of the sun's light group
-    point_sun : (K + F, 3) W/m^2, its direct irradiance at the points
+    point_sun : (K + F, 3) direct irradiance of the sun at the points, W/m^2
     """
 
     answer: Answer
@@ -130,12 +130,12 @@ class StoredAnswer:
 
 
 def read_answer(store: Store) -> StoredAnswer:
-    """The answer of a store.
+    """Read the answer of a store.
 
     Raises
     ------
     UserError
-        Where the store has none, or its arrays contradict one another.
+        If the store has none, or its arrays contradict one another.
     """
     if not has_answer(store):
         hint = "run `lambent bake --only answer` for its scene"
@@ -212,7 +212,7 @@ def read_answer(store: Store) -> StoredAnswer:
 
 
 def _at_texels(store: Store, names: list[str], texels: NDArray[np.uint32]) -> NDArray[np.float32]:
-    """(G, T, 3) of maps of both sides (G, H, W, 3), or (H, W, 3); black where a side has none."""
+    """(G, T, 3) of maps of both sides (G, H, W, 3), or (H, W, 3); black for a side without a map."""
     found: NDArray[np.float32] | None = None
     for side, name in enumerate(names):
         if name not in store:
@@ -228,7 +228,7 @@ def _at_texels(store: Store, names: list[str], texels: NDArray[np.uint32]) -> ND
 
 
 def _numbers(texels: NDArray[np.uint32], size: int) -> NDArray[np.int64]:
-    """(2 size,) number of each spot among the texels that answer, -1 for others."""
+    """(2 size,) index of each spot among the answer's texels, -1 for others."""
     number = np.full(2 * size, -1)
     number[texels] = np.arange(len(texels))
     return number
