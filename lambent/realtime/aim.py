@@ -1,8 +1,8 @@
-"""The table of a probe's lamps that the progressive mode aims samples by; shaders/aim.wgsl draws directions from it.
+"""Table of a probe's lamps: shaders/aim.wgsl draws directions from it for the progressive mode.
 
-Lamps are all texels brighter than the mean of all directions. Samples of the lobe find the rest at least as well: this
-is the best density beside another technique (Karlik et al. 2019, "MIS compensation"). Over a texel the density is
-constant in the face's own coordinates, so its solid angle enters exactly.
+Lamps are all texels brighter than the mean over all directions. Samples of the lobe find darker light at least as well:
+subtracting the mean gives the best density beside a second technique (Karlik et al. 2019, "MIS compensation"). The
+density is constant over a texel in the coordinates of its face, so the texel's solid angle enters exactly.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from lambent.core.cubemap import texel_solid_angles
 from lambent.materials.document import Material
 from lambent.realtime.cube_mips import blurred, overlaps
 
-LEVELS = 6  # at most: 64 texels along a face
+LEVELS = 6  # most levels: 64 texels along a face
 HEAD_ROWS = 3
-INTERPOLATED = (1 / 8, 6 / 8, 1 / 8)  # mean over a texel of what bilinear look-ups show there
+INTERPOLATED = (1 / 8, 6 / 8, 1 / 8)  # mean of bilinear look-ups over a texel
 
 
 def lamp_probabilities(cube: Floats) -> tuple[Floats, float]:
-    """Probabilities (6, m, m) of a cube map's texels, and the variance of its light that comes from lamps.
+    """Probabilities (6, m, m) of a cube map's texels, and the variance of its light due to lamps.
 
     Parameters
     ----------
@@ -30,8 +30,9 @@ def lamp_probabilities(cube: Floats) -> tuple[Floats, float]:
     Returns
     -------
     probabilities : (6, m, m) float64, sum 1; m is a power of two, at least 2, at most N or 64
-    variance : 4 pi C^2/omega, relative to the squared mean, of lamps that hold the share C of all light and fill omega
-        sr: 20 to 100 in rooms and at night, .2 under a sky without a sun; 0, and even probabilities, of uniform light
+    variance : relative to the squared mean, 4 pi C^2/omega for lamps that give the share C of all light from omega sr:
+        20 to 100 in rooms and at night, .2 under a sky without a sun. Uniform light has variance 0 and even
+        probabilities.
     """
     n = cube.shape[1]
     m = 1 << min(LEVELS, max(1, n.bit_length() - 1))
@@ -48,15 +49,15 @@ def lamp_probabilities(cube: Floats) -> tuple[Floats, float]:
 
 
 def prominence(variance: float) -> float:
-    """How much aiming pays, 0 to 1: not at all up to a variance of 1, as much as the lobe allows from 4 on."""
+    """Gain from aiming, 0 to 1, of lamps with this variance: 0 up to a variance of 1, 1 from a variance of 4 on."""
     return float(np.clip(np.log2(max(variance, 1e-9)) / 2, 0, 1))
 
 
 def aimed_share(roughness: float, prominent: float) -> float:
-    """Share of a lobe's samples that aim, before rounding (wanted_sixteenths of aim.wgsl): 0 to 12/16.
+    """Share of a lobe's samples that aim, 0 to 12/16, before rounding (wanted_sixteenths of aim.wgsl).
 
-    `roughness` is sqrt(mx my). At .1 and a `prominent` of 1 half of the samples aim, 2.5/16 more for each doubling of
-    the roughness; by experiment (docs/decisions.md).
+    `roughness` is sqrt(mx my), `prominent` the lamps' `prominence`. With a roughness of .1 and a prominence of 1, half
+    of the samples aim; each doubling of the roughness adds 2.5/16. Found by experiment (docs/decisions.md).
     """
     return float(np.clip(prominent * (8 + 2.5 * np.log2(roughness / 0.1)), 0, 12)) / 16
 
@@ -67,7 +68,7 @@ def widest_lobe(material: Material, textured: bool) -> float:
 
 
 def aim_table(cube: Floats) -> NDArray[np.float32]:
-    """(rows, 4): the head, then the probabilities of the quarters of every quarter, level by level (see aim.wgsl)."""
+    """Table (rows, 4) of a cube map (6, N, N, 3): the head, then probabilities of quarters by level (see aim.wgsl)."""
     probabilities, variance = lamp_probabilities(cube)
     levels = probabilities.shape[1].bit_length() - 1
     pyramid = [probabilities]
@@ -81,7 +82,7 @@ def aim_table(cube: Floats) -> NDArray[np.float32]:
 
 
 def _in_morton_order(level: Floats) -> Floats:
-    """(6 m m/4, 4) of (6, m, m): a row's four are left above, right above, left below, right below."""
+    """(6 m m/4, 4) of (6, m, m): each row holds the upper left, upper right, lower left and lower right texel."""
     bits = level.shape[1].bit_length() - 1
     split = level.reshape(6, *[2] * (2 * bits))
     order = [0] + [axis for bit in range(bits) for axis in (1 + bit, 1 + bits + bit)]

@@ -1,12 +1,11 @@
-"""Albedos of lobes in tables over cos_o: the factors of `rings` and the table of split-sum.
+"""Tables of lobe albedos over cos_o: the factors of `rings`, and the table of split-sum.
 
-`rings` loses samples below the horizon, and the rest represent wide lobes and grazing views badly: under uniform light
-n = 7 misses the albedo by .5, 2.4 and 4.4 % at m = .1, .25 and .4. That error depends on cos_o
-alone, or nearly so, hence a table of factors behind the samples removes it, smooth in cos_o. By experiment it gains
-.4 dB.
+`rings` loses samples below the horizon, and the remaining ones represent wide lobes and grazing views badly: under
+uniform light, n = 7 misses the albedo by .5, 2.4 and 4.4 % at m = .1, .25 and .4. The error depends almost on cos_o
+alone, so a table of factors, smooth in cos_o, removes it. Measured gain: .4 dB.
 
-Split-sum, as today's engines do it (Karis 2013), is kept for comparison: a cube prefiltered per roughness
-(passes/prefilter.py), and a table of albedos. It is isotropic and knows no view dependence of the lobe's shape.
+Split-sum, the method of common engines (Karis 2013), is kept for comparison: a cube prefiltered by roughness
+(passes/prefilter.py), and a table of albedos. It is isotropic, and its lobe has the same shape for every view.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ def normalised_rings_table(lobe: Lobe, n: int) -> Floats:
 
 
 def factors(lobe: Lobe, rows: Floats) -> NDArray[np.float32]:
-    """(FACTORS,) the lobe's albedo over that of its samples `rows` (n, 4), means over azimuths."""
+    """Factors (FACTORS,): the lobe's albedo over its samples' (`rows`, (n, 4)), both averaged over azimuth."""
     slopes = lobe_points(EXACT_SAMPLES, lobe.distribution == "ggx") * [lobe.mx, lobe.my]
     exact = _albedo(lobe, slopes, np.ones(EXACT_SAMPLES))
     found = _albedo(lobe, rows[:, :2].astype(float), rows[:, 3].astype(float))
@@ -63,10 +62,11 @@ def roughness_level(lobe: Lobe) -> float:
 
 
 def albedo_table(lobe: Lobe, samples: int = 1024) -> Floats:
-    """(TABLE_ROWS, 4) float32 rows (A, B, 0, 0) at cos_o = (row + 1/2)/TABLE_ROWS, of an isotropic lobe in its place.
+    """Table (TABLE_ROWS, 4) of float32 rows (A, B, 0, 0) at cos_o = (row + 1/2)/TABLE_ROWS.
 
-    With g the lobe's f cos/pdf without k and Fresnel, A = E[(1 - (1 - wo.h)^5) g] and B = E[(1 - wo.h)^5 g]: the
-    reflected albedo is k (r0 A + B), the transmitted k (1 - r0) A.
+    An isotropic lobe of roughness sqrt(mx my) replaces the lobe. With g = f cos/pdf without k and Fresnel,
+    A = E[(1 - (1 - wo.h)^5) g] and B = E[(1 - wo.h)^5 g]: the reflected albedo is k (r0 A + B), the transmitted
+    albedo k (1 - r0) A.
     """
     slopes = np.sqrt(lobe.mx * lobe.my) * lobe_points(samples, lobe.distribution == "ggx")
     cos_d, g = gains(lobe, slopes, (np.arange(TABLE_ROWS) + 0.5) / TABLE_ROWS)
@@ -76,9 +76,9 @@ def albedo_table(lobe: Lobe, samples: int = 1024) -> Floats:
 
 
 def gains(lobe: Lobe, slopes: Floats, cos_o: Floats, phi_rad: float = 0.0) -> tuple[Floats, Floats]:
-    """cos_d = wo.h and f cos_i/pdf without k and Fresnel, (views, n), of half vectors of slopes (n, 2).
+    """cos_d = wo.h, and f cos_i/pdf without k and Fresnel: both (views, n), for half vectors with slopes (n, 2).
 
-    `cos_o` (views,) are those of viewers at the azimuth `phi_rad`; what a viewer sees below the horizon has gain 0.
+    Viewers are at cos_o (views,) and azimuth `phi_rad`. Directions below the horizon have gain 0.
     """
     h = normalize(np.column_stack([slopes, np.ones(len(slopes))]))
     cos_o = cos_o[:, None]

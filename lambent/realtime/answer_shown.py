@@ -1,6 +1,6 @@
-"""Brings light that answers edited materials onto the GPU, all at once: light maps, then probes.
+"""Uploads light that answers edited materials in one go: light maps, then probes.
 
-Light that is sorted by group goes through the renderer's mixer, which mixes it before the next frame.
+Light by group goes through the renderer's mixer, which mixes it before the next frame.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from lambent.realtime.renderer import Renderer
 
 
 def answered(baked: ProbeLight, answer: AnsweredLight, name: str, light: Lit) -> ProbeLight:
-    """A probe's light in other light of the surfaces that it sees."""
+    """A probe's light after the surfaces that it sees changed to `light`."""
     change = answer.probe_change(name, light)
     radiance = np.maximum(finite(baked.probe.radiance)[0] + change, 0)
     return baked.relit(radiance, answer.probe_irradiance(name, change))
@@ -28,7 +28,7 @@ def users_of(lights: Sequence[ProbeLight], owners: Mapping[str, ProbeLight]) -> 
 
 
 class AnswerShown:
-    """The light of a renderer's scene for edited materials; nobody else changes the renderer's light meanwhile."""
+    """Light of a renderer's scene for edited materials; nothing else may change the renderer's light meanwhile."""
 
     def __init__(self, renderer: Renderer, answer: AnsweredLight) -> None:
         self._renderer, self._answer = renderer, answer

@@ -1,8 +1,8 @@
 """Baked light that answers edited materials: light maps and probes, from a store's answer (`core.answer`).
 
-A texel of a probe keeps what it holds, and the diffuse light that it sees changes by a E' - a E: its edges stay smooth,
-and what mirrors show in it stays as baked. Before the first edit every array is that of the store, to the bit. Where
-light is sorted by group, each group answers by itself, and its light is mixed as baked light is.
+A texel of a probe keeps its baked radiance plus the change a E' - a E of the diffuse light that it sees: edges stay
+smooth, and reflections in mirrors stay as baked. Before the first edit every array equals the store's, to the bit.
+Light by group answers group by group, and is mixed like baked light.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from lambent.realtime.lit_texels import LitTexels, mix_into
 from lambent.realtime.resources import SceneResources, light_layers
 from lambent.store.answer import SeenSpots, StoredAnswer
 
-MARGIN = 1.4  # of the error over its estimate: at most 1.33 in 14 edits of two rooms, and 1.18 in 5 of a third
-ERROR_TEXELS = 1 << 15  # of which the error is estimated: more would make an edit wait
-FAINT = 0.01  # of the mean indirect light: darker texels say nothing of how exact the rest is
+MARGIN = 1.4  # factor on the estimated error; error over estimate was at most 1.33 in 19 edits of three rooms
+ERROR_TEXELS = 1 << 15  # most texels for the estimate of the error: more would make an edit wait
+FAINT = 0.01  # of the mean indirect light: darker texels do not count in the estimate of the error
 
 
 @dataclass(frozen=True, eq=False)
 class Lit:
-    """Light of the texels that answer, for materials of these albedos.
+    """Light of the answering texels for materials with these albedos.
 
-    `is_baked` says whether it is as baked. `on_gpu` is the light in the memory of a GPU, where one has computed it.
+    `is_baked`: this is the baked light. `on_gpu`: the light in GPU memory, if a GPU computed it.
     """
 
     in_memory: NDArray[np.float32] | None
@@ -49,7 +49,7 @@ class Lit:
 
     @cached_property
     def irradiance(self) -> NDArray[np.float32]:
-        """(G, T, 3) by light group, W/m^2; waits for the GPU and reads it back where that has it."""
+        """(G, T, 3) by light group, W/m^2; waits for the GPU and reads back if the light is in its memory."""
         if self.in_memory is not None:
             return self.in_memory
         assert self.on_gpu is not None, "light is in memory or on a GPU"
@@ -57,9 +57,9 @@ class Lit:
 
 
 class AnsweredLight:
-    """The light of one baked scene for other colours of its materials. Methods may run in any thread.
+    """Light of one baked scene for edited colours of its materials. Methods may run in any thread.
 
-    A `device` computes it by shaders, as far as it has room; else the processor's cores do.
+    With a `device`, shaders compute the light if its memory suffices; otherwise the CPU computes it.
     """
 
     def __init__(self, baked: BakedScene, stored: StoredAnswer, device: Any = None) -> None:
@@ -75,7 +75,7 @@ class AnsweredLight:
         return self._as_baked
 
     def lit(self, edited: Mapping[str, Material]) -> Lit:
-        """The light when some materials are others."""
+        """The light with these materials, by name, in place of the baked ones."""
         now = [edited.get(name, given) for name, given in zip(self._stored.materials, self._materials, strict=True)]
         albedos = edited_albedos(self._materials, now)
         if albedos.same_as(self._stored.answer.albedos):
@@ -83,15 +83,15 @@ class AnsweredLight:
         if self._gpu is not None:
             try:
                 return Lit(None, *_shown(now), is_baked=False, on_gpu=self._gpu.begin(albedos))
-            except NoRoom:  # something else has taken the memory since
+            except NoRoom:  # something else took the memory in the meantime
                 self._gpu = None
             except Unsolved:
-                pass  # by the cores, this time
+                pass  # the CPU computes this edit
         light = self._stored.answer.irradiance(albedos, self._reference)
         return Lit(light, *_shown(now), is_baked=False)
 
     def show(self, light: Lit, resources: SceneResources) -> None:
-        """Show light of one group in a renderer's light map; where a GPU has computed it, it stays there."""
+        """Show light of one group in a renderer's light map; light in GPU memory is not read back."""
         if light.on_gpu is None:
             resources.show_light_map(list(self.layers(light)))
             return
@@ -99,7 +99,7 @@ class AnsweredLight:
         resources.draw_light_map(base, lambda texture: draw(texture, len(base), 1 / self._baked.unit))
 
     def maps(self, light: Lit) -> tuple[Floats | None, Floats | None]:
-        """Light maps (H, W, 3) of both sides in the scene's units; what does not answer is as baked."""
+        """Light maps (H, W, 3) of front and back in the scene's units; texels that do not answer are as baked."""
         both = self._baked.irradiance, self._baked.irradiance_back
         if light.is_baked:
             return both
@@ -122,13 +122,13 @@ class AnsweredLight:
 
     @cached_property
     def of_sides(self) -> tuple[tuple[NDArray[np.intp], NDArray[np.uint32]], ...]:
-        """By side, which of the texels that answer are on it, and their places in its map."""
+        """By side: indices of its answering texels, and their positions in the flattened map."""
         texels = self._stored.texels
         each = (np.flatnonzero(texels % 2 == side) for side in range(2))
         return tuple((mine, texels[mine] // 2) for mine in each)
 
     def shown_at_texels(self, baked: Floats | None, irradiance: Floats, side: int) -> Floats | None:
-        """A map of a side (..., H, W, 3) in the scene's units with other irradiance (..., T, 3), W/m^2, in it."""
+        """`baked` (..., H, W, 3), in the scene's units, of a side with new irradiance (..., T, 3), W/m^2."""
         if baked is None:
             return None
         mine, texels = self.of_sides[side]
@@ -150,11 +150,11 @@ class AnsweredLight:
         return tuple(name for name in self._stored.seen if name in self._baked.probes)
 
     def probe_change(self, name: str, light: Lit) -> NDArray[np.float32]:
-        """What is added (6, N, N, 3) to the radiance of a probe, in the scene's units."""
+        """Change (6, N, N, 3) of the radiance of a probe, in the scene's units."""
         return np.asarray(self.probe_changes(name, light).sum(axis=0))
 
     def probe_changes(self, name: str, light: Lit) -> NDArray[np.float32]:
-        """The same by light group, (G, 6, N, N, 3)."""
+        """`probe_change` by light group, (G, 6, N, N, 3)."""
         seen, before = self._stored.seen[name], self._as_baked
         at = np.flatnonzero(seen.texel.reshape(-1) >= 0)
         texel = seen.texel.reshape(-1)[at]
@@ -166,7 +166,7 @@ class AnsweredLight:
         return found.reshape(len(found), *seen.texel.shape, 3)
 
     def _sent(self, seen: SeenSpots, at: NDArray[np.intp], texel: NDArray[np.int64], light: Lit, group: int) -> Floats:
-        """Diffuse exitance (n, 3) by a group, without its texture, of the texels that a probe's texels `at` see."""
+        """Diffuse exitance (n, 3), untextured, of the light-map texels that a probe's texels `at` see, by one group."""
         material, other, irradiance = self._stored.material[texel], self._stored.other[texel], light.irradiance[group]
         power = self._stored.sun.astype(np.float32) * (group == self._stored.of_sun)
         sun = seen.sun.reshape(-1)[at].astype(np.float32)[:, None] * power
@@ -179,15 +179,16 @@ class AnsweredLight:
         return np.asarray(sent)
 
     def probe_irradiance(self, name: str, change: Floats) -> tuple[float, ...]:
-        """What a probe alone would give, of which its object shows the share that its light map has."""
+        """`Probe.irradiance` of a probe after a `change` (6, N, N, 3) of its radiance; empty if the baked one is."""
         baked = self._baked.probes[name].irradiance
         return tuple(np.array(baked) + self._baked.unit * irradiance_of(change)) if baked else ()
 
     def likely_error(self, light: Lit, factors: Floats | None = None) -> float:
-        """A bound on the root mean square error of the light over its mean, by texels, in a mix of `factors` (G, 3).
+        """Estimated bound on the texels' RMS error over their mean light, in a mix of `factors` (G, 3).
 
-        What an edit changes, or leaves if that is less, is taken to be as wrong as this computes the indirect light of
-        the bake itself, times MARGIN. The direct sun counts as light, and no edit changes it.
+        The estimate compares computed with baked indirect light before any edit. This relative error, times MARGIN,
+        applies to the change by the edit, or to the remaining light if that is less. The direct sun counts as light and
+        never changes.
         """
         answer = self._stored.answer
         shares = np.ones((len(answer.baked), 3), np.float32) if factors is None else np.asarray(factors, np.float32)
@@ -209,20 +210,20 @@ class AnsweredLight:
         )
 
     def groups(self, light: Lit) -> GroupArrays | None:
-        """The light by group, to be mixed; as baked before an edit, and None where it is not sorted."""
+        """Light by group, for mixing; as baked before an edit, None if the scene was baked without groups."""
         base = self._baked.groups
         if base is None or light.is_baked:
             return base
         return AnsweredGroups(base.records, base.store, base.unit, base=base, answer=self, light=light)
 
     def probe(self, name: str, light: Lit) -> Probe:
-        """A probe in other light."""
+        """A probe in this light."""
         baked = self._baked.probes[name]
         if light.is_baked:
             return baked
         groups = self.groups(light)
         by_group = None if groups is None else groups.probe(name)
-        if by_group is not None:  # as a mix has it: cut at 0 group by group
+        if by_group is not None:  # clipped at 0 by group, as in a mix
             radiance = np.asarray(by_group.sum(axis=0))
             own = tuple(map(float, irradiance_of(radiance) * self._baked.unit)) if baked.irradiance else ()
             return replace(baked, radiance=radiance, irradiance=own)
@@ -233,7 +234,7 @@ class AnsweredLight:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AnsweredGroups(GroupArrays):
-    """Light by group as it answers edited materials: `light` in the place of what `base` holds."""
+    """Light by group that answers edited materials: `light` replaces the light of `base`."""
 
     base: GroupArrays
     answer: AnsweredLight
@@ -241,12 +242,12 @@ class AnsweredGroups(GroupArrays):
 
     @cached_property
     def sides(self) -> tuple[Floats | None, ...]:
-        """Light maps by group, as those of `base`."""
+        """Light maps by group, laid out as in `base`."""
         show, irradiance = self.answer.shown_at_texels, self.light.irradiance
         return tuple(show(baked, irradiance, side) for side, baked in enumerate(self.base.sides))
 
     def light_map(self, factors: Floats) -> tuple[NDArray[np.float16] | None, ...]:
-        """By side, a mix of all groups, as `base` has it."""
+        """A mix of all groups by side, laid out as in `base`."""
         found = []
         for (rows, texels), rest in zip(self.answer.of_sides, self.answer.stays_as_baked, strict=True):
             layer = None if rest is None else rest.mixed(factors)
@@ -256,7 +257,7 @@ class AnsweredGroups(GroupArrays):
         return tuple(found)
 
     def probe(self, name: str) -> Floats | None:
-        """Radiance of the probe of an object by group, as that of `base`."""
+        """Radiance of an object's probe by group, laid out as in `base`."""
         by_group = self.base.probe(name)
         if by_group is None or name not in self.answer.probes:
             return by_group
@@ -264,13 +265,13 @@ class AnsweredGroups(GroupArrays):
 
 
 def _shown(materials: list[Material]) -> tuple[Floats, Floats]:
-    """Diffuse colours that probes see, float32: without what edits of lobes count as."""
+    """Diffuse colours that probes see, float32, without the diffuse equivalent of lobes."""
     albedos: Albedos = albedos_of(materials)
     return albedos.reflected.astype(np.float32), albedos.transmitted.astype(np.float32)
 
 
 def answered_scene(baked: BakedScene, stored: StoredAnswer, edited: Mapping[str, Material]) -> BakedScene:
-    """A baked scene with some of its materials replaced, and its light and probes as they answer that."""
+    """A baked scene with edited materials, by name, and with light maps and probes that answer the edit."""
     answer = AnsweredLight(baked, stored)
     light = answer.lit(edited)
     front, back = answer.maps(light)

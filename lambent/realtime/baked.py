@@ -1,4 +1,4 @@
-"""What the renderer needs of a store, as plain arrays; a store that lacks something says so in `missing`."""
+"""The renderer's inputs from a store, as plain arrays; `missing` names what the store lacks."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ ENVIRONMENT = "environment/radiance"
 class Probe:
     """Light around an object, seen from `centre`: radiance (6, N, N, 3), distance (6, M, M) or None, planes (P, 4).
 
-    `irradiance`, nine numbers, is what the probe alone would give (`store.contract`), where the object is to be shown
-    only the share of it that its light map has. An object with a `light_field` has a probe of its own, and in `sky` the
-    environment (6, N, N, 3).
+    `irradiance`, nine numbers (`store.contract`), is the irradiance from the probe alone; its object receives only the
+    share of it that its light map shows. Empty: no such scaling. An object with a `light_field` has its own probe, and
+    the environment (6, N, N, 3) in `sky`.
     """
 
     centre: tuple[float, float, float]
@@ -45,10 +45,10 @@ class Probe:
     irradiance: tuple[float, ...] = ()
     light_field: LightField | None = None
     sky: Floats | None = None
-    most_bytes: float | None = None  # that the maps of the light field may take on the GPU
-    policy: str = LEAST_RECENT  # of the cache that they are in, where they do not fit
-    gain: float = 1.0  # on the light map's share of `irradiance`
-    even_niches: bool = False  # what that share leaves is the light map's, from all directions alike
+    most_bytes: float | None = None  # budget of the light field's maps on the GPU
+    policy: str = LEAST_RECENT  # of their cache, if they exceed the budget
+    gain: float = 1.0  # factor on the light map's share of `irradiance`
+    even_niches: bool = False  # the rest comes from the light map, evenly from all directions
 
 
 DARK = Probe((0.0, 0.0, 0.0), np.zeros((6, 1, 1, 3), np.float32))
@@ -58,8 +58,8 @@ DARK = Probe((0.0, 0.0, 0.0), np.zeros((6, 1, 1, 3), np.float32))
 class BakedScene:
     """Geometry (as in store.contract), light maps (H, W, 3), environment (6, N, N, 3) and probes by object name.
 
-    All light is in units of `unit` W/(sr m^2) or W/m^2, so that what the sun shows has room in half floats; that of the
-    record, and probes' `irradiance`, is not. Pictures are in W/(sr m^2).
+    Light is in units of `unit` W/(sr m^2) or W/m^2, so that sunlit surfaces fit half floats. Exceptions: light in the
+    record, and probes' `irradiance`. Pictures are in W/(sr m^2).
     """
 
     record: SceneRecord
@@ -91,9 +91,9 @@ class BakedScene:
     replaced: bool = False  # whether a mesh stands in the place of an object: light maps are not the store's then
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
-        """The object's own probe or the one it shares, else the nearest one, else the environment, else None.
+        """The object's own or shared probe, else the nearest one, else the environment, else None.
 
-        With its light field, where it has one.
+        Includes the object's light field, if any.
         """
         probe, light_field = self._cube_of(obj), self.light_fields.get(obj.name)
         if light_field is None:
@@ -117,12 +117,12 @@ class BakedScene:
 
     @cached_property
     def far_light(self) -> Probe | None:
-        """The environment as a probe: infinitely far, so its centre does not matter."""
+        """The environment as a probe at infinity, with an arbitrary centre."""
         return None if self.environment is None else Probe((0.0, 0.0, 0.0), self.environment)
 
 
 def _light_field(store: Store, name: str, unit: float) -> LightField:
-    """The light field of an object, its light in `unit`."""
+    """The light field of an object, its light in units of `unit` W/(sr m^2)."""
     found = read_light_field(store, name)
     own = contract.radiance_unit(store, light_name(store, name))
     return (
@@ -137,7 +137,7 @@ def _in_units(sun: SunRecord | None, unit: float) -> SunRecord | None:
 
 
 def read_baked(store: Store, light_field_mb: float | None = None, policy: str = LEAST_RECENT) -> BakedScene:
-    """Everything the renderer shows of a store. Only the geometry and the scene record must be there."""
+    """All data of a store that the renderer shows. Only the geometry and the scene record are required."""
     known("cache of light fields", policy, POLICIES, field="--light-field-cache")
     record = contract.scene_record(store)
     missing: list[str] = []

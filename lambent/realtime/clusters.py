@@ -1,7 +1,7 @@
-"""Which triangles a camera can see: clusters of neighbours, by the boxes around them.
+"""Frustum culling on the CPU, by bounding boxes of clusters of neighbouring triangles.
 
-A software adapter spends a third of a small frame on vertices (docs/decisions.md), and a band of a frame would spend
-as much again for each pass; what is outside of the view, or of the band, is left out here, on the CPU.
+A software adapter spends a third of a small frame on vertices (docs/decisions.md), and each band of a frame would spend
+as much again in each pass.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.store.contract import ObjectRecord
 
 CLUSTER_FACES = 64
-SLACK = 1e-5  # of the largest term of a plane's equation: the GPU counts in single precision
-SLIVER_PX = 1.5  # width up to which a sliver may lie between the middles of pixels
+SLACK = 1e-5  # of the largest term of a plane's equation: the GPU computes in single precision
+SLIVER_PX = 1.5  # slivers up to this width may miss all pixel centres
 LONG = 3.0  # length over width of a sliver
-FEW_PX = 4.0  # side of a box whose triangles may be so small whatever their shape
+FEW_PX = 4.0  # triangles in boxes of up to this side may miss all pixel centres, whatever their shape
 Ranges = list[tuple[int, int]]
-MERGED_GAP = 256  # faces between two runs that are drawn with them: another call costs as much
+MERGED_GAP = 256  # faces; runs with a smaller gap are drawn in one call, which costs less than a second call
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Seen:
     end: Indices
 
     def of(self, first_face: int, face_count: int) -> Ranges:
-        """(first, count) of what the runs have of a range of faces."""
+        """(first, count) of each run within a range of faces."""
         last = first_face + face_count
         mine = slice(np.searchsorted(self.end, first_face, "right"), np.searchsorted(self.begin, last))
         begin, end = self.begin[mine].clip(first_face).tolist(), self.end[mine].clip(max=last).tolist()
@@ -40,10 +40,10 @@ class Seen:
 
 
 class Clusters:
-    """The clusters of a scene: `CLUSTER_FACES` neighbours of an object's index range each."""
+    """The clusters of a scene, each of `CLUSTER_FACES` consecutive faces of one object."""
 
     def __init__(self, positions: Floats, faces: NDArray[np.unsignedinteger], objects: Sequence[ObjectRecord]) -> None:
-        """`positions` (V, 3), `faces` (F, 3)."""
+        """Vertices are at `positions` (V, 3), metres; `faces` (F, 3) are their indices."""
         ordered = sorted(objects, key=lambda record: record.first_face)
         limits = [(o.first_face, o.first_face + o.face_count) for o in ordered]
         starts = [np.arange(first, end, CLUSTER_FACES) for first, end in limits]
@@ -61,7 +61,7 @@ class Clusters:
         )
 
     def seen(self, clip_from_world: Floats, rows: tuple[float, float] = (0.0, 1.0)) -> Seen:
-        """What a camera may see of the scene.
+        """The clusters that a camera may see.
 
         Parameters
         ----------
@@ -79,14 +79,14 @@ class Clusters:
         for plane in (w + x, w - x, top * w - y, y - bottom * w, z, w - z):
             terms = np.where(plane[:3] > 0, self._high, self._low) * plane[:3]  # of the corner farthest inside
             reach = np.abs(terms).sum(axis=1) + abs(plane[3])
-            # NaN and infinity: such a cluster is drawn.
+            # Clusters with NaN or infinite terms are drawn.
             visible &= ~(terms.sum(axis=1) + plane[3] < -SLACK * reach)
         return visible
 
     def thin(self, clip_from_world: Floats, rows: tuple[float, float], height_px: int) -> Seen:
-        """What of it may be too thin for the middles of pixels: slivers, and clusters of few pixels.
+        """The faces in view that may miss all pixel centres: slivers, and clusters of few pixels.
 
-        `height_px` is that of the whole image; the rest as for `seen`.
+        `height_px` is the height of the whole image; other parameters as in `seen`.
         """
         _, y, _, w = np.asarray(clip_from_world, np.float64)
         centre, half = (self._high + self._low) / 2, (self._high - self._low) / 2
@@ -106,7 +106,7 @@ class Clusters:
 
 
 def _slivers(corners: Floats) -> Floats:
-    """(F,) least height (m) of triangles (F, 3, 3) that are long and thin, infinity for others."""
+    """(F,) least height, m, of long and thin triangles among (F, 3, 3), infinity for others."""
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     height = np.divide(area, edges, out=np.zeros_like(edges), where=edges > 0)
@@ -114,7 +114,7 @@ def _slivers(corners: Floats) -> Floats:
 
 
 def merged(runs: Iterable[tuple[int, int]], gap: int) -> Ranges:
-    """(first, count) of runs [begin, end) in order, those together that are less than `gap` apart."""
+    """(first, count) of ordered runs [begin, end), merged where less than `gap` apart."""
     found: Ranges = []
     for begin, end in runs:
         if found and 0 <= begin - sum(found[-1]) < gap:

@@ -1,4 +1,4 @@
-"""What the passes of a frame share."""
+"""State that the passes of a frame share."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from lambent.realtime.slices import Band, Cut, Steps, Whole
 from lambent.realtime.structs import Record
 from lambent.realtime.targets import PassTimer, Target, Targets, stored
 
-SMOOTH_PRIOR = 0.5  # share of the prior from which edges are those of one frame, and so are blended
+SMOOTH_PRIOR = 0.5  # from this share of the prior on, edges come mostly from one frame, and are blended
 
 
 @dataclass
 class FrameContext:
-    """A frame under way. Passes read it, and leave in it what the next ones need."""
+    """A frame in progress. Passes read it and store their results in it for later passes."""
 
-    slicing: Whole | Cut  # whose encoder takes the passes
+    slicing: Whole | Cut  # its encoder takes the passes
     state: FrameState
     data: Record  # of FRAME_DTYPE
     frame_group: Any  # group 0 of all pipelines, with `data`
@@ -32,49 +32,49 @@ class FrameContext:
     clusters: Clusters
     targets: Targets
     timer: PassTimer
-    target: Target  # that light is drawn into
+    target: Target  # light is drawn into it
     draws: list[Draw]
-    panes: list[Draw]  # clear glass, which is laid over all else
-    views: list[PlanarView]  # of the planar reflectors that have a buffer in this frame
+    panes: list[Draw]  # clear glass, blended over everything else
+    views: list[PlanarView]  # planar reflectors with a buffer in this frame
     counts: Counter[str]  # draw_calls
-    waits: bool = True  # for what is drawn once and takes seconds
-    shown: Any = None  # view that the display image is drawn into, if any
-    radiance: Any = None  # texture of linear light, as the passes before left it
-    prior: Any = None  # texture of the last frame of few samples, where it is shown beside a progressive mean
-    base: Any = None  # texture of the last frame of few samples, where this one is drawn over it
-    redrawn: frozenset[str] | None = None  # materials whose objects alone are drawn over `base`
-    light: tuple[Any, ...] = ()  # of group 3: light maps, the sun, and what pixels see of it
-    pane_light: tuple[Any, ...] = ()  # the same of panes
-    reflections: Any = None  # group 3 of draws that have pixels on planar reflectors
+    waits: bool = True  # the frame waits for one-time work that takes seconds
+    shown: Any = None  # view of the texture for the display image, if any
+    radiance: Any = None  # texture of linear light after the previous pass
+    prior: Any = None  # texture of the last frame of few samples, if blended with a progressive mean
+    base: Any = None  # texture of the last frame of few samples, if this frame is drawn over it
+    redrawn: frozenset[str] | None = None  # materials; only their objects are drawn over `base`
+    light: tuple[Any, ...] = ()  # resources of group 3: light maps, the sun, and its visible share by pixel
+    pane_light: tuple[Any, ...] = ()  # `light` for panes
+    reflections: Any = None  # group 3 of draws with pixels on planar reflectors
 
     @property
     def is_passing(self) -> bool:
-        """Whether the frame is shown once: half floats suffice, and edges of masked surfaces can be blended."""
+        """Whether the frame is shown by itself: half floats suffice, and edges of masked surfaces can be blended."""
         return self.shown is not None and self.state.accumulate is None
 
     @property
     def blends_masks(self) -> bool:
-        """Whether pixels that masked surfaces cover in part are blended with what is behind."""
+        """Whether pixels that masked surfaces cover in part are blended with the background."""
         return self.is_passing and self.state.is_smoothed and bool(self.resources.masked)
 
     @property
     def is_covered(self) -> bool:
-        """Whether pixels show the mean over several places. Frames over others keep what those have."""
+        """Whether pixels show the mean over several places. Frames drawn over a base keep the base's pixels."""
         return self.is_passing and self.state.covers and self.state.is_smoothed and self.redrawn is None
 
     @property
     def unsmoothed(self) -> Any:
-        """Texture of the display image before its edges are blended, None where they are not."""
+        """Texture of the display image before its edges are blended; None without blending."""
         of_one = self.state.accumulate is None or (self.prior is not None and self.state.prior > SMOOTH_PRIOR)
         smoothed = self.shown is not None and of_one and self.state.is_smoothed
         return self.targets.display("unsmoothed", self.state.size) if smoothed else None
 
     def seen(self, rows: tuple[float, float] = (0.0, 1.0)) -> Seen:
-        """What the frame's camera may see of the scene in a band of rows."""
+        """The clusters that the frame's camera may see in a band of rows."""
         return self.clusters.seen(self.data["clip_from_world"].T, rows)
 
     def thin(self, rows: tuple[float, float]) -> Seen:
-        """What of it may be too thin for the middles of pixels."""
+        """The faces in view that may miss all pixel centres."""
         return self.clusters.thin(self.data["clip_from_world"].T, rows, self.state.height)
 
     def begin(
@@ -102,6 +102,6 @@ class FrameContext:
 
 
 class Pass(Protocol):
-    """A step of a frame; does nothing where the frame has no need of it."""
+    """A step of a frame; does nothing if the frame does not need it."""
 
     def encode(self, context: FrameContext) -> Steps: ...

@@ -1,11 +1,11 @@
-"""MIP chains of cube maps: every level keeps the light of the one below.
+"""MIP chains of cube maps: every level holds the same light.
 
-A texel of a level is the mean of what it covers, weighted by solid angle, so the light over the sphere is the same on
-every level. Neighbouring faces meet without a seam because the GPU filters cube maps across their edges.
+A texel of a level is the mean over its area, weighted by solid angle, so the integral over the sphere is the same on
+every level. Faces meet without a seam because the GPU filters cube maps across their edges.
 
-A look-up between the texels of such a level shows them: the light of a small lamp has corners, and is bright where it
-falls on the middle of a texel. Smooth levels are blurred once more, over `SMOOTH_AREA` times the area, and looked up
-as much finer: the blur is the same and nearly round. By experiment (docs/decisions.md) that is worth 2.5 dB.
+Interpolation between texels of a plain level shows the texels: a small lamp looks square, and brightest at the centre
+of a texel. Smooth levels are blurred once more, over `SMOOTH_AREA` times the area, and the look-up reads a level finer
+by the same factor: the blur keeps its size and is nearly round. Measured gain: 2.5 dB (docs/decisions.md).
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from lambent.core.colour import HALF_MAX
 from lambent.core.cubemap import directions_at, sample, texel_solid_angles
 
 BLUR = (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)  # along rows and columns: variance 1 texel^2
-# Variance of a look-up in texel^2 per axis: box 1/12, and linear interpolation 1/6, to which the blur adds 1.
+# Variance of a look-up in texel^2 per axis: box 1/12, linear interpolation 1/6, blur 1.
 SMOOTH_AREA = 5.0
-FAINT = 1e-4  # of the mean light of a cube map: what is darker says nothing of how light changes
+FAINT = 1e-4  # of the mean light of a cube map: darker texels count as unchanged
 
 
 def halved(cube: Floats) -> Floats:
@@ -52,10 +52,10 @@ def mip_chain(cube: Floats) -> list[Floats]:
 
 
 def light_change(now: Floats, before: Floats) -> list[Floats]:
-    """Levels of a cube map of how many times brighter a probe's light `now` is than `before`, (6, N, N, 3) each.
+    """MIP levels of the ratio of a probe's light `now` to its light `before`, (6, N, N, 3) each.
 
-    A light field in other light is its maps times this, read towards what its rays meet. Where the probe saw next to
-    nothing, light stays as it was.
+    Relighting multiplies the maps of a light field by this ratio, read in the direction of each ray's hit point. The
+    ratio is 1 where the probe saw almost no light.
     """
     faint = FAINT * float(np.mean(before)) + 1e-30
     return [(a + faint) / (b + faint) for a, b in zip(mip_chain(now), mip_chain(before), strict=True)]
@@ -76,7 +76,7 @@ def blurred(cube: Floats, kernel: tuple[float, ...] = BLUR) -> Floats:
 
 
 def _with_border(cube: Floats, by: int) -> Floats:
-    """Every face with `by` more texels on all sides, read from the faces beyond."""
+    """Every face padded by `by` texels on all sides from the neighbouring faces."""
     n = cube.shape[1]
     wide = np.pad(cube, ((0, 0), (by, by), (by, by), (0, 0)))
     row, column = np.nonzero(np.pad(np.zeros((n, n), bool), by, constant_values=True))

@@ -1,4 +1,4 @@
-"""The GPU: which adapter, with which limits."""
+"""The GPU: choice of the adapter and of its limits."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from lambent.core.errors import UserError
 
 MEND = "install a Vulkan driver (Debian: apt-get install mesa-vulkan-drivers libvulkan1)"
 
-# What every WebGPU implementation grants (WebGPU, section 3.6.2). A device asked for without limits gets the adapter's
-# own, so that code which outgrows the defaults would only fail on someone else's machine: we always ask for these.
+# Limits that every WebGPU implementation grants (WebGPU, section 3.6.2). A device requested without limits gets the
+# adapter's own; code that exceeds the defaults would then fail only on other machines. So we always request these.
 WEBGPU_LIMITS: Mapping[str, int] = {
     "max-texture-dimension-1d": 8192,
     "max-texture-dimension-2d": 8192,
@@ -57,7 +57,7 @@ OPTIONAL_FEATURES = ("timestamp-query", BLOCKS)
 
 @dataclass(frozen=True)
 class AdapterInfo:
-    """What a user, a report or a bench says about the GPU."""
+    """Description of the GPU for users, reports and benches."""
 
     name: str
     type: str  # "DiscreteGPU", "IntegratedGPU", "CPU"...
@@ -84,7 +84,7 @@ def choose_adapter() -> Any:
     Raises
     ------
     UserError
-        Where this machine has no adapter at all; names the package that mends it.
+        If this machine has no adapter; names the package to install.
     """
     _have_runtime_folder()
     _leave_out_opengl()
@@ -98,12 +98,12 @@ def choose_adapter() -> Any:
 @cache
 def _leave_out_opengl() -> None:
     """Keep wgpu from starting EGL to list OpenGL adapters, which can abort the process on a loaded machine."""
-    with suppress(RuntimeError):  # wgpu has started already, with the backends of the program around us
+    with suppress(RuntimeError):  # wgpu has started already, with backends that the calling program chose
         extras.set_instance_extras(backends=BACKENDS)
 
 
 def _have_runtime_folder() -> None:
-    """A private folder for drivers, which complain on stderr where no login manager has made one."""
+    """Make a private runtime folder: drivers complain on stderr if no login manager has made one."""
     if sys.platform.startswith("linux") and not os.environ.get("XDG_RUNTIME_DIR"):
         folder = tempfile.mkdtemp(prefix="lambent-")
         os.environ["XDG_RUNTIME_DIR"] = folder
@@ -111,19 +111,19 @@ def _have_runtime_folder() -> None:
 
 
 def open_device(needs: Mapping[str, int] | None = None, adapter: Any = None) -> Any:
-    """A wgpu device with WebGPU's default limits, raised only where `needs` says so.
+    """A wgpu device with WebGPU's default limits, raised only as `needs` says.
 
     Parameters
     ----------
     needs : mapping, optional
-        Limit name -> least value, for example ``{"max-buffer-size": 1 << 30}`` of a large scene.
+        Limit name -> least value, for example ``{"max-buffer-size": 1 << 30}`` for a large scene.
     adapter : wgpu.GPUAdapter, optional
         The adapter of a window; by default `choose_adapter`.
 
     Raises
     ------
     UserError
-        Where there is no adapter or it cannot grant a limit.
+        If there is no adapter, or it cannot grant a limit.
     """
     adapter = adapter or choose_adapter()
     limits = dict(WEBGPU_LIMITS)

@@ -1,4 +1,4 @@
-"""Discs of a few pixels at places in a scene, as a picture of its own, where nothing stands before them."""
+"""Discs of a few pixels at points of a scene, drawn into their own picture and hidden behind the scene's surfaces."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class Discs(Overlay):
     _pipeline: Any = None
 
     def draw(self, state: FrameState, places: Floats, colours: Floats, radii_px: Floats, rims: Floats) -> Any:
-        """View of an RGBA texture of the state's size: discs at places (P, 3) in the world; clear elsewhere.
+        """View of an RGBA texture of the state's size: discs at world positions `places` (P, 3), m; clear elsewhere.
 
-        `colours` (P, 3) are encoded for the display, `radii_px` (P,) in its pixels, `rims` (P,)
-        the grey of the rims, encoded.
+        `colours` (P, 3) and the greys `rims` (P,) of the rims are display-encoded, 0 to 1; `radii_px` (P,) are in
+        display pixels.
         """
         if self._pipeline is None:
             module = self._device.create_shader_module(code=assemble("discs.wgsl"))

@@ -1,4 +1,4 @@
-"""The objects of a frame, each with how it is drawn."""
+"""The draws of a frame: its objects, each with integrator, samples and textures."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.resources import ObjectResources, SceneResources
 from lambent.realtime.textures import WIDENING, bits_that_show
 
-FAINT_N = 5  # samples per lobe that serve where no lamp shows by itself
-LampUse = Literal["", "aim", "lamps"]  # samples aim at lamps, or lamps are outside of the cube map
+FAINT_N = 5  # samples per lobe that suffice if no lamp's highlight shows
+LampUse = Literal["", "aim", "lamps"]  # aim: samples aim at lamps; lamps: lamps are taken out of the cube map
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,11 @@ class Draw:
     look_up: LookUp
     material_group: Any
     textures: int = 0  # bits of the textures to read, see realtime.textures
-    table: LampUse = ""  # what it does with the lamps of its probe
-    planar_n: int = 0  # samples per lobe where it has pixels on planar reflectors; 0 where it has none
-    is_beyond: bool = False  # the light of a part, added to its neighbours
-    is_dark: bool = False  # drawn without what it emits
-    is_pane: bool = False  # clear glass: what is behind it is seen straight through it
+    table: LampUse = ""  # use of the probe's lamps
+    planar_n: int = 0  # samples per lobe on planar reflectors; 0 for objects without pixels on any
+    is_beyond: bool = False  # light of a part, added to neighbouring parts
+    is_dark: bool = False  # drawn without its emission
+    is_pane: bool = False  # clear glass: the background shows straight through it
     has_holes: bool = False
 
     def by(self, how: Integrator, resources: SceneResources, n: int) -> Draw:
@@ -46,7 +46,7 @@ class Draw:
 
     @property
     def planar(self) -> bool:
-        """Whether it has pixels on planar reflectors."""
+        """Whether the object has pixels on planar reflectors."""
         return self.planar_n > 0
 
     @property
@@ -61,7 +61,7 @@ class Draw:
 
     @property
     def cube(self) -> Cube:
-        """Which cube map of the probe it reads."""
+        """The cube map of the probe that the draw reads."""
         return "cleaned" if self.table == "lamps" else self.integrator.cube
 
     @property
@@ -80,7 +80,7 @@ class Draw:
 
     @property
     def faces(self) -> Ranges:
-        """(first, count) of what is drawn."""
+        """(first, count) of the faces to draw."""
         record = self.item.record
         return self.item.beyond if self.is_beyond else [(record.first_face, record.face_count)]
 
@@ -90,7 +90,7 @@ class Draw:
 
     @property
     def constants(self) -> dict[str, float]:
-        """Constants of the pipeline, not uniforms: the compiler unrolls loops, which is a quarter faster."""
+        """Constants of the pipeline. With constants instead of uniforms, unrolled loops make it a quarter faster."""
         return {
             "SAMPLES": self.n,
             "LOBES": self.lobes,
@@ -105,7 +105,7 @@ class Draw:
 
 
 def lamp_use(how: Integrator, light: ProbeLight, look_up: LookUp, material: Material, textures: int) -> LampUse:
-    """What an integrator does with the lamps of a probe for a material; `textures` are the bits of those that show."""
+    """An integrator's use of a probe's lamps for a material; `textures` are the bits of the textures that show."""
     if brings_light(look_up):
         return ""
     widened = bool(textures & WIDENING)
@@ -115,14 +115,14 @@ def lamp_use(how: Integrator, light: ProbeLight, look_up: LookUp, material: Mate
 
 
 def shows_no_lamp(how: Integrator, light: ProbeLight, look_up: LookUp, material: Material, textures: int) -> bool:
-    """Whether lamps stay in the cube map because their highlights on a material are faint."""
+    """Whether lamps stay in the cube map because their highlights on the material are faint."""
     return bool(how.lamps) and not brings_light(look_up) and light.lamps.are_faint(material, bool(textures & WIDENING))
 
 
 def panes_of(state: FrameState, resources: SceneResources) -> frozenset[str]:
     """Names of the objects of clear glass (`materials.clear`), if the frame shows specular light.
 
-    Glass with maps of a light field that refract has these instead.
+    Glass whose light field has maps of refracted rays uses these maps instead.
     """
     if SHOW[state.show][3] or not INTEGRATORS[state.integrator].specular:
         return frozenset()
@@ -144,7 +144,7 @@ def _refracts(state: FrameState, item: ObjectResources) -> bool:
 def draws_of(
     state: FrameState, resources: SceneResources, reflecting: Collection[str] = (), panes: Collection[str] = ()
 ) -> list[Draw]:
-    """What a frame draws; objects in `reflecting` are on planar reflectors, those in `panes` are of clear glass."""
+    """Draws of a frame; objects in `reflecting` are on planar reflectors, objects in `panes` are clear glass."""
     wanted = INTEGRATORS["diffuse" if SHOW[state.show][3] else state.integrator]
     found = {}
     for name, buffers in resources.materials.items():

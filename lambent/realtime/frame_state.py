@@ -1,4 +1,4 @@
-"""What a frame depends on besides the store, the choices there are, and the record that shaders read."""
+"""The state of a frame: all its inputs besides the store, their allowed values, and the record that shaders read."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from lambent.realtime.patterns import N_MAX, automatic_n
 from lambent.realtime.planar_integrators import AUTO, MOST_SHARED, TILE, interleaved_table, planar_integrator
 from lambent.realtime.structs import FRAME_DTYPE, Record
 
-LIGHT_MAP = "light-map"  # irradiance, in the place of radiance
-LIGHT_MAP_NOISE = "noise"  # its relative standard error before it was denoised
+LIGHT_MAP = "light-map"  # irradiance in place of radiance
+LIGHT_MAP_NOISE = "noise"  # relative standard error of the irradiance before denoising
 # Weights of diffuse, specular, sky, light map.
 SHOW = {
     "full": (1, 1, 1, 0), "diffuse": (1, 0, 0, 0), "specular": (0, 1, 0, 0),
     LIGHT_MAP: (0, 0, 0, 1), LIGHT_MAP_NOISE: (0, 0, 0, 1),
 }  # fmt: skip
-QUANTITIES = {LIGHT_MAP: ILLUMINANCE, LIGHT_MAP_NOISE: NOISE}  # of what is shown; of everything else luminance
+QUANTITIES = {LIGHT_MAP: ILLUMINANCE, LIGHT_MAP_NOISE: NOISE}  # shown quantity; luminance for all others
 FALSE_COLOUR = "false-colour"
 VIEW_TRANSFORMS = {FALSE_COLOUR: 3, "linear": 0, "neutral": 1, "filmic": 2}  # as shaders/tonemap.wgsl numbers them
 QMC_N = 8  # samples per pixel, lobe and frame of the progressive mode
@@ -48,44 +48,44 @@ class FrameState:
     n : int, optional
         Samples per lobe, 1 to 64; by default chosen per material from its roughness.
     exposure_ev : float
-        Radiance is multiplied by 2^exposure_ev before the view transform; only the display image knows it.
+        Radiance is multiplied by 2^exposure_ev before the view transform, in the display image only.
     view_transform : str
         filmic, neutral, linear, or false-colour: luminance in colours of `scale`.
     scale : false_colour.Range
-        What the false colours mean, in the unit of `quantity_of(show)`.
+        Range of the false colours, in the unit of `quantity_of(show)`.
     near_m : float, optional
-        Nearer things are cut away; by default a ten-thousandth of the scene's size.
+        Near plane; by default a ten-thousandth of the scene's size.
     materials : mapping
-        Materials that stand in for the store's, by name.
+        Materials, by name, that replace the store's.
     maps : int
-        `Renderer.light_version`: with other light, or more maps of light fields, a picture is another one.
+        `Renderer.light_version`: the picture changes with the light and with the loaded maps of light fields.
     light : mapping
-        Factors of light groups, by name and channel; a group that is left out is as baked.
+        Factors of light groups, by name and channel; groups left out are as baked.
     mixed : int
-        `LightMixer.version`: with more of a mix ready a picture is another one.
+        `LightMixer.version`: the picture changes when more of a mix is ready.
     lookup : str
-        How a direction finds its light in a probe: auto, or a look-up of `realtime.incident`.
+        Method to find the light of a direction in a probe: auto, or a look-up of `realtime.incident`.
     lookups : mapping
         The same for single objects, by name.
     planar : str
-        How planar reflectors are drawn: auto, off (by their probes), or a method of `planar_integrators`.
+        Method for planar reflectors: auto, off (drawn from their probes), or a method of `planar_integrators`.
     show : str
-        full, diffuse, specular, light-map: the irradiance, W/m^2, or noise: its relative standard error, which is
-        always in false colours.
+        full, diffuse, specular, light-map (irradiance, W/m^2), or noise (relative standard error of the irradiance,
+        always in false colours).
     accumulate : int, optional
         Index of the frame in a progressive series: it is averaged into the frames 0 ... index - 1 before it.
     prior : float
-        Share, in the display image of a progressive series, of the last frame of few samples that was displayed.
+        Share, 0 to 1, of the last displayed frame of few samples in the display image of a progressive series.
     antialias : bool
-        Edges of the display image are blended, or, when accumulating, frames are jittered.
+        Blend edges of the display image; when accumulating, jitter the frames instead.
     covers : bool
-        Pixels of a frame in motion show the mean over five places, so that thin geometry stays whole. In software a
-        frame of an interior takes 1.45 times as long.
+        Average each pixel of a frame in motion over five places, so that thin geometry stays whole. In software this
+        takes 1.45 times as long for a frame of an interior.
     over : bool
-        Draw over the last displayed frame of few samples, and draw only the objects whose materials have changed since.
-        Where anything else but the size or planar reflections has changed, the frame is drawn whole.
+        Draw over the last displayed frame of few samples, and draw only objects whose materials have changed since. If
+        anything else has changed, except the size or planar reflections, the frame is drawn whole.
     jitter_px : tuple of float
-        Where light is looked up in each pixel: right of and below its centre, within (-.5, .5).
+        Offset of the shaded point from each pixel's centre, right and down, within (-.5, .5).
     """
 
     camera: Camera
@@ -113,7 +113,7 @@ class FrameState:
     jitter_px: tuple[float, float] = (0.0, 0.0)
 
     def check(self) -> None:
-        """Raise `UserError` for a value that no frame can have; look-ups are checked where objects are drawn."""
+        """Raise `UserError` for an invalid value. Names of look-ups are checked later, when objects are drawn."""
         integrator(self.integrator)
         planar_integrator(self.integrator, self.planar)
         if self.n is not None and not 1 <= self.n <= N_MAX:
@@ -128,7 +128,7 @@ class FrameState:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height."""
+        """Width and height, pixels."""
         return self.width, self.height
 
     @property
@@ -143,32 +143,32 @@ class FrameState:
 
     @property
     def is_smoothed(self) -> bool:
-        """Whether edges of the display image are blended where it comes from one frame."""
+        """Whether edges of the display image are blended if it comes from one frame."""
         return self.antialias and not self.is_false_coloured
 
     def samples(self, material: Material, roughness: float = 1.0, without_lamps: bool = False) -> int:
-        """Samples per lobe of a material in this frame; `roughness` is a factor on that of the document.
+        """Samples per lobe of a material in this frame; `roughness` is a factor on the document's roughness.
 
-        `without_lamps`: all lamps are outside of the cube map that is sampled.
+        `without_lamps`: the sampled cube map holds no lamps.
         """
         if integrator(self.integrator).progressive:
             return self.n or QMC_N
         return self.n or automatic_n(material, roughness, without_lamps)
 
     def planar_samples(self, material: Material, roughness: float = 1.0) -> int:
-        """The same on planar reflectors, where neighbouring pixels may share a lobe's samples."""
+        """`samples` on planar reflectors, where neighbouring pixels may share a lobe's samples."""
         n, how = self.samples(material, roughness), planar_integrator(self.integrator, self.planar)
         shared = self.n is None and how is not None and how.table is interleaved_table
         return min(n, MOST_SHARED) if shared else n
 
 
 def quantity_of(show: str) -> Quantity:
-    """Quantity and unit of an image that shows this part of the light."""
+    """Quantity and unit of an image of `show`."""
     return QUANTITIES.get(show, LUMINANCE)
 
 
 def frame_data(state: FrameState, bounds: ArrayLike) -> Record:
-    """Record of FRAME_DTYPE; `bounds` (2, 3) are those of the scene."""
+    """Record of FRAME_DTYPE; `bounds` (2, 3) is the box of the scene, m."""
     camera, width, height = state.camera, state.width, state.height
     jitter, turn = state.jitter_px, state.jitter_px[0] + 0.5
     if state.accumulate is not None:

@@ -1,4 +1,4 @@
-"""Radiance that was made elsewhere, shown as the renderer shows its own: exposure, view transform, false colours."""
+"""Displays radiance computed elsewhere like the renderer's own: exposure, view transform, false colours."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lambent.realtime.targets import DISPLAY_FORMAT, target_texture
 
 
 class Given:
-    """One picture; `view` is that of the texture that shows it, None before the first `show`."""
+    """One picture; `view` is the view of its display texture, None before the first `show`."""
 
     def __init__(self, layouts: Layouts, resources: SceneResources) -> None:
         self._layouts, self._scene, self._device = layouts, resources.scene, layouts.device
@@ -45,7 +45,7 @@ class Given:
         self.view = self._target.create_view()
 
     def show(self, state: FrameState) -> None:
-        """Draw what was taken into `view`, with the exposure and the view transform of a state."""
+        """Draw the picture into `view` with the exposure and view transform of a state."""
         data = frame_data(state, self._scene.record.bounds)
         for factor in (data["exposure"], data["scale"][3:]):
             factor *= self._scene.unit

@@ -1,4 +1,4 @@
-"""The light of a store by light group, read when a mix first needs it."""
+"""Light of a store by light group, read when a mix first needs it."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ FIELDS_FOLLOW = "light fields follow approximately: scaled by the change of ligh
 
 @dataclass(frozen=True, eq=False)
 class GroupArrays:
-    """Light by group as a store has it: sides of the light map (n, H, W, 3), and probes (n, 6, N, N, 3) by object.
+    """Light of a store by group: sides of the light map (n, H, W, 3), and probes (n, 6, N, N, 3) by object.
 
-    All are read when they are first needed; probes are in `unit` W/(sr m^2).
+    Arrays are read on first use; probes are in `unit` W/(sr m^2).
     """
 
     records: tuple[LightGroupRecord, ...]
     store: Store
     unit: float = 1.0
-    _probes: dict[str, Floats] = field(default_factory=dict)  # as stored, once they were read
+    _probes: dict[str, Floats] = field(default_factory=dict)  # as stored, after the first read
 
     @cached_property
     def sides(self) -> tuple[Floats | None, ...]:
-        """Light maps by group, float32; None of a side without light."""
+        """Light maps by group, float32; None for a side without light."""
         found = [self.store.read(name) if (name := group_name(side)) in self.store else None for side in SIDES]
         lit = [None if one is None or not one.any() else one.astype(np.float32) for one in found]
         scale = np.float32(1 / self.unit)
@@ -44,15 +44,15 @@ class GroupArrays:
 
     @cached_property
     def lit_sides(self) -> tuple[LitTexels | None, ...]:
-        """The same as the texels that hold any light."""
+        """`sides` as sparse maps of their lit texels."""
         return tuple(None if side is None else LitTexels.of(side) for side in self.sides)
 
     def light_map(self, factors: Floats) -> tuple[NDArray[np.float16] | None, ...]:
-        """By side, a mix of all groups as (H, W, 4) half floats."""
+        """By side, a mix of all groups as (H, W, 4) half floats; `factors` are (n, 3)."""
         return tuple(None if side is None else side.mixed(factors) for side in self.lit_sides)
 
     def probe(self, name: str) -> Floats | None:
-        """Radiance of the probe of an object by group; None where the store has none."""
+        """Radiance (n, 6, N, N, 3) of an object's probe by group; None if the store has none."""
         array = contract.probe_name(name, "groups")
         if array not in self.store:
             return None
@@ -62,11 +62,11 @@ class GroupArrays:
         return np.asarray(self._probes[name].astype(np.float32) * scale)
 
     def number(self, member: str) -> int | None:
-        """The group of the sun, the sky, or an object that emits."""
+        """Number of the group of the sun, the sky, or an emitting object."""
         return next((i for i, record in enumerate(self.records) if member in record.members), None)
 
     def factors(self, light: Factors) -> Floats:
-        """(n, 3) of a mix; `UserError` for a name that no group has."""
+        """Factors (n, 3) of a mix; `UserError` for an unknown group."""
         names = [record.name for record in self.records]
         for name in light:
             if name not in names:
@@ -77,6 +77,6 @@ class GroupArrays:
 
 
 def groups_in(store: Store, unit: float) -> GroupArrays | None:
-    """The light of a store by group; None where it was baked without."""
+    """Light of a store by group, probes in `unit` W/(sr m^2); None if the store was baked without groups."""
     records = light_groups(store)
     return GroupArrays(records, store, unit) if records else None

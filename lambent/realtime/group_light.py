@@ -1,7 +1,7 @@
-"""The light of a baked scene by group, as arrays, and what a mix of the groups makes of it: nothing here draws.
+"""Mixes of light groups of a baked scene, as arrays on the CPU.
 
-A mix is a table of factors (n, 3), by group and channel. All light is in units of the scene, and without the sun's
-disc, which the renderer draws by pixel (`sun_disc`): the disc is taken out of the sun's group.
+A mix is a table of factors (n, 3), by group and channel. All light is in units of the scene. The sun's disc is removed
+from the sun's group: the renderer draws it by pixel (`sun_disc`).
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from lambent.store.contract import ObjectRecord
 
 @dataclass(frozen=True, eq=False)
 class GroupLight:
-    """What a mix of groups makes of the light of a scene."""
+    """Light of a scene under a mix of its groups."""
 
     scene: BakedScene
     groups: GroupArrays
     _discs: dict[str, Floats] = field(default_factory=dict)  # radiance of the sun's disc, by object with a probe
 
     def light_map(self, factors: Floats) -> tuple[NDArray[np.float16] | None, ...]:
-        """By side of the light map, (H, W, 4) half floats; None of a side that no light reaches."""
+        """By side of the light map, (H, W, 4) half floats; None for a side that no light reaches."""
         return self.groups.light_map(factors)
 
     def sky(self, factors: Floats) -> tuple[Floats | None, Floats | None]:
-        """The environment (6, N, N, 3) as it is seen, and without the sun's disc."""
+        """The environment (6, N, N, 3) with and without the sun's disc."""
         if self._bare_sky is None or self.scene.environment is None:
             return None, None
         bare = self._bare_sky * self._of(SKY, factors)
@@ -63,24 +63,24 @@ class GroupLight:
         return (texels, disc[texels]) if len(texels) else None
 
     def turns_sky(self, factors: Floats, before: Floats) -> bool:
-        """Whether the environment is another one than in the mix before."""
+        """Whether the environment differs between the mixes `factors` and `before`."""
         pairs = ((self._of(member, factors), self._of(member, before)) for member in (SKY, SUN))
         return any(not np.array_equal(now, then) for now, then in pairs)
 
     def sky_change(self, factors: Floats) -> Triple:
-        """How many times brighter the environment without the sun's disc is than as baked."""
+        """Ratio, by channel, of the environment without the sun's disc to the baked one."""
         return triple(self._of(SKY, factors))
 
     def sun(self, factors: Floats) -> Triple | None:
-        """W/m^2 of the sun, in units of the scene."""
+        """Irradiance of the sun, W/m^2 in units of the scene."""
         return None if self.scene.sun is None else triple(np.array(self.scene.sun.irradiance) * self._of(SUN, factors))
 
     def emission(self, record: ObjectRecord, factors: Floats) -> Triple:
-        """W/(sr m^2) of an object, not in units of the scene."""
+        """Emitted radiance of an object, W/(sr m^2), not in units of the scene."""
         return triple(np.array(record.emission) * self._of(record.part_of or record.name, factors))
 
     def probe(self, name: str, factors: Floats) -> Probe | None:
-        """The probe of an object without the sun's disc; None where the store does not have it by group."""
+        """The probe of an object without the sun's disc; None if the store does not have it by group."""
         by_group = self.groups.probe(name)
         if by_group is None:
             return None

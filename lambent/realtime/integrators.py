@@ -1,6 +1,6 @@
-"""The specular integrators: which shader, with which constants, reads which table of samples.
+"""The specular integrators: shader, constants and table of samples of each.
 
-A further one is a file in shaders/ with `integrate(index, wo, surface)` and a row here.
+To add one, write a file in shaders/ with `integrate(index, wo, surface)`, and add a row here.
 """
 
 from __future__ import annotations
@@ -17,29 +17,29 @@ from lambent.materials.document import Lobe
 from lambent.realtime import patterns
 from lambent.realtime.albedo import TABLE_ROWS, albedo_table, normalised_rings_table
 
-# Levels by smooth_chain or mip_chain of cube_mips.py, or prefiltered by roughness. Published estimates keep theirs.
-# `cleaned` is an array of smooth ones, without lamps (lamps.py).
+# Kinds of MIP levels: smooth_chain or mip_chain of cube_mips.py, or prefiltered by roughness. Integrators from
+# publications keep the published kind. `cleaned` is an array of smooth cube maps without lamps (lamps.py).
 Cube = Literal["smooth", "box", "prefiltered", "cleaned"]
 
 
 @dataclass(frozen=True, eq=False)
 class Integrator:
-    """`table(lobe, n)` gives (rows, 4) float32; `rows` fixes their number where it is not the sample count n."""
+    """One integrator. `table(lobe, n)` gives (rows, 4) float32; `rows` is their number if it is not n."""
 
     shader: str
     table: Callable[[Lobe, int], Floats] = lambda lobe, n: np.zeros((n, 4), np.float32)
     constants: Mapping[str, float] = field(default_factory=dict)
     rows: int | None = None
-    cube: Cube = "smooth"  # which cube map of a probe it reads; all are the same on level 0 but for prefiltered
+    cube: Cube = "smooth"  # cube map of the probe; level 0 is the same for all kinds except prefiltered
     specular: bool = True
-    progressive: bool = False  # unbiased: frames may be averaged, all of the same few samples
-    spp: int = 256  # of a still of a progressive one
-    aimed: str | None = None  # shader for a probe whose lamps stand out: part of the samples aims at them
-    lamps: str | None = None  # shader for a probe with lamps that are smaller than a lobe: they leave the cube map
-    clears_views: bool = False  # of a planar one: lamps smaller than a lobe leave the mirrored view
+    progressive: bool = False  # unbiased: frames of few samples may be averaged
+    spp: int = 256  # samples per pixel of a progressive still
+    aimed: str | None = None  # shader for a probe with prominent lamps: part of the samples aims at them
+    lamps: str | None = None  # shader for a probe with lamps smaller than a lobe, which leave the cube map
+    clears_views: bool = False  # planar: lamps smaller than a lobe leave the mirrored view
 
 
-SUN_SAMPLED = {"SUN_SAMPLED": 1}  # not in closed form: exact for lobes narrower than the sun's disc, too
+SUN_SAMPLED = {"SUN_SAMPLED": 1}  # sampled, not in closed form: exact also for lobes narrower than the sun's disc
 INTEGRATORS: dict[str, Integrator] = {
     "lamps": Integrator("rings.wgsl", normalised_rings_table, lamps="lamps.wgsl"),
     "rings": Integrator("rings.wgsl", normalised_rings_table),

@@ -1,8 +1,8 @@
-"""How much of its lamps each point of a planar reflector sees: a map over the plane, made once.
+"""Visible solid angle of lamps over a planar reflector: a map over the plane, drawn once.
 
-Places of a lamp draw what stands between them and the plane, each by the projection that has the reflector for its
-picture. A texel holds the solid angles, in sr, of at most four lamps, one per channel, penumbras included. No look-up
-in a mirrored view could tell: it does not hold what its eye does not see.
+From each sample point of a lamp, the blockers between it and the plane are drawn in the projection whose image is the
+reflector. A texel holds the solid angles, in sr, of at most four lamps, one per channel, penumbras included. A mirrored
+view cannot give this visibility: it lacks surfaces hidden from its eye.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from lambent.realtime.plane_lamps import MOST, PlaneLamp
 from lambent.realtime.solid_depths import SolidDepths, depth_texture, read_depths
 
 LONGER_PX = 512  # texels along the longer side of a map
-STEP_PX = 64  # rows that can be read back are multiples of this
-COARSE = 24  # places along each side where the shape of a lamp is summed over all its triangles
-THIN = 1e-3  # of a lamp's height: what is nearer to its places than that blocks nothing
-AT_ONCE = 4  # places of a lamp: layers of a texture, which are drawn before the first is read
+STEP_PX = 64  # rows of a multiple of this length can be read back
+COARSE = 24  # points along each side where a lamp's solid angle is summed over all its triangles
+THIN = 1e-3  # of a lamp's height: surfaces nearer to its sample points than this do not block
+AT_ONCE = 4  # sample points drawn before the first is read, each into a layer of one texture
 
 
 @dataclass(frozen=True, eq=False)
 class PlaneFrame:
-    """A rectangle about a reflector: corner (3,), axes (2, 3), sides (2,) in metres, and size (columns, rows)."""
+    """A rectangle around a reflector: corner (3,), axes (2, 3), sides (2,) in metres, and size (columns, rows)."""
 
     corner: Floats
     axes: Floats
@@ -40,7 +40,7 @@ class PlaneFrame:
 
     @staticmethod
     def about(outline: Floats, normal: Floats) -> PlaneFrame:
-        """That of an outline (P, 3), along its longest edge."""
+        """The rectangle around an outline (P, 3), along its longest edge."""
         edges = np.roll(outline, -1, axis=0) - outline
         across = normalize(edges[np.argmax(np.linalg.norm(edges, axis=1))])
         axes = np.stack([across, np.cross(normal, across)])
@@ -51,17 +51,17 @@ class PlaneFrame:
         return PlaneFrame(corner, axes, sides, (int(px[0]), int(px[1])))
 
     def points(self, columns: Floats, rows: Floats) -> Floats:
-        """(..., 3) places of texels; whole numbers and a half are their middles."""
+        """World positions (..., 3) of texel coordinates; texel centres are at half-integers."""
         shares = np.stack([columns / self.size[0], rows / self.size[1]], axis=-1)
         return np.asarray(self.corner + (shares * self.sides_m) @ self.axes)
 
     def texel_rows(self) -> Floats:
-        """(2, 4) that turn a place (x, y, z, 1) into columns and rows."""
+        """Matrix (2, 4) from a position (x, y, z, 1) to column and row."""
         scale = self.axes * (np.array(self.size) / self.sides_m)[:, None]
         return np.column_stack([scale, -scale @ self.corner])
 
     def _offsets(self, place: Floats) -> tuple[NDArray[np.float32], NDArray[np.float32], float]:
-        """Of the middles of columns, of rows, and of the plane from a place (3,), along the axes and across, metres."""
+        """Offsets, m, from a point (3,): column and row centres along the axes, and the plane along its normal."""
         u, v = (place - self.corner) @ self.axes.T
         lines = (
             ((np.arange(count) + 0.5) * side / count - start).astype(np.float32)
@@ -71,12 +71,12 @@ class PlaneFrame:
         return columns, rows, float((self.corner - place) @ np.cross(*self.axes))
 
     def distances2(self, place: Floats) -> NDArray[np.float32]:
-        """(rows, columns) squared distances of texels from a place (3,), m^2."""
+        """(rows, columns) squared distances of texels from a point (3,), m^2."""
         columns, rows, off = self._offsets(place)
         return np.asarray(columns * columns + (rows * rows)[:, None] + np.float32(off * off), np.float32)
 
     def received(self, place: Floats, area: Floats) -> NDArray[np.float32]:
-        """(rows, columns) sr of a small area at a place, its vector (3,) along its normal, 0 from behind."""
+        """(rows, columns) solid angle, sr, of a small area vector (3,) at a point; 0 seen from behind."""
         columns, rows, off = self._offsets(place)
         along, beside = (self.axes @ area).astype(np.float32)
         facing = columns * along + (rows * beside)[:, None] + np.float32(off * (area @ np.cross(*self.axes)))
@@ -84,9 +84,9 @@ class PlaneFrame:
         return np.asarray(np.maximum(facing, 0) / (distance2 * np.sqrt(distance2)), np.float32)
 
     def clip_from_world(self, place: Floats, plane: Floats, least_m: float, jitter_px: Floats) -> Floats:
-        """(4, 4) of the projection from a place (3,) over the plane (n, d); depths rise with the height over it.
+        """Projection (4, 4) from a point (3,) onto the plane (n, d); depth rises with the height over the plane.
 
-        What is lower than `least_m` is cut away, as is what is higher than the place.
+        Surfaces lower than `least_m` over the plane or higher than the point are clipped.
         """
         n, d = plane[:3], float(plane[3])
         high = float(n @ place) + d
@@ -106,7 +106,7 @@ class PlaneFrame:
 def lamp_map(
     layouts: Layouts, resources: Any, lamps: list[PlaneLamp], frame: PlaneFrame, plane: Floats, clearance_m: float
 ) -> NDArray[np.float16]:
-    """(rows, columns, MOST) sr of each lamp that the middles of texels see; `resources` is a `SceneResources`."""
+    """(rows, columns, MOST) visible solid angle, sr, of each lamp at texel centres; `resources`: `SceneResources`."""
     steps = lamp_map_steps(layouts, resources, lamps, frame, plane, clearance_m)
     while True:
         try:
@@ -118,7 +118,7 @@ def lamp_map(
 def lamp_map_steps(
     layouts: Layouts, resources: Any, lamps: list[PlaneLamp], frame: PlaneFrame, plane: Floats, clearance_m: float
 ) -> Generator[None, None, NDArray[np.float16]]:
-    """The same as a generator that yields after every place of a lamp and returns the map."""
+    """`lamp_map` as a generator that yields after every sample point of a lamp and returns the map."""
     width, height = frame.size
     edge = np.linspace(0, 1, COARSE)
     coarse = frame.points(*(side.ravel() for side in np.meshgrid(edge * width, edge * height)))
@@ -139,9 +139,9 @@ def lamp_map_steps(
 def _blocked(
     layouts: Layouts, solid: SolidDepths, places: Floats, frame: PlaneFrame, plane: Floats, clearance_m: float
 ) -> Iterator[NDArray[np.float32]]:
-    """For each place (K, 3), (rows, columns), not 0 where something stands between it and the plane."""
+    """For each point (K, 3): (rows, columns), not 0 where a surface lies between it and the plane."""
     depths = depth_texture(layouts.device, *frame.size, AT_ONCE)
-    shifts = hammersley(max(len(places), 1)) - 0.5  # of the texels: each place draws edges elsewhere
+    shifts = hammersley(max(len(places), 1)) - 0.5  # of texels: jitters edges from point to point
     for first in range(0, len(places), AT_ONCE):
         mine = range(first, min(first + AT_ONCE, len(places)))
         encoder = layouts.device.create_command_encoder()
@@ -154,7 +154,7 @@ def _blocked(
 
 
 def _solid_angles(lamp: PlaneLamp, frame: PlaneFrame, coarse: Floats) -> NDArray[np.float32]:
-    """(rows, columns) sr of all of a lamp; from `coarse` points areas across the view are interpolated."""
+    """(rows, columns) unoccluded solid angle, sr, of a lamp; projected areas are interpolated from `coarse` points."""
     width, height = frame.size
     across = lamp.solid_angles(coarse) * ((coarse - lamp.centre) ** 2).sum(axis=1)
     lines = (np.arange(count) + 0.5 for count in (height, width))

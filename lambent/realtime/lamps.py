@@ -1,18 +1,18 @@
-"""A probe's lamps outside of its cube map, for shaders/lamps.wgsl.
+"""Lamps taken out of a probe's cube map, for shaders/lamps.wgsl.
 
-Lamps of similar radius form a group. Groups leave the cube map one after the other, the smallest first, as lobes get
-wider than they are; there is a cube map for each number of groups that have left, and lobes between two of them mix
-both (`groups_out`), so that nothing pops while a roughness is dragged.
+Lamps of similar radius form a group. As a lobe gets wider, groups leave the cube map, the smallest first. There is one
+cube map for each number of groups taken out; lobes between two numbers mix both maps (`groups_out`), so that nothing
+pops while a roughness is dragged.
 
-The table that the shader reads has the rows
-    radii of the groups, a large number where there is none
-    (lamps up to and with each group)
+The shader's table has the rows
+    radii of the groups, a large number for missing groups
+    cumulative number of lamps up to each group
 and per lamp
-    mean place about the probe's centre, m, or direction; 1 where it is a place
+    mean position about the probe's centre, m, or direction; w: 1 for a position
     excess flux, W/m^2 on a surface at the probe's centre that faces the lamp; its group
-    two principal deviations a, b of its places or directions; of places their w are e^3/|n.p| and a.a + b.b
-Seen from x a place p has e^2 = |p - x|^2 + a.a + b.b, which bounds what is touched, and n = a x b: the flux changes
-with |n.(p - x)|/e^3, as a surface of that normal does.
+    two principal deviations a, b of its positions or directions; for positions, w are e^3/|n.p| and a.a + b.b
+Seen from x, a lamp at p has e^2 = |p - x|^2 + a.a + b.b, which stays finite on contact, and the normal n = a x b: its
+flux changes with |n.(p - x)|/e^3, like that of a flat emitter.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from lambent.realtime.cube_mips import finite, smooth_chain
 from lambent.realtime.incident import LookUp
 
 GROUPS = 4
-GROUP_RATIO = 1.25  # of radii, from which on two lamps may be in two groups
-FIRST, LAST = 0.47, 0.54  # widths of a lobe, in radii of a group, between which the group leaves
+GROUP_RATIO = 1.25  # least ratio of radii between two groups
+FIRST, LAST = 0.47, 0.54  # a group leaves gradually between these widths of a lobe, in radii of the group
 NONE = 1e9
-FAINT = 0.1  # of the mean radiance of a probe: highlights that no picture shows by themselves
+FAINT = 0.1  # of the mean radiance of a probe: darker highlights are not discernible
 HEAD_ROWS, LAMP_ROWS = 2, 4
 
 
@@ -49,7 +49,7 @@ class ProbeLamps:
         self.group = group_of([lamp.radius_rad for lamp in self.lamps])
         self._power = np.array([lamp.power for lamp in self.lamps])
         self._peak = np.array([luminance(lamp.excess).max() for lamp in self.lamps])
-        self._highlight = lru_cache(64)(self._brightest_highlight)  # asked for by every draw of every frame
+        self._highlight = lru_cache(64)(self._brightest_highlight)  # every draw of every frame asks for it
 
     @property
     def groups(self) -> int:
@@ -66,18 +66,18 @@ class ProbeLamps:
         return radii
 
     def serve(self, material: Material, textured: bool) -> bool:
-        """Whether a lamp leaves the cube for any lobe of a material, whose widths textures may change.
+        """Whether a lamp leaves the cube map for any lobe of a material; `textured`: textures change lobe widths.
 
-        None does where all highlights are faint.
+        False if all highlights are faint.
         """
         leave = self.groups > 0 and (textured or any(groups_out(lobe, self.radii) > 0 for lobe in material.lobes))
         return leave and not self.are_faint(material, textured)
 
     def are_faint(self, material: Material, textured: bool) -> bool:
-        """Whether no lamp shows by itself in any lobe of a material: its highlight is dark beside all that is lit.
+        """Whether no lamp has a discernible highlight in any lobe of a material.
 
-        A lamp of flux E and radiance L has in a lobe of reflectance F a highlight of F E / (4 pi mx my), at most F L,
-        along the normal. Textures may narrow a lobe, and so make it brighter.
+        Along the normal, a lamp of flux E and radiance L has a highlight of F E / (4 pi mx my), at most F L, in a lobe
+        of reflectance F. Textures may narrow a lobe and brighten its highlights.
         """
         return not textured and all(self._highlight(lobe) <= FAINT * self._mean for lobe in material.lobes)
 
@@ -94,11 +94,11 @@ class ProbeLamps:
         return float(luminance(tint)) * brightest
 
     def all_out(self, material: Material, textured: bool) -> bool:
-        """Whether no lamp is in the cube map of any lobe."""
+        """Whether all lobes read a cube map without lamps."""
         return not textured and all(groups_out(lobe, self.radii) == self.groups for lobe in material.lobes)
 
     def mixes(self, material: Material, textured: bool) -> bool:
-        """Whether a lobe may be between two of the cube maps."""
+        """Whether a lobe may mix two of the cube maps."""
         return textured or any(groups_out(lobe, self.radii) % 1 > 0 for lobe in material.lobes)
 
     def chain(self) -> list[Floats]:
@@ -113,7 +113,7 @@ class ProbeLamps:
         return [np.concatenate(levels) for levels in zip(*map(smooth_chain, cubes), strict=True)]
 
     def table(self, probe: Probe, look_up: LookUp) -> NDArray[np.float32]:
-        """(HEAD_ROWS + LAMP_ROWS MOST, 4) rows as above, lamps where the look-up finds them."""
+        """Table (HEAD_ROWS + LAMP_ROWS MOST, 4) as above, with lamps positioned by the look-up."""
         counts = [np.count_nonzero(self.group <= number) for number in range(GROUPS)]
         rows = [np.array([self.radii, counts])]
         n = self.radiance.shape[1]
@@ -127,7 +127,7 @@ class ProbeLamps:
 
 
 def group_of(radii: list[float]) -> NDArray[np.intp]:
-    """(K,) group of each of the radii, which rise: cut at the widest gaps."""
+    """(K,) group of each of the ascending radii, split at the widest gaps."""
     gaps = np.diff(np.log(np.maximum(radii, 1e-6)))
     widest = np.argsort(-gaps, kind="stable")[: GROUPS - 1]
     cut = np.zeros(len(radii), np.intp)
@@ -136,13 +136,13 @@ def group_of(radii: list[float]) -> NDArray[np.intp]:
 
 
 def groups_out(lobe: Lobe, radii: Floats) -> float:
-    """Groups that have left the cube map for a lobe; fractions are shares of the last (groups_out of lamps.wgsl)."""
+    """Number of groups taken out for a lobe; a fraction is the share of the last group (groups_out of lamps.wgsl)."""
     share = np.clip((np.sqrt(lobe.mx * lobe.my) / radii - FIRST) / (LAST - FIRST), 0, 1)
     return float(np.sum(share * share * (3 - 2 * share)))
 
 
 def placed(lamp: Lamp, group: int, n: int, probe: Probe, look_up: LookUp) -> Floats:
-    """(LAMP_ROWS, 4) rows of a lamp of a cube map of n x n faces, where a look-up finds what the probe sees."""
+    """Rows (LAMP_ROWS, 4) of a lamp in a cube map with n x n faces, positioned by the distances of a look-up."""
     w = normalize(corners(lamp.texels, n).reshape(-1, 3))
     weight = np.repeat(luminance(lamp.flux), 4)
     distance = look_up.distances(probe, w)

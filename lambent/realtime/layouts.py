@@ -1,4 +1,4 @@
-"""Bind group layouts: 0 frame, 1 material, 2 object, 3 light of the scene; and what single passes bind."""
+"""Bind group layouts: 0 frame, 1 material, 2 object, 3 light of the scene; and bindings of single passes."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ KINDS: dict[str, dict[str, Any]] = {
 
 
 LIGHT = "layers", "uniform", "exact"  # light maps; the sun, and the share of it that each pixel sees
-# The sun, depths towards it, and their blocks; depths of panes before it, and what they let through; texels it reaches.
+# The sun, depths towards it, and their blocks; depths of panes before it, and their transmittances; texels it reaches.
 SHADOW_MAP = "uniform", "depth layers", "exact layers", "depth layers", "exact layers", "exact"
-PANE = "uniform", "depth layers", "depth layers"  # terms of clear glass, depths of what is solid, of the layer before
+PANE = "uniform", "depth layers", "depth layers"  # terms of clear glass, opaque depths, depths of the previous layer
 
 
 class Layouts:
-    """Bind group layouts of one device. Bindings of the same kinds share a layout, and so fit the same pipelines."""
+    """Bind group layouts of one device. Equal kinds of bindings share a layout, so groups fit several pipelines."""
 
     def __init__(self, device: Any) -> None:
         self.device = device
@@ -53,7 +53,7 @@ class Layouts:
         self.empty = device.create_buffer(size=16, usage=wgpu.BufferUsage.STORAGE)  # a binding must hold something
 
     def object(self, look_up: tuple[str, ...], cube: str = "cube") -> Any:
-        """Layout of group 2 with the bindings of a look-up of incident light; `cube`: the kind of the probe's light."""
+        """Layout of group 2 with the bindings of a look-up of incident light; `cube`: kind of the probe's cube map."""
         return self.of("uniform", cube, "uniform" if cube == "cubes" else "storage", *look_up)
 
     def _of(self, *kinds: str, visibility: int = wgpu.ShaderStage.FRAGMENT) -> Any:
@@ -62,11 +62,11 @@ class Layouts:
         return self.device.create_bind_group_layout(entries=entries)
 
     def buffer(self, usage: str, data: NDArray[Any]) -> Any:
-        """Buffer of an array that stays as it is; `usage` is UNIFORM, STORAGE, VERTEX or INDEX."""
+        """Constant buffer of an array; `usage` is UNIFORM, STORAGE, VERTEX or INDEX."""
         return self.device.create_buffer_with_data(data=data.tobytes(), usage=wgpu.BufferUsage[usage])
 
     def uniform(self, size: int) -> Any:
-        """Uniform buffer of a record that is written anew for each frame."""
+        """Uniform buffer of `size` bytes, rewritten for each frame."""
         return self.device.create_buffer(size=size, usage=wgpu.BufferUsage.UNIFORM | wgpu.BufferUsage.COPY_DST)
 
     def group(self, layout: Any, *resources: Any) -> Any:

@@ -1,4 +1,4 @@
-"""A light field on the GPU: its maps as tiles of an atlas, with levels, and what their texels mean in distance."""
+"""A light field on the GPU: its maps as tiles of an atlas with MIP levels, and the coding of distances."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ MOST_LAYERS = WEBGPU_LIMITS["max-texture-array-layers"]
 
 @dataclass(frozen=True)
 class Layout:
-    """Where tiles lie in the layers of an atlas: those of each level row by row, coarser levels below finer ones."""
+    """Layout of tiles in the layers of an atlas: row by row for each level, coarser levels below finer ones."""
 
-    tiles: tuple[int, ...]  # texels of a tile's side by level
-    columns: int  # of tiles of level 0
-    places: int  # maps of a layer
+    tiles: tuple[int, ...]  # side of a tile in texels, by level
+    columns: int  # tiles of level 0 in a row
+    places: int  # maps in a layer
     layers: int
 
     @classmethod
     def of(cls, count: int, tiles: tuple[int, ...]) -> Layout:
-        """The smallest layout for the tiles of `count` maps that WebGPU has room for."""
+        """The smallest layout for `count` maps within WebGPU's limits."""
         most = MOST_TEXELS // tiles[0]
         least = -(-count // (most * most))
         found = [
@@ -64,7 +64,7 @@ class Layout:
         return self.columns * self.tiles[0], self.first_row(len(self.tiles)), self.layers
 
     def runs(self, place: int, count: int, level: int) -> Iterator[tuple[slice, int, int, int]]:
-        """Parts of `count` maps from a place on that lie side by side: which; column and row of tiles, and layer."""
+        """Runs of adjacent tiles of `count` maps from `place` on: slice of maps; column and row of tiles, and layer."""
         done = 0
         while done < count:
             layer, within = divmod(place + done, self.places)
@@ -82,21 +82,21 @@ def beside(tiles: NDArray[Any]) -> NDArray[Any]:
 
 @dataclass(frozen=True)
 class Coding:
-    """How texels of radiance are stored: in blocks of BC6H, or each by itself in 32 bits."""
+    """Storage of radiance: BC6H blocks, or 32 bits per texel."""
 
     format: str
-    block: int  # texels a side of what is written as one
-    bytes: int  # of such a block
+    block: int  # side of a block, texels
+    bytes: int  # of a block
     pack: Callable[[NDArray[np.float32]], NDArray[Any]]  # (P, t, t, 3) to (P, t/block, t/block, words)
 
 
 def is_software(device: Any) -> bool:
-    """Whether the adapter unpacks blocks by code, for each texel that is read."""
+    """Whether the adapter is a software one, which decodes blocks in code at every texel read."""
     return adapter_info(device).is_software
 
 
 def coding(device: Any) -> Coding:
-    """Blocks where the adapter reads them in hardware; they have a quarter of the bytes."""
+    """BC6H blocks, a quarter of the bytes, if the adapter decodes them in hardware; else 32 bits per texel."""
     if BLOCKS in device.features and not is_software(device):
         from lambent.core.bc6h import BLOCK, encoded  # which imports numba
 
@@ -105,9 +105,9 @@ def coding(device: Any) -> Coding:
 
 
 def with_quarters(inverse: NDArray[np.float16], cover: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    """Bits of inverse distances with the quarters of texels that show a surface: three lowest bits, and the sign.
+    """Bits of inverse distances, with a flag for each quarter of a texel that shows a surface.
 
-    What is left of the distance is right to .4 %.
+    Flags take the three lowest bits and the sign; the distance keeps a precision of .4 %.
     """
     rounded = np.minimum(inverse.view(np.uint16) + np.uint16(4), np.uint16(0x7BFF)) & np.uint16(0x7FF8)
     bits = (cover & 7).astype(np.uint16) | (cover.astype(np.uint16) >> 3 & 1) << 15
@@ -116,7 +116,7 @@ def with_quarters(inverse: NDArray[np.float16], cover: NDArray[np.uint8]) -> NDA
 
 @dataclass(frozen=True)
 class Packed:
-    """Maps as they are written to an atlas: tiles of every level of radiance, and distances."""
+    """Maps in the form that an atlas stores: tiles of every level of radiance, and distances."""
 
     levels: tuple[NDArray[Any], ...]
     distances: NDArray[Any]
@@ -130,13 +130,13 @@ class Packed:
 
 
 class Atlas:
-    """The textures of a light field: radiance with coarser levels, and inverse distance.
+    """Textures of a light field: radiance with MIP levels, and inverse distance.
 
-    Each map has a place, by number. With `most_bytes` there are places for as many maps as fit into them.
+    Each map has a numbered place. With `most_bytes`, there are as many places as fit.
     """
 
     def __init__(self, device: Any, field: LightField, most_bytes: float | None = None, sky: Sky | None = None) -> None:
-        """`sky` is in coarser levels of texels that show a surface and the sky."""
+        """`sky`: blended into coarser levels of texels that show both a surface and the sky."""
         self.tiles = Tiles.of(field.radiance.shape[1])
         self._how, self._field, self._sky = coding(device), field, sky
         tile = self.tiles.tiles[0]
@@ -162,13 +162,13 @@ class Atlas:
 
     @property
     def bytes(self) -> int:
-        """Of both textures."""
+        """Bytes of both textures."""
         texels, distances = (int(math.prod(texture.size)) for texture in (self.radiance, self.distances))
         return round(texels * self._bytes_per_texel + distances * self._bytes_per_distance)
 
     @property
     def map_bytes(self) -> float:
-        """Of one map in both textures."""
+        """Bytes of one map in both textures."""
         return float(self.tiles.texels * self._bytes_per_texel + math.prod(self.cell) * self._bytes_per_distance)
 
     @property
@@ -184,7 +184,7 @@ class Atlas:
         return self._device.create_texture(size=size, format=format, usage=usage)
 
     def packed(self, part: slice | Sequence[int]) -> Packed:
-        """Some maps, ready to be written; any thread may do this."""
+        """Some maps, ready for `write`; may run in any thread."""
         field, how = self._field, self._how
         light, _ = finite(field.radiance[part])
         ready = field.blocks if self.in_blocks else None

@@ -1,8 +1,9 @@
-"""Brings mixes of light groups onto the GPU: light map, sky, sun and emitters at once, then probe after probe.
+"""Uploads mixes of light groups: first light map, sky, sun and emitters together, then probe after probe.
 
-A thread makes the arrays and touches no GPU; before a frame, whatever is ready is uploaded. A mix that changes while
-the thread works is taken up after the part under way: the light map first, so that a dragged slider shows at once, and
-the probes by turns. So does light that answers edited materials, group by group (`answering.AnsweredGroups`).
+A thread computes the arrays and never touches the GPU; finished arrays are uploaded before a frame. If the mix changes
+while the thread works, it finishes the current part, then computes the light map, so that a dragged slider shows at
+once, and then the probes in turn. Light that answers edited materials by group (`answering.AnsweredGroups`) takes the
+same path.
 """
 
 from __future__ import annotations
@@ -26,29 +27,29 @@ from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.resources import SceneResources
 from lambent.realtime.uploads import with_alpha
 
-MAP = -1  # the part that is no probe
+MAP = -1  # number of the light map among the parts; other numbers are probes
 
 
 class LightMixer:
-    """The mix of a scene's light that its resources show.
+    """Mixes a scene's light and shows the mix in its resources.
 
     Attributes
     ----------
     version : int
-        Grows with every part that is ready: a frame drawn now is another one than before.
+        Grows whenever a part is ready, and the picture changes.
     """
 
     def __init__(self, layouts: Layouts, scene: BakedScene, resources: SceneResources) -> None:
         self._layouts, self._scene, self._resources = layouts, scene, resources
         self.version = 0
-        self._wanted: Floats | None = None  # None: as baked, and nothing was read yet
+        self._wanted: Floats | None = None  # requested mix; None: as baked, and no group has been read
         self._shown: Floats | None = None  # mix of the light map on the GPU; None: as baked
-        self._made: dict[int, bytes] = {}  # state of each part that was made last
+        self._made: dict[int, bytes] = {}  # state that each part was last computed for
         self._ready: deque[tuple[int, Floats, Any]] = deque()
         self._work: Future[None] | None = None
-        self._sky_of: Floats | None = None  # mix of the sky that was made last
-        self._answer: GroupLight | None = None  # of edited materials, in the place of the light as baked
-        self._answers = 0  # that were given
+        self._sky_of: Floats | None = None  # mix that the sky was last computed for
+        self._answer: GroupLight | None = None  # light for edited materials, which replaces the baked light
+        self._answers = 0  # answers received
 
     @property
     def busy(self) -> bool:
@@ -57,18 +58,18 @@ class LightMixer:
 
     @property
     def lags(self) -> bool:
-        """Whether the light map on the GPU is that of another mix."""
+        """Whether the light map on the GPU still shows an earlier mix."""
         if self._wanted is None:
             return False
         return not np.array_equal(self._wanted, np.ones_like(self._wanted) if self._shown is None else self._shown)
 
     def follow(self, light: Factors, *, waits: bool) -> None:
-        """Show a mix from this frame on, all of it where the frame `waits`, else what is ready.
+        """Show a mix from this frame on: the whole mix if the frame `waits`, else the finished parts.
 
         Raises
         ------
         UserError
-            Where a group is named that the store does not have.
+            If the store does not have a named group.
         """
         groups = self._scene.groups
         if groups is None or (self._wanted is None and not light):
@@ -89,16 +90,16 @@ class LightMixer:
         if self._wanted is None:
             self._wanted = groups.factors({})
         self._answer = replace(self._light, groups=groups)
-        self._answers += 1  # last: the thread reads it first, so that it never takes old light for new
+        self._answers += 1  # written last and read first by the thread, so that it never takes old light for new
 
     @property
     def groups(self) -> GroupArrays | None:
-        """The light by group that is mixed; None where it was baked as one."""
+        """The light by group; None if the scene was baked without groups."""
         return self._scene.groups if self._answer is None else self._answer.groups
 
     @property
     def factors(self) -> Floats | None:
-        """(n, 3) of the mix that is wanted; None while all light is as it was baked."""
+        """Factors (n, 3) of the requested mix; None while all light is as baked."""
         return self._wanted
 
     @cached_property
@@ -112,7 +113,7 @@ class LightMixer:
 
     @cached_property
     def _owners(self) -> dict[int, str | None]:
-        """By the number of each probe's light, the object whose probe it is; None: the sky stands for one."""
+        """The object that owns each probe's light, by number; None where the sky serves as probe."""
         names = {id(probe.radiance): name for name, probe in self._scene.probes.items()}
         found = [self._scene.probe_of(record) for record in self._scene.record.objects]
         keys = [0 if probe is None else id(probe.radiance) for probe in found]
@@ -120,21 +121,21 @@ class LightMixer:
 
     @cached_property
     def _users(self) -> list[list[int]]:
-        """Objects that show each probe's light, by number."""
+        """Numbers of the objects that show each probe's light."""
         found: dict[int, list[int]] = {}
         for number, item in enumerate(self._resources.objects):
             found.setdefault(id(item.light), []).append(number)
         return list(found.values())
 
     def _stale(self) -> list[int]:
-        """Parts that were not made for the mix that is wanted: the light map, then probes, longest ago first."""
+        """Parts not yet computed for the requested mix: the light map, then probes, the oldest first."""
         assert self._wanted is not None
         now, parts = self._state(self._wanted), [MAP, *range(len(self._users))]
         age = {part: place for place, part in enumerate(self._made)}
         return [p for p in sorted(parts, key=lambda p: (p != MAP, age.get(p, -1))) if self._made.get(p) != now]
 
     def _make(self) -> None:
-        """Make what is stale until nothing is; the light map and a probe by turns while the mix changes."""
+        """Compute stale parts until none is left; while the mix changes, the light map and a probe alternate."""
         turn = False
         while stale := self._stale():
             assert self._wanted is not None
@@ -148,12 +149,12 @@ class LightMixer:
             self.version += 1
 
     def _state(self, factors: Floats) -> bytes:
-        """What a part is made from: the light, and the mix."""
+        """Key of the inputs of a part: the light and the mix."""
         return self._answers.to_bytes(8) + factors.tobytes()
 
     @property
     def _surfaces(self) -> GroupLight:
-        """The light of surfaces and probes."""
+        """Light of surfaces and probes: the answer to edited materials if there is one, else the baked light."""
         return self._answer or self._light
 
     def _map(self, factors: Floats) -> Any:

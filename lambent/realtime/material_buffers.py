@@ -16,17 +16,17 @@ from lambent.realtime.patterns import border
 from lambent.realtime.structs import MATERIAL_DTYPE, PLACED_LOBE_DTYPE, Record
 from lambent.realtime.textures import BoundTextures
 
-KEPT = 16  # groups of one material: shading, planar reflections, mirrored views, each for some integrators and n
+KEPT = 16  # bind groups per material: shading, planar reflections, mirrored views, each for some integrators and n
 
 
 class MaterialBuffers:
-    """Bind groups of one material of a scene, immutable, one for each document, integrator and n."""
+    """Bind groups of one material of a scene: an immutable one for each document, integrator and n."""
 
     def __init__(self, layouts: Layouts, sampler: Any, textures: BoundTextures) -> None:
         self._layouts = layouts
         self.textures = textures
         self._bound = (sampler, *(texture.view for texture in textures.textures))
-        self._made: list[tuple[tuple[Material, Integrator, int], Any]] = []  # the last used first
+        self._made: list[tuple[tuple[Material, Integrator, int], Any]] = []  # most recently used first
 
     def group(self, material: Material, how: Integrator, n: int) -> Any:
         """Group 1 of `material` for an integrator of n samples per lobe."""
@@ -63,7 +63,7 @@ def lobe_data(lobes: tuple[Lobe, ...]) -> Record:
 
 
 def sample_data(lobes: tuple[Lobe, ...], how: Integrator, n: int) -> NDArray[np.float32]:
-    """(L rows, 4) float32: the integrator's table of every lobe, one after the other."""
+    """(L rows, 4) float32: the integrator's tables of all lobes in order."""
     if not lobes:
         return np.zeros((1, 4), np.float32)
     return np.concatenate([how.table(lobe, n) for lobe in lobes]).astype(np.float32)

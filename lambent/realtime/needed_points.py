@@ -1,4 +1,4 @@
-"""Which points of a light field a view needs: those that the sample map names where the object is seen, on the CPU."""
+"""Points of a light field that a view needs, computed on the CPU: the sample map's points on visible triangles."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from lambent.core.light_field import NO_POINT, LightField
 from lambent.realtime.clusters import Ranges
 from lambent.realtime.resident_maps import filled
 
-MOST_SIDE = 64  # samples along a side of a triangle
-AWAY = 1e-3  # weight of what faces away: sheets, and triangles the wrong way round
+MOST_SIDE = 64  # most samples along a side of a triangle
+AWAY = 1e-3  # weight of back faces: sheets, and triangles of reversed winding
 
 
 class NeededPoints:
-    """Points by the triangles of one object, once; then, for a view, the points in the order of what they show."""
+    """Finds the points of each triangle of one object once; then ranks the points for each view."""
 
     def __init__(self, triangles: Floats, uv2: Floats, field: LightField) -> None:
         """`triangles` (F, 3, 3) in the world, metres; `uv2` (F, 3, 2) of their corners."""
@@ -28,7 +28,7 @@ class NeededPoints:
         self._shares = seen / np.bincount(self._faces, seen, minlength=len(triangles))[self._faces]
 
     def of_view(self, eye: Floats, runs: Ranges) -> NDArray[np.int64]:
-        """Points by the solid angle at the eye, largest first, that they light; `runs` (first, count) are in view."""
+        """Points ordered by the solid angle, seen from `eye`, that they serve; `runs` (first, count) are in view."""
         inside = np.zeros(len(self._centres), bool)
         for first, count in runs:
             inside[first : first + count] = True
@@ -42,7 +42,7 @@ class NeededPoints:
 
 
 def _named(texels: Floats, field: LightField) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Triangle and point of all that the sample map names at places about a texel apart; `texels` (F, 3, 2)."""
+    """Pairs (triangle, point) of the sample map at samples about a texel apart; `texels` (F, 3, 2) are corners."""
     sample_map = filled(field.sample_map)
     edges = np.linalg.norm(texels - np.roll(texels, 1, axis=1), axis=-1).max(axis=1)
     sides = np.clip(np.ceil(np.nan_to_num(edges)), 1, MOST_SIDE).astype(int)

@@ -1,7 +1,4 @@
-"""The outline of one object as a picture of its own.
-
-It is the border of what is seen of the object: where something stands before it, the line runs along that.
-"""
+"""The outline of one object, drawn into its own picture: a line along the border of the object's visible part."""
 
 from __future__ import annotations
 
@@ -24,7 +21,7 @@ from lambent.realtime.targets import DISPLAY_FORMAT, stored, target_texture
 from lambent.store.contract import ObjectRecord
 
 SEEN_FORMAT = "r8unorm"
-REACH_PX = 2  # of the line, on either side of the border; as shaders/outline.wgsl
+REACH_PX = 2  # reach of the line on either side of the border; as in shaders/outline.wgsl
 
 
 class Outline(Overlay):
@@ -42,7 +39,7 @@ class Outline(Overlay):
         self._line = screen_pipeline(device, "outline", [self._read], [DISPLAY_FORMAT])
 
     def draw(self, state: FrameState, record: ObjectRecord) -> Any:
-        """View of an RGBA texture of the state's size: the line around an object, or its parts; clear elsewhere."""
+        """View of an RGBA texture of the state's size: the line around an object or its parts; clear elsewhere."""
         context = self._frame_context(state, SEEN_FORMAT)
         encoder, target, data = context.slicing.encoder, context.target, context.data
         seen = target.radiance.create_view()
@@ -70,11 +67,11 @@ class Outline(Overlay):
 
 
 def covered(bounds: ArrayLike, data: Record, size: tuple[int, int]) -> tuple[int, int, int, int]:
-    """Left, top, width and height in pixels of what a box (2, 3) covers of a picture, and `REACH_PX` around it."""
+    """Left, top, width and height, pixels, of a box (2, 3) in a picture, with a margin of `REACH_PX`."""
     corners = np.array(list(product(*np.asarray(bounds, float).T)))
     x, y, _, w = data["clip_from_world"].T @ np.concatenate([corners, np.ones((8, 1))], axis=1).T
     if (w <= 1e-6).any():
-        return (0, 0, *size)  # some of it is beside or behind the eye
+        return (0, 0, *size)  # part of the box is beside or behind the eye
     across, down = ((1 + x / w) / 2 * size[0], (1 - y / w) / 2 * size[1])
     (left, right), (top, bottom) = (
         np.clip((np.floor(at.min()) - REACH_PX, np.ceil(at.max()) + REACH_PX), 0, most).astype(int).tolist()

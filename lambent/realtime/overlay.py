@@ -1,4 +1,4 @@
-"""What is drawn over a picture: at full size whatever the frames' size is, without jitter, hidden as the scene is."""
+"""Overlays of a picture: drawn at full size for frames of any size, without jitter, with the scene's occlusion."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from lambent.realtime.targets import PassTimer, Targets
 
 
 class Overlay:
-    """Draws beside a scene's renderer, also while that one has a frame under way."""
+    """Draws independently of the scene's renderer, even while it has a frame in progress."""
 
     def __init__(self, layouts: Layouts, resources: SceneResources, clusters: Clusters) -> None:
         self._layouts, self._resources, self._clusters = layouts, resources, clusters

@@ -1,8 +1,8 @@
-"""Clear glass in the sun's shadow map: depth and transmittance of its layers, the nearest to the sun first.
+"""Clear glass in the sun's shadow map: depth and transmittance of its layers, nearest to the sun first.
 
-Layers are peeled (Everitt 2001, "Interactive order-independent transparency"): each pass draws the nearest glass behind
-the layer before, as long as any is left in front of what blocks the sun. What lies beyond the last layer counts as air.
-Texels are twice as large as those of the map.
+Depth peeling (Everitt 2001, "Interactive order-independent transparency"): each pass draws the nearest glass behind the
+previous layer, until none is left in front of opaque surfaces. Glass beyond the last layer is ignored. Texels are twice
+as large as those of the shadow map.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ COLOUR_FORMAT = "rgb10a2unorm"
 
 @dataclass(frozen=True)
 class PaneLayers:
-    """Textures of `count` layers in each square: depths, and transmittances.
+    """Textures of `count` layers in each square: depths and transmittances.
 
-    Number layer x squares + square, of the squares of all parts of the sun.
+    The array index is layer x squares + square, counting the squares of all parts of the sun.
     """
 
     count: int
@@ -43,14 +43,14 @@ class PaneLayers:
 
 
 def no_panes(device: Any) -> PaneLayers:
-    """Of a scene without glass: textures that only fill their bindings."""
+    """Placeholder textures for a scene without glass."""
     return PaneLayers(0, _texture(device, 1, 1, DEPTH_FORMAT), _texture(device, 1, 1, COLOUR_FORMAT))
 
 
 def pane_layers(
     layouts: Layouts, parts: Sequence[SunSquares], resources: Any, solid: Any, names: tuple[str, ...]
 ) -> PaneLayers:
-    """The layers of the materials `names` of a scene (`resources.SceneResources`) before its depths `solid`."""
+    """Layers of the materials `names` in front of the opaque depths `solid`; `resources` is a `SceneResources`."""
     items = [item for item in resources.objects if item.record.material in names]
     layers: list[tuple[Any, Any]] = []
     while items and len(layers) < MOST_LAYERS:
@@ -65,7 +65,7 @@ def pane_layers(
 
 
 def pane_data(material: Material) -> NDArray[np.float32]:
-    """(MOST_TERMS, 4) float32 terms of clear glass, black past the last."""
+    """(MOST_TERMS, 4) float32 terms of clear glass, zero-padded."""
     data = np.zeros((MOST_TERMS, 4), np.float32)
     terms = clear_terms(material)
     if terms is not None:

@@ -1,4 +1,4 @@
-"""Parts of objects: where the light of one part's probe reaches its neighbours' faces (shaders/part_share.wgsl)."""
+"""Parts of objects: the neighbours' faces that each part's probe also lights (shaders/part_share.wgsl)."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from lambent.realtime.clusters import MERGED_GAP, Ranges, merged
 from lambent.scenes.scene import Border
 from lambent.store.contract import ObjectRecord
 
-WITHIN: Border = (0.0, 0.0, 0.0, 1.0)  # a border that all is within
+WITHIN: Border = (0.0, 0.0, 0.0, 1.0)  # a border with every point inside
 
 
 def neighbouring_faces(scene: BakedScene) -> dict[str, Ranges]:
-    """By part of an object, (first, count) of the faces of its other parts that it has a share of."""
+    """(first, count) of the faces of an object's other parts that a part lights with a share, by part name."""
     wholes: dict[str, list[ObjectRecord]] = {}
     for o in scene.record.objects:
         if o.borders:
@@ -31,6 +31,6 @@ def neighbouring_faces(scene: BakedScene) -> dict[str, Ranges]:
 
 
 def reaches(borders: tuple[Border, ...], corners: Floats) -> Flags:
-    """Whether triangles (F, 3, 3) may have points that a part with these borders has a share of."""
+    """Whether a part with these borders may have a share of points of triangles (F, 3, 3)."""
     n, d = np.array(borders)[:, :3], np.array(borders)[:, 3]
     return np.asarray(((corners @ n.T + d).max(axis=1) > -0.5).all(axis=1))

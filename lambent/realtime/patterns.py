@@ -1,11 +1,11 @@
-"""The few samples of a lobe: the table that each integrator's shader reads.
+"""Sample patterns of a lobe, as tables that the integrators' shaders read.
 
 A table has one row (x, y, z, w) per sample:
     x, y   slopes of the half vector, h = normalize(x, y, 1)
     z      half the log2 of the filter constant c: the sample looks up the solid angle c (wo.h) h_z^3 sr
-    w      the sample's weight, of mean 1; for the thesis's estimates exp(-r^2), the density of slopes relative to its
-           peak (Beckmann), or its equal for GGX
-with r the slope in units of (mx, my). The rows depend on the lobe alone, so the shader does no exp, ratio or border.
+    w      weight of the sample, of mean 1; in the thesis's estimates the density of slopes relative to its peak,
+           exp(-r^2) for Beckmann
+with r the slope in units of (mx, my). Rows depend on the lobe alone, so the shader computes no exp, ratio or border.
 
 Sources: thesis M, section 4.4.3 (eqs 4.10-4.17); Colbert & Krivanek 2007, "GPU-based importance sampling".
 """
@@ -27,18 +27,18 @@ RINGS: dict[int, tuple[int, ...]] = {
     19: (1, 6, 6, 6), 40: (1, 13, 13, 13),
 }  # fmt: skip
 N_MAX = 64
-LINE_RATIO, LINE_BLEND = 3.0, 4 / 3  # of the roughnesses, at n = 7: where rings turn into a line, and how softly
-CENTRE_WEIGHT, CENTRE_WEIGHT_FEW = 1.8, 1.3  # of the centre sample, against 1 on the mean; below 7 samples the latter
-STRETCH = {3: 0.89, 5: 0.89, 7: 0.92}  # of the rings' radii; .93 otherwise, .97 of many samples
-BIAS = {3: 0.5, 5: 0.6, 7: 0.75, 11: 0.75}  # of the rings' filters, against filters that cover the lobe; .9 otherwise
-MANY = 30  # samples: from here on filters hardly blur
+LINE_RATIO, LINE_BLEND = 3.0, 4 / 3  # ratio of roughnesses where rings turn into a line, at n = 7; width of the blend
+CENTRE_WEIGHT, CENTRE_WEIGHT_FEW = 1.8, 1.3  # of the centre sample, relative to the mean; the latter below 7 samples
+STRETCH = {3: 0.89, 5: 0.89, 7: 0.92}  # factor on the rings' radii; .93 for other n, .97 for many samples
+BIAS = {3: 0.5, 5: 0.6, 7: 0.75, 11: 0.75}  # filter size relative to filters that cover the lobe; .9 for other n
+MANY = 30  # from this number of samples on, filters hardly blur
 LINE_TEMPER = 1.16  # tau sqrt(n), see `line_pattern`
 BORDER_MASS = 0.01  # share of the lobe outside its border (4.10)
 RING_XI1 = 0.6  # the thesis's ring, 40 % of the way to the border
 
 
 def ring_counts(n: int) -> tuple[int, ...]:
-    """Samples per ring, from the centre: tested splits, and for other n a centre and rings of about seven."""
+    """Samples per ring, from the centre outwards: tested splits; for other n, a centre and rings of about seven."""
     if n in RINGS:
         return RINGS[n]
     rings = max(1, round((n - 1) / 7))
@@ -48,10 +48,7 @@ def ring_counts(n: int) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Pattern:
-    """n samples of a lobe.
-
-    slopes (n, 2) in units of (mx, my); factor (n) S of the filters, see `table`; weight (n), of mean 1.
-    """
+    """n samples of a lobe: slopes (n, 2) in units of (mx, my), filter factors S (n,) (see `table`), weights (n,)."""
 
     slopes: Floats
     factor: Floats
@@ -59,11 +56,11 @@ class Pattern:
 
 
 def ring_pattern(n: int, ggx: bool = False) -> Pattern:
-    """A centre and staggered rings, each ring where half of its mass lies inside.
+    """A centre and staggered rings; each ring's radius halves its mass.
 
-    All samples of the rings carry the same mass, the centre more: by experiment 1.8/n of the lobe. Filters of .6 of
-    what would cover the lobe are the sharpest and leave the highlight of a small lamp in pieces, one per sample; those
-    of `ring_bias` leave it nearly whole, and rings drawn in by `ring_stretch` keep the lobe as wide as it is.
+    Ring samples carry equal mass, the centre more: 1.8/n of the lobe, by experiment. Filters of .6 of the covering size
+    are the sharpest, but break the highlight of a small lamp into one piece per sample. Filters of `ring_bias` keep it
+    nearly whole, and `ring_stretch` shrinks the rings to preserve the lobe's width.
     """
     counts = ring_counts(n)
     centred = counts[0] == 1 and n > 1
@@ -85,21 +82,21 @@ def ring_pattern(n: int, ggx: bool = False) -> Pattern:
 
 
 def ring_bias(n: int) -> float:
-    """Factor on the filters of n samples on rings, 1 where they cover the lobe; chosen by eye, per n."""
+    """Factor on the filters of n ring samples; 1 covers the lobe. Chosen by eye for each n."""
     return BIAS.get(n, 0.9 if n < MANY else 1.0)
 
 
 def ring_stretch(n: int) -> float:
-    """Factor on the radii of n samples' rings, 1 where half of a ring's mass lies inside."""
+    """Factor on ring radii of n samples; 1 puts each ring at the half of its mass."""
     return STRETCH.get(n, 0.93 if n < MANY else 0.97)
 
 
 def line_pattern(n: int, ggx: bool = False) -> Pattern:
     """Samples on the x axis, for lobes much longer than wide.
 
-    The marginal of a Beckmann lobe is p = exp(-x^2). Samples that follow p itself leave its tails to one or two of
-    them; these follow p^tau and are weighted by p^(1 - tau), close to the trapezium rule, which is exact to many digits
-    on a Gaussian. tau, the filters and how they grow outwards are by experiment. A GGX lobe, whose marginal is
+    The marginal of a Beckmann lobe is p = exp(-x^2). Samples of density p would leave its tails to one or two samples.
+    So the density is p^tau and the weight p^(1 - tau): close to the trapezium rule, which is exact to many digits for a
+    Gaussian. tau, the filters and their growth outwards are by experiment. A GGX lobe, whose marginal is
     (1 + x^2)^(-3/2), keeps samples of equal mass and the thesis's filter, narrowed by one level.
     """
     from scipy.special import erfinv
@@ -131,7 +128,7 @@ def relative_density(slopes: Floats, ggx: bool = False) -> Floats:
 def line_share(lobe: Lobe, n: int) -> float:
     """0 for rings, 1 for a line, smooth in my/mx between, so that nothing pops while a slider moves.
 
-    The more samples, the longer a lobe rings cover well: by experiment the turn is at 3 sqrt(n/7).
+    More samples on rings cover longer lobes: by experiment, the change is at a ratio of 3 sqrt(n/7).
     """
     middle = np.log(LINE_RATIO * np.sqrt(n / 7))
     s = float(np.clip((abs(np.log(lobe.my / lobe.mx)) - middle) / (2 * np.log(LINE_BLEND)) + 0.5, 0, 1))
@@ -139,16 +136,16 @@ def line_share(lobe: Lobe, n: int) -> float:
 
 
 def along_axis(slopes: Floats, lobe: Lobe) -> tuple[Floats, NDArray[np.integer]]:
-    """Slopes with x as the lobe's long axis, and the order of the samples along it.
+    """Slopes with x along the lobe's long axis, and the order of the samples along it.
 
-    Both patterns are sorted along the long axis, so that the k-th of one moves to the k-th of the other.
+    Both patterns are sorted along the long axis, so that a blend moves the k-th sample of one to the k-th of the other.
     """
     turned = slopes if lobe.mx >= lobe.my else slopes[:, ::-1]
     return turned, np.lexsort((turned[:, 1].round(9), turned[:, 0].round(9)))
 
 
 def blended(rings: Floats, line: Floats, lobe: Lobe) -> Floats:
-    """Slopes (n, 2) between a ring pattern and a line along x, by the lobe's anisotropy."""
+    """Slopes (n, 2) blended between a ring pattern and a line along x by the lobe's anisotropy."""
     share = line_share(lobe, len(rings))
     if share == 0:
         return rings
@@ -160,7 +157,7 @@ def blended(rings: Floats, line: Floats, lobe: Lobe) -> Floats:
 def table(slopes: Floats, filter_factor: Floats, lobe: Lobe, fourth: Floats | None = None) -> Floats:
     """Rows (x, y, z, w) of samples at slopes (n, 2) in units of (mx, my), each of solid angle S/(n pdf).
 
-    `fourth` is w where it is not 1.
+    `fourth` is w; 1 by default.
     """
     n = len(slopes)
     constant = filter_factor * 4 * np.pi * lobe.mx * lobe.my / n
@@ -169,7 +166,7 @@ def table(slopes: Floats, filter_factor: Floats, lobe: Lobe, fourth: Floats | No
 
 
 def rings_table(lobe: Lobe, n: int) -> Floats:
-    """Samples of the `rings` integrator: rings, or a line for lobes much longer than wide."""
+    """Table of the `rings` integrator: rings, or a line for lobes much longer than wide."""
     ggx = lobe.distribution == "ggx"
     rings, line = ring_pattern(n, ggx), line_pattern(n, ggx)
     share = line_share(lobe, n)
@@ -180,7 +177,7 @@ def rings_table(lobe: Lobe, n: int) -> Floats:
 
 
 def lobe_points(n: int, ggx: bool = False) -> Floats:
-    """(n, 2) slopes in units of (mx, my) that follow the lobe: Hammersley's points."""
+    """Hammersley points distributed by the lobe: (n, 2) slopes in units of (mx, my)."""
     u1, u2 = hammersley(n).T
     return polar(radius(u1, ggx), 2 * np.pi * u2)
 
@@ -193,13 +190,13 @@ def fis_table(lobe: Lobe, n: int) -> Floats:
 
 
 def lobe_table(lobe: Lobe, n: int) -> Floats:
-    """The thesis's pattern: a centre and a ring (or a line) equally spaced in angle within the lobe's border."""
+    """The thesis's pattern within the lobe's border: a centre and a ring, or a line, equally spaced in angle."""
     ring = polar(1 - RING_XI1, 2 * np.pi * np.arange(n - 1) / max(1, n - 1))
     return lobe_table_at(lobe, np.concatenate([np.zeros((1, 2)), ring]))
 
 
 def lobe_table_at(lobe: Lobe, ring: Floats) -> Floats:
-    """`lobe_table` of a pattern (n, 2) within the unit disc, the lobe's border at 1, in place of centre and ring."""
+    """`lobe_table` with another pattern: points (n, 2) in the unit disc, with the lobe's border at radius 1."""
     n = len(ring)
     t = (2 * np.arange(n) + 1) / n - 1
     of_border = blended(ring, np.stack([t, np.zeros(n)], axis=-1), lobe)
@@ -214,19 +211,19 @@ def lobe_table_at(lobe: Lobe, ring: Floats) -> Floats:
 
 
 def polar(r: Any, phi_rad: Floats) -> Floats:
-    """(n, 2) points at radii r, a number or (n,), and angles (n,)."""
+    """(n, 2) points at radii r, a number or (n,), and angles (n,), rad."""
     return np.stack([r * np.cos(phi_rad), r * np.sin(phi_rad)], axis=-1)
 
 
 def border(lobe: Lobe) -> Floats:
-    """Slopes (2,) along t and b of the lobe's border, outside which 1 % of it lies (4.10)."""
+    """Slopes (2,) along t and b of the lobe's border, which leaves 1 % of the lobe outside (4.10)."""
     return float(radius(1 - BORDER_MASS, lobe.distribution == "ggx")) * np.array([lobe.mx, lobe.my])
 
 
 def automatic_n(material: Material, roughness: float = 1.0, without_lamps: bool = False) -> int:
-    """Samples per lobe that a material needs: the more, the wider its widest lobe; `roughness` is a factor on it.
+    """Samples per lobe for a material; grows with the width of its widest lobe times `roughness`.
 
-    Where no lamps are left in the light that is sampled, fewer are as good (docs/performance.md).
+    Fewer suffice with `without_lamps`, for light that holds no lamps (docs/performance.md).
     """
     m = roughness * max((max(lobe.mx, lobe.my) for lobe in material.lobes), default=0.0)
     steps = ((0.004, 1), (0.015, 3), (0.04, 5), (0.1, 7), (0.2, 11), (0.35, 15))

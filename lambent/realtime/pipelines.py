@@ -1,4 +1,4 @@
-"""Render pipelines: of the scene's triangles, and of one triangle that covers a whole target."""
+"""Render pipelines for the scene's triangles, and for one triangle that covers a whole target."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def pipeline(
 ) -> Any:  # fmt: skip
     """Pipeline of a shader module into targets of `formats`.
 
-    `entry` of the fragment stage may be empty where depth alone is drawn. `compare` is that of the depth test; without
-    it there is no depth. With a `blend`, the first target is blended and the others stay as they are.
+    `entry`, of the fragment stage, is empty for depth alone. `compare` is the depth test; without it there is no depth
+    attachment. With a `blend`, the first target is blended and the others are not written.
     """
     first, others = ({"blend": blend}, {"write_mask": 0}) if blend else ({}, {})
     targets = [{"format": format, **(others if i else first)} for i, format in enumerate(formats)]
@@ -47,7 +47,7 @@ def pipeline(
 def screen_pipeline(
     device: Any, shader: str, layouts: Sequence[Any], formats: Iterable[str], entry: str = "", **depth: Any
 ) -> Any:
-    """Pipeline of a file that includes screen.wgsl; its entry point is named after it unless `entry` is given."""
+    """Pipeline of a file that includes screen.wgsl; by default its entry point is named after the file."""
     module = device.create_shader_module(code=assemble(f"{shader}.wgsl"))
     return pipeline(device, module, entry or f"{shader}_main", layouts, formats, vertex="screen_main", **depth)
 

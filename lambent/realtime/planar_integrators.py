@@ -1,7 +1,7 @@
-"""The specular integrators on planar reflectors, by the name they have on curved objects.
+"""Specular integrators on planar reflectors, by their names on curved objects.
 
-Each is a shader with `integrate_planar(index, wo, surface, place)` and a table of samples (rows as in patterns.py). An
-integrator without one shows the probes on planar reflectors, too.
+Each is a shader with `integrate_planar(index, wo, surface, place)` and a table of samples (rows as in patterns.py).
+Integrators without one use the probes on planar reflectors, too.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from lambent.materials.document import Lobe
 from lambent.realtime import patterns
 from lambent.realtime.integrators import Integrator
 
-TILE = 64  # pixels that sample a lobe in turns
-MOST_SHARED = 7  # samples per lobe that are chosen where the pixels of a tile share it
-TURN = 0.088  # of a pixel's samples against those of the one before it in turn
-# Factors on the filter, 1 where it covers the lobe, by experiment: the narrower the better where each sample finds its
-# own hit, and where 64 pixels share the lobe: at grazing angles round filters blur the slim lobe.
+TILE = 64  # pixels with interleaved samples of a lobe
+MOST_SHARED = 7  # most samples per lobe if the pixels of a tile share it
+TURN = 0.088  # rotation of a pixel's samples relative to the previous pixel's, in turns
+# Factors on the filter, found by experiment; 1 covers the lobe. Narrow filters are better if each sample finds its own
+# hit, or if 64 pixels share the lobe: at grazing angles, round filters blur the slim lobe.
 FIXED_BIAS, INTERLEAVED_BIAS = 0.4, 0.003
 MOST_RINGS = 3
 THREE_STEPS = {"MARCH_STEPS": 0}
-# Hidden hits count a fifth. Samples that leave the buffer are filtered in the probe as those of fixed rings are.
+# Hidden hits have a weight of 1/5. Samples outside the buffer are filtered in the probe like fixed rings.
 SHARED = {"HIDDEN_DROP": 0.8, "BEYOND_WIDER": 1.75}
 
 
 def multi_ring_table(lobe: Lobe, n: int) -> Floats:
-    """The thesis's pattern on planes (4.5.3): a centre and up to three rings of equal count, radii evenly spaced.
+    """The thesis's pattern on planes (4.5.3): a centre and up to three rings of equal count, evenly spaced radii.
 
-    Lobes much longer than wide keep the line. Its figure for n = 10 is 3 rings of 3.
+    Lobes much longer than wide keep the line. As in the thesis's figure, n = 10 has 3 rings of 3.
     """
     rings = next((r for r in range(MOST_RINGS, 1, -1) if n > 1 and (n - 1) % r == 0 and (n - 1) // r >= 3), 1)
     count = (n - 1) // rings
@@ -45,7 +45,7 @@ def multi_ring_table(lobe: Lobe, n: int) -> Floats:
 
 
 def fixed_table(lobe: Lobe, n: int) -> Floats:
-    """The rings of curved objects with the filter that is best on planes; a line for long lobes."""
+    """The rings of curved objects with the best filter for planes; a line for long lobes."""
     rows = patterns.rings_table(lobe, n)
     rows[:, 2] += 0.5 * np.log2(FIXED_BIAS / patterns.ring_bias(n))
     return rows
@@ -55,7 +55,7 @@ def interleaved_table(lobe: Lobe, n: int, bias: float = INTERLEAVED_BIAS) -> Flo
     """`fixed_table`, then 64 spirals of n samples, one for each pixel of a tile of 8 x 8: (65 n, 4).
 
     Spiral o is r_k = sqrt(-ln(1 - (k + a)/n)), phi_k = 2 pi (.618034 k + beta), with a = (o + 1/2)/64 and
-    beta = fract(TURN o): all 64 together cover the lobe's mass evenly, and so do every fourth of them.
+    beta = fract(TURN o). All 64 together cover the lobe's mass evenly, as does every fourth of them.
     """
     ggx = lobe.distribution == "ggx"
     k, blocks = np.arange(n), [fixed_table(lobe, n)]
@@ -66,8 +66,8 @@ def interleaved_table(lobe: Lobe, n: int, bias: float = INTERLEAVED_BIAS) -> Flo
     return np.concatenate(blocks)
 
 
-# Two searches for hits: `marched` is the better one on a real floor, `interleaved` takes .7 of its time and is as good
-# where little stands on the floor (docs/performance.md).
+# Two searches for hits: `marched` is better on cluttered floors; `interleaved` takes .7 of its time and is as good on
+# nearly empty floors (docs/performance.md).
 PLANAR: dict[str, dict[str, Integrator]] = {
     "rings": {
         "marched": Integrator("planar_interleaved.wgsl", interleaved_table, {"MARCH_STEPS": 12, **SHARED}),
@@ -78,10 +78,10 @@ PLANAR: dict[str, dict[str, Integrator]] = {
     "lobe-4.25": {"thesis": Integrator("planar_thesis.wgsl", multi_ring_table, {"FORMULA": 25})},
     "fis": {"fis": Integrator("planar_quadrature.wgsl", patterns.fis_table, THREE_STEPS)},
     "qmc": {"qmc": Integrator("planar_qmc.wgsl")},
-    "qmc-lobe": {"qmc": Integrator("planar_qmc.wgsl")},  # its samples follow the lobe already
+    "qmc-lobe": {"qmc": Integrator("planar_qmc.wgsl")},  # its samples follow the lobe on curved objects, too
 }
 PLANAR["oslf"] = PLANAR["oslf-points"] = PLANAR["qmc-lobe"]
-# Small lamps leave the mirrored view (reflector_lamps.py); what that does not hold comes from the whole probe.
+# Small lamps leave the mirrored view (reflector_lamps.py); light outside the view comes from the whole probe.
 PLANAR["lamps"] = {name: replace(how, clears_views=True) for name, how in PLANAR["rings"].items()}
 AUTO, OFF = "auto", "off"
 CHOICES = tuple(dict.fromkeys([AUTO, OFF, *(name for methods in PLANAR.values() for name in methods if name != "qmc")]))
@@ -89,19 +89,19 @@ CHOICES = tuple(dict.fromkeys([AUTO, OFF, *(name for methods in PLANAR.values() 
 
 @cache
 def with_lamps(how: Integrator, count: int) -> Integrator:
-    """A planar integrator that evaluates `count` lamps of a reflector by themselves."""
+    """The planar integrator with `count` lamps of a reflector evaluated in closed form."""
     return replace(how, constants={**how.constants, "LAMPS": count})
 
 
 def planar_integrator(integrator: str, method: str) -> Integrator | None:
-    """How planar reflectors are drawn with an integrator: by `method`, else its first one, else None, by probes."""
+    """Planar counterpart of an integrator: `method`, else its first method, else None (probes)."""
     known("method for planar reflectors", method, CHOICES)
     methods = PLANAR.get(integrator, {})
     return None if method == OFF or not methods else methods.get(method, next(iter(methods.values())))
 
 
 def check_planar(integrator: str, method: str) -> None:
-    """Raise `UserError` where an integrator does not have a method: a frame would be drawn by its first."""
+    """Raise `UserError` for a method that an integrator lacks; a frame would silently use the first method."""
     planar_integrator(integrator, method)
     choices = (AUTO, OFF, *PLANAR.get(integrator, {}))
     if method not in choices:

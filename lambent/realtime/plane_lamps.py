@@ -1,11 +1,10 @@
-"""Small lamps over planar reflectors: emitting objects that leave a mirrored view for lobes wider than they are.
+"""Small lamps over planar reflectors: emitting objects taken out of a mirrored view for lobes wider than the lamp.
 
-A reflector's pixels evaluate them in closed form (shaders/planar_lamps.wgsl, materials/lamp_light.py). Of a lamp they
-read the place, the spread and the colour, and, from a map over the reflector (lamp_maps.py), the solid angle of it that
-a point of the plane sees.
+A reflector's pixels evaluate these lamps in closed form (shaders/planar_lamps.wgsl, materials/lamp_light.py) from
+position, spread and colour, and from a map over the reflector (lamp_maps.py) of the solid angle visible from the plane.
 
-Seen along w, the places of a lamp's silhouette have the covariance P M P, P = 1 - w w^T. One matrix M serves all
-directions exactly where the lamp is an ellipsoid or flat, and by least squares elsewhere.
+Seen along w, a lamp's silhouette has the covariance P M P, P = 1 - w w^T. One matrix M serves all directions: exactly
+for ellipsoids and flat lamps, by least squares for others.
 """
 
 from __future__ import annotations
@@ -27,16 +26,16 @@ from lambent.core.plain import Triple
 from lambent.realtime.baked import BakedScene
 from lambent.store.contract import ReflectorRecord
 
-MOST = 4  # lamps of a reflector and channels of its map, as shaders/planar_lamp_record.wgsl has room for
-POINTS = 64  # of a lamp, that see a reflector's points or do not; of a ball, some 20 face each of these
-MOST_RADIUS_RAD = 0.35  # of a lamp as seen from the farthest point: larger ones are surfaces, not lamps
-AT_ONCE = 1 << 20  # pairs of points and triangles: some 50 MB
-WELDED_M = 1e-5  # corners that are nearer are one
+MOST = 4  # most lamps of a reflector, and channels of its map: size of arrays in shaders/planar_lamp_record.wgsl
+POINTS = 64  # sample points of a lamp for visibility; of a ball, some 20 face each point of a reflector
+MOST_RADIUS_RAD = 0.35  # seen from the farthest point; larger emitters count as surfaces
+AT_ONCE = 1 << 20  # pairs of points and triangles at a time: some 50 MB
+WELDED_M = 1e-5  # nearer corners are merged
 
 
 @dataclass(frozen=True, eq=False)
 class PlaneLamp:
-    """A connected part of an emitting object: corners (F, 3, 3) of its triangles, and its radiance, on their fronts."""
+    """A connected part of an emitting object: corners (F, 3, 3) of its triangles, m, and radiance of their fronts."""
 
     object: str
     corners: Floats
@@ -49,23 +48,23 @@ class PlaneLamp:
         object.__setattr__(self, "middles", self.corners.mean(axis=1))
 
     def solid_angles(self, points: Floats) -> Floats:
-        """(M,) sr of the lamp from points (M, 3) that see all of it, as of a convex one."""
+        """(M,) solid angle, sr, from points (M, 3), unoccluded; exact for a convex lamp."""
         parts = np.array_split(np.arange(len(points)), 1 + len(points) * len(self.middles) // AT_ONCE)
         return np.concatenate([self._facing(points[part]).sum(axis=1) for part in parts])
 
     def _facing(self, points: Floats) -> Floats:
-        """(M, F) solid angle of every triangle, 0 of those seen from behind."""
+        """(M, F) solid angle, sr, of every triangle; 0 for back faces."""
         to = points[:, None] - self.middles
         return np.asarray(np.maximum(np.einsum("mfx,fx->mf", to, self.areas), 0) / (to * to).sum(axis=-1) ** 1.5)
 
     @cached_property
     def centre(self) -> Floats:
-        """(3,) mean place by area."""
+        """(3,) centroid by area, m."""
         area = np.linalg.norm(self.areas, axis=1)
         return np.asarray(area @ self.middles / area.sum())
 
     def spread_from(self, points: Floats) -> Floats:
-        """(3, 3) matrix M, m^2, by least squares over the silhouettes seen from points (M, 3)."""
+        """The matrix M (3, 3), m^2, by least squares over the silhouettes seen from points (N, 3)."""
         rows, wanted = [], []
         index = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
         for point, share in zip(points, self._facing(points), strict=True):
@@ -74,11 +73,11 @@ class PlaneLamp:
             to = self.centre - point
             w = normalize(to)
             axes = np.stack(basis(w))
-            # in the plane across the view through the centre: (F, 3, 2)
+            # projected to the plane through the centre, perpendicular to the view: (F, 3, 2)
             place = (self.corners - point) @ axes.T * (to @ w / ((self.corners - point) @ w))[..., None]
             mean = share @ place.mean(axis=1) / share.sum()
             about = place - mean
-            # over a triangle the second moment is (sum of the corners' + 9 times the middle's)/12
+            # second moment over a triangle: (sum of the corners' moments + 9 times the centroid's)/12
             middle = about.mean(axis=1)
             moment = (np.einsum("fca,fcb->fab", about, about) + 9 * np.einsum("fa,fb->fab", middle, middle)) / 12
             covariance = np.einsum("f,fab->ab", share, moment) / share.sum()
@@ -94,7 +93,7 @@ class PlaneLamp:
         return np.asarray((vector * np.maximum(value, 0)) @ vector.T)
 
     def light_points(self, points: Floats) -> tuple[Floats, Floats]:
-        """At most POINTS places (K, 3) on triangles that any of points (M, 3) sees, and their area vectors (K, 3)."""
+        """At most POINTS positions (K, 3) on triangles that face any of points (M, 3), and area vectors (K, 3)."""
         heights = points @ self.areas.T - (self.middles * self.areas).sum(axis=1)
         facing = np.flatnonzero(heights.max(axis=0) > 0)
         if not len(facing):
@@ -103,14 +102,14 @@ class PlaneLamp:
         areas = self.areas[facing][of] / np.bincount(of)[of][:, None]
         label = _bundles(pieces, POINTS)
         label = np.unique(label, return_inverse=True)[1]
-        # a piece of each bundle at random: middles lie in rows, and straight edges would pass them row by row
+        # a random piece of each bundle: centroids lie in rows, and a straight edge would cover whole rows at once
         order = np.random.default_rng(5).permutation(len(pieces))
         chosen = order[np.unique(label[order], return_index=True)[1]]
         return pieces[chosen], np.stack([np.bincount(label, areas[:, i]) for i in range(3)], axis=-1)
 
 
 def _bundles(points: Floats, count: int) -> NDArray[np.intp]:
-    """(P,) number, below `count`, of a bundle of neighbours of each of the points (P, 3): halves of halves."""
+    """(P,) bundle, below `count`, of each of the points (P, 3); neighbours are bundled by recursive halving."""
     label = np.zeros(len(points), np.intp)
     if count < 2 or len(points) < 2:
         return label
@@ -122,7 +121,7 @@ def _bundles(points: Floats, count: int) -> NDArray[np.intp]:
 
 
 def _pieces(corners: Floats, count: int) -> tuple[Floats, NDArray[np.intp]]:
-    """At least `count` middles (P, 3) of parts of equal area of triangles (F, 3, 3), and the triangle of each."""
+    """At least `count` centroids (P, 3) of equal-area pieces of triangles (F, 3, 3), and the triangle of each."""
     of = np.arange(len(corners))
     while len(corners) < count:
         a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
@@ -134,7 +133,7 @@ def _pieces(corners: Floats, count: int) -> tuple[Floats, NDArray[np.intp]]:
 
 
 def lamps_of(scene: BakedScene) -> list[PlaneLamp]:
-    """Every connected part of every whole emitting object; objects of more than MOST parts are one lamp each."""
+    """Every connected part of every whole emitting object; an object of more than MOST parts is one lamp."""
     found: list[PlaneLamp] = []
     for record in scene.record.objects:
         if not any(record.emission) or record.part_of:
@@ -162,9 +161,9 @@ def _connected(corners: Floats) -> Iterable[Floats]:
 
 
 def over(lamps: Iterable[PlaneLamp], reflector: ReflectorRecord, plane: Floats, clearance_m: float) -> list[PlaneLamp]:
-    """The lamps of a reflector, seen from the side that the plane (n, d) faces: of the brightest objects, at most MOST.
+    """Lamps of a reflector seen from the side that the plane (n, d) faces: from the brightest objects, at most MOST.
 
-    All of an object's lamps or none, for the mirrored view shows the object with its light or without.
+    An object contributes all of its lamps or none: the mirrored view shows the object either lit or dark.
     """
     outline = np.asarray(reflector.outline, float)
     points = np.concatenate([outline, outline.mean(axis=0)[None]])

@@ -1,4 +1,4 @@
-"""A probe on the GPU: its cube maps, the table of its lamps, and what the look-ups read of it."""
+"""A probe on the GPU: its cube maps, tables of its lamps, and resources of its look-ups."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from lambent.realtime.uploads import upload, with_alpha
 
 
 def kind_of(cube: Cube) -> str:
-    """Kind (`layouts.KINDS`) of the binding of a cube map."""
+    """Kind of the binding (`layouts.KINDS`) of a cube map."""
     return "cubes" if cube == "cleaned" else "cube"
 
 
@@ -38,29 +38,29 @@ class AimTable:
         self.prominence = float(table[0, 1])
 
     def is_aimed_at(self, material: Material, textured: bool) -> bool:
-        """Whether samples of a material's lobes, which textures may widen, are worth aiming at all."""
+        """Whether any sample of a material's lobes would aim; `textured`: textures may widen the lobes."""
         return aimed_share(widest_lobe(material, textured), self.prominence) > 1 / 16
 
 
 class ProbeLight:
-    """What objects bind of the probe that they share; without a probe they are dark.
+    """Bindings of a probe, shared by its objects; objects without a probe are dark.
 
-    Cube maps and the resources of a look-up are made when a draw first asks for them.
+    Cube maps and the resources of a look-up are made on first use.
     """
 
     def __init__(self, layouts: Layouts, probe: Probe | None, sampler: Any, look_ups: dict[str, LookUp]) -> None:
         self._layouts, self._sampler, self.probe, self._look_ups = layouts, sampler, probe or DARK, look_ups
         self._texture = cache(self._new_texture)
-        self._levels: dict[Cube, list[NDArray[np.float16]]] = {}  # of cube maps that were made ready beforehand
+        self._levels: dict[Cube, list[NDArray[np.float16]]] = {}  # of cube maps prepared in advance
         self._used: set[Cube] = set()
-        self.table = cache(self._new_table)  # of lamps: what it is for, and the look-up that finds them
-        self.streams: list[ResidentMaps] = []  # of the light field, where not all of its maps are on the GPU
+        self.table = cache(self._new_table)  # of lamps, by use and look-up
+        self.streams: list[ResidentMaps] = []  # of the light field, if some of its maps are not on the GPU
         self._resources: dict[str, tuple[Any, ...]] = {}  # of look-ups, by their files
-        self.as_baked = self  # of which this is other light
-        self.sky_change = (1.0, 1.0, 1.0)  # how many times brighter the sky is than it was baked
+        self.as_baked = self  # the same probe in baked light
+        self.sky_change = (1.0, 1.0, 1.0)  # ratio of the sky to the baked sky
 
     def resources(self, look_up: LookUp) -> tuple[Any, ...]:
-        """What the look-ups of one file read."""
+        """Resources of a look-up; look-ups of one file share them."""
         if look_up.__file__ not in self._resources:
             self._resources[look_up.__file__] = look_up.resources(self._layouts.device, self.probe, self.streams)
         return self._resources[look_up.__file__]
@@ -74,7 +74,7 @@ class ProbeLight:
         return self._texture(cube).create_view(dimension="cube-array" if cube == "cleaned" else "cube")
 
     def half_log2_texels(self, cube: Cube) -> float:
-        """Half the log2 of texels, as large as a look-up blurs, per unit area of the cube [-1, 1]^3 (N^2/4 in 4.17)."""
+        """Half the log2 of texels per unit area of the cube [-1, 1]^3 (N^2/4 in 4.17), corrected for the blur."""
         blur = np.log2(SMOOTH_AREA) / 2 if cube in ("smooth", "cleaned") else 0
         return float(np.log2(self.probe.radiance.shape[1] / 2) - blur)
 
@@ -86,7 +86,7 @@ class ProbeLight:
         return upload(self._layouts.device, levels, "rgba16float")
 
     def _chain(self, cube: Cube) -> list[NDArray[np.float16]]:
-        """Levels of a cube map as its texture has them."""
+        """Levels of a cube map in the form of its texture."""
         if cube == "cleaned":
             return [with_alpha(level) for level in self.lamps.chain()]
         chain = smooth_chain if cube == "smooth" else mip_chain
@@ -94,11 +94,11 @@ class ProbeLight:
 
     @property
     def is_relit(self) -> bool:
-        """Whether its light is another one than its light field was taken in."""
+        """Whether the light differs from the light that the light field was baked in."""
         return self.as_baked is not self
 
     def change_view(self) -> Any:
-        """View of a cube map that says how many times brighter light is than as baked, in each direction."""
+        """View of a cube map of the ratio of the light to the baked light, by direction."""
         return upload(self._layouts.device, self._change, "rgba16float").create_view(dimension="cube")
 
     @cached_property
@@ -109,13 +109,14 @@ class ProbeLight:
     def relit(
         self, radiance: Floats, irradiance: tuple[float, ...], sky_change: Triple = (1.0, 1.0, 1.0)
     ) -> ProbeLight:
-        """The same probe with other light, its cube maps and lamps made ready as far as this one's were used.
+        """The same probe with new light; prepares the cube maps and lamps that this one has used.
 
-        `sky_change` is that of the sky. Touches no GPU, so that another thread may call it.
+        `radiance` is (6, N, N, 3), `irradiance` as in `Probe`, `sky_change` the ratio of the sky to the baked sky. Does
+        not touch the GPU, so any thread may call it.
         """
         probe = replace(self.probe, radiance=radiance, irradiance=irradiance)
         other = ProbeLight(self._layouts, probe, self._sampler, self._look_ups)
-        other._resources, other.streams = self._resources, self.streams  # which hold no light of the cube
+        other._resources, other.streams = self._resources, self.streams  # they do not depend on the cube's light
         for cube in sorted(self._used | set(self._levels)):
             if cube != "prefiltered":
                 other._levels[cube] = other._chain(cube)
@@ -141,9 +142,9 @@ class ProbeLight:
 
     @cached_property
     def cheapest(self) -> LookUp:
-        """The look-up of draws that have no lobes."""
+        """The look-up for draws without lobes."""
         return next(one for one in self._look_ups.values() if one.serves(self.probe))
 
     def look_up(self, wanted: str) -> LookUp:
-        """The look-up of that name, if it serves the probe, else the preferred one."""
+        """The look-up named `wanted` if it serves the probe, else the preferred one."""
         return look_up_of(self.probe, wanted, self._look_ups)

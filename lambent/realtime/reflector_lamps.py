@@ -1,4 +1,4 @@
-"""The lamps of planar reflectors on the GPU: what shaders/planar_lamps.wgsl reads of them."""
+"""Lamps of planar reflectors on the GPU, for shaders/planar_lamps.wgsl."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from lambent.realtime.structs import PLANE_LAMPS_DTYPE, Record
 
 OUT_FROM = 0.5  # of a lamp's radius, as in shaders/planar_lamps.wgsl: narrower lobes leave all lamps in the buffer
 FADE_PX = 24.0  # as in shaders/planar.wgsl
-GRID = 5  # places along each side of a reflector from which lamps' shapes are seen
+GRID = 5  # viewpoints along each side of a reflector for the shapes of lamps
 
 
 class ReflectorLamps:
-    """The lamps over one side of one reflector, at least one. `draw_map` draws their map, which takes seconds."""
+    """One or more lamps over one side of a reflector. `draw_map` draws their map, which takes seconds."""
 
     def __init__(
         self, layouts: Layouts, resources: Any, lamps: list[PlaneLamp], outline: Floats, plane: Floats,
@@ -34,7 +34,7 @@ class ReflectorLamps:
         self.objects = list(dict.fromkeys(lamp.object for lamp in lamps))  # in the order of their channels
         self._layouts, self._resources = layouts, resources
         self._frame = PlaneFrame.about(outline, plane[:3])
-        self.map: Any = None  # buffer of the solid angles that the reflector's points see
+        self.map: Any = None  # buffer of the solid angles visible from the reflector's points
         self._drawing = lamp_map_steps(layouts, resources, lamps, self._frame, plane, clearance_m)
         width, height = self._frame.size
         columns, rows = np.meshgrid(np.linspace(0, width, GRID), np.linspace(0, height, GRID))
@@ -45,16 +45,16 @@ class ReflectorLamps:
         self._least_radius_rad = min(radius / far for radius, far in zip(self._radii_m, far_m, strict=True))
 
     def serve(self, lobes: Iterable[Lobe], widest_factor: float = 1.0) -> bool:
-        """Whether a lamp may leave the buffer for one of the lobes, whose widths textures may multiply."""
+        """Whether a lamp may leave the buffer for one of the lobes, widened by at most `widest_factor`."""
         widest = max((float(np.sqrt(lobe.mx * lobe.my)) for lobe in lobes), default=0.0) * widest_factor
         return widest > OUT_FROM * self._least_radius_rad
 
     def are_within(self, view: PlanarView) -> bool:
-        """Whether a mirrored view would show any of them, if nothing hid it."""
+        """Whether any lamp is within a mirrored view, hidden or not."""
         return any(inside_share(view, lamp.middles) > 0 for lamp in self.lamps)
 
     def draw_map(self, seconds: float = float("inf")) -> bool:
-        """Go on with the map for about so long; whether it is there."""
+        """Continue the map for about `seconds`; returns whether it is complete."""
         end = time.perf_counter() + seconds
         while self.map is None and time.perf_counter() < end:
             try:
@@ -68,7 +68,7 @@ class ReflectorLamps:
         data = np.zeros((), PLANE_LAMPS_DTYPE)
         data["to_column"], data["to_row"] = self._frame.texel_rows()
         data["size"][:2] = self._frame.size
-        shown = {item.record.name: item.emission for item in self._resources.objects}  # as a mix of light has them
+        shown = {item.record.name: item.emission for item in self._resources.objects}  # in the current mix of light
         for k, (lamp, spread, radius_m) in enumerate(zip(self.lamps, self._spreads, self._radii_m, strict=True)):
             data["centres"][k] = *lamp.centre, inside_share(view, lamp.middles)
             data["spreads"][3 * k : 3 * k + 3, :3] = spread
@@ -78,20 +78,20 @@ class ReflectorLamps:
 
 
 class LampsOverReflectors:
-    """The lamps of every reflector of a scene, from either side, found when a frame first shows it."""
+    """The lamps over each side of every reflector of a scene, found when a frame first shows the reflector."""
 
     def __init__(self, layouts: Layouts, resources: Any) -> None:
         """`resources` is a `SceneResources`."""
         self._layouts, self._resources = layouts, resources
         self._found: dict[Any, ReflectorLamps | None] = {}
-        self._under_way: list[ReflectorLamps] = []  # whose maps frames asked for that did not wait
+        self._under_way: list[ReflectorLamps] = []  # maps requested by frames that do not wait
 
     @cached_property
     def _lamps(self) -> list[PlaneLamp]:
         return lamps_of(self._resources.scene)
 
     def of(self, view: PlanarView) -> ReflectorLamps | None:
-        """Those of a view's reflector, None where there are none."""
+        """The lamps of a view's reflector, None without any."""
         plane = np.asarray(view.uniform["plane"], float)
         key = view.reflector.outline, bool(plane[:3] @ np.asarray(view.reflector.plane[:3]) > 0)
         if key not in self._found:
@@ -103,7 +103,7 @@ class LampsOverReflectors:
         return self._found[key]
 
     def have_map(self, lamps: ReflectorLamps, *, waits: bool) -> bool:
-        """Whether the map of lamps is there, which a frame may wait for; else `follow` draws it beside frames."""
+        """Whether the lamps' map is complete; with `waits`, draw it now, else `follow` draws it between frames."""
         if lamps.draw_map(float("inf") if waits else 0.0):
             return True
         if lamps not in self._under_way:
@@ -111,14 +111,14 @@ class LampsOverReflectors:
         return False
 
     def follow(self) -> None:
-        """Go on with the maps that frames asked for, for a slice; the picture changes when one is there."""
+        """Continue the requested maps for a time slice; the picture changes when one is complete."""
         if self._under_way and self._under_way[0].draw_map(SLICE_S):
             self._under_way.pop(0)
             self._resources.light_version += 1
 
 
 def inside_share(view: PlanarView, places: Floats) -> float:
-    """Share, 0 to 1, of places (K, 3) that lie within a mirrored view; it fades out beyond its edges (planar.wgsl)."""
+    """Share, 0 to 1, of positions (K, 3) within a mirrored view, faded out beyond its edges (planar.wgsl)."""
     uniform = view.uniform
     q = places - uniform["eye"][:3]
     x, y, depth = (q @ uniform[name][:3].astype(float) for name in ("row_x", "row_y", "row_w"))

@@ -1,8 +1,8 @@
-"""Another mesh in the place of an object with a light field of its volume (thesis R, "Object Replacement").
+"""Replaces an object that has a light field of its volume by another mesh (thesis R, "Object Replacement").
 
-The points of the volume answer for whatever stands in it: the mesh gets a sample map, its diffuse light comes from the
-irradiance of the maps, and the shadow map of the sun is drawn with it. What the bake knows of the old object stays: its
-shadows and its reflections on other things. The mesh neither mirrors nor shades itself.
+Points of the volume serve any object in it: the mesh gets a sample map, its diffuse light comes from the irradiance of
+the maps, and the sun's shadow map is drawn with it. The old object's baked shadows and reflections on other objects
+remain. The mesh neither reflects nor shadows itself.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from lambent.scenes.replacement import FIELD, Replacement, fitted
 from lambent.scenes.scene import Mesh
 from lambent.store.contract import ObjectRecord, SceneRecord
 
-FINER = 2  # texels of the sample map to one of the light map
-MOST_FACES = 60_000  # of a mesh that is cut into smaller triangles
+FINER = 2  # texels of the sample map per texel of the light map
+MOST_FACES = 60_000  # after the mesh is cut into smaller triangles
 
 
 def with_replacements(scene: BakedScene, replacements: Sequence[Replacement]) -> BakedScene:
@@ -39,7 +39,7 @@ def with_replacements(scene: BakedScene, replacements: Sequence[Replacement]) ->
     Raises
     ------
     UserError
-        Where there is no such object or material, or the object has no light field of a volume.
+        If an object or material does not exist, an object has no light field of a volume, or a mesh has no triangles.
     """
     for one in replacements:
         scene = _replaced(scene, one)
@@ -113,7 +113,7 @@ def _spacing_m(field: LightField) -> float:
 def _spliced(
     scene: BakedScene, record: ObjectRecord, faces: NDArray[np.integer], changes: dict[str, Any]
 ) -> tuple[NDArray[np.uint32], tuple[ObjectRecord, ...]]:
-    """The scene's faces with others in the place of an object's, and all objects with their ranges."""
+    """The scene's faces with an object's faces replaced, and all objects with their new ranges."""
     end = record.first_face + record.face_count
     parts = scene.faces[: record.first_face], faces.astype(np.uint32), scene.faces[end:]
     more = len(faces) - record.face_count
@@ -127,14 +127,14 @@ def _spliced(
 
 
 def _without_reflector(record: SceneRecord, name: str) -> SceneRecord:
-    """The record without the planar reflectors that the object was a part of."""
+    """The record without the planar reflectors that contain the object."""
     kept = tuple(r for r in record.reflectors if all(part.object != name for part in r.parts))
     return record.model_copy(update={"reflectors": kept})
 
 
 @dataclass(frozen=True)
 class _Room:
-    """Where blocks of `count` triangles lie: below a light map of `old` (rows, columns), in one of `size`."""
+    """Room for blocks of `count` triangles below a light map of `old` (rows, columns), in a new one of `size`."""
 
     old: tuple[int, int]
     size: tuple[int, int]
@@ -151,17 +151,17 @@ class _Room:
         return self.size[1] // 2
 
     def moved(self, uv2: Floats) -> NDArray[np.float32]:
-        """Coordinates (V, 2) of the old light map."""
+        """Coordinates (V, 2) of the old light map, moved to the new one."""
         share = np.array([self.old[1] / self.size[1], self.old[0] / self.size[0]])
         return np.asarray(uv2 * share, np.float32)
 
     def uv2_of_blocks(self) -> NDArray[np.float32]:
-        """(3 count, 2) of the triangles' corners."""
+        """Light-map coordinates (3 count, 2) of the triangles' corners."""
         texels = corners_in_blocks(self.count, self._across) + np.array([0, self.old[0]])
         return np.asarray(texels.reshape(-1, 2) / self.size[::-1], np.float32)
 
     def joined(self, old: Floats | None, corners: Floats | None = None) -> Floats | None:
-        """A light map (H, W, ...) with room for the blocks, which hold what triangles have at `corners`."""
+        """A light map (H, W, ...) enlarged by the blocks, filled from the triangles' values at `corners`."""
         if old is None:
             return None
         whole = np.zeros((*self.size, *old.shape[2:]), old.dtype)
@@ -171,12 +171,12 @@ class _Room:
         return whole
 
     def moved_field(self, field: LightField) -> LightField:
-        """A light field whose sample map was made for the old light map."""
+        """A light field with its sample map moved from the old light map."""
         rows, columns = (round(g * new / old) for g, new, old in zip(field.grid, self.size, self.old, strict=True))
         return replace(field, grid=(rows, columns))
 
     def sample_map(self, mesh: Mesh, field: LightField) -> dict[str, Any]:
-        """The fields of a `LightField` that say which points are near places of the mesh."""
+        """Fields of a `LightField` for the sample map of the mesh."""
         weights = places_in_blocks(FINER)
         texels = weights.shape[0]
         x, n = (

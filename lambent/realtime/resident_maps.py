@@ -1,7 +1,7 @@
-"""Maps of a light field on the GPU: all, or those that a view needs, within a budget.
+"""Maps of a light field on the GPU: all maps, or those that a view needs, within a budget.
 
-A point whose map is not there stands for the nearest point whose map is: the table of places that shaders read has that
-one's place and map in its stead. So every picture is of true maps, some of them taken a little farther off.
+If a point's map is not resident, the nearest point with a resident map replaces it: the shaders' table of points then
+holds that point's position and map. So shaders read real maps only, some of them taken slightly farther away.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from lambent.core.map_cache import LEAST_RECENT, POLICIES
 from lambent.realtime.light_field_atlas import Atlas, Packed
 from lambent.realtime.uploads import upload
 
-POINTS_IN_ROW = 256  # of the texture of places
-BATCH = 16  # maps that are made ready at a time, and written before one frame
-TURNED = 0.25  # of the points' extent, that points count as apart for normals that are a unit apart
+POINTS_IN_ROW = 256  # of the texture of points
+BATCH = 16  # maps prepared at a time, and written before one frame
+TURNED = 0.25  # distance that a unit difference of normals counts as, relative to the points' extent
 
 
 @dataclass
 class Reads:
-    """What views asked of a cache, map by map, since it was made."""
+    """Hits and misses of a cache, by map, since it was made."""
 
     hits: int = 0
     misses: int = 0
 
 
 class ResidentMaps:
-    """The atlas of a light field, and `points`, the table of places; `most_bytes` for both textures of the atlas.
+    """The atlas of a light field, and `points`, the texture of points; `most_bytes` limits the atlas's two textures.
 
-    Without a budget, and where all maps fit, they stay for good. Else `follow` keeps those that views need, and drops
-    those that its `policy`, one of `core.map_cache.POLICIES`, lets go.
+    Without a budget, or if all maps fit, they stay resident. Otherwise `follow` loads the maps that views need, and
+    evicts others by its `policy`, one of `core.map_cache.POLICIES`.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class ResidentMaps:
         self.whole, self.reads = room == count, Reads()
         self._cache = POLICIES[policy](room)
         first = np.arange(count) if self.whole else np.linspace(0, count - 1, room).round().astype(int)
-        self._place = {int(point): place for place, point in enumerate(first)}  # of the maps that are there, by point
+        self._place = {int(point): place for place, point in enumerate(first)}  # of resident maps, by point
         self._ready: Future[tuple[Sequence[int], Packed]] | None = None
         if self.whole:
             self.atlas.fill()
@@ -59,38 +59,39 @@ class ResidentMaps:
                 self._cache.read(point)
                 self.atlas.write(self.atlas.packed([point]), place)
             self._thread = ThreadPoolExecutor(1, "maps")
-        self.loaded = room  # maps that were written, also those dropped since
+        self.loaded = room  # maps written so far, evicted ones included
         self.points = upload(device, [self._table()[None]], "rgba32float")
 
     @property
     def maps(self) -> int:
-        """Of the light field altogether."""
+        """Number of maps of the light field."""
         return len(self._field.points)
 
     @property
     def resident(self) -> int:
-        """Maps that are there."""
+        """Number of resident maps."""
         return len(self._place)
 
     @property
     def resident_mb(self) -> float:
-        """Of the maps that are there."""
+        """Size of the resident maps, MB."""
         return len(self._place) * self.atlas.map_bytes / 1e6
 
     @property
     def busy(self) -> bool:
-        """Whether a map that was asked for is not there yet."""
+        """Whether a requested map is not resident yet."""
         return self._ready is not None
 
     @property
     def ready(self) -> bool:
-        """Whether `follow` would find maps that can be written."""
+        """Whether maps are prepared for `follow` to write."""
         return self._ready is not None and self._ready.done()
 
     def follow(self, wanted: Sequence[int], *, waits: bool) -> None:
-        """Bring what a view needs, most needed first, as far as there is room.
+        """Load the maps that a view needs, most needed first, as far as they fit.
 
-        `waits`: until all of it is there. Else the next batch is made ready beside, and that of before is written.
+        With `waits`, return when all are resident. Otherwise write the batch that is prepared, and start the next one
+        in a thread.
         """
         wanted = [int(point) for point in wanted[: self.atlas.places]]
         missing = [point for point in wanted if point not in self._place]
@@ -112,12 +113,12 @@ class ResidentMaps:
         return batch, self.atlas.packed(batch)
 
     def _write(self, batch: Sequence[int], maps: Packed) -> None:
-        """Put maps in the places of such as the cache has dropped."""
+        """Write maps to the places of evicted ones."""
         held = self._cache.held
         dropped = [point for point in self._place if point not in held]
         for i, point in enumerate(batch):
             if point not in held or not dropped:
-                continue  # another view was asked for since
+                continue  # a newer view does not need it
             place = self._place.pop(dropped.pop())
             self.atlas.write(maps.of(i), place)
             self._place[point] = place
@@ -128,11 +129,11 @@ class ResidentMaps:
         )
 
     def _table(self) -> NDArray[np.float32]:
-        """(rows, POINTS_IN_ROW, 4): place in the world of each point, or of the one that stands for it, and map."""
+        """(rows, POINTS_IN_ROW, 4): world position, m, and place of the map of each point or of its substitute."""
         field = self._field
         table = np.zeros((-(-len(field.points) // POINTS_IN_ROW), POINTS_IN_ROW, 4), np.float32)
         there = np.fromiter(self._place, int)
-        apart = TURNED * float(np.ptp(field.points, axis=0).max())  # so that none stands for the far side of a sheet
+        apart = TURNED * float(np.ptp(field.points, axis=0).max())  # no substitute on the far side of a sheet
         keys = np.concatenate([field.points, apart * field.normals], axis=1)
         nearest = there[cKDTree(keys[there]).query(keys)[1]]
         nearest[there] = there
@@ -142,7 +143,7 @@ class ResidentMaps:
 
 
 def filled(sample_map: NDArray[np.uint16]) -> NDArray[np.uint16]:
-    """(h, w, 4) with the points of the nearest texel that has any where a texel has none."""
+    """The sample map (h, w, 4) with empty texels filled from the nearest texel with points."""
     bare = (sample_map == NO_POINT).all(axis=-1)
     rows, columns = distance_transform_edt(bare, return_distances=False, return_indices=True)
     return np.asarray(sample_map[rows, columns])

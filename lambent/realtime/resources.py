@@ -1,4 +1,4 @@
-"""A baked scene on the GPU: vertices, light maps, probes, materials, and the bind groups that hold them."""
+"""A baked scene on the GPU: vertices, light maps, probes, materials, and their bind groups."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ from lambent.realtime.uploads import half, layers_of, upload, with_alpha
 from lambent.scenes.scene import Look
 from lambent.store.contract import MOST_BORDERS, ObjectRecord
 
-LIGHT_MAP_USAGE = wgpu.TextureUsage.STORAGE_BINDING | wgpu.TextureUsage.COPY_SRC  # besides those of all textures
+LIGHT_MAP_USAGE = wgpu.TextureUsage.STORAGE_BINDING | wgpu.TextureUsage.COPY_SRC  # in addition to the usual ones
 
-EVEN_NICHES = 9  # of the numbers of an object's `irradiance`, whether its probe has them
+EVEN_NICHES = 9  # index, in a shader object's `irradiance`, of the flag for `Probe.even_niches`
 
 
 def device_needs(scene: BakedScene) -> dict[str, int]:
-    """Limits above WebGPU's defaults that a scene needs, for `device.open_device`."""
+    """Limits that a scene needs beyond WebGPU's defaults, for `device.open_device`."""
     needs = {"max-buffer-size": max(len(scene.positions) * VERTEX_FLOATS * 4, scene.faces.size * 4)}
     if scene.irradiance is not None:
         needs["max-texture-dimension-2d"] = max(scene.irradiance.shape[:2])
@@ -46,32 +46,32 @@ def device_needs(scene: BakedScene) -> dict[str, int]:
 
 
 class ObjectResources:
-    """One object: its range of the index buffer, its light and its bind groups.
+    """One object: its faces, its light and its bind groups.
 
-    `beyond` has the ranges [begin, end) of faces of other parts that its light is added to.
+    `beyond` has the ranges (first, count) of other parts' faces that its light is added to.
     """
 
     def __init__(
         self, layouts: Layouts, record: ObjectRecord, light: ProbeLight, unit: float, beyond: Ranges,
         has_shares: bool = False,
     ) -> None:  # fmt: skip
-        """`has_shares`: the light map says how much of the probe's light arrives, by direction."""
+        """`has_shares`: the light map holds the share of the probe's light that arrives, by direction."""
         self._has_shares = has_shares
         self.record, self.light, self._layouts, self._unit, self.beyond = record, light, layouts, unit, beyond
         self.emission = record.emission
         self.group = cache(self._new_group)
 
     def relight(self, light: ProbeLight, emission: Triple) -> None:
-        """Show the light of another probe, and emit so many W/(sr m^2)."""
+        """Show the light of another probe, and the emission, W/(sr m^2)."""
         if light is not self.light or emission != self.emission:
             self.light, self.emission = light, emission
             self.group.cache_clear()
 
     def _new_group(self, cube: Cube, look_up: LookUp, table: str = "", dark: bool = False) -> Any:
-        """Group 2 with that cube map, what the look-up reads, and a table of the probe's lamps: aim, lamps or none.
+        """Group 2: cube map, resources of the look-up, and the table of the probe's lamps (aim, lamps or none).
 
-        For look-ups with light of their own, in other light than as baked, the cube map has the change.
-        `dark`: without the object's own emission.
+        If the look-up has its own light and the light is not as baked, the cube map holds the ratio to the baked light.
+        `dark`: without the object's emission.
         """
         probe, view = self.light.probe, self.light.view(cube)
         if shows_change := brings_light(look_up) and self.light.is_relit:
@@ -90,10 +90,10 @@ class ObjectResources:
 
 
 class SceneResources:
-    """Everything of a baked scene that stays on the GPU from frame to frame."""
+    """Resources of a baked scene that stay on the GPU between frames."""
 
     def __init__(self, layouts: Layouts, scene: BakedScene, kin: SceneResources | None = None) -> None:
-        """`kin` shows the same scene in light of its own: cube maps and lamps of probes as baked are shared with it."""
+        """`kin` shows the same scene in other light; cube maps and lamps of baked probes are shared with it."""
         self.scene, self._layouts, device = scene, layouts, layouts.device
         self.sampler = device.create_sampler(
             mag_filter="linear", min_filter="linear", mipmap_filter="linear",
@@ -107,7 +107,7 @@ class SceneResources:
         self._light_layers, self._drawn_over = list(layers), None  # type: list[NDArray[np.float16]], Any
         self._light_texture = upload(device, [layers], "rgba16float", LIGHT_MAP_USAGE)
         self.light_view = self._light_texture.create_view(dimension="2d-array")
-        self.light_version = 0  # grows with every answer of light to edited materials, and with other textures
+        self.light_version = 0  # grows when light answers edited materials, and when textures change
         sky = scene.far_light or DARK
         self.sky_group = self.sky_group_of(with_alpha(finite(sky.radiance)[0]))
         cleaned = without_sun(sky, scene.sun)
@@ -145,9 +145,9 @@ class SceneResources:
         self.reflector_lamps = LampsOverReflectors(layouts, self)
 
     def show_textures(self, looks: Mapping[str, Look]) -> None:
-        """Show materials with the textures of others, all those that are left out with their own.
+        """Show materials with other materials' textures; materials left out show their own.
 
-        Documents are those of a frame's state; the sun's shadows keep the holes of the materials as baked.
+        Documents come from a frame's state. The sun's shadows keep the holes of the baked materials.
         """
         own = {name: self._textured[name] for name in self.scene.record.materials}
         self.materials = {**own, **{name: self._textured[look.textures] for name, look in looks.items()}}
@@ -157,18 +157,18 @@ class SceneResources:
         self.light_version += 1
 
     def _whole_ranges(self, panes: frozenset[str] = frozenset()) -> Ranges:
-        """(first, count) of the faces of all objects without holes but `panes`."""
+        """(first, count) of the faces of all objects without holes, except `panes`."""
         whole = (r for r in self.scene.record.objects if r.name not in self.masked and r.name not in panes)
         return merged(((r.first_face, r.first_face + r.face_count) for r in whole), gap=1)
 
     def show_light_map(self, sides: Sequence[NDArray[np.float16] | None]) -> None:
-        """Show other light maps (H, W, 4) on the front and the back; None of a side that stays.
+        """Show new light maps (H, W, 4) on the front and the back; None leaves a side as it is.
 
-        A third map is the dominant direction, a fourth the shares of probes' light.
+        A third map is the dominant direction, a fourth holds the shares of probes' light.
         """
         replaced = sum(texels is not None for texels in sides[:2])
         if self._drawn_over is not None and replaced == len(self._drawn_over):
-            self._drawn_over = None  # nothing that was drawn is left to be read back
+            self._drawn_over = None  # the GPU's drawing is overwritten: nothing to read back
         layers = self.light_layers
         for layer, texels in enumerate(sides):
             if texels is not None:
@@ -180,9 +180,9 @@ class SceneResources:
                 )  # fmt: skip
 
     def draw_light_map(self, base: NDArray[np.float16], draw: Callable[[Any], None]) -> None:
-        """Have `draw` write texels into the light map's texture, over `base` (n, H, W, 4).
+        """Let `draw` write texels into the light map's texture, over `base` (n, H, W, 4).
 
-        The base is not uploaded again while it is what was drawn over last: `draw` writes the same texels each time.
+        The same base is not uploaded again: `draw` must write the same texels each time.
         """
         if self._drawn_over is not base:
             self.show_light_map(list(base))
@@ -191,14 +191,14 @@ class SceneResources:
 
     @property
     def light_layers(self) -> list[NDArray[np.float16]]:
-        """Light maps (H, W, 4) as they are shown; read back where the GPU has drawn them."""
+        """Light maps (H, W, 4) as shown; read back if the GPU has drawn them."""
         if self._drawn_over is not None:
             self._light_layers = list(layers_of(self._layouts.device, self._light_texture))
             self._drawn_over = None
         return self._light_layers
 
     def light_of(self, name: str) -> ProbeLight:
-        """The light that the object of this name and those that share it are shown in."""
+        """The light of the object of this name, shared with other objects."""
         return next(one.light for one in self.objects if one.record.name == name)
 
     def sky_group_of(self, texels: NDArray[np.float16]) -> Any:
@@ -208,7 +208,7 @@ class SceneResources:
 
     @cached_property
     def noise_group(self) -> Any:
-        """Group 3 that shows the noise of the light map instead of its light, without a sun."""
+        """Group 3 with the noise of the light map in place of its light, without a sun."""
         both = (self.scene.noise, self.scene.noise_back)
         grey = (None if noise is None else np.repeat(noise[..., None], 3, axis=-1) for noise in both)
         dark = SunLight(self._layouts)
@@ -219,9 +219,10 @@ class SceneResources:
 def light_layers(
     front: Floats | None, back: Floats | None, direction: Floats | None = None, share: Floats | None = None
 ) -> NDArray[np.float16]:
-    """(n, H, W, 4) of maps (H, W, 3): light on the front, on the back, dominant direction; of shares (H, W, 4).
+    """Layers (n, H, W, 4): light on the front and on the back, dominant direction (H, W, 3 each), shares (H, W, 4).
 
-    Layers end with the last map there is, missing ones before it are black, and the shader reads all others as black.
+    Layers end with the last map that is not None. Missing maps before it are black; the shader reads later layers as
+    black.
     """
     maps = [None if light is None else finite(light)[0] for light in (front, back)]
     maps += [None if values is None else np.nan_to_num(values) for values in (direction, share)]

@@ -1,4 +1,4 @@
-"""Shaders are assembled from files: `#include "name.wgsl"` on a line of its own, every file at most once."""
+"""Assembles shaders from files: `#include "name.wgsl"` on a line of its own includes a file, at most once."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _INCLUDE = re.compile(r'^#include "([\w.-]+)"$', re.MULTILINE)
 
 
 def assemble(*names: str, given: Mapping[str, str] | None = None) -> str:
-    """WGSL of the named files and all they include, in order of need; `given` has the text of includes without a file.
+    """WGSL of the named files after all their includes; `given` has the text of includes without a file, by name.
 
     Raises
     ------
     FileNotFoundError
-        Where a file is in none of `FOLDERS`.
+        If a file is in none of `FOLDERS`.
     """
     done: dict[str, str] = {}
     for name in names:

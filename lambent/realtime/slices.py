@@ -1,7 +1,7 @@
-"""A frame in slices of time: an adapter in software takes seconds for a large frame, events wait for a slice at most.
+"""Frames in time slices: a software adapter takes seconds for a large frame; events wait for one slice at most.
 
-Passes are generators that draw one band of rows after another, and yield where a frame may be cut. What a pixel becomes
-does not depend on where: the bands of all passes together are the same frame to the bit.
+Passes are generators that draw one band of rows after another, and yield where a frame may be cut. Cuts do not change
+pixels: the sliced frame is identical, to the bit, to the whole one.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 SLICE_S = 0.05
-KEPT = 0.95  # of a cost per pixel, from slice to slice
-STEP_ROWS = 16  # of a band; Mesa's rasteriser in software works on tiles of 64, and gains nothing by fewer, larger ones
-Steps = Generator[None, None, None]  # of a pass
+KEPT = 0.95  # decay of the cost per pixel from slice to slice
+STEP_ROWS = 16  # granularity of a band; Mesa's software rasteriser, with tiles of 64, is no faster with larger bands
+Steps = Generator[None, None, None]  # a pass, which yields where a frame may be cut
 
 
 @dataclass(frozen=True)
@@ -27,12 +27,12 @@ class Band:
 
     @property
     def shares(self) -> tuple[float, float]:
-        """Shares of the image's height, from the top."""
+        """Begin and end as shares of the image's height, from the top."""
         return self.begin / self.height, self.end / self.height
 
     @property
     def load_op(self) -> str:
-        """The first band clears the targets of a pass, the others load them."""
+        """Load operation: the first band clears the targets of a pass, later ones load them."""
         return "load" if self.begin else "clear"
 
     def cut(self, render: Any) -> None:
@@ -47,15 +47,15 @@ class Whole:
     encoder: Any
 
     def bands(self, _: str, size: tuple[int, int]) -> Iterator[Band]:
-        """One of all rows of an image of `size`."""
+        """One band of all rows of an image of `size`."""
         yield Band(0, size[1], *size)
 
 
 @dataclass
 class Cut:
-    """A frame in slices of about `SLICE_S`, by the time that a pixel of each kind of pass took before.
+    """A frame in slices of about `SLICE_S`, sized by the measured time per pixel of each kind of pass.
 
-    `encoder` is that of the slice under way.
+    `encoder` takes the current slice.
     """
 
     costs_s: dict[str, float] = field(default_factory=dict)  # per pixel, by the kind of pass; kept between frames
@@ -69,18 +69,18 @@ class Cut:
         while begin < height:
             if kind in self.costs_s:
                 fitting = max(1, int(SLICE_S / (self.costs_s[kind] * width * STEP_ROWS))) * STEP_ROWS
-                rows = min(fitting, 2 * rows)  # by and by: the most costly rows may follow empty ones
+                rows = min(fitting, 2 * rows)  # grow gradually: costly rows may follow empty ones
             end = min(begin + rows, height)
             self._under_way = (kind, (end - begin) * width)
             yield Band(begin, end, width, height)
             begin = end
 
     def took(self, seconds: float) -> None:
-        """Learn the time of the last slice."""
+        """Update costs by the time of the last slice, s."""
         if self._under_way is None:
             return
         kind, pixels = self._under_way
         per_pixel = max(seconds, 1e-6) / max(pixels, 1)
-        # The greatest cost of the last frame or two: a band that took longer than foreseen was waited for.
+        # Keep the greatest cost of the last frame or two: underestimates make events wait.
         self.costs_s[kind] = max(per_pixel, KEPT * self.costs_s.get(kind, 0.0))
         self._under_way = None

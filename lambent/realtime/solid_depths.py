@@ -1,4 +1,4 @@
-"""Depths of all that blocks light, drawn once by any projection: holes of masked surfaces are open."""
+"""Depths of all surfaces that block light, drawn in any projection; holes of masked surfaces are open."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from lambent.realtime.targets import DEPTH_FORMAT
 
 
 class SolidDepths:
-    """Draws the objects of `resources` (a `SceneResources`) but those of some materials or names; 0 is farthest."""
+    """Draws the objects of `resources`, a `SceneResources`, except some materials or names; depth 0 is farthest."""
 
     def __init__(
         self, layouts: Layouts, resources: Any, materials: Collection[str] = (), names: Collection[str] = ()
@@ -38,7 +38,7 @@ class SolidDepths:
         )
 
     def draw(self, encoder: Any, view: Any, clip_from_world: Floats) -> None:
-        """Encode a pass that clears a view of a depth texture and draws into it."""
+        """Encode a pass that clears a depth texture's view and draws into it."""
         layouts, resources = self._layouts, self._resources
         data = np.zeros((), FRAME_DTYPE)
         data["clip_from_world"] = clip_from_world.T
@@ -62,13 +62,13 @@ class SolidDepths:
 
 
 def depth_texture(device: Any, width: int, height: int, layers: int) -> Any:
-    """Texture of depths that can be read back."""
+    """Depth texture that can be read back."""
     usage = wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_SRC
     return device.create_texture(size=(width, height, layers), format=DEPTH_FORMAT, usage=usage)
 
 
 def read_depths(device: Any, texture: Any, layer: int) -> NDArray[np.float32]:
-    """(height, width) depths of a layer; waits for the GPU. Rows of 64 texels and their multiples can be read."""
+    """(height, width) depths of a layer; waits for the GPU. The width must be a multiple of 64 texels."""
     width, height, _ = texture.size
     source = {"texture": texture, "origin": (0, 0, layer)}
     data = device.queue.read_texture(source, {"bytes_per_row": 4 * width}, (width, height, 1))

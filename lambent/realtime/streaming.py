@@ -1,4 +1,4 @@
-"""Light fields of a scene that do not fit their budget: before each frame, the maps that it needs are asked for."""
+"""Streaming of light fields larger than their budget: before each frame, requests the maps that it needs."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from lambent.realtime.structs import Record
 
 
 class Streaming:
-    """The caches of a scene, which renderers of the same resources share."""
+    """The caches of a scene, shared by renderers of the same resources."""
 
     def __init__(self, scene: BakedScene, objects: Iterable[ObjectResources]) -> None:
         self._scene, self._objects = scene, [item for item in objects if item.light.probe.most_bytes is not None]
         self._needed: dict[str, NeededPoints] = {}
 
     def follow(self, draws: Iterable[Draw], data: Record, clusters: Clusters, *, waits: bool) -> None:
-        """Ask for what the draws of a frame need; `waits`: until it is there."""
+        """Request the maps that the draws of a frame need; with `waits`, return when all are resident."""
         drawn = [draw for draw in draws if draw.item in self._objects]
         for draw in drawn:
-            _ = draw.object_group  # makes the cache at its first use
+            _ = draw.object_group  # makes the cache on first use
             if not (streams := draw.item.light.streams):
                 continue
             record = draw.item.record
@@ -52,17 +52,17 @@ class Streaming:
 
     @property
     def version(self) -> int:
-        """Grows with every map that has become ready: a frame drawn now is another one than before."""
+        """Grows whenever a map is ready, and the picture changes."""
         return sum(maps.loaded + maps.ready for maps in self._caches())
 
     @property
     def busy(self) -> bool:
-        """Whether a map that a frame asked for is not there yet."""
+        """Whether a map that a frame requested is not resident yet."""
         return any(maps.busy for maps in self._caches())
 
     @property
     def statistics(self) -> dict[str, Any]:
-        """The policy of the caches; maps of light fields with a budget, those resident, their MB; hits and misses."""
+        """Policy of the caches; for light fields with a budget: maps, resident maps, their MB, hits and misses."""
         caches = list(self._caches())
         if not caches:
             return {}

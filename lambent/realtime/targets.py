@@ -1,4 +1,4 @@
-"""Textures that frames are drawn into, and the time that each pass took."""
+"""Render targets of frames, and GPU times of passes."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ DEPTH_FORMAT, DISPLAY_FORMAT = "depth32float", "rgba8unorm"
 
 
 def target_texture(device: Any, size: tuple[int, ...], format: str, levels: int = 1) -> Any:
-    """Texture of a size (width, height) or (width, height, layers) that passes draw into and read."""
+    """Texture of size (width, height) or (width, height, layers) for passes to draw into and read."""
     usage = wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_SRC
     return device.create_texture(size=size, format=format, mip_level_count=levels, usage=usage)
 
 
 def pixels(device: Any, texture: Any) -> NDArray[Any]:
-    """(height, width, 3) texels of a texture of four channels, row 0 on top; waits for the GPU."""
+    """(height, width, 3) texels of a four-channel texture, row 0 on top; waits for the GPU."""
     width, height, _ = texture.size
     dtype = np.dtype({"rgba8unorm": np.uint8, "rgba16float": np.float16, "rgba32float": np.float32}[texture.format])
     rows = {"bytes_per_row": 4 * width * dtype.itemsize}
@@ -29,20 +29,20 @@ def pixels(device: Any, texture: Any) -> NDArray[Any]:
 
 
 def stored(views: Iterable[Any], load_op: str = "clear") -> list[dict[str, Any]]:
-    """Colour attachments of a render pass that keeps what it draws."""
+    """Colour attachments of a render pass that stores its result."""
     return [{"view": view, "load_op": load_op, "store_op": "store"} for view in views]
 
 
 @dataclass(frozen=True)
 class Target:
-    """Depth (reversed: 0 is infinity) and radiance of one size."""
+    """Textures of depth (reversed: 0 is infinity) and radiance."""
 
     depth: Any
     radiance: Any
 
 
 class Targets:
-    """Targets of the last size; others are forgotten."""
+    """Targets of the latest size; other sizes are released."""
 
     def __init__(self, device: Any) -> None:
         self._device = device
@@ -50,15 +50,15 @@ class Targets:
         self._made: dict[str, Any] = {}
 
     def fit(self, size: tuple[int, int], format: str, *, passing: bool = False) -> Target:
-        """What light is drawn into; `format` is that of the radiance.
+        """The target for light of a size; `format` is the format of the radiance.
 
-        Passing frames have a target of their own: the last of them stays while others are drawn.
+        Passing frames have a separate target, so that the last one stays while other frames are drawn.
         """
         name = f"{format}, passing" if passing else format
         return Target(self._texture("depth", size, DEPTH_FORMAT), self._texture(name, size, format))
 
     def display(self, name: str, size: tuple[int, int]) -> Any:
-        """A display image that stays here."""
+        """The display image `name`; its texture stays until the size changes."""
         return self._texture(name, size, DISPLAY_FORMAT)
 
     def _texture(self, name: str, size: tuple[int, int], format: str) -> Any:
@@ -70,9 +70,9 @@ class Targets:
 
 
 class PassTimer:
-    """GPU time per pass by timestamp queries; measures nothing where the adapter has none."""
+    """GPU time per pass by timestamp queries; measures nothing on adapters without them."""
 
-    PASSES = 512  # timed in one go: planar reflection buffers have one for each of their levels
+    PASSES = 512  # most timed passes: planar reflection buffers have one per MIP level
 
     def __init__(self, device: Any) -> None:
         self._device, self._names = device, []  # type: Any, list[str]
@@ -84,7 +84,7 @@ class PassTimer:
             self._buffer = device.create_buffer(size=16 * self.PASSES, usage=usage)
 
     def writes(self, name: str) -> dict[str, Any]:
-        """Arguments of `begin_render_pass` that time the pass."""
+        """Arguments of `begin_render_pass` that time the pass `name`."""
         if self._queries is None or len(self._names) == self.PASSES:
             return {}
         at = 2 * len(self._names)
@@ -99,7 +99,7 @@ class PassTimer:
         self._resolved, self._names = self._names, []
 
     def read(self) -> dict[str, float]:
-        """Milliseconds of the last frame by the passes' names; waits for the GPU."""
+        """Milliseconds of the last frame by pass name; waits for the GPU."""
         if not self._resolved:
             return {}
         data = self._device.queue.read_buffer(self._buffer, size=16 * len(self._resolved))

@@ -1,14 +1,13 @@
-"""Textures of materials on the GPU. MIP levels are means of quantities that may be averaged:
+"""Textures of materials on the GPU. MIP levels average the following quantities:
 
 diffuse, specular   bytes, sRGB encoded, times a scale per channel: half a step is less than the eye sees
-roughness           the mean of squares: slopes' variances add
-normal              mean slopes, and twice the variance of the slopes within a texel (0 on level 0), which widens
-                    the lobes: a texel of bumps reflects as widely as their slopes differ (Olano & Baker
-                    2010, "LEAN mapping", without the covariance)
+roughness           squares, because variances of slopes add
+normal              slopes, and twice the variance of the slopes within a texel (0 on level 0), which widens the
+                    lobes (Olano & Baker 2010, "LEAN mapping", without the covariance)
 direction           cosine and sine of the doubled angle
-opacity             every level has the share of surface that level 0 has (Castano 2010), so that leaves keep
-                    their area where the test at the cutoff is sharp; beside it the share of what passes the test
-                    on level 0, which is how much is covered where a pixel is larger than a texel
+opacity             opacity, scaled so that on every level the same share of texels passes the cutoff (Castano
+                    2010) and leaves keep their area; and the share of level-0 texels that pass, which is the
+                    coverage of pixels larger than a texel
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from lambent.scenes.textures import CHANNELS, doubled_angle, halved, parts, slop
 KINDS = tuple(CHANNELS)  # order of the bindings, and of the bits of TEXTURES, in shaders/material.wgsl
 BITS = {kind: 1 << i for i, kind in enumerate(KINDS)}
 WIDENING = BITS["roughness"] | BITS["normal"]  # textures that make lobes wider
-ROUGH_SHARE = 0.9  # of a texture's texels are at most as rough as what chooses the number of samples
+ROUGH_SHARE = 0.9  # quantile of a texture's roughness that sets the number of samples
 ANISOTROPY = 8
 _ALL_HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16)
 
@@ -51,7 +50,7 @@ def normal_levels(normals: Floats) -> list[Floats]:
 
 
 def opacity_levels(opacity: Floats, cutoff: float) -> list[Floats]:
-    """Levels scaled so that each is at or above the cutoff on the same share of its texels."""
+    """MIP levels, scaled so that the same share of texels is at or above the cutoff on each."""
     levels = chain(opacity)
     share = float((levels[0] >= cutoff).mean())
     if not 0 < share < 1:
@@ -60,14 +59,14 @@ def opacity_levels(opacity: Floats, cutoff: float) -> list[Floats]:
 
 
 def _with_share(opacity: Floats, cutoff: float, share: float) -> Floats:
-    """`opacity` times a factor; the factor is found between texels, so that a level of few texels errs least."""
+    """`opacity` times a factor for the given share; interpolated between texels, to be accurate on small levels."""
     ordered = np.sort(opacity, axis=None)[::-1]
     edge = np.interp(share * len(ordered), np.arange(len(ordered)) + 0.5, ordered)
     return np.asarray(opacity * np.float32(cutoff / max(float(edge), 1e-3)))
 
 
 def encoded(texels: Floats) -> tuple[list[NDArray[np.uint8]], tuple[float, ...]]:
-    """Levels (H, W, 4) as sRGB bytes, and the scale (3) of their decoded values."""
+    """MIP levels (H, W, 4) as sRGB bytes, and the scale (3,) of their decoded values."""
     scale = np.maximum(texels.max(axis=(0, 1)).astype(float), 1e-6)
     with np.errstate(invalid="ignore"):
         relative = np.clip(np.nan_to_num(_ALL_HALVES.astype(float)[:, None] / scale), 0, 1)
@@ -91,13 +90,13 @@ class BoundTexture:
 
 @dataclass(frozen=True)
 class BoundTextures:
-    """Textures in a material's bind group, in the order of KINDS; `bits` says which are no stand-ins."""
+    """Textures in a material's bind group, in the order of KINDS; `bits` marks the ones that are not placeholders."""
 
     textures: tuple[BoundTexture, ...]
     bits: int = 0
     cutoff: float = 0.5
     lie: NDArray[np.float32] = field(default_factory=lambda: np.zeros((2 * len(KINDS), 4), np.float32))
-    rough: float = 1.0  # factor on the roughness that most of the surface stays below
+    rough: float = 1.0  # factor on the roughness that ROUGH_SHARE of the texels do not exceed
 
     @property
     def masked(self) -> bool:
@@ -113,7 +112,7 @@ class TextureCache:
     def __init__(self, device: Any) -> None:
         self._device = device
         self._made: dict[tuple[str, int, float], BoundTexture] = {}
-        self._kept: list[Any] = []  # arrays, so that no other comes to stand at a made one's address
+        self._kept: list[Any] = []  # arrays kept alive, because the cache identifies them by address
         self._none = BoundTexture(self._uploaded([np.full((1, 1, 4), 255, np.uint8)], "rgba8unorm"))
         self.sampler = device.create_sampler(
             mag_filter="linear", min_filter="linear", mipmap_filter="linear", max_anisotropy=ANISOTROPY,
@@ -121,7 +120,7 @@ class TextureCache:
         )  # fmt: skip
 
     def of_material(self, textures: MaterialTextures | None) -> BoundTextures:
-        """The textures of one material; stand-ins of one texel where it has none."""
+        """The textures of one material, with placeholders of one texel for missing ones."""
         there = parts(textures) if textures is not None else {}
         if textures is None or not there:
             return BoundTextures((self._none,) * len(KINDS))
@@ -161,7 +160,7 @@ class TextureCache:
 
 
 def bits_that_show(bits: int, lobes: int, anisotropic: bool) -> int:
-    """Bits of the textures that shading reads: opacity is tested before, and only lobes read roughness and the like."""
+    """Bits of the textures that shading reads: opacity is tested earlier; roughness and the like need lobes."""
     shown = bits & ~BITS["opacity"]
     if not lobes:
         return shown & (BITS["diffuse"] | BITS["normal"])

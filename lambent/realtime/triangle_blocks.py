@@ -14,13 +14,13 @@ CORNERS = np.array([(0.5, 0.5), (1.5, 0.5), (0.5, 1.5)])  # of a triangle in its
 
 
 def corners_in_blocks(count: int, across: int) -> Floats:
-    """(count, 3, 2) corners of triangles in texels, column before row; blocks lie in rows of `across`."""
+    """(count, 3, 2) corners (column, row) of triangles, texels; blocks lie in rows of `across`."""
     row, column = np.divmod(np.arange(count), across)
     return np.asarray(2 * np.stack([column, row], axis=-1)[:, None] + CORNERS)
 
 
 def filled_blocks(values: Floats, across: int) -> Floats:
-    """Texels (2 rows, 2 across, C) of values (count, 3, C) at the triangles' corners, at least 0."""
+    """Light map (2 rows, 2 across, C) of values (count, 3, C) at the triangles' corners, clamped to 0 or more."""
     count, _, channels = values.shape
     row, column = np.divmod(np.arange(count), across)
     texels = np.zeros((2 * -(-count // across), 2 * across, channels), np.float32)
@@ -31,9 +31,9 @@ def filled_blocks(values: Floats, across: int) -> Floats:
 
 
 def places_in_blocks(finer: int) -> Floats:
-    """(2 finer, 2 finer, 3) weights of a triangle's corners at the middles of finer texels of its block.
+    """Weights (2 finer, 2 finer, 3) of a triangle's corners at the centres of finer texels of its block.
 
-    Those beyond the triangle have the weights of a place on its border.
+    Texels outside the triangle have the weights of a point on its border.
     """
     at = (np.arange(2 * finer) + 0.5) / finer - 0.5
     b, c = np.maximum(np.stack(np.meshgrid(at, at)), 0)

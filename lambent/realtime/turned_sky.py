@@ -1,8 +1,8 @@
-"""A baked scene under its sky turned about the vertical: relighting by light fields (thesis R, "Relighting").
+"""Rotates the sky of a baked scene about the vertical: relighting by light fields (thesis R, "Relighting").
 
-What is seen of the sky turns at once: behind everything, in light fields, where they say that nothing is hit, and in
-probes whose distances say so. The sun turns with it, and its direct light and shadows are drawn anew. What the light
-map holds stays as it was baked: the diffuse light of the sky, and all that surfaces throw on each other.
+The visible sky rotates at once: in the background, in rays of light fields that hit nothing, and in probes whose
+distances mark the sky. The sun rotates with it, and its direct light and shadows are redrawn. The light map stays as
+baked: diffuse skylight and light between surfaces.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from lambent.store.contract import FAR
 
 
 def under_turned_sky(scene: BakedScene, degrees: float) -> BakedScene:
-    """The scene with its sky turned by degrees from -z towards -x, as `ImageEnvironment.rotation_deg` counts."""
+    """The scene with its sky rotated by degrees from -z towards -x, like `ImageEnvironment.rotation_deg`."""
     if scene.environment is None or degrees % 360 == 0:
         return scene
     rotation = turn("y", degrees)
@@ -61,9 +61,9 @@ def under_turned_sky(scene: BakedScene, degrees: float) -> BakedScene:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TurnedGroups(GroupArrays):
-    """Light by group of a scene under a turned sky.
+    """Light by group of a scene under a rotated sky.
 
-    `whole` and `clear` are the levels of the sky with the sun's disc and without: the disc is of the sun's group.
+    `whole` and `clear` are the sky's MIP levels with and without the sun's disc, which belongs to the sun's group.
     """
 
     base: GroupArrays
@@ -73,7 +73,7 @@ class TurnedGroups(GroupArrays):
     rotation: Floats
 
     def probe(self, name: str) -> Floats | None:
-        """Radiance of the probe of an object by group, as that of `base`."""
+        """Radiance of an object's probe by group, laid out as in `base`."""
         by_group, sky, sun = self.base.probe(name), self.number(SKY), self.number(SUN)
         if by_group is None or sky is None or (probe := self.baked[name]).distance is None:
             return by_group
@@ -91,7 +91,7 @@ def _levels(cube: Floats) -> list[Floats]:
 
 
 def _of(levels: list[Floats], side: int) -> Sky:
-    """The sky for maps of side^2 texels over the sphere: of the level whose texels are about as large."""
+    """The sky for maps of side^2 texels over the sphere: the level with texels of about the same size."""
     fits = next((level for level in levels if 6 * level.shape[1] ** 2 <= 1.5 * side**2), levels[-1])
     return lambda w: sample(fits, w)
 
@@ -102,7 +102,7 @@ def _seen(sky: Sky, n: int) -> Floats:
 
 
 def _probe_under(probe: Probe, levels: list[Floats], rotation: Floats) -> Probe:
-    """A probe whose distances say where it sees the sky; others stay."""
+    """The probe under the rotated sky; unchanged if it has no distances, which mark the sky."""
     if probe.distance is None:
         return probe
     n = probe.radiance.shape[1]
@@ -111,7 +111,7 @@ def _probe_under(probe: Probe, levels: list[Floats], rotation: Floats) -> Probe:
 
 
 def _sees_sky(distance: Floats, n: int) -> Flags:
-    """(6, n, n) texels of a probe that hit nothing, of distances (6, m, m)."""
+    """Texels (6, n, n) of a probe that see the sky, by its distances (6, m, m)."""
     at = np.minimum((np.arange(n) + 0.5) * distance.shape[1] / n, distance.shape[1] - 1).astype(int)
     return np.asarray(distance[:, at[:, None], at] >= 0.999 * FAR)
 

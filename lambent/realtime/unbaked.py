@@ -1,7 +1,7 @@
-"""Shapes under an environment, drawn without a bake: for the benches and the preview of a material.
+"""Shapes under an environment, drawn without a bake, for benches and material previews.
 
-All light comes from afar, so one probe serves every shape, and the irradiance of a point depends on its normal alone.
-Shapes neither shadow nor light each other.
+All light is distant, so one probe serves every shape, and the irradiance of a point depends on its normal alone. Shapes
+neither shadow nor light each other.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from lambent.scenes.geometry import merge
 from lambent.scenes.scene import Mesh
 from lambent.store.contract import ObjectRecord, SceneRecord
 
-COARSE = 16  # texels along a face of the environment that diffuse light is summed from
+COARSE = 16  # texels along a face of the environment for the sum of diffuse light
 CAMERA = Camera(name="front", position=(0.0, 0.0, 4.2), target=(0.0, 0.0, 0.0), fov_y_deg=36.0)
 
 
@@ -39,9 +39,9 @@ def unbaked_scene(
     *,
     name: str = "unbaked",
 ) -> BakedScene:
-    """All `meshes` in one material, each with a probe at the origin that sees `environment` (6, N, N, 3).
+    """Scene of all `meshes` in one material, each with a probe at the origin that sees `environment` (6, N, N, 3).
 
-    Every point receives the same `irradiance`; see `with_diffuse_light`.
+    Every point receives the same `irradiance`, W/m^2; see `with_diffuse_light`.
     """
     whole, records, first = merge(meshes.values()), [], 0
     for key, mesh in meshes.items():
@@ -67,9 +67,9 @@ def unbaked_scene(
 
 
 def with_diffuse_light(scene: BakedScene) -> BakedScene:
-    """The scene with light maps that hold the irradiance from its environment at every vertex, on both sides.
+    """The scene with light maps of the irradiance from its environment at every vertex, on both sides.
 
-    Triangles no longer share vertices: see `triangle_blocks`.
+    Triangles of the result do not share vertices (see `triangle_blocks`).
     """
     assert scene.environment is not None, "a scene without an environment has no light from afar"
     corners = scene.faces.reshape(-1)
@@ -95,7 +95,7 @@ def with_diffuse_light(scene: BakedScene) -> BakedScene:
 
 
 def irradiance(environment: Floats, normals: Floats) -> Floats:
-    """(V, 3) in W/m^2 at unit normals (V, 3) under an environment (6, N, N, 3); summed over a coarser cube."""
+    """Irradiance (V, 3), W/m^2, at unit normals (V, 3) under an environment (6, N, N, 3), summed on a coarser cube."""
     unit = max(1.0, float(np.max(environment)) / HALF_MAX)  # a sun is brighter than half floats
     cube = next(level for level in mip_chain(finite(environment / unit)[0]) if level.shape[1] <= COARSE)
     n = cube.shape[1]

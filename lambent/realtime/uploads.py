@@ -1,4 +1,4 @@
-"""Arrays to textures and buffers."""
+"""Uploads of arrays to textures and buffers, and reading back."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from lambent.core.colour import HALF_MAX
 
 
 def half(values: Floats) -> NDArray[np.float16]:
-    """As half floats, cut at the largest of them."""
+    """Half floats, clamped to their largest value."""
     return np.clip(values, -HALF_MAX, HALF_MAX).astype(np.float16)
 
 
 def whole_words(data: NDArray[Any]) -> NDArray[np.uint8]:
-    """Bytes of an array, padded to whole words as buffers are written."""
+    """Bytes of an array, padded to whole words of 4 bytes, as writes to buffers require."""
     flat = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
     return np.pad(flat, (0, -len(flat) % 4)) if len(flat) % 4 else flat
 
@@ -32,9 +32,9 @@ def with_alpha(rgb: Floats) -> NDArray[np.float16]:
 
 
 def upload(device: Any, levels: Sequence[NDArray[Any]], format: str, usage: int = 0) -> Any:
-    """Texture of MIP levels (layers, rows, columns, channels) whose texels are those of `format`.
+    """Texture of MIP levels (layers, rows, columns, channels) with texels of `format`.
 
-    It is sampled and written to, and has the `usage` that is given besides.
+    It can be sampled and written to; `usage` adds further usages.
     """
     layers, height, width = levels[0].shape[:3]
     usage |= wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
@@ -52,7 +52,7 @@ def upload(device: Any, levels: Sequence[NDArray[Any]], format: str, usage: int 
 
 
 def layers_of(device: Any, texture: Any) -> NDArray[np.float16]:
-    """Texels (layers, height, width, 4) of a texture of half floats, read back; waits for the GPU."""
+    """Texels (layers, height, width, 4) of a half-float texture, read back; waits for the GPU."""
     width, height, layers = texture.size
     rows = {"bytes_per_row": 8 * width, "rows_per_image": height}
     data = device.queue.read_texture({"texture": texture}, rows, (width, height, layers))
@@ -60,5 +60,5 @@ def layers_of(device: Any, texture: Any) -> NDArray[np.float16]:
 
 
 def cube_texture(device: Any, levels: Sequence[Floats], format: str = "rgba16float") -> Any:
-    """Cube texture of MIP levels (6, n, n, 3) or, for r16float, (6, n, n, 1)."""
+    """Cube texture of MIP levels (6, n, n, 3), or (6, n, n, 1) for r16float."""
     return upload(device, [with_alpha(level) if format == "rgba16float" else half(level) for level in levels], format)

@@ -1,1 +1,1 @@
-"""Light that answers other colours on a GPU: what `lambent.core.answer` computes, by compute shaders."""
+"""Light that answers edited colours, on a GPU: compute shaders for `lambent.core.answer`."""

@@ -1,7 +1,7 @@
-"""One answer in the memory of a GPU, from albedos to the irradiance of texels.
+"""One answer in GPU memory, from albedos to the irradiance of texels.
 
-Light groups have arrays of their own, so that a binding holds one group. Sweeps over the patches go on until every
-group's solution stands, some in each submission, so that a frame waits for few; all else is one submission.
+Each light group has its own arrays, so that a binding holds one group. Sweeps over the patches are split into several
+submissions until every group has converged, so that a frame waits for few sweeps; everything else is one submission.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from lambent.core.answer_rays import Rays
 from lambent.core.arrays import Floats
 from lambent.realtime.answered.stages import GROUP, Call, NoRoom, Stages
 
-NEAR = 8  # points of a texel, as the shader says
-GPU_TOLERANCE = 1e-5  # relative change of a patch in the last sweep
-GPU_SWEEPS = 2 * SWEEPS  # at most: Jacobi's method takes about twice those of Gauss and Seidel's
-SWEEPS_AT_ONCE = 32  # of a submission, at most
-STEPS_AT_ONCE = 1 << 15  # of loops in a submission, for frames to wait little; llvmpipe ends loops after 65535 steps
+NEAR = 8  # points per texel, as in the shader
+GPU_TOLERANCE = 1e-5  # largest relative change of a patch in the last sweep
+GPU_SWEEPS = 2 * SWEEPS  # at most: Jacobi's method takes about twice as many as Gauss-Seidel
+SWEEPS_AT_ONCE = 32  # most sweeps per submission
+STEPS_AT_ONCE = 1 << 15  # loop steps per submission: frames wait little, and llvmpipe ends loops after 65535 steps
 LIGHT_BYTES = 12  # three float32
 
 
 @dataclass(frozen=True, eq=False)
 class TexelsOnGpu:
-    """Irradiance of T texels that answer an edit, by light group in one buffer each."""
+    """Irradiance of T answering texels, in one buffer per light group."""
 
     stages: Stages
     buffers: tuple[Any, ...]
@@ -42,7 +42,7 @@ class TexelsOnGpu:
         return np.stack([self.stages.read(one, np.float32, count).reshape(-1, 3) for one in self.buffers])
 
     def draw(self, texture: Any, sides: int, per_unit: float) -> None:
-        """Write the light, of one group and times `per_unit`, to its texels on one or both sides of a light map."""
+        """Write the light of one group, times `per_unit`, to its texels in a light map with 1 or 2 `sides`."""
         (buffer,) = self.buffers
         parameters = len(self.texels), texture.size[0], sides, float(per_unit)
         resources = self._places, buffer, texture.create_view(dimension="2d-array")
@@ -54,7 +54,7 @@ class TexelsOnGpu:
 
 
 class Unsolved(Exception):
-    """Light between patches does not stand."""
+    """Light between patches has not converged."""
 
 
 class GpuAnswer:
@@ -65,17 +65,17 @@ class GpuAnswer:
     reference : (G, T, 3)
         `answer.reference()`.
     texels : (T,) uint32
-        Twice row * width + column in the light map, plus 1 on the other side.
+        2 (row * width + column) in the light map, plus 1 on the back.
 
     Raises
     ------
     NoRoom
-        Where an array does not fit.
+        If an array does not fit.
     """
 
     def __init__(self, device: Any, answer: Answer, reference: Floats, texels: NDArray[np.uint32]) -> None:
         self._stages, self._texels = Stages(device), texels
-        self._lock = threading.Lock()  # an edit's albedos and its submission go together
+        self._lock = threading.Lock()  # keeps an edit's albedos and its submission together
         self._shared = _Shared(self._stages, answer)
         numbers = range(len(answer.direct))
         self._solvers = [_Solver(self._stages, self._shared, answer, group) for group in numbers]
@@ -96,14 +96,14 @@ class GpuAnswer:
         ]
 
     def begin(self, albedos: Albedos) -> TexelsOnGpu:
-        """Solve for the light of patches with other albedos, and ask for that of texels without waiting for it.
+        """Solve for the light of patches with new albedos; start the light of texels without waiting for it.
 
         Raises
         ------
         NoRoom
-            Where the adapter has no more memory.
+            If the adapter has no more memory.
         Unsolved
-            Where light grows from sweep to sweep: the cores have a bound for that.
+            If the light grows from sweep to sweep; the CPU's solver bounds it.
         """
         found = tuple(self._stages.empty(len(self._texels) * LIGHT_BYTES) for _ in self._groups)
         with self._lock:
@@ -119,12 +119,12 @@ class GpuAnswer:
         return np.stack([solver.light() for solver in self._solvers])
 
     def sweeps(self) -> list[tuple[int, bool]]:
-        """Sweeps of each group in the last edit, and whether its solution stands: for tests."""
+        """Sweeps of each group in the last edit, and whether it converged: for tests."""
         return [solver.outcome() for solver in self._solvers]
 
 
 class _Shared:
-    """What all light groups read."""
+    """Buffers that all light groups read."""
 
     def __init__(self, stages: Stages, answer: Answer) -> None:
         patches, points, rays = answer.patches, answer.points, answer.rays
@@ -161,7 +161,7 @@ class _Solver:
         self.indirect, sent, self._outcome = stages.empty(size), stages.empty(size), stages.empty(8)
         given = (shared.row_starts, shared.row_entries, shared.patches, shared.albedos, stages.buffer(direct),
                  self.indirect, sent, self._outcome)  # fmt: skip
-        steps = -(-self._patches // GROUP) * (shared.longest_row + 3)  # of a thread in a sweep
+        steps = -(-self._patches // GROUP) * (shared.longest_row + 3)  # per thread and sweep
         sweeps = max(1, min(SWEEPS_AT_ONCE, GPU_SWEEPS, STEPS_AT_ONCE // max(1, steps)))
         self.submissions = -(-GPU_SWEEPS // sweeps)  # at most
         self.begins, self.goes_on = (
@@ -173,13 +173,13 @@ class _Solver:
         return self._stages.read(self.indirect, np.float32, 3 * self._patches).reshape(-1, 3)
 
     def outcome(self) -> tuple[int, bool]:
-        """Sweeps taken, and whether the solution stands."""
+        """Sweeps taken, and whether the solution has converged."""
         sweeps, stands = self._stages.read(self._outcome, np.uint32, 2)
         return int(sweeps), bool(stands)
 
 
 def _solve(stages: Stages, solvers: Sequence[_Solver]) -> bool:
-    """Solve for the light of patches in all groups, and tell whether it stands; waits for the GPU."""
+    """Solve for the light of patches in all groups; returns whether it converged. Waits for the GPU."""
     stages.submit([solver.begins for solver in solvers])
     submitted = 1
     while left := [one for one in solvers if submitted < one.submissions and not one.outcome()[1]]:
@@ -189,7 +189,7 @@ def _solve(stages: Stages, solvers: Sequence[_Solver]) -> bool:
 
 
 class _Group:
-    """The arrays of one light group, and its calls after its patches are solved for."""
+    """The arrays of one light group, and its calls after the solution for its patches."""
 
     def __init__(
         self, stages: Stages, shared: _Shared, solver: _Solver, answer: Answer, group: int, gathered: Floats,
@@ -213,7 +213,7 @@ class _Group:
         self._least = _least(reference)
 
     def calls(self, found: Any) -> Iterator[Call]:
-        """Stages in order, the last of which writes the irradiance of texels to `found`."""
+        """Stages in order; the last writes the irradiance of texels to `found`."""
         for step in range(PASSES):
             yield self._first if step == 0 else self._next
             yield self._gathers_last if step == PASSES - 1 else self._gathers
@@ -229,12 +229,12 @@ class _Group:
 
 
 def _least(light: Floats) -> float:
-    """Light below which a ratio to light (n, 3) says nothing."""
+    """Threshold for ratios to light (n, 3): with less light, the ratio is 1."""
     return float(least_light(light[None])[0, 0, 0]) if len(light) else 0.0
 
 
 def packed_near(near: Neighbours) -> NDArray[np.uint32]:
-    """(T, 10) words: eight points, then their eight shares of 8 bits."""
+    """(T, 10) words: eight points, then eight shares of 8 bits."""
     missing = NEAR - near.points.shape[1]
     if missing < 0:
         raise NoRoom
@@ -244,7 +244,7 @@ def packed_near(near: Neighbours) -> NDArray[np.uint32]:
 
 
 def gpu_answer(device: Any, answer: Answer, reference: Floats, texels: NDArray[np.uint32]) -> GpuAnswer | None:
-    """An answer on a device; None where it has no room, so that the cores compute."""
+    """An answer on a device; None if it does not fit, so that the CPU computes it."""
     try:
         return GpuAnswer(device, answer, reference, texels)
     except NoRoom:

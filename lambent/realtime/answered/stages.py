@@ -1,4 +1,4 @@
-"""Compute shaders of the answer, and the buffers they share, within WebGPU's default limits."""
+"""Compute shaders of the answer and their buffers, within WebGPU's default limits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from lambent.realtime.layouts import Layouts
 from lambent.realtime.shader_source import assemble
 from lambent.realtime.uploads import whole_words
 
-GROUP = 256  # threads of a workgroup, as the shaders say
+GROUP = 256  # threads of a workgroup, as in the shaders
 READ, WRITTEN = "storage", "written storage"
 BINDINGS = {
     "solve": ("uniform", READ, READ, READ, READ, READ, WRITTEN, WRITTEN, WRITTEN),
@@ -38,17 +38,17 @@ const HALF_MAX = {HALF_MAX:.9g}f;
 
 
 class NoRoom(Exception):
-    """The adapter cannot hold an answer, or a shader could not see all of an array."""
+    """The adapter cannot hold an answer, or an array exceeds a shader's binding."""
 
 
 def computes(device: Any) -> bool:
-    """Whether a device computes answers faster than the processor's cores: a real GPU does."""
+    """Whether a device computes answers faster than the CPU, as hardware GPUs do."""
     return not adapter_info(device).is_software
 
 
 @dataclass(frozen=True)
 class Call:
-    """One dispatch of a stage with all that it binds."""
+    """One dispatch of a stage with its bindings."""
 
     stage: str
     group: Any
@@ -56,7 +56,7 @@ class Call:
 
 
 class Stages:
-    """The stages on one device. Threads may submit at the same time."""
+    """The stages on one device. Threads may submit concurrently."""
 
     def __init__(self, device: Any) -> None:
         self.device, self._layouts = device, Layouts(device)
@@ -70,14 +70,14 @@ class Stages:
         Raises
         ------
         NoRoom
-            Where the adapter does not have it.
+            If the adapter has no room, or the array exceeds a shader's binding.
         """
         made = self.empty(data.nbytes)
         self.write(made, data)
         return made
 
     def empty(self, size: int) -> Any:
-        """A buffer of `size` bytes of 0; see `buffer`."""
+        """A buffer of `size` zero bytes; raises like `buffer`."""
         limits = self.device.limits
         if size > min(limits["max-storage-buffer-binding-size"], limits["max-buffer-size"]):
             raise NoRoom
@@ -93,18 +93,18 @@ class Stages:
             return
         try:
             self.device.queue.write_buffer(buffer, 0, whole_words(data))
-        except wgpu.GPUOutOfMemoryError as error:  # the copy on its way takes room, too
+        except wgpu.GPUOutOfMemoryError as error:  # the staging copy needs memory, too
             raise NoRoom from error
 
     def read(self, buffer: Any, dtype: type, count: int) -> NDArray[Any]:
-        """The first `count` numbers of a buffer; waits for the GPU."""
+        """The first `count` elements of a buffer as an array (count,); waits for the GPU."""
         size = count * np.dtype(dtype).itemsize
         if count == 0:
             return np.zeros(0, dtype)
         return np.frombuffer(self.device.queue.read_buffer(buffer, size=size), dtype)
 
     def call(self, stage: str, parameters: tuple[int | float, ...], *resources: Any, threads: int) -> Call:
-        """A dispatch over so many threads; `parameters` begins the stage's uniform, `resources` are in its order."""
+        """A dispatch over `threads`; `parameters` begin the stage's uniform, `resources` are in binding order."""
         words = [np.float32(one).view(np.uint32) if isinstance(one, float) else np.uint32(one) for one in parameters]
         uniform = self._layouts.buffer("UNIFORM", np.array([*words, *[0] * (4 - len(words))], np.uint32))
         workgroups = -(-threads // GROUP)
@@ -113,7 +113,7 @@ class Stages:
         return Call(stage, self._layouts.group(self._bindings[stage], uniform, *resources), workgroups)
 
     def submit(self, calls: Iterable[Call]) -> None:
-        """Send calls that read what those before them wrote, in one submission."""
+        """Submit calls together, in order: each may read the results of earlier ones."""
         encoder = self.device.create_command_encoder()
         compute = encoder.begin_compute_pass()
         for call in calls:

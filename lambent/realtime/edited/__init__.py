@@ -1,4 +1,4 @@
 """Edited pictures on a GPU: sums of transport rows, folding of curves, and the picture in a texture.
 
-Everything here takes plain arrays, with the meaning that `lambent.editing` gives them; the window joins both.
+All functions take plain arrays, as defined in `lambent.editing`; the window connects both packages.
 """

@@ -1,6 +1,6 @@
-"""The edited picture in a texture: a frame's sums, then every layer over what is not edited, in one submission.
+"""The edited picture in a texture: one submission sums a frame and adds every layer to the unedited background.
 
-Times of a frame on the GPU: `Canvas.milliseconds`.
+GPU time of a frame: `GpuCanvas.milliseconds`.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from lambent.realtime.edited.commands import Commands
 from lambent.realtime.edited.layer import GpuLayer, texels
 from lambent.realtime.targets import pixels
 
-FORMAT = "rgba32float"  # half floats end at 65504; the sun's light does not
-TEXELS = 16  # of a row: what is copied between buffers and textures begins at multiples of 256 bytes
+FORMAT = "rgba32float"  # sunlight may exceed 65504, the largest half float
+TEXELS = 16  # rows are padded to a multiple: copies between buffers and textures need rows of a multiple of 256 bytes
 
 
 class GpuCanvas:
-    """As `lambent.editing.canvas.Canvas`, in the memory of a GPU.
+    """`lambent.editing.canvas.Canvas` in GPU memory.
 
     Parameters
     ----------
     background : (H, W, 3) float32
-        Linear radiance that layers are added to.
+        Linear radiance, W/(sr m^2), that layers are added to.
 
     Attributes
     ----------
     texture
-        (H, W) `FORMAT`, linear radiance, alpha 1, as last composed; the same texture for the canvas's life.
+        (H, W) `FORMAT`, linear radiance, alpha 1, as last composed; the same texture for the lifetime of the canvas.
     """
 
     def __init__(self, device: Any, background: Image) -> None:
@@ -48,11 +48,11 @@ class GpuCanvas:
         self.texture = device.create_texture(size=(self._width, height, 1), format=FORMAT, usage=usage)
 
     def layer(self, pixel: Indices, theta_o: Floats, texture: Floats | None) -> GpuLayer:
-        """A new layer over pixels (P,), with the viewer's angle (P,) and a texture (P, 3) or none."""
+        """A new layer over pixels (P,), with the viewer's angle (P,), rad, and a texture (P, 3) or None."""
         return GpuLayer(self._commands, self._texels(pixel), theta_o, texture, self._image)
 
     def compose(self, shown: Sequence[tuple[Any, NDArray[np.float32]]]) -> None:
-        """Draw the sum of this canvas's layers, each with its scale (3,), into the texture, in one submission."""
+        """Add layers of this canvas, each times its scale (3,), to the background in the texture; one submission."""
         self._commands.copy(lambda to: to.copy_buffer_to_buffer(self._background, 0, self._image, 0, self._bytes))
         for layer, scale in shown:
             layer.compose(scale)
@@ -63,7 +63,7 @@ class GpuCanvas:
         self._commands.submit()
 
     def image(self) -> Image:
-        """(H, W, 3) float32, read back from the GPU: to save the picture, not to show it."""
+        """(H, W, 3) float32, read back from the GPU; for saving the picture, not for display."""
         return np.array(pixels(self._commands.device, self.texture))
 
     def finish(self) -> None:
@@ -71,7 +71,7 @@ class GpuCanvas:
         self._commands.read(self._background, np.uint8, 4)
 
     def milliseconds(self) -> float | None:
-        """Time of the last submission's compute passes on the GPU; None where the adapter has no timers."""
+        """GPU time of the last submission's compute passes; None on adapters without timers."""
         return self._commands.timer.read().get("edit")
 
     def _texels(self, pixel: Indices) -> NDArray[np.uint32]:

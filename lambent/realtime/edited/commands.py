@@ -18,10 +18,10 @@ from lambent.realtime.shader_source import assemble
 from lambent.realtime.targets import PassTimer
 from lambent.realtime.uploads import whole_words
 
-GROUP = 256  # threads of a workgroup, as the shaders say
-REACH = 64 << 10  # bytes of parameters that a dispatch sees
+GROUP = 256  # threads of a workgroup, as in the shaders
+REACH = 64 << 10  # bytes of parameters visible to a dispatch
 ROOM = 1 << 20  # bytes of parameters of one submission
-ALIGNED = 256  # bytes, of dynamic offsets by WebGPU's default limits
+ALIGNED = 256  # bytes; alignment of dynamic offsets in WebGPU's default limits
 BINDINGS = {
     "sum": ("uniform", "storage", "written storage"),
     "fold": ("uniform", "storage", "storage", "storage", "written storage"),
@@ -30,7 +30,7 @@ BINDINGS = {
 
 
 class OutOfGpuMemory(UserError):
-    """The adapter cannot hold the transport of a picture; memory and the processor's cores may."""
+    """The adapter cannot hold the transport of a picture; main memory and the CPU may."""
 
     def __init__(self, bytes_wanted: int) -> None:
         super().__init__(
@@ -48,7 +48,7 @@ class _Dispatch:
 
 
 class Commands:
-    """What one canvas asks of its device. Threads may record and submit at the same time."""
+    """Recorded commands of one canvas. Threads may record and submit concurrently."""
 
     def __init__(self, device: Any) -> None:
         self._lock = threading.RLock()
@@ -65,16 +65,16 @@ class Commands:
 
     @property
     def largest(self) -> int:
-        """Bytes that a shader can see of one buffer."""
+        """Largest binding of a buffer, bytes."""
         return int(min(self.device.limits["max-storage-buffer-binding-size"], self.device.limits["max-buffer-size"]))
 
     def buffer(self, data: NDArray[Any], usage: str = "STORAGE") -> Any:
-        """A buffer of at least one word that holds `data`, and can be written and copied.
+        """A writable and copyable buffer that holds `data`, of at least one word.
 
         Raises
         ------
         OutOfGpuMemory
-            The adapter has no room, or a shader could not see all of it.
+            If the adapter has no room, or the data exceed a shader's binding.
         """
         made = self.empty(data.nbytes, usage)
         self.write(made, data)
@@ -87,11 +87,11 @@ class Commands:
             return
         try:
             self.device.queue.write_buffer(buffer, 0, whole_words(data))
-        except wgpu.GPUOutOfMemoryError as error:  # the copy on its way takes room, too
+        except wgpu.GPUOutOfMemoryError as error:  # the staging copy needs memory, too
             raise OutOfGpuMemory(data.nbytes) from error
 
     def empty(self, size: int, usage: str = "STORAGE") -> Any:
-        """A buffer of `size` bytes of 0; see `buffer`."""
+        """A buffer of `size` zero bytes; raises like `buffer`."""
         if size > self.largest:
             raise OutOfGpuMemory(size)
         flags = wgpu.BufferUsage[usage] | wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.COPY_SRC
@@ -105,7 +105,7 @@ class Commands:
         return self._layouts.group(self._bindings[shader], *buffers)
 
     def dispatch(self, shader: str, parameters: bytes, work: list[tuple[Any, int, int]]) -> None:
-        """Record a shader over bind groups, each with its number of workgroups in x and y."""
+        """Record a dispatch of a shader for each bind group in `work`, with its numbers of workgroups in x and y."""
         assert len(parameters) <= REACH
         with self._lock:
             if len(self._bytes) + len(parameters) > ROOM:
@@ -115,12 +115,12 @@ class Commands:
             self._recorded += [_Dispatch(shader, offset, group, (x, y)) for group, x, y in work if x > 0]
 
     def copy(self, encode: Callable[[Any], None]) -> None:
-        """Record a copy between buffers and textures: `encode` gets the command encoder."""
+        """Record a copy between buffers and textures; `encode` receives the command encoder."""
         with self._lock:
             self._recorded.append(encode)
 
     def submit(self) -> None:
-        """Send all that was recorded."""
+        """Submit all recorded commands."""
         with self._lock:
             self._submit()
 
@@ -151,7 +151,7 @@ class Commands:
         self._recorded, self._bytes = [], bytearray()
 
     def read(self, buffer: Any, dtype: Any, size: int | None = None) -> NDArray[Any]:
-        """The content of a buffer, or its first `size` bytes, after all that was recorded; waits for the GPU."""
+        """The content of a buffer, or its first `size` bytes, after all recorded commands; waits for the GPU."""
         self.submit()
         return np.frombuffer(self.device.queue.read_buffer(buffer, size=size), dtype)
 

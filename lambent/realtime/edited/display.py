@@ -1,4 +1,4 @@
-"""Radiance of an edited picture as a display shows it, from texture to texture."""
+"""Display of an edited picture's radiance, from texture to texture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One term of one material on a GPU: its transport, and what multiplies its sums."""
+"""One term of one material on a GPU: its transport, and the factors on its sums."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from lambent.materials.factored.curve import END_RAD, KNOTS, Curve
 from lambent.realtime.edited.commands import GROUP, Commands
 from lambent.realtime.edited.products import GpuProducts, Halves, Piece, new_piece, words_of
 
-POINTS_AT_ONCE = 2 * 65535  # of a fold: two for each workgroup
-PAIR_BYTES = 4  # of a pair's value; its step has one in a buffer of its own
-MOST_BANDS = 256  # that the shader has room for
+POINTS_AT_ONCE = 2 * 65535  # points of one fold: two per workgroup
+PAIR_BYTES = 4  # bytes of a pair's value; its step is one byte in another buffer
+MOST_BANDS = 256  # limit of the shader
 TEXTURE, CURVE = 1, 2
 
 
 class GpuLayer:
-    """As `lambent.editing.canvas.Layer`, with transport of two curves as plain arrays.
+    """`lambent.editing.canvas.Layer` on a GPU; transport of two curves comes as plain arrays.
 
     Parameters
     ----------
     places : (P,) uint32
         Texels of `image`, each once.
     theta_o : (P,)
-        Radians.
+        Angle of the viewer, rad.
     texture : (P, 3) or None
     image
-        Buffer of texels that layers are added to.
+        Buffer of texels; layers are added to it.
     """
 
     products: GpuProducts
@@ -50,7 +50,7 @@ class GpuLayer:
         self._pairs: Any = None
 
     def hold(self, transport: Halves) -> GpuProducts:
-        """Take transport (J, 3, P) float16; the layer shows its products from now on."""
+        """Upload transport (J, 3, P) float16; the layer shows its products from now on."""
         bands, _, pixels = transport.shape
         most = self._most(bands)
         self._divide([(k, min(most, pixels - k)) for k in range(0, pixels, most)], bands)
@@ -69,9 +69,9 @@ class GpuLayer:
         edited: int,
         bands: int,
     ) -> tuple[GpuProducts, float]:
-        """Fold on the GPU; parameters, and the scale that is returned, as of `lambent.editing.folding.folded`.
+        """Fold on the GPU; parameters and returned scale as in `lambent.editing.folding.folded`.
 
-        The pairs are sent once, and kept.
+        The pairs are uploaded once and kept.
         """
         assert max(bands, len(idle)) <= MOST_BANDS
         if self._pairs is not values:
@@ -94,22 +94,22 @@ class GpuLayer:
             self._commands.write(self._curve, table)
 
     def compose(self, scale: NDArray[np.float32]) -> None:
-        """Record that the products, times `scale` (3,), are added to the image."""
+        """Record the addition of the products, times `scale` (3,), to the image."""
         parameters = np.asarray(scale, np.float32).tobytes() + np.uint32(self._kinds).tobytes()
         self._commands.dispatch("compose", parameters, [(g, -(-pixels // GROUP), 1) for g, pixels in self._composed])
 
     def _show(self, shape: tuple[int, int, int]) -> GpuProducts:
-        """Products of the transport that the pieces now have, from a picture of 0."""
+        """Products of the pieces' current transport, with a zero picture."""
         self.products = GpuProducts(self._commands, self._pieces, shape)
         self.products.add_rows(np.zeros(0, int), np.zeros((0, 3)), anew=True)
         return self.products
 
     def _most(self, rows: int) -> int:
-        """Pixels of which a shader sees `rows` rows of transport, and the sums: two half floats, and two floats."""
+        """Most pixels whose `rows` rows of transport (half floats) and whose sums (floats) fit a binding."""
         return 2 * (self._commands.largest // (3 * max(4 * rows, 8)))
 
     def _divide(self, parts: list[tuple[int, int]], rows: int) -> None:
-        """New pieces from (first, pixels), with room for `rows` rows."""
+        """Replace the pieces by new ones from (first, pixels), with room for `rows` rows."""
         commands = self._commands
         self._pieces, self._composed, self._folds = [], [], []
         for first, pixels in parts:
@@ -120,7 +120,7 @@ class GpuLayer:
             self._composed.append((commands.group("compose", *buffers, self._curve, self._image), pixels))
 
     def _send(self, spans: NDArray[np.uint32], steps: NDArray[np.uint8], values: NDArray[np.uint32], rows: int) -> None:
-        """Divide the points so that a shader sees all pairs of a piece and all of its rows, and upload them."""
+        """Upload pairs of points, divided into pieces whose pairs and rows fit a binding."""
         commands = self._commands
         begins, ends = _bounds(spans)
         self._divide(list(self._parts(begins, ends, rows)), rows)
@@ -145,12 +145,12 @@ class GpuLayer:
 
 
 def _bounds(spans: NDArray[np.uint32]) -> tuple[Indices, Indices]:
-    """First entries and those past the last; points without any bound nothing."""
+    """First and past-the-last entry of each point; points without entries do not bound anything."""
     begins, ends = spans.astype(np.int64).T
     empty = begins >= ends
     return np.where(empty, ends.max(initial=0), begins), np.where(empty, 0, ends)
 
 
 def texels(pixel: Indices, width: int, stride: int) -> NDArray[np.uint32]:
-    """Numbers of pixels (row * width + column) in an image with rows of `stride` texels."""
+    """Texel numbers, in an image with rows of `stride` texels, of pixels given as row * width + column."""
     return np.asarray(pixel // width * stride + pixel % width, np.uint32)

@@ -1,7 +1,7 @@
-"""Sums of transport rows on a GPU: `lambent.editing.products` in its memory.
+"""Sums of transport rows on a GPU: `lambent.editing.products` in GPU memory.
 
-A shader sees 128 MiB of a buffer by WebGPU's default limits, and a layer may have 400 MB of transport: its pixels are
-divided into pieces with buffers of their own. Reads run along the pixels, as they lie in memory.
+WebGPU's default limits allow bindings of 128 MiB, and a layer may have 400 MB of transport, so its pixels are divided
+into pieces with separate buffers. Consecutive threads read consecutive pixels.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ ROWS_AT_ONCE = (REACH - HEAD.itemsize) // ROW.itemsize
 
 @dataclass(frozen=True)
 class Piece:
-    """Pixels `first`, `first` + 1, ... of a layer, with room for transport of some number of rows."""
+    """Pixels `first`, `first` + 1, ... of a layer, with room for a fixed number of transport rows."""
 
     first: int
     pixels: int
-    about: Any  # uniform of the same
+    about: Any  # uniform with the numbers above
     transport: Any  # (J, 3, words) of two half floats
     picture: Any  # (3, 2 words) float32
     sums: Any  # bind group
 
     @property
     def words(self) -> int:
-        """Of a row: two pixels each."""
+        """Words of a row, of two pixels each."""
         return words_of(self.pixels)
 
 
@@ -44,7 +44,7 @@ def words_of(pixels: int) -> int:
 
 
 def new_piece(commands: Commands, first: int, pixels: int, rows: int) -> Piece:
-    """A piece with transport and picture of 0."""
+    """A piece with zero transport and picture."""
     words = words_of(pixels)
     about = commands.buffer(np.array([first, pixels, words, 0], np.uint32), "UNIFORM")
     transport, picture = commands.empty(rows * 3 * words * 4), commands.empty(3 * words * 8)
@@ -52,7 +52,7 @@ def new_piece(commands: Commands, first: int, pixels: int, rows: int) -> Piece:
 
 
 class GpuProducts:
-    """As `lambent.editing.products.Products`, of transport (J, 3, P) that lies in pieces."""
+    """`lambent.editing.products.Products` for transport (J, 3, P) in pieces."""
 
     def __init__(self, commands: Commands, pieces: Sequence[Piece], shape: tuple[int, int, int]) -> None:
         self._commands, self._pieces, self.shape = commands, pieces, shape
@@ -69,7 +69,10 @@ class GpuProducts:
     def add_rows(
         self, rows: NDArray[np.integer], weights: Floats, part: slice = slice(None), *, anew: bool = False
     ) -> None:
-        """Record picture += sum over k of weights[k] transport[rows[k]], in `part` of the pixels, see `Products`."""
+        """Record picture += sum over k of weights[k] transport[rows[k]] for `part` of the pixels; see `Products`.
+
+        `rows` are (K,), `weights` (K, 3). With `anew` the sum replaces the picture.
+        """
         begin, end, _ = part.indices(self.shape[2])
         parameters = np.zeros(len(rows), ROW)
         parameters["index"], parameters["weight"] = rows, weights
@@ -79,7 +82,7 @@ class GpuProducts:
             self._commands.dispatch("sum", head.tobytes() + some.tobytes(), self._work(begin, end))
 
     def _work(self, begin: int, end: int) -> list[tuple[Any, int, int]]:
-        """Bind groups of the pieces that hold pixels from `begin` to `end`, and workgroups for those pixels."""
+        """Bind groups of the pieces that hold pixels `begin` to `end`, with workgroups for these pixels."""
         work = []
         for piece in self._pieces:
             first, last = max(begin, piece.first) - piece.first, min(end - piece.first, piece.pixels)

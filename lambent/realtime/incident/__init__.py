@@ -1,15 +1,15 @@
-"""Look-ups of incident light: where in a probe a direction at a surface finds its light. One file each, found by name.
+"""Look-ups of incident light: they map a direction at a surface to a direction of a probe. Files are found by name.
 
-A look-up is a module that has what `LookUp` lists, and beside it a shader of the same name with
-    fn incident_look_up(x: vec3f, w: vec3f) -> LookUp    where to look from x, about the probe's centre, along w
-    fn incident_bound(x: vec3f, w: vec3f) -> f32         1/m: 1 over the distance at which a wall that is known ends the
-                                                         view along w; 0 where none is known
-and, where samples can be aimed at lamps through it (AIMS),
-    fn aim_maps(x: vec3f) -> bool                        whether that can be done at x
-    fn aimed_look_up(x: vec3f, w: vec3f) -> Aimed        incident_look_up, and how densely the probe's directions lie
-    fn aim_towards(x: vec3f, q: vec3f) -> Towards        the way back, from a direction q of the probe
-The types are those of shaders/incident.wgsl. Bindings of its own are in group 2, from 3 on. A look-up whose light is
-not that of the probe's cube map has besides all functions of shaders/incident_light.wgsl.
+A look-up is a module with the members of `LookUp`, and a shader of the same name with
+    fn incident_look_up(x: vec3f, w: vec3f) -> LookUp    look-up from x, about the probe's centre, along w
+    fn incident_bound(x: vec3f, w: vec3f) -> f32         1 over the distance, in m, to the nearest known wall along w; 0
+                                                         without one
+and, if samples can be aimed at lamps through it (AIMS),
+    fn aim_maps(x: vec3f) -> bool                        whether aiming works at x
+    fn aimed_look_up(x: vec3f, w: vec3f) -> Aimed        incident_look_up, and the density of the probe's directions
+    fn aim_towards(x: vec3f, q: vec3f) -> Towards        inverse: from a direction q of the probe
+shaders/incident.wgsl declares the types. Bindings of the look-up are in group 2, from 3 on. A look-up with its own
+light, other than the probe's cube map, must also define all functions of shaders/incident_light.wgsl.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ AUTO = "auto"
 
 
 class LookUp(Protocol):
-    """What a module of this package has."""
+    """Members of a look-up's module."""
 
-    NAME: str  # as the command line and the window have it
-    COST: int  # relative: lists go from cheap to dear
-    PREFERENCE: int  # AUTO takes the look-up of the highest preference that serves a probe
+    NAME: str  # on the command line and in the window
+    COST: int  # relative; sorts lists
+    PREFERENCE: int  # AUTO takes the look-up of highest preference that serves the probe
     AIMS: bool  # whether samples can be aimed at the probe's lamps through it
     BINDINGS: tuple[str, ...]  # kinds (`layouts.KINDS`) of its resources
     __file__: str
@@ -39,20 +39,20 @@ class LookUp(Protocol):
     def __hash__(self) -> int: ...
 
     def serves(self, probe: Probe) -> bool:
-        """Whether the probe has what the look-up needs."""
+        """Whether the probe has the data that the look-up needs."""
 
     def distances(self, probe: Probe, w: Floats) -> Floats:
-        """(M,) metres from the probe's centre to what is known along unit directions w (M, 3); inf for nothing."""
+        """(M,) distance, m, from the probe's centre to known geometry along unit directions w (M, 3); else inf."""
 
     def constants(self, device: Any, probe: Probe) -> dict[str, int]:
         """Values of the shader's `override` constants."""
 
     def resources(self, device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
-        """Buffers and views of textures that its shader reads; what of them follows the view joins `streams`."""
+        """Buffers and texture views for the shader; maps that must follow the camera are appended to `streams`."""
 
 
 def look_ups() -> dict[str, LookUp]:
-    """All look-ups by name, from cheap to dear. A file may have several, in `LOOK_UPS`."""
+    """All look-ups by name, cheapest first. A file may have several, in `LOOK_UPS`."""
     here = sys.modules[__name__]
     found = [cast(LookUp, module) for module in modules_in(here, having="NAME").values()]
     found += [one for module in modules_in(here, having="LOOK_UPS").values() for one in module.LOOK_UPS]
@@ -60,7 +60,7 @@ def look_ups() -> dict[str, LookUp]:
 
 
 def look_up_of(probe: Probe, wanted: str, among: dict[str, LookUp]) -> LookUp:
-    """The look-up `wanted` if it serves the probe, else, and for AUTO, the one of the highest preference that does."""
+    """The look-up `wanted` if it serves the probe; else, and for AUTO, the preferred one that does."""
     known("look-up", wanted, (AUTO, *among))
     if wanted != AUTO and among[wanted].serves(probe):
         return among[wanted]
@@ -74,11 +74,11 @@ def shader_of(look_up: LookUp) -> str:
 
 @cache
 def brings_light(look_up: LookUp) -> bool:
-    """Whether its light is its own, not that of the probe's cube map."""
+    """Whether a look-up has its own light, other than the probe's cube map."""
     return "fn incident(" in shader_of(look_up)
 
 
 def included(look_up: LookUp) -> dict[str, str]:
-    """What `shader_source.assemble` is given for a draw with that look-up."""
+    """Argument `given` of `shader_source.assemble` for a draw with this look-up."""
     own = {"incident_light.wgsl": ""} if brings_light(look_up) else {}
     return {"look_up.wgsl": shader_of(look_up), **own}

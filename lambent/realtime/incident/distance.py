@@ -1,4 +1,4 @@
-"""The probe's distance map: a direction is marched to where it meets what the probe sees."""
+"""The probe's distance map: marches along a direction to the surface that the probe sees."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lambent.core.probe_lookups import inverse_depth
 from lambent.realtime.baked import Probe
 from lambent.realtime.uploads import cube_texture
 
-NAME, COST, PREFERENCE, AIMS = "distance", 2, 1, False  # its mapping of directions is not one to one
+NAME, COST, PREFERENCE, AIMS = "distance", 2, 1, False  # no aiming: the mapping of directions is not one to one
 BINDINGS = ("cube",)
 
 

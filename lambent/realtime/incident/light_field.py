@@ -1,6 +1,6 @@
-"""Offset surface light fields: light that was taken at points just above the object, the nearest of which are asked.
+"""Offset surface light fields: light recorded at points just above the object; look-ups read the nearest points.
 
-Spec: thesis R, "Offset surface light fields"; the methods are those of `core.light_field_lookup`.
+Source: thesis R, "Offset surface light fields"; methods as in `core.light_field_lookup`.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from lambent.realtime.resident_maps import ResidentMaps, filled
 from lambent.realtime.structs import LIGHT_FIELD_DTYPE, Record
 from lambent.realtime.uploads import cube_texture, upload
 
-# by the shader's numbers; how the light of the points is blended, or found
+# Methods to blend or find the light of the points, by the shader's numbers.
 NEAREST, ANGLE, AVERAGE, TOWARDS_RAY, TOWARDS_NORMAL, MARCHED, CHOSEN = range(7)
 
 
 @dataclass(frozen=True)
 class LightFieldLookUp:
-    """One method; see `incident.LookUp` for what the names are."""
+    """One method; `incident.LookUp` describes the members."""
 
     NAME: str
     METHOD: int
     COST: int
     PREFERENCE: int = -1
     RULE: March = field(default_factory=March)
-    POWER: int = POWER  # of the cosines that weight points
-    SURFACE: bool = False  # whether points show the object itself, too, in place of its light map
+    POWER: int = POWER  # exponent of the cosines that weight points
+    SURFACE: bool = False  # whether points also replace the object's light map
     AIMS: bool = False
     BINDINGS: tuple[str, ...] = ("uniform", "exact", "layers", "number layers", "numbers", "cube")
     __file__: str = __file__
@@ -96,7 +96,7 @@ class LightFieldLookUp:
 
 
 def _put_layout(record: Record, atlas: Atlas) -> None:
-    """Write where maps lie."""
+    """Write the layout of the maps."""
     tiles, layout = atlas.tiles, atlas.layout
     levels = range(1, len(tiles.sides))
     record["side"], record["tile"], record["levels"] = tiles.sides[0], tiles.tiles[0], len(tiles.sides)
@@ -119,7 +119,7 @@ LOOK_UPS = (
 
 
 def check_serves(scene: BakedScene, wanted: str, store: str) -> None:
-    """`UserError` where a look-up of light fields is wanted and serves no object of the scene."""
+    """Raise `UserError` if the wanted look-up is one of light fields and serves no object of the scene."""
     look_up = next((one for one in LOOK_UPS if wanted == one.NAME), None)
     if look_up is None:
         return

@@ -1,4 +1,4 @@
-"""Light from afar: the probe is looked up in the direction itself."""
+"""Distant light: the probe is read in the direction itself."""
 
 from __future__ import annotations
 

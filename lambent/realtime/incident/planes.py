@@ -14,7 +14,7 @@ from lambent.realtime.baked import Probe
 
 NAME, COST, PREFERENCE, AIMS = "planes", 1, 2, True
 BINDINGS = ("storage",)
-STEP = 6  # plane counts are padded to multiples of this: each count is a pipeline of its own
+STEP = 6  # plane counts are padded to multiples of this, because each count needs its own pipeline
 
 
 def serves(probe: Probe) -> bool:

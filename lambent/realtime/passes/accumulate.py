@@ -1,4 +1,4 @@
-"""Progressive frames: the running mean of a camera at rest."""
+"""Progressive frames: the running mean while the camera rests."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MEAN_FORMAT = "rgba32float"
 
 
 class AccumulatePass:
-    """Keeps two full-float images and writes the mean from one into the other."""
+    """Keeps two images of 32-bit floats and writes the mean from one into the other."""
 
     def __init__(self, layouts: Layouts) -> None:
         self._layouts = layouts
@@ -27,7 +27,7 @@ class AccumulatePass:
         self._means = lru_cache(1)(self._new_means)
 
     def encode(self, context: FrameContext) -> Steps:
-        """Add the frame's radiance as the one of its index in the series; the mean takes its place."""
+        """Add the frame's radiance, by its index in the series, to the mean, which becomes the frame's radiance."""
         index = context.state.accumulate
         if index is None:
             return
@@ -39,7 +39,7 @@ class AccumulatePass:
         yield
 
     def _new_means(self, frame: Any) -> list[tuple[Any, Any]]:
-        """Both images, each with the group that reads the other one and the frame."""
+        """Both images, each with the bind group that reads the other image and the frame."""
         means = [target_texture(self._layouts.device, frame.size, MEAN_FORMAT) for _ in range(2)]
         return [
             (mean, self._layouts.group(self._layout, before.create_view(), frame.create_view(), self._weight))

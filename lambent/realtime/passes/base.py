@@ -1,4 +1,4 @@
-"""What a frame is drawn over, where the objects of some materials alone are drawn anew."""
+"""Base of a frame that redraws only the objects of some materials."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from lambent.realtime.slices import Steps
 
 
 class BasePass:
-    """Enlarges the last frame into the target where it was smaller; else it is in the target already."""
+    """Enlarges the last frame into the target if it was smaller; otherwise the target holds it already."""
 
     def __init__(self, layouts: Layouts) -> None:
         self._layouts = layouts

@@ -1,4 +1,4 @@
-"""Edges and thin geometry in motion: pixels become means over places of theirs, see shaders/coverage.wgsl."""
+"""Edges and thin geometry in motion: pixels become means over several places in them (shaders/coverage.wgsl)."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ LIGHT_FORMAT, STEPS_FORMAT = "rgba16float", "r32uint"
 class Covering:
     """Textures of one size."""
 
-    places: list[Any]  # depth of what is at each place
-    steps: Any  # where each place's light is, see shaders/places.wgsl
-    missed: Any  # light of places that no pixel near them shows
+    places: list[Any]  # depth at each place
+    steps: Any  # step from each place to the pixel with its light, see shaders/places.wgsl
+    missed: Any  # light of surfaces that no neighbouring pixel shows
     covered: Any
 
     @staticmethod
@@ -40,7 +40,7 @@ class Covering:
 
 @dataclass(frozen=True)
 class Pipelines:
-    """What the pass draws with, and the layouts of what its shaders read."""
+    """Pipelines of the pass, and layouts of its bind groups."""
 
     depths: Any
     coverage: Any
@@ -68,10 +68,9 @@ class Pipelines:
 
 
 class CoverPass:
-    """Gives each pixel the light of all surfaces in it, by their shares of its places.
+    """Averages the light of all surfaces in a pixel, weighted by their shares of its places.
 
-    Most are surfaces of pixels beside it, whose light is there. What is too thin for the middle of any pixel is shaded
-    here, and nothing else.
+    Most surfaces are already shaded at a neighbouring pixel. The pass shades only surfaces that miss all pixel centres.
     """
 
     def __init__(self, layouts: Layouts, depth: DepthPass, light: LightPass) -> None:

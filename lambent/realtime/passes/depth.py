@@ -1,4 +1,4 @@
-"""Depth before light: every pixel is shaded once, whatever lies behind it."""
+"""Depth before light, so that every pixel is shaded only once."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lambent.realtime.slices import Steps
 
 
 class DepthPass:
-    """Draws the depth (reversed: near/z) of all objects but panes, and behind holes of masked ones of what is there."""
+    """Draws the reversed depth (near/z) of all objects except panes; holes of masked ones show what is behind."""
 
     def __init__(self, layouts: Layouts) -> None:
         device, groups = layouts.device, [layouts.frame, layouts.material]
@@ -34,8 +34,8 @@ class DepthPass:
     def draw(self, render: Any, context: FrameContext) -> int:
         """Encode into a render pass whose group 0 is set; returns the draw calls.
 
-        Pixels that a masked surface covers in part are left open where the frame blends them (`light.FRINGE`). The
-        passes that follow shade where depths are equal, and so need not look for holes again.
+        If the frame blends pixels that a masked surface covers in part (`light.FRINGE`), they stay open. Later passes
+        shade at equal depth, and need not test for holes again.
         """
         seen, resources = context.seen(), context.resources
         set_geometry(render, resources)
@@ -59,12 +59,12 @@ def set_geometry(render: Any, resources: SceneResources) -> None:
 
 
 def draw_seen(render: Any, seen: Seen, first_face: int, face_count: int) -> int:
-    """Encode what is seen of a range of faces; returns the draw calls."""
+    """Encode the visible faces of a range; returns the draw calls."""
     return draw_runs(render, seen.of(first_face, face_count))
 
 
 def draw_runs(render: Any, runs: Ranges) -> int:
-    """Encode (first, count) of faces; returns the draw calls."""
+    """Encode runs (first, count) of faces; returns the draw calls."""
     for first, count in runs:
         render.draw_indexed(count * 3, 1, first * 3)
     return len(runs)

@@ -1,4 +1,4 @@
-"""Radiance to the display image: exposure, view transform, sRGB; then its edges, blended."""
+"""Radiance to the display image: exposure, view transform, sRGB; then blending of edges."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from lambent.realtime.targets import DISPLAY_FORMAT
 
 
 class TonemapPass:
-    """Draws the radiance, and the prior with the share that the frame says, into the display image."""
+    """Draws the radiance, blended with the frame's share of the prior, into the display image."""
 
     def __init__(self, layouts: Layouts) -> None:
         self._layouts, self._layout = layouts, layouts.of("exact", "exact")
@@ -21,7 +21,7 @@ class TonemapPass:
         )
 
     def encode(self, context: FrameContext) -> Steps:
-        """Draw into the texture whose edges are then smoothed, or into `shown` where they are not."""
+        """Draw into `unsmoothed`, or straight into `shown` without blending of edges."""
         if context.shown is None:
             return
         views = [(texture or context.radiance).create_view() for texture in (context.radiance, context.prior)]

@@ -23,23 +23,23 @@ from lambent.realtime.slices import Steps
 
 @dataclass(frozen=True)
 class Stage:
-    """What a pass makes of an object's light: entry point, and the shader that has it, if not the integrator's."""
+    """Entry point of a pass for an object's light, and its shader if it is not the integrator's."""
 
     entry: str
     shader: str = ""
     front_face: str = "ccw"
-    blend: str = ""  # of `_BLENDS`: how it is laid over what is behind, instead of standing for it
-    mixes_parts: bool = False  # draws with the light of an object's parts, mixed near their borders
+    blend: str = ""  # of `_BLENDS`: blending with the background; opaque by default
+    mixes_parts: bool = False  # mixes the light of an object's parts near their borders
 
     def shaders(self, draw: Draw) -> tuple[str, ...]:
-        """Names of the files that the shader of a draw is assembled from."""
+        """Names of the files for the shader of a draw."""
         if not self.shader:
             return "diffuse.wgsl", "probe_light.wgsl", "shade.wgsl", draw.shader
         return draw.shader, "planar_shown.wgsl" if draw.planar else "probe_light.wgsl", "shade.wgsl", self.shader
 
 
 SHADE = Stage("shade_main", "shade.wgsl", mixes_parts=True)
-FRINGE = Stage("fringe_main", "fringe.wgsl", blend="over")  # of masked surfaces, after what is whole
+FRINGE = Stage("fringe_main", "fringe.wgsl", blend="over")  # of masked surfaces, after fully covered pixels
 _BLENDS = {
     name: {
         "color": {"src_factor": source, "dst_factor": behind, "operation": "add"},
@@ -52,9 +52,9 @@ _BLENDS = {
 
 
 class Shading:
-    """Draws objects where the depth pass saw them; one pipeline per integrator, look-up and set of constants.
+    """Draws objects at the depths of the depth pass; one pipeline per integrator, look-up and set of constants.
 
-    `light` is the layout of group 3, `reflections` that for draws with `planar`.
+    `light` is the layout of group 3, `reflections` its layout for draws with `planar`.
     """
 
     def __init__(self, layouts: Layouts, stage: Stage, light: Any, reflections: Any = None) -> None:
@@ -105,10 +105,10 @@ class Shading:
 
 
 class Glazing:
-    """Lays clear glass over what stands behind it, which has no depth and so is drawn as if there were none.
+    """Blends clear glass over the background; panes write no depth.
 
-    Panes follow from the farthest to the nearest. Of each, all faces take from the light behind what they absorb before
-    any adds what it mirrors.
+    Panes are drawn from the farthest to the nearest. For each pane, all faces first absorb from the light behind, then
+    all faces add their reflections.
     """
 
     def __init__(self, layouts: Layouts, front_face: str = "ccw") -> None:
@@ -118,7 +118,7 @@ class Glazing:
         self._passing, self._mirroring = (Shading(layouts, stage, layouts.light) for stage in (passing, mirroring))
 
     def draw(self, render: Any, context: FrameContext, seen: Seen, formats: tuple[str, ...]) -> None:
-        """Encode into a render pass of `formats` that has the depth and the light of all else."""
+        """Encode into a render pass of `formats` that holds depth and light of everything else."""
         if not context.panes:
             return
         light = self._layouts.group(self._layouts.light, *context.pane_light)
@@ -133,10 +133,10 @@ class Glazing:
 
 
 class LightPass:
-    """Draws linear radiance into the frame's target, whose depth is there."""
+    """Draws linear radiance into the frame's target, after its depth."""
 
     def __init__(self, layouts: Layouts, reflections: Any) -> None:
-        """`reflections` is the layout of group 3 for draws that have pixels on planar reflectors."""
+        """`reflections` is the layout of group 3 for draws with pixels on planar reflectors."""
         self._layouts, self._glazing = layouts, Glazing(layouts)
         self._shade, self._fringe = (Shading(layouts, stage, layouts.light, reflections) for stage in (SHADE, FRINGE))
         self._sky: dict[str, Any] = {}
@@ -157,7 +157,7 @@ class LightPass:
             )
             seen = context.seen(band.shares)
             self._shade.draw(render, context, draws, seen, (format,), light)
-            if is_whole:  # sky and fringes are there already, and fringes cannot be laid over themselves
+            if is_whole:  # a base already has sky and fringes, and fringes must not be blended twice
                 self._draw_sky(render, context, format)
                 self._fringe.draw(render, context, fringes, seen, (format,), light)
                 self._glazing.draw(render, context, seen, (format,))
@@ -166,7 +166,7 @@ class LightPass:
         context.radiance = context.target.radiance
 
     def missed(self, context: FrameContext, load_op: str) -> Steps:
-        """Draw where the target has depths of what the frame missed (`CoverPass`); the sky too, between thin things."""
+        """Draw the missed surfaces (`CoverPass`), whose depths the target holds, and the sky between them."""
         format, layouts = context.target.radiance.format, self._layouts
         light = layouts.group(layouts.light, *context.light)
         for band in context.slicing.bands("missed light", context.state.size):
@@ -179,7 +179,7 @@ class LightPass:
             yield
 
     def _draw_sky(self, render: Any, context: FrameContext, format: str) -> None:
-        """The environment where the depth pass left infinity."""
+        """Draw the environment where depth is infinite."""
         if format not in self._sky:
             groups = [self._layouts.frame, self._layouts.cube]
             self._sky[format] = screen_pipeline(self._layouts.device, "sky", groups, [format], compare="equal")

@@ -1,4 +1,4 @@
-"""Specular light of planar reflectors, in layers of a texture of its own that the shading reads."""
+"""Specular light of planar reflectors, in layers of a separate texture that the shading reads."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from lambent.realtime.structs import PLANE_LAMPS_DTYPE
 from lambent.realtime.targets import stored, target_texture
 
 FORMAT = "rgba16float"
-FOUND, CLEANED = 2, 3  # layers (shaders/planar_layers.wgsl) that planar.wgsl draws, and planar_clean.wgsl
+FOUND, CLEANED = 2, 3  # numbers of layers (shaders/planar_layers.wgsl) of planar.wgsl and of planar_clean.wgsl
 STAGE = Stage("planar_main")  # of the shader of a planar integrator
 
 
 def beyond_view(draw: Draw) -> Draw:
-    """A reflector that looks up what its mirrored view does not hold by its probe's distances, if these are there.
+    """A reflector's draw that uses its probe's distances, if there are any, for light outside the mirrored view.
 
-    Planes around a whole room leave out what stands in it, which is near to a floor's places.
+    Planes around a whole room ignore furniture, which is near to points on the floor.
     """
     return replace(draw, look_up=draw.item.light.look_up("distance"))
 
@@ -40,8 +40,8 @@ class PlanarPass:
     def __init__(self, layouts: Layouts, depth: DepthPass) -> None:
         self._layouts = layouts
         self._buffers, self._cells = PlanarBufferPass(layouts, depth), PlanarCells(layouts)
-        # Bindings without gaps: a software Vulkan (Mesa 22.3) dies of them. The light maps have another number than in
-        # shading.
+        # Bindings have no gaps, because they crash a software Vulkan (Mesa 22.3). So the light maps have another number
+        # than in shading.
         self._hits = layouts.of("uniform", "layers", "exact", "exact", "uniform", "storage", "layers")
         self._lamps = cache(lambda index: layouts.uniform(PLANE_LAMPS_DTYPE.itemsize))
         self._shading = Shading(layouts, STAGE, self._hits)
@@ -51,7 +51,7 @@ class PlanarPass:
         self._texture = lru_cache(1)(lambda size: target_texture(layouts.device, size, FORMAT))
 
     def encode(self, context: FrameContext) -> Steps:
-        """Draw the buffer of each view and the light that is found in it; the frame's depth is there already."""
+        """Draw the buffer of each view and the light found in it, after the frame's depth."""
         how = planar_integrator(context.state.integrator, context.state.planar)
         if not context.views or how is None:
             return
@@ -69,9 +69,9 @@ class PlanarPass:
         yield
 
     def _lamps_of(self, context: FrameContext, view: PlanarView, how: Integrator) -> ReflectorLamps | None:
-        """The lamps that leave a mirrored view; None where no lobe of its reflector is wide enough for any.
+        """The lamps taken out of a mirrored view; None if no lobe of its reflector is wide enough.
 
-        They stay in the view until their map is there, too, where the frame does not wait for it.
+        If the frame does not wait for their map, lamps stay in the view until it is complete.
         """
         if not how.clears_views:
             return None
@@ -111,8 +111,8 @@ class PlanarPass:
             yield
 
     def _encode_clean(self, context: FrameContext, how: Integrator, texture: Any, layers: list[Any]) -> None:
-        """Clean interleaved light along rows; the layers are black where there is none."""
-        if how.table is interleaved_table:  # neighbouring pixels sample lobes in turns
+        """Clean interleaved light along rows; without any, the layers are black."""
+        if how.table is interleaved_table:  # neighbouring pixels take different samples of a lobe
             found = texture.create_view(dimension="2d-array", base_array_layer=0, array_layer_count=FOUND)
             group = self._layouts.group(self._layouts.of("exact layers"), found)
             context.cover("clean", layers, self._clean, [group])

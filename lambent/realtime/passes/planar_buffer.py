@@ -1,6 +1,6 @@
-"""The planar reflection buffer: light of the mirrored view with its MIP levels, and the plane seen at every pixel.
+"""The planar reflection buffer: light of the mirrored view with MIP levels, and the plane seen at every pixel.
 
-Beside it the walls that end the view, and the nearest surface in each of its cells.
+Also the walls that bound the view, and the nearest surface in each cell of the buffer.
 """
 
 from __future__ import annotations
@@ -33,21 +33,19 @@ CELL_FORMAT = "rgba32float"
 FIRST_PX = 4  # side of the finest cells, CELL_PX of shaders/planar_view.wgsl
 MOST_LEVELS = 7  # of cells; the coarsest have 256 px
 FORMATS = LIGHT_FORMAT, PLANE_FORMAT = "rgba16float", "rgba32float"
-MIRRORED_N = 3  # samples per lobe of what is mirrored, from its probe
-BLURRED_N = 1  # where the reflector blurs what it mirrors
-BLURS_M = 0.04  # least roughness of such a reflector's lobes
-STAGE = Stage(
-    "planar_buffer_main", "planar_buffer.wgsl", "cw", mixes_parts=True
-)  # mirrored triangles turn the other way
+MIRRORED_N = 3  # samples per lobe of mirrored objects, from their probes
+BLURRED_N = 1  # samples per lobe if the reflector blurs the mirrored view
+BLURS_M = 0.04  # least roughness of a blurring reflector's lobes
+STAGE = Stage("planar_buffer_main", "planar_buffer.wgsl", "cw", mixes_parts=True)  # mirroring reverses the winding
 
 
 @dataclass(frozen=True)
 class PlanarBuffer:
-    """Textures of one size, used by all reflectors that need it, one after the other, and their views."""
+    """Textures of one size with their views; reflectors that need this size use them one after the other."""
 
     target: Target
     light: Any  # all levels and layers
-    layers: list[list[Any]]  # levels of the light, and of what is seen of lamps, where that is asked
+    layers: list[list[Any]]  # levels of the light and, on request, of the lamps seen
     planes: Any
 
     @staticmethod
@@ -68,7 +66,7 @@ class PlanarBuffer:
 
 
 class PlanarWalls:
-    """Holes in the depth of a mirrored view, where its eye looks past the foot of a wall: nothing is drawn there."""
+    """Masks the depth of a mirrored view where its eye looks past the foot of a wall, so that nothing is drawn."""
 
     def __init__(self, layouts: Layouts) -> None:
         self._layouts, self._layout = layouts, layouts.of("uniform", "flat")
@@ -80,9 +78,9 @@ class PlanarWalls:
         self._uniform = cache(lambda index: layouts.uniform(PLAN_DTYPE.itemsize))
 
     def draw(self, render: Any, index: int, view: PlanarView) -> int:
-        """Encode into a render pass of depth whose group 0 is set, before all else; returns the draw calls.
+        """Encode first into a depth pass whose group 0 is set; returns the draw calls.
 
-        `index` is that of the view in its frame.
+        `index` is the view's index in its frame.
         """
         if view.plan is None or view.reflector.plan is None:
             return 0
@@ -99,7 +97,7 @@ class PlanarWalls:
 
 
 class PlanarCells:
-    """The nearest surface in each cell of a buffer, which lets a search do with few steps."""
+    """The nearest surface in each cell of a buffer, so that searches take few steps."""
 
     def __init__(self, layouts: Layouts) -> None:
         self._layouts, self._layout = layouts, layouts.of("uniform", "exact")
@@ -110,7 +108,7 @@ class PlanarCells:
         self.views = lru_cache(MOST_REFLECTORS)(self._new_views)
 
     def _new_views(self, size: tuple[int, int]) -> list[Any]:
-        """Views of the cells of buffers of that size: all levels, then each."""
+        """Views of the cells for buffers of this size: one of all levels, then one of each."""
         cells = (size[0] // FIRST_PX, size[1] // FIRST_PX)
         levels = min(MOST_LEVELS, max(cells).bit_length())
         made = target_texture(self._layouts.device, cells, CELL_FORMAT, levels)
@@ -118,7 +116,7 @@ class PlanarCells:
         return [made.create_view(), *single]
 
     def encode(self, context: FrameContext, planes: Any, size: tuple[int, int], uniform: Any) -> None:
-        """Fill the cells from a view of the planes of a buffer of that size."""
+        """Fill the cells from a view of the planes of a buffer of this size."""
         finer = planes
         for level, into in enumerate(self.views(size)[1:]):
             group = self._layouts.group(self._layout, uniform, finer)
@@ -127,7 +125,7 @@ class PlanarCells:
 
 
 class PlanarLampsShown:
-    """What a mirrored view shows of lamps that are drawn there without their light, a channel for each object."""
+    """Visibility of lamps drawn dark in a mirrored view, with one channel per object."""
 
     def __init__(self, layouts: Layouts) -> None:
         module = layouts.device.create_shader_module(code=assemble("planar_lamps_shown.wgsl"))
@@ -139,7 +137,7 @@ class PlanarLampsShown:
         )  # fmt: skip
 
     def encode(self, context: FrameContext, objects: Sequence[str], view: Any) -> None:
-        """Draw into the target `view`, where the mirrored view's depth is."""
+        """Draw into the target `view` at the depths of the mirrored view."""
         render, seen = context.begin("mirror", [view], "clear"), context.seen()
         set_geometry(render, context.resources)
         for draw in context.draws:
@@ -151,7 +149,7 @@ class PlanarLampsShown:
 
 
 class PlanarBufferPass:
-    """Draws the mirrored views of a frame; they may share a buffer, so each is shaded from before the next is drawn."""
+    """Draws the mirrored views of a frame. Views may share a buffer, so each is used before the next is drawn."""
 
     def __init__(self, layouts: Layouts, depth: DepthPass) -> None:
         device = layouts.device
@@ -169,9 +167,9 @@ class PlanarBufferPass:
     def mirrored(
         self, context: FrameContext, lamps: Sequence[ReflectorLamps | None]
     ) -> Iterator[tuple[FrameContext, PlanarBuffer]]:
-        """The mirrored frames of a frame, one after the other, and their buffers; `uniform` has the record of each.
+        """The mirrored frames of a frame in turn, with their buffers; `uniform` has the record of each.
 
-        `lamps` are those that leave each view.
+        `lamps` are taken out of each view.
         """
         write, layouts = self._layouts.device.queue.write_buffer, self._layouts
         for index, (view, gone) in enumerate(zip(context.views, lamps, strict=True)):
@@ -222,14 +220,14 @@ class PlanarBufferPass:
 
 
 def mirrored_by(context: FrameContext, view: PlanarView) -> tuple[Integrator, int]:
-    """Integrator of what a view mirrors, and its samples per lobe.
+    """Integrator of the objects in a mirrored view, and its samples per lobe.
 
-    Where every lobe of the reflector is wide, one sample serves: the highlights in the view are blurred themselves.
+    One sample suffices if every lobe of the reflector is wide, because the reflector blurs the view's highlights.
     """
     wanted = INTEGRATORS[context.state.integrator]
     mine = [draw for draw in context.draws if view.has(draw.item.record)]
     narrowest = min((min(lobe.mx, lobe.my) for draw in mine for lobe in draw.material.lobes), default=0.0)
     if wanted.lamps and narrowest >= BLURS_M and not any(draw.textures & BITS["roughness"] for draw in mine):
         return INTEGRATORS["rings"], BLURRED_N
-    # published integrators draw what they mirror as they were published
+    # published integrators also draw mirrored objects as published
     return INTEGRATORS["lamps" if wanted.lamps or wanted.progressive else "rings"], MIRRORED_N

@@ -1,4 +1,4 @@
-"""The cube map that split-sum reads: light averaged over an isotropic lobe about each texel, per roughness."""
+"""The prefiltered cube map of split-sum: light averaged over an isotropic lobe about each texel, by roughness."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SAMPLES = 64
 
 
 def prefiltered_cube(layouts: Layouts, source: Any, sampler: Any) -> Any:
-    """A cube texture of LEVELS levels, each the light of the cube texture `source` blurred for its roughness."""
+    """Cube texture of at most LEVELS levels: the light of the cube texture `source` blurred for each roughness."""
     device, n = layouts.device, source.size[0]
     levels = min(LEVELS, n.bit_length())
     target = target_texture(device, (n, n, 6), FORMAT, levels)
