@@ -30,7 +30,7 @@ from lambent.realtime.resources import SceneResources, light_layers
 from lambent.store.answer import SeenSpots, StoredAnswer
 
 MARGIN = 1.4  # factor on the estimated error; error over estimate was at most 1.33 in 19 edits of three rooms
-ERROR_TEXELS = 1 << 15  # most texels for the estimate of the error: more would make an edit wait
+ERROR_TEXELS = 1 << 15  # texels in the estimate of the error, about; more would make an edit wait
 FAINT = 0.01  # of the mean indirect light: darker texels do not count in the estimate of the error
 
 

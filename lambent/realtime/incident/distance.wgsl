@@ -1,23 +1,23 @@
-// Distance impostor (Szirmay-Kalos et al. 2005): a direction is marched to where it meets what the probe sees.
+// Distance impostor (Szirmay-Kalos et al. 2005): marches along a direction to the surface that the probe sees.
 
 @group(2) @binding(3) var inverse_depth_cube: texture_cube<f32>;
 
-// 1/max(|x|, |y|, |z|) of what the probe sees in a direction, 1/m.
+// 1/max(|x|, |y|, |z|) of the surface that the probe sees in a direction, 1/m.
 fn inverse_depth(w: vec3f) -> f32 {
     return textureSampleLevel(inverse_depth_cube, linear_sampler, w, 0.0).r;
 }
 
-// Depth of the point relative to what the probe sees behind it: < 1 in front, > 1 behind.
+// Depth of the point relative to the surface that the probe sees in its direction: < 1 in front, > 1 behind.
 fn relative_depth(p: vec3f) -> f32 {
     return max_norm(p) * inverse_depth(p);
 }
 
-// Steps grow along the ray until it is behind what the probe sees, then the secant. 1/depth is linear over planes, so
-// walls are met exactly.
+// Growing steps along the ray until it is behind the seen surface, then secant steps. 1/depth is linear over planes, so
+// hits on walls are exact.
 fn incident_look_up(x: vec3f, w: vec3f) -> LookUp {
     const STEPS = 12u;
     var near = 0.0;
-    var f_near = -1.0; // the surface itself lies in front of what the probe sees
+    var f_near = -1.0; // the start counts as in front of the seen surface
     let reach = 1.0 / max(inverse_depth(w), 1e-4);
     var far = max(length(x), 0.05 * reach);
     var f_far = -1.0;

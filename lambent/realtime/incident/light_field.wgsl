@@ -1,5 +1,5 @@
-// Offset surface light fields: the points nearest to a pixel, by the sample map, each with its map of light and inverse
-// distance. Methods as core/light_field_lookup.py has them. Places are in world space.
+// Offset surface light fields: the points nearest to a pixel, by the sample map, each with a map of light and inverse
+// distance. Methods as in core/light_field_lookup.py. Positions are in world space.
 
 #include "frame.wgsl"
 #include "light_field_record.wgsl"
@@ -7,7 +7,8 @@
 #include "light_field_maps.wgsl"
 
 @group(2) @binding(3) var<uniform> field: LightFieldRecord;
-@group(2) @binding(4) var points: texture_2d<f32>; // places, and where the map is in the atlas; adapters in software read textures faster than buffers
+// Positions of points, and their maps' places in the atlas. Software adapters read textures faster than buffers.
+@group(2) @binding(4) var points: texture_2d<f32>;
 @group(2) @binding(5) var atlas: texture_2d_array<f32>;
 @group(2) @binding(6) var distances: texture_2d_array<u32>;
 @group(2) @binding(7) var sample_map: texture_2d<u32>;
@@ -15,18 +16,18 @@
 
 override METHOD: u32 = 5u;
 override POWER: f32 = 4.0;
-override MARCHES: u32 = 4u; // points whose maps are marched through; see March of light_field_lookup.py
+override MARCHES: u32 = 4u; // points to march through; see March of light_field_lookup.py
 override STEPS: u32 = 8u;
 override SECANTS: u32 = 3u;
 override FIRST: f32 = 0.15;
 override LAST: f32 = 1.0;
 override TOLERANCE: f32 = 0.15;
 override ALIKE: f32 = 0.15;
-override SURFACE: bool = false; // points show the surface itself, too
-override HAS_SKY: bool = true; // or the maps answer for it
+override SURFACE: bool = false; // points also show the surface itself
+override HAS_SKY: bool = true; // a separate sky; else the maps hold the sky
 
-override RELIT: bool = false; // the cube map says how many times brighter light is than in the maps
-override GLASS: bool = false; // what is transmitted is refracted; the lower half of the sample map then has the exits
+override RELIT: bool = false; // the cube map holds the ratio of the light to the light in the maps
+override GLASS: bool = false; // transmitted light is refracted; the lower half of the sample map holds the exits
 
 const NEAREST = 0u;
 const ANGLE = 1u;
@@ -54,8 +55,8 @@ fn exit_of(texel: vec2i) -> vec4f {
     return vec4f(unpack2x16float(bits.x | (bits.y << 16u)), unpack2x16float(bits.z | (bits.w << 16u)));
 }
 
-// The face behind a place that is seen from the side of its normal, between the four nearest texels; the nearest alone
-// where one of these has none.
+// The back face behind a point of the surface, interpolated between the four nearest texels; the nearest texel alone if
+// one of them has none. `front`: seen from the side of the normal.
 fn exit_near(uv2: vec2f, front: bool) -> vec4f {
     if (!GLASS) { return vec4f(0.0); }
     let at = uv2 * field.grid - field.corner - 0.5;
@@ -80,10 +81,10 @@ fn light_of_sky(w: vec3f, half_log2_omega: f32) -> vec3f {
     return textureSampleLevel(sky_cube, linear_sampler, w, level).rgb;
 }
 
-const BLUR_TEXELS = 9.0; // as far as linear look-ups in a map, and what a march misses a surface by, spread light, about
+const BLUR_TEXELS = 9.0; // about how far linear look-ups in a map, and errors of a march, spread light
 
-// How many times brighter the light is now that comes from the distance 1/u along r: as the probe sees it there. It is
-// averaged as far as the map spreads light: beside a lamp that is off now, the map has some of the lamp's light.
+// Ratio of the light from distance 1/u along r to the baked light, as the probe sees it there. It is averaged as far as
+// the map spreads light: next to a lamp that is now off, the map holds some of the lamp's light.
 fn change_along(s: Surface, r: vec3f, u: f32, half_log2_omega: f32) -> vec3f {
     if (!RELIT) { return vec3f(1.0); }
     let q = r + u * s.x;
@@ -102,7 +103,7 @@ fn cosine_to(point: u32, axis: vec3f, x: vec3f) -> f32 {
     return select(dot(axis, to) * inverseSqrt(max(dot(to, to), 1e-30)), -2.0, point == NO_POINT);
 }
 
-// The same for all four points. Written out, as all of four: software adapters are slow at arrays.
+// cosine_to for all four points. Written out, like all code for four points: software adapters are slow at arrays.
 fn cosines_to(axis: vec3f, s: Surface) -> vec4f {
     let x = s.x + object.centre.xyz;
     let p = s.points;
@@ -113,8 +114,8 @@ fn largest_of(v: vec4f) -> f32 {
     return max(max(v.x, v.y), max(v.z, v.w));
 }
 
-// Weights of the points by the cosines between the directions to them and an axis, relative to the largest; all alike
-// where all are behind.
+// Weights of the points by the cosines between the directions to them and an axis, relative to the largest; equal if
+// all points are behind.
 fn weights_about(axis: vec3f, s: Surface) -> vec4f {
     let cosines = max(cosines_to(axis, s), vec4f(0.0));
     let largest = largest_of(cosines);
@@ -146,8 +147,9 @@ fn weights_of(method: u32, s: Surface, r: vec3f) -> vec4f {
     }
 }
 
-// Light of the points along w[j] = r + u[j] (x - p_j), by weights; u is 0 without parallax. Rays with one weight leave the
-// loop after one turn: software adapters take both sides of a branch, but no turn that all pixels have left.
+// Weighted light of the points along w[j] = r + u[j] (x - p_j); u is 0 without parallax. Rays with one weight leave the
+// loop after one iteration: software adapters run both sides of a branch, but skip iterations that all pixels have
+// left.
 fn weighted(s: Surface, r: vec3f, u: vec4f, weights: vec4f, half_log2_omega: f32) -> vec3f {
     let x = s.x + object.centre.xyz;
     var left = weights;
@@ -170,20 +172,20 @@ fn blended(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
     return light * change_along(s, r, 0.0, half_log2_omega);
 }
 
-const SHARP = -20.0; // half the log2 of a solid angle that is smaller than any texel
+const SHARP = -20.0; // half the log2 of a solid angle smaller than any texel
 
 const SKY = 0.0;
 const MISSED = -1.0;
 
-// How far behind what a map sees a ray from o about its point along r is at the distance 1/u: 1/m, < 0 in front. Linear
-// in u for planes, and finite at infinity.
+// How far a ray from o, relative to the map's point, along r is behind the map's surface at distance 1/u: 1/m, < 0 in
+// front. Linear in u for planes, and finite at infinity.
 fn behind(map: Map, o: vec3f, r: vec3f, u: f32) -> f32 {
     let q = r + u * o;
     return inverse_distance(map, q) - u * inverseSqrt(dot(q, q));
 }
 
-// 1/m, of where the ray meets what the map sees; SKY or MISSED. Steps grow from FIRST times the distance of the point to
-// where the parallax is LAST texels, about 4/side rad each, and end at infinity.
+// Inverse distance, 1/m, of the ray's hit on the map's surface; SKY or MISSED. Steps grow from FIRST times the distance
+// of the point to the distance where the parallax is LAST texels of about 4/side rad, and end at infinity.
 fn marched(point: u32, o: vec3f, r: vec3f) -> f32 {
     let map = map_of(point);
     let texel = 4.0 / f32(field.side);
@@ -213,7 +215,7 @@ fn marched(point: u32, o: vec3f, r: vec3f) -> f32 {
     return select(MISSED, u, u > 0.0 && abs(g_u) * stretch * max(stretch, 1.0) < TOLERANCE * u);
 }
 
-// 1/m, by point, of where its map says that the ray ends; SKY or MISSED.
+// By point: inverse distance, 1/m, of the ray's hit in its map; SKY or MISSED.
 fn found_by_points(s: Surface, r: vec3f) -> vec4f {
     let x = s.x + object.centre.xyz;
     var found = vec4f(MISSED);
@@ -223,16 +225,16 @@ fn found_by_points(s: Surface, r: vec3f) -> vec4f {
     return found;
 }
 
-// Whether rays end in the sky that no point finds a surface on: one sees it, or of wide bundles, whose edges lie beside the
-// ray, all do.
+// Whether rays without a found surface end in the sky: for narrow bundles, if one point sees the sky; for wide bundles,
+// whose edges lie beside the ray, if all points do.
 fn is_sky(s: Surface, found: vec4f, half_log2_omega: f32) -> bool {
     let asked = (vec4u(0u, 1u, 2u, 3u) < vec4u(MARCHES)) & (s.points != vec4u(NO_POINT));
     let sharp = half_log2_omega + log2(0.5 * f32(field.side)) < 0.0;
     return largest_of(found) == SKY && (sharp || all(!asked | (found == vec4f(SKY))));
 }
 
-// The nearest surface that a point verifies is there: those that agree on it are blended. Where none does, the ray
-// ends in the sky if a point sees it there, or the answer is B_n.
+// Light of the nearest surface that a point verifies, blended over the points that agree on it. If no point verifies a
+// surface, the ray ends in the sky if is_sky, else the result is B_n.
 fn marched_light(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
     let found = found_by_points(s, r);
     if (HAS_SKY && is_sky(s, found, half_log2_omega)) {
@@ -243,7 +245,7 @@ fn marched_light(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
     return light * change_along(s, r, nearest, half_log2_omega);
 }
 
-// Weights of the points that agree on the nearest surface; of all, where none has met one.
+// Weights of the points that agree on the nearest surface; of all points if none has found one.
 fn weights_of_found(s: Surface, found: vec4f) -> vec4f {
     let nearest = largest_of(found);
     let agree = (found > vec4f(0.0)) & (found * (1.0 + ALIKE) >= vec4f(nearest));
@@ -251,7 +253,8 @@ fn weights_of_found(s: Surface, found: vec4f) -> vec4f {
     return select(weights, select(vec4f(0.0), max(weights, vec4f(1e-6)), agree), nearest > 0.0);
 }
 
-// What is found, in colours of middle brightness: one for each point, of that which has the largest share; blue for the sky, and red where no point verifies a surface.
+// The result in colours of medium brightness: one colour per point, for the point of largest share; blue for the sky;
+// red if no point verifies a surface.
 fn chosen(s: Surface, r: vec3f) -> vec3f {
     let found = found_by_points(s, r);
     var colour = vec3f(1.0, 0.0, 0.0);
@@ -267,8 +270,8 @@ const CONES = vec2f(0.42261826, 0.25881905); // cosines of 65 and 75 degrees
 const SURFACE_TOLERANCE = 0.15;
 const UNSEEN = 3.0;
 
-// How little a point is asked for the surface at x: by the cones about n that it is out of, UNSEEN where its map has
-// something else in x's place.
+// Rank of a point for the surface at x, lower is better: the number of cones about n that it is outside of; UNSEEN if
+// its map shows another surface in place of x.
 fn rank_of(point: u32, x: vec3f, n: vec3f) -> f32 {
     if (point == NO_POINT) { return UNSEEN; }
     let q = x - place_of_point(point);
@@ -278,9 +281,9 @@ fn rank_of(point: u32, x: vec3f, n: vec3f) -> f32 {
     return select(UNSEEN, dot(select(vec2f(0.0), vec2f(1.0), vec2f(cosine) < CONES), vec2f(1.0)), sees);
 }
 
-// Light of the surface as the nearest point shows it that lies in the narrowest cone and sees it (3.11).
+// Light of the surface, read from the nearest point in the narrowest cone that sees it (3.11).
 fn own_light(s: Surface, of_light_map: vec3f) -> vec3f {
-    if (!SURFACE || RELIT) { return of_light_map; } // which follows other light
+    if (!SURFACE || RELIT) { return of_light_map; } // the light map follows changes of light
     let x = s.x + object.centre.xyz;
     let p = s.points;
     let ranks = vec4f(rank_of(p.x, x, s.n), rank_of(p.y, x, s.n), rank_of(p.z, x, s.n), rank_of(p.w, x, s.n));
@@ -291,7 +294,7 @@ fn own_light(s: Surface, of_light_map: vec3f) -> vec3f {
     return light_of(point, select(-s.n, q, dot(q, q) > 0.0), SHARP);
 }
 
-// Light that comes through the glass, from where rays leave it, and what its further faces mirror.
+// Light through the glass, from the exits of rays, and light that its further faces reflect.
 fn light_through_glass(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
     let found = through_glass(r, s.n, s.exit, field.eta);
     var beyond = s;
@@ -319,7 +322,7 @@ fn incident(s: Surface, w: vec3f, half_log2_omega: f32) -> vec3f {
     return incident_along(s, to_world(s, w), half_log2_omega);
 }
 
-// The prefiltered level of a probe is of a roughness m with m^2 = level/6; a lobe of that m fills about 4 pi m^2 sr.
+// The prefiltered level of a probe has the roughness m with m^2 = level/6; a lobe of that m fills about 4 pi m^2 sr.
 fn incident_at_level(s: Surface, w: vec3f, level: f32) -> vec3f {
     return incident(s, w, 0.5 * log2(4.0 * LAMBENT_PI) + log2(max(level / 6.0, 1e-6)) * 0.5);
 }

@@ -1,4 +1,4 @@
-// Light from afar: the probe is looked up in the direction itself.
+// Distant light: the probe is read in the direction itself.
 
 fn incident_look_up(x: vec3f, w: vec3f) -> LookUp {
     return LookUp(w, 1.0);

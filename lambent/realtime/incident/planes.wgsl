@@ -3,16 +3,16 @@
 @group(2) @binding(3) var<storage, read> planes: array<vec4f>; // n and n.c + d, about the probe's centre c
 
 override PLANES: u32 = 0u;
-const PLANE_ACTIVE_M = 1e-6; // planes that a point is nearer to, or behind, are left out
+const PLANE_ACTIVE_M = 1e-6; // planes nearer to a point than this, or in front of it, are ignored
 
-// What a ray meets first of the planes that x is inside of.
+// First hit of a ray among the planes that x is inside of.
 struct PlaneMet {
-    nearness: f32, // 1 over the distance, 0 where none is met
-    heights: f32,  // of the probe's centre over the plane, to that of x
+    nearness: f32, // 1 over the distance, 0 without a hit
+    heights: f32,  // height of the probe's centre over the plane, relative to the height of x
 }
 
-// The ray leaves `origin` (x or the probe's centre) along w. 1/t is the largest approach/height over the planes; where
-// `origin` is x the reciprocal heights are the same for all samples of a pixel, so the compiler hoists them.
+// The ray leaves `origin` (x or the probe's centre) along w. 1/t is the largest approach/height over the planes. If
+// `origin` is x, the reciprocal heights are the same for all samples of a pixel, so the compiler hoists them.
 fn first_plane(origin: vec3f, w: vec3f, x: vec3f) -> PlaneMet {
     var met = PlaneMet(0.0, 1.0);
     for (var i = 0u; i < PLANES; i++) {
@@ -36,8 +36,8 @@ fn incident_bound(x: vec3f, w: vec3f) -> f32 {
     return first_plane(x, w, x).nearness;
 }
 
-// All planes that a point is inside of bound a convex room, which it and the probe's centre see whole, once each: the
-// mapping is one to one where the centre is inside of all of them.
+// The planes that a point is inside of bound a convex room. The mapping is one to one if the probe's centre is inside
+// of all of them: then both see every point of the walls exactly once.
 fn aim_maps(x: vec3f) -> bool {
     for (var i = 0u; i < PLANES; i++) {
         if (dot(planes[i].xyz, x) + planes[i].w > PLANE_ACTIVE_M && planes[i].w <= PLANE_ACTIVE_M) { return false; }
@@ -45,7 +45,7 @@ fn aim_maps(x: vec3f) -> bool {
     return true;
 }
 
-// A piece of plane at the distance t, h above which x is, is seen under the solid angle h/t^3 per area; on the cube's
+// A plane element at distance t, with x at height h over the plane, has the solid angle h/t^3 per area; on the cube's
 // faces it covers h_centre/max|p|^3 per area.
 fn aimed_look_up(x: vec3f, w: vec3f) -> Aimed {
     let met = first_plane(x, w, x);

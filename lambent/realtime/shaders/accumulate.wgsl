@@ -9,6 +9,6 @@
 @fragment fn accumulate_main(screen: Screen) -> @location(0) vec4f {
     let at = vec2i(screen.position.xy);
     let now = textureLoad(this_frame, at, 0);
-    if (weight.x >= 1.0) { return now; } // the mean of a first frame is undefined before
+    if (weight.x >= 1.0) { return now; } // before the first frame the mean is undefined
     return mix(textureLoad(mean_before, at, 0), now, weight.x);
 }

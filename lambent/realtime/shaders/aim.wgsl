@@ -1,8 +1,8 @@
-// Directions drawn from the lamps of a probe, and their density at the surface, 1/sr. The table is aim.py's: row 0 (levels,
-// prominence of the lamps), rows 1 and 2 the probabilities of the six faces, then those of the four
-// quarters of each face, of each quarter and so on, faces one after the other, quarters in Morton order.
+// Directions drawn from the lamps of a probe, and their density at the surface, 1/sr. The table is made by aim.py: row
+// 0 (levels, prominence of the lamps), rows 1 and 2 the probabilities of the six faces, then the probabilities of the
+// four quarters of each face, of the quarters of each quarter, and so on, face by face, quarters in Morton order.
 //
-// A direction at the surface belongs to one of the probe by the look-up in use (aimed_look_up).
+// The look-up in use maps directions at the surface to directions of the probe (aimed_look_up).
 
 @group(2) @binding(2) var<storage, read> aim: array<vec4f>;
 
@@ -19,7 +19,7 @@ fn aim_row(level: u32, face: u32, morton: u32) -> u32 {
     return AIM_NODES + 2u * (faces - 1u) + face * faces + morton;
 }
 
-// Every other bit of 16.
+// Spreads 8 bits to every other bit of 16.
 fn spread_bits(v: u32) -> u32 {
     var x = v;
     x = (x | (x << 4u)) & 0x0f0fu;
@@ -47,8 +47,8 @@ fn aim_probability(w: vec3f) -> f32 {
     return aim[aim_row(levels - 1u, face, morton >> 2u)][morton & 3u] * (0.25 * n * n);
 }
 
-// A direction of the probe (largest component 1) from u in [0, 1)^2: faces, then quarters, each time by what is left of u
-// (McCool & Harwood 1997), which keeps an even sequence even. w: its probability as aim_probability gives it.
+// A direction of the probe (largest component 1) from u in [0, 1)^2: chooses a face, then quarters, and rescales u at
+// each choice (McCool & Harwood 1997), which keeps an even sequence even. w: its probability, as from aim_probability.
 fn aim_draw(given: vec2f) -> vec4f {
     var u = given;
     var face = 0u;

@@ -6,7 +6,7 @@ fn factor_at(first: u32, i: u32) -> f32 {
     return samples[first + i / 4u][i % 4u];
 }
 
-// Factors stand at cos_o = (i + 1/2)/(4 FACTOR_ROWS).
+// Factors are given at cos_o = (i + 1/2)/(4 FACTOR_ROWS).
 fn albedo_factor(first: u32, cos_o: f32) -> f32 {
     let last = f32(4u * FACTOR_ROWS - 1u);
     let at = clamp(cos_o * (last + 1.0) - 0.5, 0.0, last);

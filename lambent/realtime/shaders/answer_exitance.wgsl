@@ -1,10 +1,11 @@
-// Exitance of points whose indirect light is some ratio of that as baked (`lambent.core.answer.Points.exitance`).
+// Exitance of points from the ratio of their current to their baked indirect light
+// (`lambent.core.answer.Points.exitance`).
 
 #include "answer.wgsl"
 
 struct Exitance {
     points: u32,
-    by_patch: u32,  // whether light now and as baked is that of patches, or of points
+    by_patch: u32,  // 1: the ratio is taken at patches; 0: at points
     least: f32,  // light below which a ratio is 1
 }
 

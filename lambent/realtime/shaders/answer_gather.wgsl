@@ -1,4 +1,4 @@
-// Indirect light at points: sums of exitance where their rays end (`lambent.core.answer_rays.gathered`).
+// Indirect light at points: sums of exitance at the ends of their rays (`lambent.core.answer_rays.gathered`).
 
 #include "answer_constants.wgsl"
 
@@ -7,8 +7,8 @@ struct Gather {
 }
 
 @group(0) @binding(0) var<uniform> gather: Gather;
-@group(0) @binding(1) var<storage, read> starts: array<u32>;  // of each point's rays, and the end of the last
-@group(0) @binding(2) var<storage, read> ends: array<u32>;  // points near which rays end, two in a word
+@group(0) @binding(1) var<storage, read> starts: array<u32>;  // first ray of each point; end of the last point's
+@group(0) @binding(2) var<storage, read> ends: array<u32>;  // points nearest to the rays' ends, two in a word
 @group(0) @binding(3) var<storage, read> weights: array<u32>;  // powers of two by WEIGHT_STEPS, four in a word; 0 for none
 @group(0) @binding(4) var<storage, read> scale: array<f32>;  // one over the rays of each point
 @group(0) @binding(5) var<storage, read> sent: array<f32>;

@@ -1,12 +1,12 @@
-// Irradiance of texels that answer, into the texture of the light map.
+// Writes the irradiance of answering texels into the light map's texture.
 
 #include "answer_constants.wgsl"
 
 struct Show {
     texels: u32,
     width: u32,  // of the light map
-    layers: u32,  // that it has, one for each side
-    per_unit: f32,  // of the scene
+    layers: u32,  // of the light map, one for each side
+    per_unit: f32,  // 1 over the unit of the scene's light
 }
 
 @group(0) @binding(0) var<uniform> show: Show;

@@ -1,7 +1,7 @@
 // Light between patches: B = D + F (a B + t B of the other side), by Jacobi's method (`lambent.core.answer.solved`).
 //
-// One workgroup solves for one light group, so that barriers order its sweeps and it stops when no patch changes any more.
-// Sweeps are divided among submissions, between which frames are drawn.
+// One workgroup solves for one light group, so that barriers order its sweeps and it stops when all patches have
+// converged. Sweeps are split into submissions, and frames are drawn between them.
 
 #include "answer.wgsl"
 
@@ -10,21 +10,21 @@ const LANES = 256u;
 struct Solve {
     patches: u32,
     sweeps: u32,  // at most, in this call
-    anew: u32,  // whether this call is the first
-    tolerance: f32,  // relative change of a patch
+    anew: u32,  // 1 in the first call
+    tolerance: f32,  // largest relative change of a patch
 }
 
 @group(0) @binding(0) var<uniform> solve: Solve;
-@group(0) @binding(1) var<storage, read> starts: array<u32>;  // of each patch's entries, and the end of the last
-@group(0) @binding(2) var<storage, read> entries: array<vec2u>;  // number of the sender, bits of its share
+@group(0) @binding(1) var<storage, read> starts: array<u32>;  // first entry of each patch; end of the last patch's
+@group(0) @binding(2) var<storage, read> entries: array<vec2u>;  // index of the sender, bits of its share
 @group(0) @binding(3) var<storage, read> patches: array<vec2u>;  // material, patch on the other side
 @group(0) @binding(4) var<storage, read> albedos: array<vec4f>;  // reflected by material, then transmitted
 @group(0) @binding(5) var<storage, read> direct: array<f32>;
 @group(0) @binding(6) var<storage, read_write> indirect: array<f32>;  // B - D
 @group(0) @binding(7) var<storage, read_write> sent: array<f32>;
-@group(0) @binding(8) var<storage, read_write> outcome: array<u32>;  // sweeps taken, and whether the solution stands
+@group(0) @binding(8) var<storage, read_write> outcome: array<u32>;  // sweeps taken, whether it has converged
 
-const ENDLESS = 1e30; // W/m^2: no light that stands; differences of infinities may compare as any
+const ENDLESS = 1e30; // W/m^2; more light counts as diverged, since comparisons with infinities are unreliable
 
 var<workgroup> moved: atomic<u32>;
 var<workgroup> stands: u32;
@@ -43,7 +43,7 @@ fn send(p: u32) {
     sent[3u * p + 2u] = light.b;
 }
 
-// Light that arrives at a patch; an equivalent albedo may be negative, light is not.
+// Light that arrives at a patch, at least 0: an equivalent albedo may be negative.
 fn arrived(p: u32) -> vec3f {
     var sum = vec3f(0.0);
     for (var k = starts[p]; k < starts[p + 1u]; k++) {

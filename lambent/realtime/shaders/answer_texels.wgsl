@@ -1,9 +1,9 @@
-// Irradiance of texels that answer, of indirect light at the points near each (`lambent.core.answer.Answer.at_texels`).
+// Irradiance of answering texels from the indirect light at points near each (`lambent.core.answer.Answer.at_texels`).
 
 #include "answer.wgsl"
 
-const NEAR = 8u;  // points of a texel
-const WORDS = 10u;  // of a texel: eight points, then their eight shares
+const NEAR = 8u;  // points per texel
+const WORDS = 10u;  // per texel: eight points, then eight shares
 
 struct Texels {
     texels: u32,
@@ -13,7 +13,7 @@ struct Texels {
 @group(0) @binding(0) var<uniform> about: Texels;
 @group(0) @binding(1) var<storage, read> near: array<u32>;
 @group(0) @binding(2) var<storage, read> indirect: array<f32>;  // of points
-@group(0) @binding(3) var<storage, read> gathered: array<f32>;  // indirect light of texels as it is gathered as baked
+@group(0) @binding(3) var<storage, read> gathered: array<f32>;  // baked indirect light of texels, as gathered
 @group(0) @binding(4) var<storage, read> direct: array<f32>;
 @group(0) @binding(5) var<storage, read> baked: array<f32>;
 @group(0) @binding(6) var<storage, read_write> irradiance: array<f32>;

@@ -1,6 +1,6 @@
-// Colour: sibling of core/colour.py, which is the truth; a test compares the two.
+// Colour: same functions as core/colour.py, the reference; a test compares the two.
 
-const HALF_MAX = 65504.0; // the largest half float: brighter light is cut there
+const HALF_MAX = 65504.0; // the largest half float: brighter light is clamped to it
 
 // Y of linear Rec.709 RGB.
 fn luminance(rgb: vec3f) -> f32 {
@@ -13,7 +13,7 @@ fn filmic(c: vec3f) -> vec3f {
     return (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
 }
 
-// Light that the filmic curve shows as `shown`, 0 to 1.
+// Light whose filmic value is `shown`, 0 to 1.
 fn filmic_inverse(shown: vec3f) -> vec3f {
     let a = 2.43 * shown - 2.51;
     let b = 0.59 * shown - 0.03;

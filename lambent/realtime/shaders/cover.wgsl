@@ -1,5 +1,5 @@
-// The light of every pixel as the mean over its places (coverage.wgsl). Where all lie on its own surface it stays as it
-// is. The mean is that of the light a display emits, as in a still, so that edges against a lamp are smooth.
+// The light of every pixel as the mean over its places (coverage.wgsl); unchanged if all lie on the pixel's own
+// surface. The mean is taken of the light that a display emits, as in a still, so that edges against a lamp are smooth.
 
 #include "frame.wgsl"
 #include "screen.wgsl"
@@ -10,10 +10,10 @@
 @group(1) @binding(1) var missed_light: texture_2d<f32>;
 @group(1) @binding(2) var steps: texture_2d<u32>;
 
-const MIXED = 0.0; // alpha of a mean over several surfaces, 1 elsewhere: smooth.wgsl leaves it alone
+const MIXED = 0.0; // alpha of means over several surfaces, which smooth.wgsl skips; 1 elsewhere
 const FILMIC_WHITE = 7.24; // exposed light that the curve shows as white
 
-// Exposed light as the display emits it, without the encoding; and the other way round.
+// Exposed light as the display emits it, without the encoding; and the inverse.
 fn emitted(light: vec3f) -> vec3f {
     let seen = frame.exposure * light;
     return select(min(seen, vec3f(1.0)), filmic(min(seen, vec3f(FILMIC_WHITE))), frame.view_transform == 2u);
@@ -35,7 +35,7 @@ fn exposed(shown: vec3f) -> vec3f {
         var light = here.rgb;
         if (step == MISSED) {
             let seen = textureLoad(missed_light, at, 0);
-            light = select(light, seen.rgb, seen.a > 0.0); // nothing is there but what is hardly ever missed
+            light = select(light, seen.rgb, seen.a > 0.0); // rarely, nothing was drawn: keep the pixel's
         } else if (step != OWN) {
             light = textureLoad(radiance, at + step_of(PLACES[i], step), 0).rgb;
         }

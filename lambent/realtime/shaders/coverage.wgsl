@@ -1,24 +1,24 @@
-// What is at four places of every pixel beside its middle, after Chajdas, McGuire and Luebke 2011 ("Subpixel
-// reconstruction antialiasing for deferred shading"): the surface of that pixel, or of one beside it, or one that no
-// pixel near it shows. Depths are reversed, near/z, and so linear in the image along a plane.
+// The surface at four places of every pixel besides its centre, after Chajdas, McGuire and Luebke 2011 ("Subpixel
+// reconstruction antialiasing for deferred shading"): the surface of the pixel, of a neighbour, or one that no
+// neighbour shows. Depths are reversed, near/z, and so linear in the image along a plane.
 
 #include "screen.wgsl"
 #include "places.wgsl"
 
 @group(0) @binding(0) var depths: texture_2d<f32>;
-@group(0) @binding(1) var depths_0: texture_2d<f32>; // of what is at each place
+@group(0) @binding(1) var depths_0: texture_2d<f32>; // at each place
 @group(0) @binding(2) var depths_1: texture_2d<f32>;
 @group(0) @binding(3) var depths_2: texture_2d<f32>;
 @group(0) @binding(4) var depths_3: texture_2d<f32>;
 
-const SAME_SURFACE = 0.004; // of the depth
-const STEEPEST = 0.1;       // of the depth per px, beyond which two neighbours are no one surface
+const SAME_SURFACE = 0.004; // largest deviation on one surface, relative to the depth
+const STEEPEST = 0.1;       // largest slope of one surface between neighbours, relative to the depth, per px
 
 fn depth_of(at: vec2i) -> f32 {
     return textureLoad(depths, clamp(at, vec2i(0), vec2i(textureDimensions(depths)) - 1), 0).r;
 }
 
-// The change of depth (per px) of a pixel's surface along `along`, from the neighbour that is more likely to show it.
+// Slope (per px) of the depth of a pixel's surface along `along`, from the neighbour more likely to show the surface.
 fn slope_along(at: vec2i, here: f32, along: vec2i) -> f32 {
     let after = depth_of(at + along) - here;
     let before = here - depth_of(at - along);
@@ -34,7 +34,7 @@ fn is_on(depth: f32, predicted: f32) -> bool {
     return abs(depth - predicted) <= SAME_SURFACE * max(depth, predicted);
 }
 
-// How the surface of `depth` at place `i` is found from a pixel whose own it is not: a step, or MISSED.
+// Step from a pixel to the one that shows the surface of `depth` at place `i`, not the pixel's own; or MISSED.
 fn step_to(at: vec2i, i: u32, depth: f32) -> u32 {
     let size = vec2i(textureDimensions(depths));
     for (var k = 1u; k < MISSED; k++) {

@@ -1,4 +1,4 @@
-// Depth alone, at the positions of vertex.wgsl to the bit.
+// Depth alone, at bit-identical positions to vertex.wgsl.
 
 #include "frame.wgsl"
 

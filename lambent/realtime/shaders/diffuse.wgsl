@@ -1,4 +1,4 @@
-// No specular light: the floor of every measurement.
+// No specular light: the baseline of measurements.
 
 #include "surface.wgsl"
 

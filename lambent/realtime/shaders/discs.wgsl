@@ -1,4 +1,4 @@
-// Discs that face the eye, each with a rim; see realtime/discs.py for what the vertices hold.
+// Discs that face the eye, each with a rim; realtime/discs.py describes the vertices.
 
 #include "frame.wgsl"
 

@@ -1,13 +1,13 @@
-// Diffuse light on a bent normal, from the dominant direction of the light on the mesh's normal.
+// Diffuse light for a bent normal, from the dominant direction of the light at the mesh's normal.
 
-// E(bent)/E(n) for light of the dominant direction d: the mean of the directions it comes from, weighted by what each adds
-// to the irradiance, in the frame of n and bent. The light is taken as a share a of a uniform hemisphere, whose mean is
-// 2/3 n, and one lamp in direction l: d = a 2/3 n + (1 - a) l with |l| = 1 gives a. Exact for either alone. What is below
-// the mesh's own horizon is dark.
+// E(bent)/E(n) for light of the dominant direction d: the mean of incident directions, weighted by irradiance, in the
+// frame of n and bent. The light is modelled as a share a of a uniform hemisphere, whose mean is 2/3 n, and one lamp in
+// direction l: d = a 2/3 n + (1 - a) l with |l| = 1 gives a. Exact for either alone. Directions below the mesh's own
+// horizon are dark.
 fn bent_share(d: vec3f, n: vec3f, bent: vec3f) -> f32 {
     let square = dot(d, d);
     if (square < 1e-6) { return 1.0; }
-    // 5/9 a^2 - 2 h a + c = 0; its lesser root, without cancellation
+    // 5/9 a^2 - 2 h a + c = 0: smaller root, without cancellation
     let h = 1.0 - 2.0 / 3.0 * dot(d, n);
     let c = max(1.0 - square, 0.0);
     let a = min(c / (h + sqrt(max(h * h - 5.0 / 9.0 * c, 0.0)) + 1e-6), 1.0);

@@ -1,10 +1,10 @@
-// A layer added to the image: scale, texture and the viewer's curve times the sums (`lambent.editing.canvas`).
+// Adds a layer to the image: its sums times scale, texture and the viewer's curve (`lambent.editing.canvas`).
 
 #include "edited.wgsl"
 
 struct Layer {
     scale: vec3f,
-    kinds: u32,  // of factors besides: 1 a texture, 2 a curve of the viewer's angle
+    kinds: u32,  // further factors, bits: 1 texture, 2 curve of the viewer's angle
 }
 
 @group(0) @binding(0) var<storage, read> layer: Layer;

@@ -1,4 +1,4 @@
-// An edited picture as a display shows it: with the rest of what fades, which may be negative.
+// An edited picture for the display, plus a share of the fading difference, which may be negative.
 
 #include "screen.wgsl"
 #include "display.wgsl"

@@ -1,23 +1,23 @@
-// Transport of two curves with the idle one folded in, as rows of wavelets: `lambent.editing.folding` on a GPU.
+// Folds the idle one of two curves into the transport, as rows of wavelets: `lambent.editing.folding` on a GPU.
 //
-// A workgroup makes the rows of two neighbouring points, which share the words of a row. It reads a point's pairs in
-// batches, and each thread sums those of its bands: shader languages know no atomic sums of floats.
+// A workgroup computes the rows of two neighbouring points, which share the words of a row. It reads a point's pairs in
+// batches, and each thread sums the pairs of its own bands, because WGSL has no atomic sums of floats.
 
 #include "edited.wgsl"
 #include "wavelet_taps.wgsl"
 
 const LANES = 64u;
-const MOST = 256u;  // bands of a curve
+const MOST = 256u;  // most bands of a curve
 
 struct Fold {
     edited: u32,  // 0 or 1: which of the two curves
-    bands: u32,   // of it, a power of two
+    bands: u32,   // of the edited curve, a power of two
     second: u32,  // bands of the second curve, a power of two
     idle: array<vec4f>,  // means of the other curve over its bands
 }
 
 @group(0) @binding(0) var<storage, read> fold: Fold;
-@group(1) @binding(1) var<storage, read> spans: array<vec2u>;  // of the piece's points, in `steps` and `values`
+@group(1) @binding(1) var<storage, read> spans: array<vec2u>;  // ranges of the piece's points in `steps` and `values`
 @group(1) @binding(2) var<storage, read> steps: array<u32>;
 @group(1) @binding(3) var<storage, read> values: array<u32>;
 @group(1) @binding(4) var<storage, read_write> transport: array<u32>;
@@ -26,9 +26,9 @@ var<workgroup> step: array<u32, LANES>;
 var<workgroup> light: array<vec3f, LANES>;
 var<workgroup> row: array<vec3f, MOST>;
 var<workgroup> before: array<vec3f, MOST>;
-var<workgroup> left: array<vec3f, MOST>;  // row of the first of both points
+var<workgroup> left: array<vec3f, MOST>;  // row of the first point
 
-// From an entry's pair of bands to the next entry's: a byte of each.
+// Difference between an entry's pair of bands and the next entry's, one byte per entry.
 fn step_of(entry: u32) -> u32 {
     return (steps[entry / 4u] >> (8u * (entry % 4u))) & 0xffu;
 }
@@ -56,7 +56,7 @@ fn sum_of(point: u32, lane: u32) {
             pair += step[k];
             var bands = vec2u(pair >> shift, pair & (fold.second - 1u));
             if (fold.edited == 1u) { bands = bands.yx; }
-            if (bands.x % LANES == lane) { row[bands.x] += fold.idle[bands.y].rgb * light[k]; }  // this thread's alone
+            if (bands.x % LANES == lane) { row[bands.x] += fold.idle[bands.y].rgb * light[k]; }  // no other thread
         }
         workgroupBarrier();
     }

@@ -1,4 +1,4 @@
-// Sums of transport rows, two pixels a thread: what `lambent.editing.products.add_rows` is in memory.
+// Sums of transport rows, two pixels per thread: `lambent.editing.products.add_rows` on a GPU.
 
 #include "edited.wgsl"
 
@@ -9,7 +9,7 @@ struct Row {
 struct Sum {
     begin: u32,  // pixels of the layer
     end: u32,
-    anew: u32,   // whether the sum takes the place of what was there
+    anew: u32,   // 1: the sum replaces the previous values
     count: u32,
     rows: array<Row>,
 }
@@ -28,7 +28,7 @@ struct Sum {
     var seen = select(before, vec2f(0.0), sum.anew != 0u);
     for (var k = 0u; k < sum.count; k++) {
         let weight = sum.rows[k].weight[id.y];
-        if (weight != 0.0) {  // the same for the whole workgroup: whole rows are left out
+        if (weight != 0.0) {  // uniform in the workgroup: skips whole rows
             seen += weight * unpack2x16float(transport[3u * piece.words * sum.rows[k].index + at]);
         }
     }

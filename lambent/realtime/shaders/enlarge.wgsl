@@ -1,4 +1,4 @@
-// The radiance of a smaller frame, as what a frame of full size is drawn over.
+// Enlarges the radiance of a smaller frame, as the base of a frame of full size.
 
 #include "screen.wgsl"
 

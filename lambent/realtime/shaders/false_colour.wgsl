@@ -1,4 +1,4 @@
-// Luminance in false colour: core.false_colour, of which this repeats the colours.
+// Luminance in false colour; the colours are copied from core.false_colour.
 
 #include "frame.wgsl"
 #include "colour.wgsl"

@@ -1,8 +1,8 @@
-// What every pass of a frame knows (group 0).
+// Data of all passes of a frame (group 0).
 
 struct Frame {
     clip_from_world: mat4x4f,
-    eye: vec4f,      // w: which of 64 turns this frame takes of interleaved samples; frames of a still take them all
+    eye: vec4f,      // w: this frame's turn, of 64, of interleaved samples; the frames of a still take all turns
     across: vec4f,   // the ray of clip position (x, y) is forward + x across + y up
     up: vec4f,
     forward: vec4f,
@@ -10,7 +10,7 @@ struct Frame {
     first_sample: u32, // index of this frame's first sample of a progressive series
     view_transform: u32,
     exposure: f32,   // factor on radiance, 2^EV
-    prior: f32,      // share of the last frame of few samples that is shown beside a progressive mean
+    prior: f32,      // share of the last frame of few samples, blended with a progressive mean
     scale: vec4f,      // of false colour: low, high, logarithmic, lm/W
     alone: u32,        // 1: no other frames are averaged with this one
 }

@@ -1,4 +1,4 @@
-// Pixels that a masked surface covers in part, laid over what is behind them. Appended to a shader of shade.wgsl.
+// Pixels that a masked surface covers in part, blended over the background. Appended to a shader of shade.wgsl.
 
 const LEAST_COVERAGE = 0.01;
 

@@ -1,10 +1,10 @@
-// Clear glass over what is behind it. Appended to a shader of shade.wgsl that leaves out what is transmitted (STRAIGHT).
+// Clear glass over the background. Appended to a shader of shade.wgsl that leaves out transmitted light (STRAIGHT).
 
 #include "clear.wgsl"
 
 override MASKED: bool = false; // the glass has holes
 
-// What it lets through of the light behind it.
+// Transmittance of the glass for the light behind it.
 @fragment fn pass_main(v: Varyings) -> @location(0) vec4f {
     let open = MASKED && is_hole(v.uv);
     let tint = painted(v.uv).specular;
@@ -23,7 +23,7 @@ override MASKED: bool = false; // the glass has holes
     return vec4f(min(lambent_clear(cosine, terms) * tint, vec3f(LAMBENT_CLEAR_MOST)), 1.0);
 }
 
-// What it adds: mirrored and emitted light.
+// Light that the glass adds: reflected and emitted.
 @fragment fn mirror_main(v: Varyings, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     let open = MASKED && is_hole(v.uv);
     let light = part_share(v.p_world) * surface_light(v, front);

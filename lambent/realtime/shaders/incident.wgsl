@@ -1,21 +1,21 @@
-// What look-ups of incident light return (lambent/realtime/incident), and the answers for light from afar.
+// Results of look-ups of incident light (lambent/realtime/incident), and results for distant light.
 
 #include "directions.wgsl"
 
-// Where to look in the probe (not unit), and the distance from the surface to what is seen there; 1 for light from afar.
+// Direction in the probe (not unit), and distance from the surface to the point seen there; 1 for distant light.
 struct LookUp {
     direction: vec3f,
     t: f32,
 }
 
-// A look-up, and how densely directions of the probe lie there: area on the faces of the cube [-1, 1]^3 per solid angle at
-// the surface, 1/sr.
+// A look-up, and the density of the probe's directions there: area on the faces of the cube [-1, 1]^3 per solid angle
+// at the surface, 1/sr.
 struct Aimed {
     direction: vec3f,
     density: f32,
 }
 
-// Unit direction at the surface to what the probe sees in a given direction, and the density there.
+// Unit direction at the surface to the point that the probe sees in a given direction, and the density there.
 struct Towards {
     w: vec3f,
     density: f32,

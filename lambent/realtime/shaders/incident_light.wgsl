@@ -1,11 +1,11 @@
-// Light of a look-up in the cube map of a probe. Look-ups that bring light of their own have the same functions.
+// Light of a look-up in the cube map of a probe. Look-ups with their own light define the same functions.
 
-// Points of a light field near a place of the light map; here none are asked.
+// Points of a light field near a position of the light map; none here.
 fn points_near(uv2: vec2f) -> vec4u {
     return vec4u(0u);
 }
 
-// The face behind a place of glass that refracts; here none does.
+// The back face behind a point of refracting glass; none here.
 fn exit_near(uv2: vec2f, front: bool) -> vec4f {
     return vec4f(0.0);
 }
@@ -18,14 +18,14 @@ fn incident(s: Surface, w: vec3f, half_log2_omega: f32) -> vec3f {
     return s.niche + arriving(s, along) * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
 }
 
-// The same from a cube that is prefiltered by roughness.
+// `incident` from a cube map that is prefiltered by roughness.
 fn incident_at_level(s: Surface, w: vec3f, level: f32) -> vec3f {
     let along = to_world(s, w);
     let found = incident_look_up(s.x, along);
     return s.niche + arriving(s, along) * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
 }
 
-// Weights of the points of a light field for a mirror direction, and light as one of them sees it; here there are none.
+// Weights of a light field's points for a mirror direction, and light seen from one point; none here.
 fn point_weights(s: Surface, mirror: vec3f) -> vec4f {
     return vec4f(1.0, 0.0, 0.0, 0.0);
 }
@@ -34,7 +34,7 @@ fn ray_of_point(s: Surface, point: u32, w: vec3f) -> vec3f {
     return incident_ray(s, w);
 }
 
-// Light of the surface itself without its lobes: that of the light map, where no look-up knows better.
+// Light of the surface without its lobes: the light map's, unless a look-up has a better one.
 fn own_light(s: Surface, of_light_map: vec3f) -> vec3f {
     return of_light_map;
 }

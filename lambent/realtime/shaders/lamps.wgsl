@@ -1,5 +1,5 @@
-// `lamps`: as rings.wgsl, with the probe's small lamps outside of the cube map, each under the lobe in closed form
-// (lamp_light.wgsl). The table is that of lamps.py.
+// `lamps`: like rings.wgsl, but the probe's small lamps are taken out of the cube map, and each is evaluated under the
+// lobe in closed form (lamp_light.wgsl). lamps.py describes the table.
 
 #include "surface.wgsl"
 #include "albedo_factor.wgsl"
@@ -8,14 +8,14 @@
 @group(2) @binding(1) var cleaned_cubes: texture_cube_array<f32>; // without 0, 1, ... groups of lamps
 @group(2) @binding(2) var<uniform> lamps: array<vec4f, 130>;
 
-override LAYERS: u32 = 2u; // 1 where no lobe is between two cube maps, which the loop need not allow for
+override LAYERS: u32 = 2u; // 1 if no lobe mixes two cube maps, which shortens the loop
 
 const LAMP_HEAD = 2u;
 const LAMP_ROWS = 4u;
 const FIRST_OUT = 0.47;
 const LAST_OUT = 0.54;
 
-// How many groups have left the cube map for a lobe; fractions are shares of the last (lamps.py).
+// Number of groups taken out of the cube map for a lobe; a fraction is the share of the last group (lamps.py).
 fn groups_out(lobe: LambentLobe) -> f32 {
     let share = smoothstep(vec4f(FIRST_OUT), vec4f(LAST_OUT), sqrt(lobe.mx * lobe.my) / lamps[0]);
     return dot(share, vec4f(1.0));
@@ -33,7 +33,7 @@ fn lamps_light(lobe: LambentLobe, wo: vec3f, s: Surface, out: f32) -> vec3f {
         let first = lamps[row + 2u];
         let second = lamps[row + 3u];
         let to = place.xyz - place.w * s.x;
-        let per_t = inverseSqrt(dot(to, to) + second.w); // a bit short, as the mean direction of what is near should be
+        let per_t = inverseSqrt(dot(to, to) + second.w); // slightly short, like the mean direction of a near lamp
         let wi = (to_local * to) * per_t;
         let facing = first.w * abs(dot(cross(first.xyz, second.xyz), to)) * per_t * per_t * per_t;
         let a = rejection((to_local * first.xyz) * per_t, wi);

@@ -1,27 +1,27 @@
-// Maps of a light field: their light on all levels, and their distances, as realtime/light_field_atlas.py lays them out.
+// Maps of a light field: light on all levels, and distances, laid out by realtime/light_field_atlas.py.
 
-override QUARTERS: bool = false; // texels say which of their quarters show a surface
+override QUARTERS: bool = false; // texels flag the quarters that show a surface
 override BLOCKS: bool = false;   // distances are in blocks: core/distance_blocks.py
 
-// Where a point's map lies: its number in its layer, and the layer; `span` is what codes of distances mean.
+// Location of a point's map: its number in its layer, and the layer; `span` scales the codes of distances.
 struct Map {
     place: u32,
     layer: u32,
     span: vec2f,
 }
 
-// What a texel sees: 1/m, and which of its quarters show a surface.
+// A texel: inverse distance, 1/m, and flags of the quarters that show a surface.
 struct Texel {
     inverse: f32,
     cover: u32,
 }
 
-// a/b rounded down, exact for a < 2^16: in whole numbers, adapters in software divide one after the other.
+// a/b rounded down, exact for a < 2^16: software adapters do not vectorise integer division.
 fn whole_share(a: u32, b: u32) -> u32 {
     return u32((f32(a) + 0.5) / f32(b));
 }
 
-// The first texel of the place in a grid with so many columns of cells.
+// The first texel of a place in a grid with `columns` of cells.
 fn corner_of(place: u32, columns: u32, cell: vec2u) -> vec2u {
     let row = whole_share(place, columns);
     return vec2u(place - row * columns, row) * cell;
@@ -66,8 +66,8 @@ fn light_on_level(map: Map, place: vec2f, level: u32) -> vec3f {
     return textureSampleLevel(atlas, linear_sampler, texel / field.size, map.layer, 0.0).rgb;
 }
 
-// Light of a point's map from direction w, averaged over a solid angle there: of a texel, 4 (|x| + |y| + |z|)^3/side^2 sr.
-// Between levels, light is mixed so that the mean of its filters' solid angles is that.
+// Light of a point's map from direction w, averaged over a solid angle. A texel has 4 (|x| + |y| + |z|)^3/side^2 sr.
+// Two levels are mixed so that the mean of their filters' solid angles equals the wanted one.
 fn light_of(point: u32, w: vec3f, half_log2_omega: f32) -> vec3f {
     let spread = dot(abs(w), vec3f(1.0)) * inverseSqrt(dot(w, w));
     let texels = exp2(2.0 * half_log2_omega - 2.0 - 3.0 * log2(spread)); // of a map of 1 x 1 texels
@@ -86,8 +86,8 @@ fn light_of(point: u32, w: vec3f, half_log2_omega: f32) -> vec3f {
     return light;
 }
 
-// What is added to the light of the finest level, which is that of surfaces in texels that show the sky as well, so that it
-// has the light of both. Coarser levels are of both, and a march that meets a surface wants its light alone.
+// Sky to add to the finest level: its texels hold surfaces only, even if they also show the sky, because a march that
+// hits a surface needs its light alone. Coarser levels hold both.
 fn edge_sky(map: Map, place: vec2f, w: vec3f) -> vec3f {
     let at = place * f32(field.side) - 0.5;
     let low = floor(at);
@@ -105,7 +105,7 @@ fn edge_sky(map: Map, place: vec2f, w: vec3f) -> vec3f {
     return found;
 }
 
-// What a texel of a tile sees. In half floats, its quarters are the lowest bits of the distance, and its sign.
+// A texel of a tile. In half floats, the flags of the quarters are the lowest bits of the distance, and its sign.
 fn texel_of(map: Map, texel: vec2u) -> Texel {
     if (BLOCKS) { return texel_of_block(map, texel); }
     let bits = textureLoad(distances, distance_corner(map) + texel, map.layer, 0).r;
@@ -121,7 +121,7 @@ fn texel_of_block(map: Map, texel: vec2u) -> Texel {
     let kind = (words.x >> 16u) & 3u;
     var k = (words.y >> (2u * i)) & 3u;
     var cover = 15u;
-    var share = 0.5 * (f32(k) - 1.0); // of the way between both ends; below 0 for the sky
+    var share = 0.5 * (f32(k) - 1.0); // interpolates between the ends; below 0 for the sky
     if (ends.x > ends.y) {
         let bit = 16u + 3u * i;
         let low = (words.x >> min(bit, 31u)) | (words.y << (32u - min(bit, 31u)));
@@ -144,7 +144,7 @@ fn of_entry(map: Map, corner: vec2u, number: u32, i: u32) -> u32 {
     return (select(words.x, words.y, i >= 8u) >> (4u * (i & 7u))) & 15u;
 }
 
-// 1/m, of the quarter of a texel that a direction from a point lies in; 0 for the sky.
+// Inverse distance, 1/m, in the quarter of a texel that a direction falls into; 0 for the sky.
 fn inverse_distance(map: Map, w: vec3f) -> f32 {
     let at = map_place(w) * f32(field.side);
     let texel = min(vec2u(at), vec2u(field.side - 1u));

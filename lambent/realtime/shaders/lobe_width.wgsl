@@ -1,7 +1,7 @@
-// How wide a lobe is, about its mirror direction.
+// Width of a lobe about its mirror direction.
 
-// Half-widths (minor, major) in radians: an ellipse. Slopes m turn the mirror direction by 2 m in the plane of incidence
-// and by 2 m cos_o across it.
+// Half-widths (minor, major) in radians: an ellipse. Slopes m turn the mirror direction by 2 m in the plane of
+// incidence and by 2 m cos_o across it.
 fn lobe_half_widths(lobe: LambentLobe, wo: vec3f) -> vec2f {
     let e = wo.xy * inverseSqrt(max(dot(wo.xy, wo.xy), 1e-12));
     let m2 = vec2f(lobe.mx * lobe.mx, lobe.my * lobe.my);
@@ -13,7 +13,8 @@ fn lobe_half_widths(lobe: LambentLobe, wo: vec3f) -> vec2f {
     return 2.0 * vec2f(area * inverseSqrt(max(major2, 1e-12)), sqrt(major2));
 }
 
-// Pixels that an angle covers in the mirrored view where what is reflected lies `t` behind a pixel `away` from the eye.
+// Pixels that an angle covers in the mirrored view, for a reflected point `t` behind a pixel that is `away` from the
+// eye.
 fn pixels_of(angle: f32, focal_px: f32, t: f32, away: f32) -> f32 {
     return angle * focal_px * t / (t + away);
 }

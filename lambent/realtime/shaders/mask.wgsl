@@ -7,7 +7,7 @@
     if (is_hole(v.uv)) { discard; }
 }
 
-// What is covered in part is drawn later, see fringe.wgsl.
+// Partly covered pixels are drawn later, by fringe.wgsl.
 @fragment fn solid_main(v: Varyings) {
     if (coverage(v.uv) < SOLID) { discard; }
 }

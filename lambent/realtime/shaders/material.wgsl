@@ -1,14 +1,14 @@
-// A material's numbers and the textures that multiply them (group 1), in the order of KINDS in textures.py, whose head
-// says what the texels of each mean.
+// A material's numbers and the textures that multiply them (group 1), in the order of KINDS in textures.py, which
+// describes their texels.
 
-// Bits of the textures to read: 1 diffuse, 2 specular, 4 roughness, 8 normal, 16 direction. A constant: what a material
-// does not have costs nothing.
+// Bits of the textures to read: 1 diffuse, 2 specular, 4 roughness, 8 normal, 16 direction. A constant, so that missing
+// textures cost nothing.
 override TEXTURES: u32 = 0u;
 
 struct Material {
     kd: vec4f, // w: 1 where the diffuse reflection is coupled to Fresnel
     kt_d: vec4f,
-    diffuse_scale: vec4f, // w: the opacity below which there is no surface
+    diffuse_scale: vec4f, // w: cutoff of opacity, below which is a hole
     specular_scale: vec4f,
     lie: array<vec4f, 12>, // two rows of each texture's uv transform
 }
@@ -32,13 +32,13 @@ struct Painted {
     turn: vec2f,     // cosine and sine of the angle from t to the brushing direction
 }
 
-// Coordinates of the texels of a texture: both v are up, rows go down.
+// Texel coordinates of a texture: v points up in both, rows go down.
 fn place(kind: u32, uv: vec2f) -> vec2f {
     let p = vec3f(uv, 1.0);
     return vec2f(dot(material.lie[2u * kind].xyz, p), 1.0 - dot(material.lie[2u * kind + 1u].xyz, p));
 }
 
-// Half the angle of a doubled direction, which averaging has shortened.
+// Halves the angle of a doubled direction, whose length averaging has shortened.
 fn half_angle(doubled: vec2f) -> vec2f {
     let l = length(doubled);
     let c2 = select(1.0, clamp(doubled.x / max(l, 1e-6), -1.0, 1.0), l > 1e-6);
@@ -46,7 +46,7 @@ fn half_angle(doubled: vec2f) -> vec2f {
     return vec2f(sqrt(0.5 + 0.5 * c2), select(s, -s, doubled.y < 0.0));
 }
 
-// Takes derivatives: to be called where all pixels of an object pass.
+// Takes derivatives: call in uniform control flow.
 fn painted(uv: vec2f) -> Painted {
     var p = Painted(vec3f(1.0), vec3f(1.0), 1.0, vec2f(0.0), vec2f(0.0), vec2f(1.0, 0.0));
     if ((TEXTURES & 1u) != 0u) {
@@ -73,10 +73,10 @@ fn is_hole(uv: vec2f) -> bool {
     return textureSample(opacity_texture, texture_sampler, place(5u, uv)).r < material.diffuse_scale.w;
 }
 
-const SOLID = 0.95; // coverage from which a pixel counts as covered
+const SOLID = 0.95; // pixels of at least this coverage count as covered
 
-// How much of a pixel the surface covers. Where texels are larger than pixels the test has an edge, as wide as a pixel;
-// where they are smaller the share of those that pass it. Takes derivatives.
+// Share of a pixel that the surface covers. For texels larger than pixels, an edge one pixel wide at the cutoff; for
+// smaller texels, the share that passes the cutoff. Takes derivatives.
 fn coverage(uv: vec2f) -> f32 {
     let at = place(5u, uv);
     let opacity = textureSample(opacity_texture, texture_sampler, at).rg;

@@ -1,4 +1,4 @@
-// Brings a place's depth before everything where its light is known, so that only what was missed is drawn there.
+// Sets the nearest depth at places with known light, so that only missed surfaces are drawn.
 
 #include "screen.wgsl"
 #include "places.wgsl"

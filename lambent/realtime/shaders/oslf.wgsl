@@ -1,6 +1,6 @@
-// Monte Carlo evaluation of a BRDF over a light field (thesis R, 5.12): samples of the lobe, as in qmc.wgsl, and the points
-// near the pixel. With samples in the outer loop each is looked up as the look-up does; with points, one map is read at a
-// time along the samples' own directions, and what the points show is blended by their weights for the mirror direction.
+// Monte Carlo evaluation of a BRDF over a light field (thesis R, 5.12): samples of the lobe, as in qmc.wgsl, and points
+// near the pixel. With samples in the outer loop, the look-up serves each sample. With points in the outer loop, maps
+// are read one at a time along the samples' directions, and blended by the points' weights for the mirror direction.
 
 #include "frame.wgsl"
 #include "surface.wgsl"
@@ -8,7 +8,7 @@
 
 override BY_POINTS: u32 = 0u;
 
-const ALL = 4u; // of the points together
+const ALL = 4u; // number that stands for all points
 
 fn of_samples(lobe: LambentLobe, offset: vec2u, point: u32, wo: vec3f, s: Surface) -> vec3f {
     var sum = vec3f(0.0);

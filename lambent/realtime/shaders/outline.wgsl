@@ -1,4 +1,4 @@
-// The line around what is seen of an object, smooth although what is seen is whole pixels.
+// A smooth line around the visible part of an object, from a mask of whole pixels.
 
 #include "screen.wgsl"
 
@@ -8,7 +8,7 @@ const SPREAD = 1.0; // standard deviation of the bell, pixels
 
 @group(0) @binding(0) var seen: texture_2d<f32>;
 
-// The bell's mean of the silhouette runs from 0 to 1 across its border: the line is where it is in between.
+// The silhouette, blurred by the bell, rises from 0 to 1 across its border: the line is drawn in between.
 @fragment fn outline_main(screen: Screen) -> @location(0) vec4f {
     let last = vec2i(textureDimensions(seen)) - 1;
     let at = vec2i(screen.position.xy);
@@ -17,7 +17,7 @@ const SPREAD = 1.0; // standard deviation of the bell, pixels
     for (var y = -REACH; y <= REACH; y++) {
         for (var x = -REACH; x <= REACH; x++) {
             let bell = exp(-0.5 * f32(x * x + y * y) / (SPREAD * SPREAD));
-            let place = clamp(at + vec2i(x, y), vec2i(0), last); // beyond the picture it goes on: no line there
+            let place = clamp(at + vec2i(x, y), vec2i(0), last); // clamped, so that the picture's edge draws no line
             share += bell * textureLoad(seen, place, 0).r;
             weight += bell;
         }

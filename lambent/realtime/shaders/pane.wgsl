@@ -1,4 +1,4 @@
-// One layer of clear glass as the sun sees it (realtime/panes.py): depth, and what it lets through.
+// One layer of clear glass as seen from the sun (realtime/panes.py): depth and transmittance.
 
 #include "vertex.wgsl"
 #include "material.wgsl"
@@ -6,10 +6,10 @@
 #include "clear.wgsl"
 
 @group(2) @binding(0) var<uniform> terms: array<vec4f, LAMBENT_CLEAR_TERMS>;
-@group(2) @binding(1) var solid: texture_depth_2d_array;  // depths of what blocks the sun, in texels half as large
-@group(2) @binding(2) var before: texture_depth_2d_array; // of the layer before
+@group(2) @binding(1) var solid: texture_depth_2d_array;  // opaque depths, in texels of half the size
+@group(2) @binding(2) var before: texture_depth_2d_array; // of the previous layer
 
-override FIRST: bool = true;   // there is no layer before
+override FIRST: bool = true;   // no previous layer
 override MASKED: bool = false; // the glass has holes
 
 // `frame.forward` is the direction to the sun, `frame.first_sample` the square.

@@ -1,5 +1,5 @@
-// The share of its object's light that a part shows at a point. Where parts meet, their probes' light is mixed: each part
-// is drawn with its share, and added to its neighbours as far as it reaches.
+// The share of an object's light that a part contributes at a point. Near borders, the parts' probes are mixed: each
+// part is drawn with its share, and added to its neighbours within its reach.
 
 override PART: u32 = 0u; // 0: a whole object; 1: a part; 2: a part, added to its neighbours
 

@@ -1,14 +1,14 @@
-// Four places of every pixel beside its middle, and steps from a pixel to the one whose light is at a
-// place: four bits for each of the places.
+// Four places of every pixel besides its centre, and steps from a pixel to the one with the light of a place: four bits
+// per place.
 
-// px right of and below the middle. With the middle they are a lattice: evenly spaced by a fifth along rows and columns,
-// and along both diagonals, so that a line of any of these directions meets the same share of them, but for one.
+// px right of and below the centre. With the centre they form a lattice, evenly spaced by a fifth along rows, columns
+// and both diagonals, so that a line in any of these directions covers the same number of places, up to one.
 const PLACES = array<vec2f, 4>(vec2f(0.2, 0.4), vec2f(0.4, -0.2), vec2f(-0.2, -0.4), vec2f(-0.4, 0.2));
 
 const OWN = 0u;    // the light of the pixel itself
 const MISSED = 4u; // no pixel near the place shows its surface
 
-// Pixels by step 1 to 3: the nearest across a side, the other one, and the one between them.
+// Pixels by step 1 to 3: the nearest edge neighbour, the other edge neighbour, and the corner between them.
 fn step_of(place: vec2f, step: u32) -> vec2i {
     let side = vec2i(sign(place));
     let nearest = select(vec2i(0, side.y), vec2i(side.x, 0), abs(place.x) > abs(place.y));

@@ -11,7 +11,7 @@ struct Prefilter {
     axis: vec4f,
     m: f32,
     texels: f32, // half the log2 of texels per unit area of the source
-    level: f32,  // of the source where m is 0
+    level: f32,  // level of the source for m = 0
     padding: f32,
 }
 

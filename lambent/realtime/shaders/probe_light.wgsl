@@ -1,4 +1,5 @@
-// Specular light of a pixel from the object's probe, each lobe by the integrator that this file is built with, and of the sun.
+// Specular light of a pixel from the object's probe, by the integrator that this file is assembled with, and from the
+// sun.
 
 fn specular_light(wo: vec3f, s: Surface) -> vec3f {
     var sum = vec3f(0.0);

@@ -1,5 +1,5 @@
 // Unbiased reference: samples of an additive sequence (Roberts 2018), rotated per pixel and lobe (Cranley & Patterson
-// 1976), unfiltered. The sequence goes on from frame to frame, so the mean converges.
+// 1976), unfiltered. The sequence continues from frame to frame, so the mean converges.
 
 #include "frame.wgsl"
 #include "surface.wgsl"

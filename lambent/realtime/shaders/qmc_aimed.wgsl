@@ -1,5 +1,5 @@
-// As qmc.wgsl, where the probe has lamps worth aiming at for some lobe: a share of the samples aims at them, the others
-// follow the lobe; each counts by the balance heuristic (Veach & Guibas 1995).
+// qmc.wgsl for probes with prominent lamps: a share of the samples aims at the lamps, the others follow the lobe; both
+// are weighted by the balance heuristic (Veach & Guibas 1995).
 
 #include "frame.wgsl"
 #include "surface.wgsl"
@@ -14,7 +14,8 @@ fn aimed_share(lobe: LambentLobe, s: Surface) -> u32 {
     return 2u * u32(round(0.5 * wanted_sixteenths(aim[0].y, lobe.mx * lobe.my)));
 }
 
-// f cos_i times the light over the density of all samples at a direction, of which `aim_share` aim with density `aimed`.
+// f cos_i times the light over the density of all samples in a direction; the share `aim_share` aims with density
+// `aimed`.
 fn counted(lobe: LambentLobe, at: Sample, wo: vec3f, light: vec3f, aimed: f32, aim_share: f32) -> vec3f {
     let pdf = lambent_distribution(at.h, lobe) * at.h.z / (4.0 * at.cos_d);
     return gain(lobe, at.wi, wo, at.h) * light * (pdf / max(mix(pdf, aimed, aim_share), 1e-30));
@@ -45,14 +46,14 @@ fn of_lamps(u: vec2f, lobe: LambentLobe, wo: vec3f, s: Surface, aim_share: f32) 
     return counted(lobe, at, wo, probe_light(s, w, drawn.xyz), drawn.w * to.density, aim_share);
 }
 
-// Which samples of the two sequences a frame takes: first and past, of the lobe's and of those that aim.
+// A frame's samples of both sequences: first and past the last, for lobe samples and for aimed samples.
 struct Turn {
     lobe: vec2u,
     aimed: vec2u,
 }
 
-// Where a frame's samples divide evenly each kind goes on with its own sequence. Where they do not, as with one sample
-// per frame, frames take turns by a sequence of its own: it must not follow where in the pixel a frame looks.
+// If a frame's samples divide evenly, each kind continues its own sequence. Otherwise, as with one sample per frame, a
+// separate sequence chooses the kind by frame; it must not correlate with the frame's jitter.
 fn turn_of(share: u32, phase: u32) -> Turn {
     let first = frame.first_sample;
     let index = first / SAMPLES;

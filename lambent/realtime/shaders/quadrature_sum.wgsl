@@ -1,6 +1,6 @@
-// Sum of w g L_i over fixed samples, `rings` and `fis` alike: their tables differ.
+// Sum of w g L_i over fixed samples, for `rings` and `fis`, which differ in their tables.
 //     g = F cos_i/((cos_i cos_o)^alpha h_z),  omega = c (wo.h) h_z^3
-// Samples below the horizon count as 0, as the integral has it.
+// Samples below the horizon count as 0, as in the integral.
 
 fn quadrature_sum(here: LobeHere, first: u32, wo: vec3f, s: Surface) -> vec3f {
     let lobe = here.lobe;

@@ -1,4 +1,4 @@
-// Light of a pixel: emission, diffuse from the light map, and each lobe by the integrator that this file is built with.
+// Light of a pixel: emission, diffuse light from the light map, and lobes by the integrator assembled with this file.
 
 #include "vertex.wgsl"
 #include "surface.wgsl"
@@ -9,15 +9,15 @@
 @group(3) @binding(0) var light_maps: texture_2d_array<f32>;
 
 const FRONT = 0u;     // irradiance on the side of the normal
-const BACK = 1u;      // on the other
-const DIRECTION = 2u; // dominant direction of front light, world space; 0 where it is not known
+const BACK = 1u;      // irradiance on the back
+const DIRECTION = 2u; // dominant direction of the front's light, world space; 0 if unknown
 const SHARES = 3u;    // a, b of the shares of the probe's light on the front
 
-// Least cos_o. A lobe with alpha > 0 returns without bound towards grazing, several times what arrives below a tenth;
-// measured tables end at 84 degrees as well (GRAZING_DEG of materials/measured/protocol.py).
+// Least cos_o. The albedo of a lobe with alpha > 0 grows without bound towards grazing angles, to several times 1 below
+// a cosine of .1; measured tables also end at 84 degrees (GRAZING_DEG of materials/measured/protocol.py).
 const GRAZING = 0.1;
 
-// Tangent, bitangent and normal of the mesh. It may bring a zero normal, and one NaN would stay in the mean of a
+// Tangent, bitangent and normal of the mesh. Guards against zero normals: one NaN would persist in the mean of a
 // progressive series.
 fn mesh_frame(v: Varyings) -> mat3x3f {
     let n = normalize(select(vec3f(0.0, 1.0, 0.0), v.n_world, dot(v.n_world, v.n_world) > 1e-12));
@@ -26,8 +26,8 @@ fn mesh_frame(v: Varyings) -> mat3x3f {
     return mat3x3f(t, cross(n, t), n);
 }
 
-// At silhouettes an interpolated normal turns away from a viewer whom the triangle faces: it is bent back towards him
-// (along `view`) until cos_o is GRAZING, so that frame, mirror direction and lobe agree.
+// At silhouettes an interpolated normal may turn away from the viewer while the triangle faces the viewer. It is bent
+// back along `view` until cos_o is GRAZING, so that frame, mirror direction and lobe agree.
 fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
     let mesh = mesh_frame(v);
     var given = mesh[2] * facing;
@@ -56,7 +56,8 @@ fn light_map(layer: u32, uv2: vec2f) -> vec3f {
     return layer_of(light_maps, layer, uv2).rgb;
 }
 
-// The surface with its share of the probe's light, where the light map has irradiance e: by direction where it has shares.
+// The surface with its share of the probe's light: by direction if the light map has shares, else from its irradiance
+// e.
 fn with_shares(found: Surface, maps: texture_2d_array<f32>, uv2: vec2f, front: bool, e: vec3f) -> Surface {
     if (object.sky_change.w > 0.5 && front) {
         var s = found;
@@ -85,7 +86,7 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
         e_bent = e_here * bent_share(light_map(DIRECTION, v.uv2), mesh[2], bent);
         sun_cos = select(0.0, max(dot(bent, sun.towards.xyz), 0.0), facing > 0.0);
     }
-    if (LOBES > 0u) { s = with_shares(s, light_maps, v.uv2, front, e_bent); } // of light without the sun, as probes have it
+    if (LOBES > 0u) { s = with_shares(s, light_maps, v.uv2, front, e_bent); } // light without the sun, as in probes
     e_bent += sun_cos * direct;
     e_here += max(facing, 0.0) * direct;
     let diffuse = own_light(s, diffuse_light(wo.z, e_bent, e_beyond, s.painted));

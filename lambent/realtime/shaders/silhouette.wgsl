@@ -1,4 +1,4 @@
-// Where an object is seen: drawn where the depth pass left its depth.
+// Mask of an object's visible pixels: drawn at the depths of the depth pass.
 
 #include "vertex.wgsl"
 

@@ -1,4 +1,4 @@
-// The environment behind everything.
+// The environment in the background.
 
 #include "frame.wgsl"
 #include "screen.wgsl"

@@ -1,6 +1,6 @@
-// What today's engines do (Karis 2013): one look-up in a cube prefiltered for the roughness, about the normal, times
+// Split-sum, the method of common engines (Karis 2013): one look-up in a cube map prefiltered for the roughness, times
 // a table of the lobe's albedo. Isotropic: an anisotropic lobe gets the roughness sqrt(mx my).
-// Where a texture varies the roughness, the level follows it, and the table stays that of the material's numbers.
+// A texture of roughness changes the level, but not the table, which is made for the material's numbers.
 // The table has rows (A, B) over cos_o: k (r0 A + B) is the albedo.
 
 #include "surface.wgsl"
@@ -15,7 +15,7 @@ fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
     let at = index * SAMPLES + row;
     let ab = mix(samples[at].xy, samples[at + 1u].xy, clamp(place - f32(row), 0.0, 1.0));
     let f = select(lobe.r0 * ab.x + ab.y, (1.0 - lobe.r0) * ab.x, lobe.side == LAMBENT_TRANSMISSION);
-    let level = lobes[index].level * exp2(0.5 * here.half_log2_growth); // goes with the root of sqrt(mx my)
+    let level = lobes[index].level * exp2(0.5 * here.half_log2_growth); // proportional to the root of sqrt(mx my)
     let mirror = vec3f(-wo.xy, wo.z);
     return lobe.k * f * incident_at_level(s, on_side(lobe, mirror), min(level, LAST_LEVEL));
 }

@@ -1,5 +1,5 @@
 // Materials (group 1), objects and the light around them (group 2), and the light from a direction; look_up.wgsl is the
-// shader of the look-up in use, see lambent/realtime/incident, which may bring an incident_light.wgsl of its own.
+// shader of the look-up in use (lambent/realtime/incident), which may replace incident_light.wgsl.
 
 #include "lobes.wgsl"
 #include "colour.wgsl"
@@ -10,21 +10,21 @@
 
 override SAMPLES: u32 = 7u; // n per lobe
 override LOBES: u32 = 1u;
-override STRAIGHT: bool = false; // what lobes transmit passes straight on and is there already (glazing.wgsl)
+override STRAIGHT: bool = false; // transmitted light passes straight through and is already drawn (glazing.wgsl)
 
 struct PlacedLobe {
     lobe: LambentLobe,
     border: vec2f, // slopes along t and b outside which 1 % of the lobe lies
-    level: f32,    // of the prefiltered cube that fits the roughness
+    level: f32,    // of the prefiltered cube map for the roughness
     unused: f32,
 }
 
 struct Object {
     centre: vec4f, // of the probe; w: half the log2 of texels per unit area of the cube [-1, 1]^3
     emission: vec4f,
-    irradiance: array<vec4f, 3>, // luminance that the probe alone would give, see probe_irradiance; 0 where it is not asked. The tenth number: even niches
+    irradiance: array<vec4f, 3>, // nine: luminance from the probe alone (probe_irradiance), 0 if unused; then even niches
     borders: array<vec4f, 2>, // of a part, see ObjectRecord of store/contract.py
-    sky_change: vec4f, // how many times brighter the sky is than as baked; w: 1 where the light map has shares
+    sky_change: vec4f, // ratio of the sky to the baked sky; w: 1 if the light map has shares
 }
 
 @group(1) @binding(1) var<storage, read> lobes: array<PlacedLobe>;
@@ -33,7 +33,7 @@ struct Object {
 @group(2) @binding(0) var<uniform> object: Object;
 @group(2) @binding(1) var radiance_cube: texture_cube<f32>;
 
-// Shading frame and place of a pixel, and what the material's textures say there; n is turned to the viewer, and
+// Shading frame and position of a pixel, and its values of the material's textures; n faces the viewer, and
 // painted.widening is along t and b.
 struct Surface {
     t: vec3f,
@@ -42,14 +42,14 @@ struct Surface {
     x: vec3f,      // position about the probe's centre
     pixel: vec2u,
     painted: Painted,
-    shares: vec4f, // a + b.w of the probe's light along w arrives at the pixel: (b, a)
-    niche: vec3f,  // light of near walls besides, from all directions alike
-    points: vec4u,  // of a light field, near the pixel
-    exit: vec4f,    // of glass with a light field: the face behind the pixel
+    shares: vec4f, // (b, a): the share a + b.w of the probe's light along w arrives at the pixel
+    niche: vec3f,  // additional light of near walls, the same from all directions
+    points: vec4u,  // points of a light field near the pixel
+    exit: vec4f,    // glass with a light field: the face behind the pixel
 }
 
-// A lobe where the textures have changed its numbers: the samples, of slopes of the material's mx and my, grow by
-// `growth` along t and b, and the solid angle they stand for by its product.
+// A lobe with its numbers changed by textures: the samples' slopes, made for the material's mx and my, grow by `growth`
+// along t and b, and their solid angles by growth.x growth.y.
 struct LobeHere {
     lobe: LambentLobe,
     growth: vec2f,
@@ -73,8 +73,8 @@ fn to_world(s: Surface, w: vec3f) -> vec3f {
     return w.x * s.t + w.y * s.b + w.z * s.n;
 }
 
-// Near things hide from a niche most of what the probe sees. The irradiance of the light map, e, knows how much; the
-// probe's own is known to the second band of harmonics (bake/probe_modes.py).
+// Near surfaces occlude most of a probe's light in a niche. The light map's irradiance e, relative to the irradiance
+// from the probe alone, gives the share that arrives; the latter is known to the second band of harmonics.
 fn specular_occlusion(n: vec3f, e: vec3f) -> f32 {
     let i = object.irradiance;
     let whole = dot(i[0], vec4f(1.0, n)) + dot(i[1], vec4f(n.xy * n.yz, 3.0 * n.z * n.z - 1.0, n.x * n.z))
@@ -89,8 +89,8 @@ fn arriving(s: Surface, w: vec3f) -> f32 {
     return clamp(dot(s.shares, vec4f(w, 1.0)), 0.0, MOST_SHARE);
 }
 
-// Share of the probe's light, the same for all directions, and light of the niche that hides the rest (Scaling of
-// bake/probes/selection.py), where the light map has e.
+// Share of the probe's light, the same for all directions, and light of the niche that occludes the rest (Scaling of
+// bake/probes/selection.py), for the light map's irradiance e.
 fn in_niche(found: Surface, e: vec3f) -> Surface {
     var s = found;
     let share = specular_occlusion(s.n, e);
@@ -108,7 +108,7 @@ fn level_of_look_up(found: LookUp, half_log2_omega: f32) -> f32 {
     return max(half_log2_omega + 0.5 * log2(max(stretch, 1e-20)) + object.centre.w, 0.0);
 }
 
-// A sample of a lobe: wi is wo mirrored about the half vector h; not `seen` where the lobe does not go.
+// A sample of a lobe: wi is wo mirrored about the half vector h; not `seen` below the horizon.
 struct Sample {
     h: vec3f,
     cos_d: f32,
@@ -122,8 +122,8 @@ fn sample_about(wo: vec3f, h: vec3f) -> Sample {
     return Sample(h, cos_d, wi, cos_d > LAMBENT_COS_MIN && wi.z > LAMBENT_COS_MIN);
 }
 
-// Half the log2 of the solid angle that a row (slopes, half_log2 of the filter constant c, weight) of a table of samples
-// stands for: c (wo.h) h_z^3 sr.
+// Half the log2 of the solid angle c (wo.h) h_z^3 sr of a row (slopes, half the log2 of the filter constant c, weight)
+// of a table of samples.
 fn half_log2_omega(row: vec4f, at: Sample, here: LobeHere) -> f32 {
     return row.z + here.half_log2_growth + 0.5 * log2(at.cos_d * at.h.z * at.h.z * at.h.z);
 }
@@ -133,25 +133,26 @@ fn gain(lobe: LambentLobe, wi: vec3f, wo: vec3f, h: vec3f) -> vec3f {
     return lambent_tint(dot(wo, h), lobe) * (wi.z / (lambent_cosine_power(wi, wo, lobe) * h.z));
 }
 
-// Diffuse light towards cos_o from the irradiance on this side and on the other (4.1). A coupled kd is kd t(cos_o) times
-// the mean of (21/20) t(cos_i) over the light, which is 1 under uniform light and taken as 1 under any.
+// Diffuse light towards cos_o from the irradiance on this side and on the other (4.1). A coupled kd is kd t(cos_o)
+// times the mean of (21/20) t(cos_i) over the light; this mean is 1 under uniform light, and is assumed 1 for all
+// light.
 fn diffuse_light(cos_o: f32, e_here: vec3f, e_beyond: vec3f, painted: Painted) -> vec3f {
     let seen = select(1.0, lambent_under_fresnel(cos_o), material.kd.w > 0.5);
     return painted.diffuse * (material.kd.rgb * seen * e_here + material.kt_d.rgb * e_beyond) / LAMBENT_PI;
 }
 
-// A direction about the mirror direction where the lobe has it, and back: transmission is reflection mirrored at the
+// Maps a direction between reflection and the lobe's side, an involution: transmission is reflection mirrored at the
 // surface, retro-reflection is reflection mirrored about n.
 fn on_side(lobe: LambentLobe, w: vec3f) -> vec3f {
     return vec3f(select(w.xy, -w.xy, lobe.retro == 1u), select(w.z, -w.z, lobe.side == LAMBENT_TRANSMISSION));
 }
 
-// Whether the light of a lobe is summed.
+// Whether a lobe contributes light.
 fn lobe_adds(lobe: LambentLobe) -> bool {
     return !STRAIGHT || lobe.side == LAMBENT_REFLECTION;
 }
 
-// Whether what a planar reflector shows is what the lobe reflects; other lobes have the probe's light.
+// Whether a planar reflector's view serves the lobe; other lobes use the probe's light.
 fn lobe_mirrors(lobe: LambentLobe) -> bool {
     return lobe.side == LAMBENT_REFLECTION && lobe.retro == 0u;
 }

@@ -26,7 +26,7 @@ fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
     var weights = vec3f(0.0);
     for (var k = 0u; k < SAMPLES; k++) {
         let sample = samples[index * SAMPLES + k];
-        // no longer quite equal angles where the roughness varies
+        // angles are only nearly equal if a texture varies the roughness
         let at = sample_about(wo, lambent_from_slopes(sample.xy * here.growth));
         if (!at.seen) { continue; }
         let p = sample.w / (at.h.z * at.h.z * at.h.z * at.cos_d);

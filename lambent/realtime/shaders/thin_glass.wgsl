@@ -1,15 +1,15 @@
-// Light that passes a thin piece of glass, refracted where it enters and where it leaves: see core/thin_glass.py.
+// Light through a thin piece of glass, refracted at entry and exit: see core/thin_glass.py.
 
 const LEAST_COSINE = 0.1;
 
 struct Through {
-    offset: vec3f, // from the surface to where the ray leaves the glass
+    offset: vec3f, // from the surface to the ray's exit from the glass
     w: vec3f,      // its direction there
     cosine: f32,   // to the second face's normal
-    share: f32,    // of light that faces beyond let pass
+    share: f32,    // of light that the faces beyond transmit
 }
 
-// Share of light that the second face and those beyond mirror, and so do not pass.
+// Share of light that the second face and the faces beyond reflect, and so do not transmit.
 fn mirrored_back(cosine: f32, share: f32, eta: f32, tint: vec3f) -> f32 {
     let r = (eta - 1.0) / (eta + 1.0);
     let mean = max(dot(tint, vec3f(1.0 / 3.0)), 1e-6);
@@ -17,7 +17,7 @@ fn mirrored_back(cosine: f32, share: f32, eta: f32, tint: vec3f) -> f32 {
     return 1.0 - (1.0 - r * r) * lambent_under_fresnel(cosine) * pow(max(share, 1e-6), colourless);
 }
 
-// The ray w against a face of normal n; mirrored where all is reflected.
+// The ray w refracted at a face of normal n; mirrored under total reflection.
 fn refracted_at(w: vec3f, n: vec3f, ratio: f32) -> vec3f {
     let cosine = -dot(w, n);
     let square = 1.0 - ratio * ratio * (1.0 - cosine * cosine);

@@ -4,9 +4,9 @@
 #include "display.wgsl"
 
 @group(1) @binding(0) var radiance: texture_2d<f32>;
-@group(1) @binding(1) var prior: texture_2d<f32>; // of few samples; `radiance` again where there is none
+@group(1) @binding(1) var prior: texture_2d<f32>; // of few samples; `radiance` itself without a prior
 
-override MARKED: bool = false; // alpha tells smooth.wgsl what is a mean over surfaces; it is never shown
+override MARKED: bool = false; // alpha marks means over surfaces for smooth.wgsl; it is never shown
 
 @fragment fn tonemap_main(screen: Screen) -> @location(0) vec4f {
     let at = vec2i(screen.position.xy);

@@ -1,4 +1,4 @@
-// The vertex stage of shade passes and, with depth.wgsl, of depth; @invariant, so that they agree to the bit.
+// The vertex stage of shade passes and, with depth.wgsl, of depth; @invariant makes them agree to the bit.
 
 #include "frame.wgsl"
 
