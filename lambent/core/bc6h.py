@@ -1,8 +1,8 @@
-"""Light in blocks of 4 x 4 texels and 128 bits: BC6H, unsigned; `bc6h_format` has its bits.
+"""Light compressed as unsigned BC6H: blocks of 4 x 4 texels in 128 bits (bit layout: `bc6h_format`).
 
-Fits are least squares of half floats seen as whole numbers, so that errors are relative. Each block is first fitted by
-one line. Where that leaves more than ROUGH, as at edges between surfaces of different hues, the texels are split by the
-partition that two lines fit best, and the better of both fits is kept. Importing this file imports numba.
+Fits minimise squared errors of the bits of half floats, read as integers, so that errors are relative. Each block is
+first fitted by one line through colour space. If the error exceeds ROUGH, as at edges between hues, the texels are
+split by the partition that two lines fit best, and the better fit is kept. Importing this file imports numba.
 """
 
 from __future__ import annotations
@@ -35,22 +35,34 @@ from lambent.core.bc6h_format import (
 
 BLOCK = 4  # texels a side
 LARGEST = 65504.0
-ROUGH = 8.0  # rms error of one line, in units of a half float, about .6 %, above which two are tried
-SLACK = 48.0  # units of a half float, 3 to 5 %: so far ends may lie beyond their texels
-_FITS = 3  # times that lines are fitted to the choice of the texels
-_MODES_TRIED = 2  # of those that hold the ends, finest first
-_POWERS = 4  # iterations towards the main axis
-_BETWEEN = 300.0  # by which squares along a line are more than what its 8 colours leave of them, about 6 x 7^2
-_AT_ONCE = 1 << 14  # blocks of one thread's turn
+ROUGH = 8.0  # rms error of one line, in steps of a half float (about .6 %), above which two lines are tried
+SLACK = 48.0  # steps of a half float (3 to 5 %) by which ends may lie beyond their texels
+_FITS = 3  # rounds of least squares after texels choose their colours
+_MODES_TRIED = 2  # modes tried, finest first, of those that can represent the ends
+_POWERS = 4  # power iterations for the principal axis
+_BETWEEN = 300.0  # variance along a line over its quantisation error with 8 colours, about 6 x 7^2
+_AT_ONCE = 1 << 14  # blocks per task of a thread
 _ONE, _TWO = FINEST_FIRST
 _WHOLE = np.zeros(TEXELS, np.int64)  # one subset
 
 
 def encoded(rgb: NDArray[Any], importance: NDArray[Any] | None = None, rough: float = ROUGH) -> NDArray[np.uint32]:
-    """Blocks (..., H/4, W/4, 4) of light (..., H, W, 3); what is negative or not a number becomes 0.
+    """Compress light (..., H, W, 3) into blocks (..., H/4, W/4, 4); clamp it to 0 and LARGEST, NaN becomes 0.
 
-    H and W must be multiples of 4. Squared errors of texels count by their `importance` (..., H, W), by default 1. Two
-    lines are tried where one errs by more than `rough`; one alone, for infinity, takes a third of the time.
+    Parameters
+    ----------
+    rgb : (..., H, W, 3)
+        H and W are multiples of 4.
+    importance : (..., H, W), optional
+        Weights of the texels' squared errors, by default 1.
+    rough : float
+        Two lines are tried in blocks where the error of one exceeds this, as `ROUGH`. Infinity allows one line only and
+        takes a third of the time.
+
+    Raises
+    ------
+    ValueError
+        If there are not 3 channels, or H or W is not a multiple of 4.
     """
     *lead, height, width, channels = rgb.shape
     if channels != 3 or height % BLOCK or width % BLOCK:
@@ -71,7 +83,7 @@ def _by_block(image: NDArray[Any]) -> NDArray[Any]:
 
 
 def decoded(blocks: NDArray[np.uint32]) -> NDArray[np.float16]:
-    """Light (..., H, W, 3) of blocks (..., H/4, W/4, 4) in any mode; blocks of reserved modes are black."""
+    """Decode blocks (..., H/4, W/4, 4) of any mode to light (..., H, W, 3); blocks of reserved modes are black."""
     *lead, rows, columns, _ = blocks.shape
     flat = np.ascontiguousarray(blocks, np.uint32).reshape(-1, 4)
     texels = np.zeros((len(flat), TEXELS, 3), np.uint16)
@@ -81,7 +93,7 @@ def decoded(blocks: NDArray[np.uint32]) -> NDArray[np.float16]:
 
 
 def _in_threads(work: Any, *arrays: NDArray[Any]) -> None:
-    """`work` on parts of arrays: loops in parallel take numba four times as long to compile."""
+    """Run `work` on parts of arrays in threads: numba's parallel loops take four times as long to compile."""
     with ThreadPoolExecutor() as pool:
         parts = [slice(first, first + _AT_ONCE) for first in range(0, len(arrays[0]), _AT_ONCE)]
         list(pool.map(lambda part: work(*(array[part] for array in arrays)), parts))
@@ -89,7 +101,7 @@ def _in_threads(work: Any, *arrays: NDArray[Any]) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _encode(rough: float, texels: Any, importance: Any, blocks: Any) -> None:
-    """Bits of half floats (B, 16, 3), whose errors count by their importance (B, 16), to blocks (B, 4)."""
+    """Encode bits of half floats (B, 16, 3), with importance (B, 16), to blocks (B, 4)."""
     values, weights = np.zeros((TEXELS, 3)), np.zeros(TEXELS)
     ends, other_ends = np.zeros((MOST_ENDS, 3), np.int64), np.zeros((MOST_ENDS, 3), np.int64)
     index, other_index = np.zeros(TEXELS, np.int64), np.zeros(TEXELS, np.int64)
@@ -112,9 +124,9 @@ def _encode(rough: float, texels: Any, importance: Any, blocks: Any) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _weigh(texels: Any, weights: Any) -> None:
-    """Weights (16,) of texels: 1, and more the brighter one is than the mean of them.
+    """Compute weights (16,) of texels: 1 + brightness over the mean brightness of the block.
 
-    Errors are relative: without weights, dark texels around a lamp would take 4 % of its light.
+    Errors are relative: without these weights, fits to dark texels around a lamp would cost 4 % of its light.
     """
     total = 0.0
     for i in range(TEXELS):
@@ -130,7 +142,7 @@ def _weigh(texels: Any, weights: Any) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _best_partition(texels: Any, weights: Any) -> tuple[int, float]:
-    """The partition whose subsets two lines fit best, and about the weighted squared error that they leave."""
+    """The partition whose subsets two lines fit best, and their approximate weighted squared error."""
     sums, whole, part = np.empty((TEXELS, 10)), np.zeros(10), np.empty(10)
     for i in range(TEXELS):
         x, y, z = texels[i, 0] - texels[0, 0], texels[i, 1] - texels[0, 1], texels[i, 2] - texels[0, 2]
@@ -155,7 +167,7 @@ def _best_partition(texels: Any, weights: Any) -> tuple[int, float]:
 
 @numba.njit(cache=True, nogil=True)
 def _off_line(sums: Any) -> float:
-    """About the squares that the best line of 8 colours leaves, by sums (10,) of weights, places, and products."""
+    """Approximate squared error of the best line of 8 colours, from sums (10,) of weights, positions and products."""
     xx, xy, xz = (
         sums[4] - sums[1] ** 2 / sums[0],
         sums[5] - sums[1] * sums[2] / sums[0],
@@ -189,7 +201,7 @@ def _off_line(sums: Any) -> float:
 def _fit(
     texels: Any, weights: Any, subset: Any, modes: Any, partition: int, ends: Any, index: Any
 ) -> tuple[float, int]:
-    """Weighted squared error of the best fit by lines of subsets, and its mode; `ends`, `index` become `ordered`."""
+    """Weighted squared error and mode of the best fit by one line per subset; makes `ends` and `index` `ordered`."""
     count = subset.max() + 1
     levels = LEVELS[count - 1]
     lines, chosen = np.zeros((MOST_ENDS, 3)), np.zeros(TEXELS, np.int64)
@@ -227,7 +239,7 @@ def _fit(
 
 @numba.njit(cache=True, nogil=True)
 def _choose(texels: Any, weights: Any, subset: Any, count: int, ends: Any, mode: int, index: Any) -> float:
-    """Weighted squared error of the best colour for each texel, which goes to `index`; `ends` (4, 3) are quantised."""
+    """Write each texel's best colour to `index`; returns the weighted squared error. `ends` (4, 3) are quantised."""
     levels, bits, total = LEVELS[count - 1], BITS[mode], 0.0
     palette = np.empty((TEXELS, 3))
     for s in range(count):
@@ -257,7 +269,7 @@ def _choose(texels: Any, weights: Any, subset: Any, count: int, ends: Any, mode:
 
 @numba.njit(cache=True, nogil=True)
 def _principal_ends(texels: Any, weights: Any, subset: Any, s: int, ends: Any) -> None:
-    """The ends of subset s, in `ends` (4, 3): of its texels' extent along the line that fits them best."""
+    """Set the ends of subset s in `ends` (4, 3) to its texels' extent along their principal axis."""
     mean, axis, next_axis, spread, total = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((3, 3)), 0.0
     for i in range(TEXELS):
         if subset[i] == s:
@@ -297,7 +309,7 @@ def _principal_ends(texels: Any, weights: Any, subset: Any, s: int, ends: Any) -
 
 @numba.njit(cache=True, nogil=True)
 def _fitted_ends(texels: Any, weights: Any, subset: Any, s: int, levels: int, index: Any, ends: Any) -> None:
-    """The ends that fit texels of subset s best in least squares, as they have chosen; left alone if all chose one."""
+    """Fit the ends of subset s by least squares to the texels' chosen colours; no change if all chose the same."""
     aa, ab, bb = 0.0, 0.0, 0.0
     a_x, b_x = np.zeros(3), np.zeros(3)
     for i in range(TEXELS):
@@ -320,7 +332,7 @@ def _fitted_ends(texels: Any, weights: Any, subset: Any, s: int, levels: int, in
 
 @numba.njit(cache=True, nogil=True)
 def _bounded(texels: Any, subset: Any, s: int, ends: Any) -> None:
-    """Ends within the range of their texels: on this scale, what lies beyond is brighter by powers."""
+    """Clamp ends to the range of their texels: on this logarithmic scale, ends beyond it would be far brighter."""
     for c in range(3):
         low, high = _range_of(texels, subset, s, c)
         for e in range(2 * s, 2 * s + 2):
@@ -329,7 +341,7 @@ def _bounded(texels: Any, subset: Any, s: int, ends: Any) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _quantised_ends(ends: Any, mode: int, count: int, found: Any) -> bool:
-    """Ends in a mode's bits; whether it may hold them, lines turned round or not."""
+    """Quantise ends to a mode's bits; returns whether the mode may represent them, with lines reversed or not."""
     for c in range(3):
         for e in range(2 * count):
             found[e, c] = quantised(ends[e, c], BITS[mode])
@@ -340,9 +352,9 @@ def _quantised_ends(ends: Any, mode: int, count: int, found: Any) -> bool:
 
 @numba.njit(cache=True, nogil=True)
 def _step_ends(texels: Any, weights: Any, subset: Any, count: int, ends: Any, mode: int, index: Any) -> None:
-    """Quantised ends moved by at most a step in each channel to where they fit best, as the texels have chosen.
+    """Move quantised ends by at most a step per channel to the least error for the texels' chosen colours.
 
-    They may leave the range of the texels by SLACK, a step or two of fine ends; coarser ones stay in it.
+    Ends may leave the range of the texels by SLACK, one or two steps of fine modes; ends of coarser modes stay inside.
     """
     bits = BITS[mode]
     for s in range(count):
@@ -368,7 +380,7 @@ def _step_ends(texels: Any, weights: Any, subset: Any, count: int, ends: Any, mo
 
 @numba.njit(cache=True, nogil=True)
 def _range_of(texels: Any, subset: Any, s: int, c: int) -> tuple[float, float]:
-    """Least and largest of a channel in subset s."""
+    """Least and largest value of channel c in subset s."""
     low, high = np.inf, -np.inf
     for i in range(TEXELS):
         if subset[i] == s:

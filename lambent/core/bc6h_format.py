@@ -1,9 +1,9 @@
-"""Bits of BC6H blocks, unsigned: 4 x 4 texels in 128 bits, all 14 modes. Importing this file imports numba.
+"""Bit layout of unsigned BC6H blocks: 4 x 4 texels in 128 bits, all 14 modes. Importing this file imports numba.
 
-A block has one or two subsets of texels. Each has two ends, and for each texel which colour on the line between them it
-shows, one of 16 or, with two subsets, of 8. Ends are half floats seen as whole numbers, so that lines are nearly
-straight in the logarithm. A mode says how many bits the first end has, and how many the differences of the others to
-it. One of 32 partitions says which texels are in the second subset.
+A block has one or two subsets of texels. A subset has two end colours, and an index per texel that selects one of 16
+colours on the line between them, or of 8 with two subsets. Ends are bits of half floats, read as integers, so lines are
+nearly straight in the logarithm. A mode fixes the bits of the first end and of the other ends' differences from it. One
+of 32 partitions selects the texels of the second subset.
 
 Format: Direct3D 11.3 functional specification, 19.5.14; Khronos data format specification, 1.3, chapter 20.2.
 """
@@ -19,8 +19,8 @@ import numpy as np
 TEXELS = 16
 MOST_ENDS = 4
 _CHANNELS, _ENDS = "rgb", "wxyz"
-# Number of a mode; bits of the number, of the first end, and of the others in r, g, b; then the header after the
-# number: channel, end and bit, or all bits from 0 on.
+# Mode number; bits of the number, of the first end, and of the other ends in r, g, b; then the header after the number:
+# channel, end and bit, or all bits from 0 on.
 _MODES = (
     (0, 2, 10, (5, 5, 5),
      "gy4 by4 bz4 rw9:0 gw9:0 bw9:0 rx4:0 gz4 gy3:0 gx4:0 bz0 gz3:0 bx4:0 bz1 by3:0 ry4:0 bz2 rz4:0 bz3"),
@@ -62,7 +62,7 @@ _SECOND = """
 
 
 def _header(layout: str) -> list[tuple[int, int, int]]:
-    """Channel, end and bit, one after another."""
+    """(channel, end, bit) of each bit of a header, in order."""
     found = []
     for channel, end, first, last in re.findall(r"([rgb])([wxyz])(\d+)(:0)?", layout):
         bits = range(int(first) + 1) if last else (int(first),)
@@ -73,26 +73,26 @@ def _header(layout: str) -> list[tuple[int, int, int]]:
 _HEADERS = [_header(mode[4]) for mode in _MODES]
 NUMBER, NUMBER_BITS, BITS = (np.array([mode[k] for mode in _MODES], np.int64) for k in range(3))
 OTHER_BITS = np.array([mode[3] for mode in _MODES], np.int64)  # (14, 3)
-DIRECT = np.isin(NUMBER, (3, 30))  # the other ends are no differences
+DIRECT = np.isin(NUMBER, (3, 30))  # modes that store the other ends directly, not as differences
 HEADER_BITS = np.array([len(header) for header in _HEADERS], np.int64)
 HEADER = np.array([header + [(0, 0, 0)] * (72 + 3 - len(header)) for header in _HEADERS], np.int64)
 SUBSETS = np.where(HEADER_BITS == 60, 1, 2)
-# Those with finer ends first; the first that holds the ends of a block is nearly always its best.
+# Modes with finer ends first; the first that can represent the ends of a block is nearly always its best.
 FINEST_FIRST = tuple(
     np.array(sorted(np.flatnonzero(count == SUBSETS), key=lambda m: -BITS[m]), np.int64) for count in (1, 2)
 )
 SECOND = np.array([[int(digit) for digit in texels] for texels in _SECOND.split()], np.int64)  # (32, 16) 1: 2nd subset
-LEVELS = np.array([16, 8], np.int64)  # by subsets less one
+LEVELS = np.array([16, 8], np.int64)  # colours per line, by number of subsets less one
 SHARES = np.array(
     [[0, 4, 9, 13, 17, 21, 26, 30, 34, 38, 43, 47, 51, 55, 60, 64], [0, 9, 18, 27, 37, 46, 55, 64, *[0] * 8]], np.int64
 )
-# The texel of the second subset whose index has no highest bit; in the first subset it is texel 0.
+# Anchor of the second subset: the texel whose index omits its highest bit. The anchor of the first subset is texel 0.
 ANCHOR = np.array([15] * 17 + [2, 8, 2, 2, 8, 8, 15, 2, 8, 2, 2, 8, 8, 2, 2], np.int64)
 
 
 @numba.njit(cache=True, nogil=True)
 def unquantised(value: int, bits: int) -> int:
-    """An end's channel of so many bits on the scale of 16."""
+    """An end's channel of `bits` bits, expanded to 16 bits."""
     if bits >= 15 or value == 0:
         return value
     if value == (1 << bits) - 1:
@@ -102,19 +102,19 @@ def unquantised(value: int, bits: int) -> int:
 
 @numba.njit(cache=True, nogil=True)
 def half(a: int, b: int, share: int) -> int:
-    """Bits of the half float between two channels on the scale of 16 bits."""
+    """Bits of the half float between two 16-bit channels; `share` of b is 0 to 64."""
     return (((a * (64 - share) + b * share + 32) >> 6) * 31) >> 6
 
 
 @numba.njit(cache=True, nogil=True)
 def quantised(value: float, bits: int) -> int:
-    """The channel of so many bits that is nearest to the bits of a half float."""
+    """The channel of `bits` bits, 0 to 2^bits - 1, for the bits of a half float."""
     return min(max(int(value * (64.0 / 31.0)) >> (16 - bits), 0), (1 << bits) - 1)
 
 
 @numba.njit(cache=True, nogil=True)
 def ordered(mode: int, partition: int, ends: Any, index: Any) -> bool:
-    """Turn lines round, in place, until anchors have no highest bit; whether the mode then holds the ends."""
+    """Reverse lines in place so that anchors' highest bits are 0; returns whether the mode can represent the ends."""
     subsets = SUBSETS[mode]
     levels = LEVELS[subsets - 1]
     for s in range(subsets):
@@ -137,7 +137,7 @@ def ordered(mode: int, partition: int, ends: Any, index: Any) -> bool:
 
 @numba.njit(cache=True, nogil=True)
 def write(block: Any, mode: int, partition: int, ends: Any, index: Any) -> None:
-    """Into a block (4,) of zeros, quantised ends (4, 3) and indices (16,), as `ordered`."""
+    """Write quantised ends (4, 3) and indices (16,), as `ordered` leaves them, into a block (4,) of zeros."""
     at = _put(block, 0, NUMBER[mode], NUMBER_BITS[mode])
     for k in range(HEADER_BITS[mode]):
         c, e, bit = HEADER[mode, k]
@@ -153,7 +153,7 @@ def write(block: Any, mode: int, partition: int, ends: Any, index: Any) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def read(blocks: Any, texels: Any) -> None:
-    """Blocks (B, 4) to bits of half floats (B, 16, 3); blocks of reserved modes are black."""
+    """Decode blocks (B, 4) to bits of half floats (B, 16, 3); blocks of reserved modes are black."""
     ends = np.zeros((MOST_ENDS, 3), np.int64)
     for b in range(len(blocks)):
         block = blocks[b]
@@ -183,7 +183,7 @@ def read(blocks: Any, texels: Any) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _make_whole(mode: int, ends: Any) -> None:
-    """Ends (4, 3) on the scale of 16 bits, in place, of what the header has."""
+    """Expand the header's values to ends (4, 3) of 16 bits, in place."""
     bits = BITS[mode]
     for c in range(3):
         for e in range(1, 2 * SUBSETS[mode]):
@@ -205,7 +205,7 @@ def _mode_of(number: int) -> int:
 
 @numba.njit(cache=True, nogil=True)
 def _put(block: Any, at: int, value: int, count: int) -> int:
-    """Write `count` bits at bit `at`; returns the bit after."""
+    """Write `count` bits at bit `at`; returns the position after them."""
     for i in range(count):
         if value >> i & 1:
             block[(at + i) >> 5] |= np.uint32(1 << ((at + i) & 31))

@@ -1,7 +1,7 @@
-"""Maps of a light field in blocks: light as BC6H, a byte per texel, distances in five bits. It imports numba.
+"""Block compression of a light field's maps: light as BC6H (8 bits per texel), distances in 5 bits. Imports numba.
 
-Blocks are of tiles, maps with a border of one texel and what fills the last blocks, so that a renderer can show them as
-they are: maps of 310 texels a side are 78 x 78 blocks, and nothing is filled.
+Blocks hold tiles: maps with a border of one texel, padded to whole blocks, so that a renderer can use them directly.
+Maps of 310 texels a side fill 78 x 78 blocks without padding.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ from lambent.core.bc6h import BLOCK, decoded, encoded
 from lambent.core.light_field import LightField
 from lambent.core.light_field_tiles import pool_rows, tiled, up
 
-OPEN = 0.25  # what a texel of sky counts beside one of a surface in the same block
+OPEN = 0.25  # weight of a sky texel relative to a surface texel in the same block
 
 
 def blocks_of(maps: NDArray[Any], shows: Flags | None = None) -> NDArray[np.uint32]:
-    """(P, B, B, 4) of maps (P, E, E, 3): 4 B is the first multiple of 4 from E + 2 on.
+    """Blocks (P, B, B, 4) uint32 of light maps (P, E, E, 3); 4 B is the least multiple of 4 from E + 2 on.
 
-    Where `shows` (P, E, E) says that texels show no surface, they count as OPEN: the environment itself answers there.
+    `shows` (P, E, E) marks texels that show a surface; other texels have the weight OPEN, because rays to the sky read
+    the environment itself.
     """
     size = up(maps.shape[1] + 2, BLOCK)
     importance = None if shows is None else np.where(tiled(shows[..., None], size)[..., 0], 1.0, OPEN)
@@ -35,31 +36,34 @@ def blocks_of(maps: NDArray[Any], shows: Flags | None = None) -> NDArray[np.uint
 
 
 def blocks_shape(side: int) -> tuple[int, int, int]:
-    """(B, B, 4) of maps of so many texels a side."""
+    """Shape (B, B, 4) of the blocks of a light map of `side` texels."""
     return up(side + 2, BLOCK) // BLOCK, up(side + 2, BLOCK) // BLOCK, 4
 
 
 def maps_of(blocks: NDArray[np.uint32], side: int) -> NDArray[np.float16]:
-    """(P, E, E, 3) of blocks (P, B, B, 4); `side` is E."""
+    """Light maps (P, E, E, 3) float16 of blocks (P, B, B, 4); `side` is E. `ValueError` if B does not fit E."""
     _held(blocks, side)
     return decoded(blocks)[:, 1 : side + 1, 1 : side + 1]
 
 
 def distance_blocks_of(inverse: NDArray[np.float16], cover: NDArray[np.uint8] | None) -> NDArray[np.uint32]:
-    """(P, R, B, 2) of inverse distances and cover (P, E, E): `core.distance_blocks` of tiles as of `blocks_of`."""
+    """Blocks (P, R, B, 2) of inverse distances, 1/m, and cover (P, E, E); see `core.distance_blocks`."""
     size = up(inverse.shape[1] + 2, BLOCK)
     bits = None if cover is None else tiled(cover[..., None], size)[..., 0]
     return distance_blocks.encoded(tiled(inverse[..., None], size)[..., 0], bits)
 
 
 def distance_blocks_shape(side: int) -> tuple[int, int, int]:
-    """(R, B, 2) of maps of so many texels a side."""
+    """Shape (R, B, 2) of the blocks of a distance map of `side` texels."""
     rows = up(side + 2, BLOCK) // BLOCK
     return rows + pool_rows(rows), rows, 2
 
 
 def distances_of(blocks: NDArray[np.uint32], side: int) -> tuple[NDArray[np.float16], NDArray[np.uint8]]:
-    """Inverse distances and cover (P, E, E) of blocks (P, R, B, 2); `side` is E."""
+    """Inverse distances, 1/m, and cover (P, E, E) of blocks (P, R, B, 2); `side` is E.
+
+    Raises `ValueError` if the blocks' shape does not fit E.
+    """
     _distances_held(blocks, side)
     inverse, cover = distance_blocks.decoded(blocks, up(side + 2, BLOCK) // BLOCK)
     inner = np.s_[:, 1 : side + 1, 1 : side + 1]
@@ -68,9 +72,9 @@ def distances_of(blocks: NDArray[np.uint32], side: int) -> tuple[NDArray[np.floa
 
 @dataclass(frozen=True, eq=False)
 class MapsInBlocks:
-    """Maps (P, E, E) or (P, E, E, C) that stay in blocks; what is read of them is decoded, whole maps at a time.
+    """Maps (P, E, E) or (P, E, E, C) that stay in blocks; reading decodes whole maps.
 
-    `decode` makes maps of some of the blocks.
+    `decode` converts blocks of some maps to these maps.
     """
 
     blocks: NDArray[np.uint32]
@@ -84,14 +88,14 @@ class MapsInBlocks:
 
     @property
     def nbytes(self) -> int:
-        """Of the maps when they are decoded."""
+        """Bytes of the decoded maps."""
         return self.size * self.dtype.itemsize
 
     def __len__(self) -> int:
         return self.shape[0]
 
     def __getitem__(self, key: Any, /) -> NDArray[Any]:
-        """As of an array; the first index says which maps are decoded."""
+        """Index like an array; the first index selects the maps to decode."""
         first, *rest = key if isinstance(key, tuple) else (key,)
         wanted = np.arange(len(self))[first]
         which, place = np.unique(wanted, return_inverse=True)
@@ -102,13 +106,13 @@ class MapsInBlocks:
 
 
 def light_in_blocks(blocks: NDArray[np.uint32], side: int) -> MapsInBlocks:
-    """Maps (P, E, E, 3) as of `maps_of`."""
+    """Light maps (P, E, E, 3), decoded by `maps_of` on demand. `ValueError` if the blocks do not fit `side`."""
     _held(blocks, side)
     return MapsInBlocks(blocks, (len(blocks), side, side, 3), np.dtype(np.float16), partial(maps_of, side=side))
 
 
 def distances_in_blocks(blocks: NDArray[np.uint32], side: int) -> tuple[MapsInBlocks, MapsInBlocks]:
-    """Inverse distances and cover, (P, E, E) each, as of `distances_of`."""
+    """Inverse distances, 1/m, and cover, (P, E, E) each, decoded by `distances_of` on demand."""
     _distances_held(blocks, side)
     shape = len(blocks), side, side
     return (
@@ -118,7 +122,7 @@ def distances_in_blocks(blocks: NDArray[np.uint32], side: int) -> tuple[MapsInBl
 
 
 def in_blocks(field: LightField) -> LightField:
-    """A light field as it is read again where its store has blocks."""
+    """The light field as a store with blocks would return it: compressed once and decoded."""
     side = field.radiance.shape[1]
     light, inverse_distance = np.asarray(field.radiance), np.asarray(field.inverse_distance)
     cover = None if field.cover is None else np.asarray(field.cover)
