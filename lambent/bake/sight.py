@@ -1,4 +1,4 @@
-"""What the viewers of a scene see of its triangles, found once for every step of a bake that asks."""
+"""Triangles that viewers of a scene see, computed once for all steps of a bake."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Sight:
-    """A scene, and what is found of it on demand; the engine is chosen before the first demand."""
+    """A scene with properties computed on first use; choose the engine before."""
 
     scene: Scene
 
     @cached_property
     def owner(self) -> Indices:
-        """(F,) number of the object of each triangle."""
+        """(F,) object index of each triangle."""
         return np.repeat(np.arange(len(self.scene.objects)), [len(o.mesh.faces) for o in self.scene.objects])
 
     @cached_property
     def is_opaque(self) -> Flags:
-        """(F,) triangles through which nothing is seen."""
+        """(F,) whether each triangle is opaque: its material neither transmits light nor has holes."""
         masked = {name for name, textures in self.scene.textures.items() if textures.opacity is not None}
         clear = masked | {name for name, material in self.scene.materials.items() if material.transmits}
         return ~np.array([o.material in clear for o in self.scene.objects], bool)[self.owner]
 
     @cached_property
     def opaque(self) -> Indices:
-        """Numbers of all triangles through which nothing is seen."""
+        """Indices of the opaque triangles."""
         return np.flatnonzero(self.is_opaque)
 
     @cached_property
@@ -56,14 +56,14 @@ class Sight:
 
     @cached_property
     def viewers(self) -> Viewers | None:
-        """Where viewers are, as `tracing.viewed.viewers_of` finds it."""
+        """The viewers found by `tracing.viewed.viewers_of`, if any."""
         from lambent.bake.tracing.viewed import viewers_of
 
         return viewers_of(self)
 
     @cached_property
     def met(self) -> tuple[Floats, Indices, Floats]:
-        """Directions (M, 3) of the viewers' rays that meet an opaque triangle, which of all (M,), how far away (M,)."""
+        """Viewers' rays that hit an opaque triangle: directions (M, 3), triangle indices (M,), distances (M,), m."""
         from lambent.bake.tracing.viewed import RAYS, met
 
         assert self.viewers is not None, "without viewers there are no rays"
@@ -71,6 +71,6 @@ class Sight:
         return directions, self.opaque[face], distance
 
     def forget(self) -> None:
-        """Drop what was found, for its memory; it is found again on demand."""
+        """Release the computed properties; they are computed again on demand."""
         for name in ("owner", "is_opaque", "opaque", "everything", "traced", "viewers", "met"):
             self.__dict__.pop(name, None)

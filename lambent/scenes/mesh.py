@@ -1,4 +1,4 @@
-"""Triangle meshes, and what is found of many at once: of 100,000, one by one, it would take minutes."""
+"""Triangle meshes, and functions on many meshes at once: for 100,000, a loop in Python would take minutes."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ TRIANGLES_AT_ONCE = 1 << 20
 
 @dataclass(frozen=True)
 class Mesh:
-    """Triangles. positions, normals (V, 3) float32; uv (V, 2) float32; tangents (V, 3) float32; faces (T, 3) uint32.
+    """A triangle mesh: positions (m), normals, tangents (V, 3) and uv (V, 2) float32; faces (T, 3) uint32.
 
-    `tangents` is the brushing direction t of the shading frame, unit, at right angles to the normal (b = n x t).
+    `tangents` are unit brushing directions t of the shading frame, perpendicular to the normals n (b = n x t).
     """
 
     positions: Array
@@ -33,28 +33,28 @@ class Mesh:
 
     @property
     def corners(self) -> Array:
-        """(T, 3, 3) float64 positions of the triangles' corners."""
+        """(T, 3, 3) float64 positions of the triangles' corners, m."""
         return self.corners_of(slice(None))
 
     def corners_of(self, faces: NDArray[np.integer] | slice) -> Array:
-        """(K, 3, 3) float64 positions of the corners of some triangles."""
+        """(K, 3, 3) float64 positions, m, of the corners of some triangles."""
         return np.asarray(self.positions[self.faces[faces]], float)
 
 
 def boxes_of(meshes: Sequence[Mesh]) -> Array:
-    """(N, 2, 3) float32 least and largest corner of the box around each mesh, all of them at once."""
+    """Bounding boxes (N, 2, 3) float32 of meshes: least and largest corner, m."""
     positions = np.concatenate([mesh.positions for mesh in meshes])
     first = np.cumsum([0] + [len(mesh.positions) for mesh in meshes[:-1]])
     return np.stack([np.minimum.reduceat(positions, first), np.maximum.reduceat(positions, first)], axis=1)
 
 
 def corners_of(meshes: Sequence[Mesh]) -> Array:
-    """(F, 3, 3) float64 positions of the corners of all triangles, mesh after mesh, all of them at once."""
+    """(F, 3, 3) float64 positions, m, of the corners of all triangles, mesh after mesh."""
     return vertices_at_corners(meshes, [mesh.positions for mesh in meshes])
 
 
 def vertices_at_corners(meshes: Sequence[Mesh], values: Sequence[Array]) -> Array:
-    """(F, 3, ...) float64 values at the corners of all triangles; `values` are those of each mesh's vertices."""
+    """(F, 3, ...) float64 values at the corners of all triangles, from the vertices' `values` (V, ...) of each mesh."""
     first = np.cumsum([0] + [len(own) for own in values[:-1]])
     faces = np.concatenate([mesh.faces for mesh in meshes]).astype(np.int64)
     faces += np.repeat(first, [len(mesh.faces) for mesh in meshes])[:, None]
@@ -62,7 +62,7 @@ def vertices_at_corners(meshes: Sequence[Mesh], values: Sequence[Array]) -> Arra
 
 
 def batches_of(meshes: Sequence[Mesh]) -> Iterator[slice]:
-    """Meshes in batches of about TRIANGLES_AT_ONCE triangles: what is found of all at once then takes little memory."""
+    """Slices of meshes with about TRIANGLES_AT_ONCE triangles each, which bounds the memory of array operations."""
     ends = np.cumsum([len(mesh.faces) for mesh in meshes])
     first = 0
     while first < len(meshes):
@@ -73,11 +73,11 @@ def batches_of(meshes: Sequence[Mesh]) -> Iterator[slice]:
 
 
 def areas_of_faces(meshes: Sequence[Mesh]) -> Array:
-    """(F,) areas of all triangles in m^2, mesh after mesh."""
+    """(F,) area of each triangle, m^2, mesh after mesh."""
     return np.concatenate([np.zeros(0), *(triangle_areas(corners_of(meshes[some])) for some in batches_of(meshes))])
 
 
 def areas_of(meshes: Sequence[Mesh]) -> Array:
-    """(N,) area of each mesh in m^2."""
+    """(N,) area of each mesh, m^2."""
     areas, ends = areas_of_faces(meshes), np.cumsum([len(mesh.faces) for mesh in meshes])
     return np.array([own.sum() for own in np.split(areas, ends[:-1])])
