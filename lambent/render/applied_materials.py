@@ -28,7 +28,7 @@ class AppliedMaterials:
     Attributes
     ----------
     answers : bool
-        Whether light follows the changed materials; where it does not, a note says so once.
+        Whether light follows the changed materials; otherwise a note says so once.
     """
 
     def __init__(self, store: Store, renderer: Renderer, note: Callable[[str], None]) -> None:

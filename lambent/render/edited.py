@@ -35,7 +35,7 @@ class Edited(Images):
         self._picture = picture
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Image:
-        return np.maximum(self._picture.image(), 0)  # half floats of wavelets round below 0 where it is dark
+        return np.maximum(self._picture.image(), 0)  # wavelets in half floats round below 0 in dark pixels
 
 
 def edited_still(
@@ -52,15 +52,15 @@ def edited_still(
     session : path
         A session's file; its camera and size replace those of `settings`.
     file, settings
-        As of `output.still`: exposure, view transform and false colours.
+        As in `output.still`: exposure, view transform and false colours.
     surfaces
         Least and most surfaces on the shown light paths.
 
     Raises
     ------
     UserError
-        Where the session or the store cannot be used, or the store lacks the transport; the hint then is the command
-        that bakes it.
+        If the session or the store cannot be used, or the store lacks the transport; the hint is then the command that
+        bakes it.
     """
     began, file = time.perf_counter(), Path(file)
     check_writable(file, WRITABLE)

@@ -1,4 +1,4 @@
-"""Images of a store, whichever renderer draws them: their settings, and the display of radiance."""
+"""Images of a store by any renderer: their settings, and the display of radiance."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ PATH_TRACER = "path"
 FALSE_COLOUR, NOISE = "false-colour", "noise"
 ANYWHERE = Camera("anywhere", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
 log = logging.getLogger(__name__)
-DARK_EV100 = -2.5  # of a metered picture, below which light from outside that slips through may be all there is
+DARK_EV100 = -2.5  # below this, a metered picture may show nothing but light leaks from outside
 MOST_EV = 64  # largest exposure in stops, up or down; 2^64 fits into float32
 VIEWS = ("filmic", "neutral", "linear", FALSE_COLOUR)
 
@@ -50,48 +50,49 @@ class Settings:
     integrator : str
         One of `realtime.integrators.INTEGRATORS`, or "path" for the path tracer.
     samples : int, optional
-        Per pixel where the integrator converges ("path": 64 by default, "qmc": 256, "oslf": 100), otherwise per lobe
-        (by default chosen from each material's roughness).
+        Per pixel for converging integrators ("path": 64 by default, "qmc": 256, "oslf": 100), otherwise per lobe (by
+        default chosen from each material's roughness).
     exposure_ev : float, optional
-        Stops, -64 to 64, for displayed images; by default the scene's, or, where it has none, what the first image asks
-        for (`core.exposure.metered`), kept for the rest.
+        Stops, -64 to 64, for displayed images; by default the scene's, else metered from the first image
+        (`core.exposure.metered`) and kept for the rest.
     view : str
         View transform of displayed images, one of `VIEWS`; "false-colour" shows luminance in cd/m^2.
     scale : Range, optional
-        Of false colours, in the unit of the shown quantity; by default fitted to the first image and kept for the rest.
+        Range of false colours, in the unit of the shown quantity; by default fitted to the first image and kept for the
+        rest.
     log : bool
-        Whether a fitted scale has even decades rather than even steps.
+        Whether a fitted scale is logarithmic.
     show : str
         Part of the light: full, diffuse, specular, light-map (irradiance in lx), or noise, the light map's relative
         standard error in percent, always in false colours.
     planar : str
-        How planar reflectors are drawn: auto, off (from their probes), or a method that the integrator knows.
+        Method for planar reflectors: auto, off (from their probes), or a method of the integrator.
     lookup : str
-        Where reflected rays find their light: auto, or a look-up of `realtime.incident`.
+        Source of light for reflected rays: auto, or a look-up of `realtime.incident`.
     projection : Projection
-        Perspective, or what is drawn from the faces of a cube around the eye.
+        Perspective, or a projection resampled from the faces of a cube around the eye.
     light_field_mb : float, optional
-        Memory on the GPU for the maps of light fields; by default all of them.
+        GPU memory for the maps of light fields, MB; by default enough for all maps.
     light : MixTrack, optional
-        Mix of the store's light groups, over the time of a film; by default that of a saved view or walk, else as
+        Mix of the store's light groups over the time of a film; by default the mix saved with the view or walk, else as
         baked.
     light_field_cache : str
-        Which maps go where not all have room: least-recent or adaptive (`core.map_cache`).
+        Eviction policy if not all maps fit: least-recent or adaptive (`core.map_cache`).
     sky_turn_deg : float
-        By which the sky is turned about the vertical, -360 to 360, from -z towards -x (`realtime.turned_sky`).
+        Rotation of the sky about the vertical, -360 to 360, from -z towards -x (`realtime.turned_sky`).
     field_deg : float, optional
-        Of a fisheye or a cylinder: field of view across the width, in degrees; 180 and 360 by default.
+        Field of view across the width of a fisheye or cylinder, degrees; 180 and 360 by default.
     seed : int
-        Of the path tracer, 0 or more: other seeds have independent noise.
+        For the path tracer, 0 or more: different seeds have independent noise.
     recolour : mapping
-        Linear RGB by material: its diffuse colour in the images, and the light answers (`realtime.answering`).
+        Diffuse colour, linear RGB, by material; indirect light follows (`realtime.answering`).
     variant : str
-        Name of one of the store's variants (`store.states`): its materials, under those of `recolour`, and its mix of
-        the light, where `light` has none. The light answers it.
+        Name of a variant of the store (`store.states`): its materials, overridden by `recolour`, and its light mix,
+        unless `light` has one. Indirect light follows.
     looks : LookTrack, optional
-        Looks of materials over the time of a film, over those of the variant; the light answers them.
+        Looks of materials over the time of a film, overriding the variant's; indirect light follows.
     replacements : tuple of Replacement
-        Other meshes in the place of objects that have light fields of their volume (`realtime.replaced`).
+        Meshes that replace objects with light fields of their volume (`realtime.replaced`).
     """
 
     width: int = 1280
@@ -147,7 +148,7 @@ class Settings:
 
 
 class Images(ABC):
-    """Images of a store; `quantity` is measured by their false colours."""
+    """Images of a store; false colours show `quantity`."""
 
     quantity: Quantity = LUMINANCE
     time_s: float = 0.0  # time within the film of the next image
@@ -162,12 +163,12 @@ class Images(ABC):
         return {}
 
     def apply_variant(self, variant: Variant) -> None:
-        """Show a variant from the next image on; a light mix of the settings goes before the variant's.
+        """Show a variant from the next image on; a light mix of the settings overrides the variant's.
 
         Raises
         ------
         UserError
-            Where the renderer has one state of materials only.
+            If the renderer supports one state of materials only.
         """
         raise UserError("excludes --edit", field="--variants")
 
@@ -176,7 +177,7 @@ class Images(ABC):
         """Linear radiance (height, width, 3) float32, row 0 on top."""
 
     def displayed(self, camera: Camera, progress: Progress = silent) -> NDArray[np.uint8]:
-        """(height, width, 3) encoded as a display gets it: after exposure and view transform, or in false colours."""
+        """Display-encoded image (height, width, 3) uint8: after exposure and view transform, or in false colours."""
         radiance = self.radiance(camera, progress)
         if not self.settings.is_false_coloured:
             return to_bytes(shown(radiance, self.settings.view, self.exposed(radiance)))
@@ -185,7 +186,7 @@ class Images(ABC):
         return with_scale(to_bytes(false_colour(values, self.scale)), self.scale, self.quantity.unit)
 
     def exposed(self, radiance: Floats) -> float:
-        """The exposure of displayed images, that of `radiance` where none was there yet."""
+        """Exposure of displayed images, EV; metered from `radiance` on first use if none is set."""
         if self.exposure_ev is None:
             found = metered(radiance)
             if found is None:

@@ -41,7 +41,7 @@ class Rendered:
     """The written file, its size in pixels, its frames, the time taken in seconds, and its exposure.
 
     `exposure_ev` (stops on radiance) and `ev100` are None for radiance files and for false colours, which have `scale`:
-    low, high, log, unit. For a contact sheet they describe the first picture; `ev100_by_name` has all where they
+    low, high, log, unit. For a contact sheet they describe the first picture; `ev100_by_name` has all values if they
     differ. `light_fields` has the statistics of light fields under the budget `Settings.light_field_mb`.
     """
 
@@ -79,20 +79,20 @@ def still(
     store : Store or path
         A baked store, or its folder.
     file : path
-        .exr and .hdr hold linear radiance in W/(sr m^2), .png displayed light.
+        .exr and .hdr store linear radiance, W/(sr m^2); .png stores the displayed image.
     camera : Camera or str, optional
         A camera, or the name of a camera or saved view; by default the scene's first camera.
     settings : Settings
         Size, integrator, exposure, view transform.
     scene : str, optional
-        For the path tracer: the scene file, where it has moved since the bake.
+        For the path tracer: the scene file, if it has moved since the bake.
     note : callable
-        Called with a sentence for everything that the store lacks, or that has changed since the bake.
+        Called with a sentence for each thing that the store lacks or that has changed since the bake.
 
     Raises
     ------
     UserError
-        Where the file cannot be written, the store cannot be read, or a name or value is unknown.
+        If the file cannot be written, the store cannot be read, or a name or value is unknown.
     """
     began, file = time.perf_counter(), Path(file)
     check_writable(file, WRITABLE)
@@ -136,7 +136,7 @@ def drawn_view(
     note: Note = ignore,
     progress: Progress = silent,
 ) -> tuple[Floats, Camera]:
-    """Radiance (height, width, 3) of a store's view, in memory, and its camera; parameters are those of `still`."""
+    """Radiance (height, width, 3), W/(sr m^2), of a store's view, and its camera; parameters as in `still`."""
     opened, record = opened_with_views(store)
     view = view_of(record, camera)
     return images(opened, settings, note=note).radiance(view, progress), view
@@ -159,7 +159,8 @@ def film(
     Parameters
     ----------
     file : path
-        .mp4 is a film, its size cut to even numbers; .png and .exr are sequences, numbered at the # signs of the name.
+        .mp4 is a film, its size rounded down to even numbers; .png and .exr are sequences, numbered at the # signs of
+        the name.
     path : CameraPath or str, optional
         A path, or the name of a camera path or recorded walk; by default the scene's first path.
     fps : int
@@ -246,7 +247,7 @@ def _mix_of_variant(settings: Settings, store: Store) -> LightMix:
 
 
 def _lit(settings: Settings, store: Store, light: MixTrack, whose: str, note: Note) -> Settings:
-    """Settings with a mix that came with a view, walk or variant, where store and integrator can show it."""
+    """Settings with the mix of a view, walk or variant, if store and integrator can show it."""
     if settings.integrator == PATH_TRACER:
         note(f"the path tracer ignores the light mix {whose}: it traces the light of the scene")
         return settings
@@ -258,7 +259,7 @@ def _lit(settings: Settings, store: Store, light: MixTrack, whose: str, note: No
 
 
 def exposed(settings: Settings, store: Store) -> Settings:
-    """Checked settings, with the exposure of the store's scene where they have none."""
+    """Checked settings; without an exposure, they get the one of the store's scene."""
     settings.check()
     if settings.exposure_ev is None:
         settings = replace(settings, exposure_ev=scene_record(store).exposure_ev)
@@ -273,7 +274,7 @@ def opened_with_views(store: Store | Path | str) -> tuple[Store, SceneRecord]:
 
 
 def view_of(record: SceneRecord, camera: Camera | str | None) -> Camera:
-    """The camera itself or by name; by default the scene's first."""
+    """The camera itself, or the camera of this name; by default the scene's first."""
     return camera if isinstance(camera, Camera) else _named("camera", record.cameras, camera)
 
 

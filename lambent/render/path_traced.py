@@ -26,7 +26,7 @@ SPP = 64
 
 
 class PathTraced(Images):
-    """Path traced images of the scene that a store was baked from; `scene` says where it is now."""
+    """Path traced images of the scene that a store was baked from; `scene` is its present file."""
 
     def __init__(self, store: Store, settings: Settings, scene: str | None, note: Callable[[str], None]) -> None:
         super().__init__(settings)

@@ -36,8 +36,8 @@ from lambent.store.contract import SIDES, noise_name
 from lambent.store.states import variants_of
 from lambent.store.store import Store
 
-METERED_PX = 256  # longer side of the picture that is metered
-FILM_SUPERSAMPLES = 4  # per pixel of an image sequence that holds radiance
+METERED_PX = 256  # longer side of the picture for metering
+FILM_SUPERSAMPLES = 4  # per pixel in image sequences of radiance
 
 
 class RealTime(Images):
@@ -84,7 +84,7 @@ class RealTime(Images):
             self._looks = variant_named(variants_of(store), settings.variant).looks
 
     def _check_light(self, light: MixTrack, note: Callable[[str], None]) -> None:
-        """Raise `UserError` where the store lacks a group of the mix; note what the mix does not change."""
+        """Raise `UserError` if the store lacks a group of the mix; note light that the mix does not change."""
         scene = self._renderer.scene
         if not light.groups:
             return

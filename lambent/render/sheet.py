@@ -30,7 +30,7 @@ from lambent.store.store import Store
 from lambent.store.views import read_views
 
 AS_BAKED = "as baked"
-MOST_PIXELS = 1 << 27  # per sheet
+MOST_PIXELS = 1 << 27  # largest sheet
 LEAST_INK_PX = 14  # height of the letters
 PAPER, INK = (255, 255, 255), (30, 30, 30)
 STAYS = "light as baked"
@@ -55,18 +55,18 @@ def sheet(
     file : path
         .png.
     settings : Settings
-        As of a still. The size is that of each picture; an exposure, if set, applies to all.
+        As for a still. The size is that of each picture; an exposure, if set, applies to all.
     exposures : {"light", "each", "one"}
         "light": pictures with the same light mix share an exposure; "each": every picture is metered; "one": all have
-        the exposure of the first. Captions show EV100 where exposures differ. The scene's exposure is that of its light
-        as baked; other mixes are metered.
+        the exposure of the first. Captions show EV100 if exposures differ. The scene's exposure applies to its baked
+        light; other mixes are metered.
 
-    The other parameters are those of `output.still`.
+    Other parameters as in `output.still`.
 
     Raises
     ------
     UserError
-        Where the store has no variants, the sheet would be too large, or as `output.still` raises it.
+        If the store has no variants, the sheet would be too large, or `output.still` would raise it.
     """
     began, file = time.perf_counter(), Path(file)
     known("exposure of a sheet", exposures, EXPOSURES, field="--exposure")
@@ -111,7 +111,7 @@ def sheet(
 class Exposures:
     """Exposures of the pictures of a sheet, in EV, in drawing order.
 
-    `how` is one of EXPOSURES, `of_scene` the exposure that was chosen for the light as baked, if any.
+    `how` is one of EXPOSURES, `of_scene` the scene's exposure for its baked light, if any.
     """
 
     def __init__(self, how: str, of_scene: float | None) -> None:
@@ -121,7 +121,7 @@ class Exposures:
         self._light: object = ()
 
     def wanted(self, light: LightMix) -> float | None:
-        """The exposure of the next picture, lit by this mix; None where it must be metered."""
+        """The exposure of the next picture, lit by this mix; None if it must be metered."""
         self._light = () if self._how == ONE else tuple(sorted(light.factors.items()))
         if self._how == EACH:
             return None
@@ -144,13 +144,13 @@ class Exposures:
 
 
 def with_the_baked_state(variants: Sequence[Variant]) -> list[Variant]:
-    """The variants, preceded by the scene as baked unless one of them is that."""
+    """The variants, preceded by the baked state unless one of them equals it."""
     is_there = any(not one.looks and not one.light.groups for one in variants)
     return [*variants] if is_there else [Variant(AS_BAKED), *variants]
 
 
 def _as_possible(variant: Variant, store: Store, settings: Settings, note: Note) -> tuple[Variant, bool]:
-    """The variant without what the store cannot show, and whether light stays as baked where it should change."""
+    """The variant reduced to what the store can show, and whether light stays as baked although it should change."""
     if settings.integrator == PATH_TRACER:
         return variant, bool(variant.light.groups)
     stays = bool(variant.looks) and not has_answer(store)
@@ -170,7 +170,7 @@ def shape_of(count: int, aspect: float) -> tuple[int, int]:
 def laid_out(
     pictures: Sequence[NDArray[np.uint8]], names: Sequence[str], columns: int, notes: Sequence[str] = ()
 ) -> NDArray[np.uint8]:
-    """Pictures (H, W, 3) of one size, laid out row by row, with captions: a name, cut where it is long, and a note."""
+    """Pictures (H, W, 3) of one size in rows, with captions: a name, shortened if too long, and a note."""
     from PIL import Image, ImageDraw, ImageFont
 
     height, width = pictures[0].shape[:2]
