@@ -200,7 +200,7 @@ def _light_fields_in_words(fields: list[dict[str, Any]]) -> str:
 
 
 def _check_lit(scene: Scene) -> None:
-    """Raise `UserError` before the bake where every picture of the scene would be black or impossible."""
+    """Raise `UserError` before the bake if every picture of the scene would be black or impossible."""
     shines = scene.environment is not None or scene.lights or any(any(o.emission) for o in scene.objects)
     if not shines or not scene.cameras:
         lacks, section = ("has no light", "[environment]") if not shines else ("has no camera", "[[cameras]]")
@@ -208,7 +208,7 @@ def _check_lit(scene: Scene) -> None:
 
 
 def _say_warnings(warnings: Sequence[str]) -> None:
-    """Say what the scene's loader left out or changed, before the bake takes its time."""
+    """Print what the scene's loader left out or changed, before the long bake."""
     for text in warnings[:MOST_WARNINGS]:
         say(f"warning: {text}")
     if (more := len(warnings) - MOST_WARNINGS) > 0:
@@ -245,7 +245,7 @@ def _proposed(
     edited: dict[str, Any],
     progress: Progress,
 ) -> tuple[Scene, Bounces, list[Proposal]]:
-    """Scene and bounces as the store has them, or as proposed; a proposal is printed on stderr before the bake."""
+    """Scene and bounces from the store, or as proposed; a proposal is printed on stderr before the bake."""
     from dataclasses import replace
 
     from lambent.bake.interreflection.proposal import held_by, propose_all
@@ -284,7 +284,7 @@ def _watch(scene: Scene, store: Path, bounces: Bounces, edited: dict[str, Any], 
 
 
 def _workers(count: int | None, address: str | None, unused: bool) -> AbstractContextManager[Workers | None]:
-    """The workers that trace interreflections; None stands for this process."""
+    """The workers that trace interreflections; None: this process."""
     if count is not None and address is not None:
         raise UserError("--workers and --cluster exclude each other", field="--cluster", hint="leave out one")
     if unused or (count is None and address is None):

@@ -71,7 +71,7 @@ def command(
 def _normalise(
     subject: str, values: list[str], asked: bool, output: Path | None, seed: int, force: bool, json: bool
 ) -> None:
-    """Write the energy-safe version of a material document, where it needs one."""
+    """Write the energy-conserving version of a material document, if it needs one."""
     from lambent.core.outputs import check_output
     from lambent.materials.document import Material
     from lambent.materials.models.model import Model
@@ -96,7 +96,7 @@ def _normalise(
 
 
 def _subject(name: str, values: list[str], reconstruction: Between = "auto") -> Material | MeasuredTable | Model:
-    """The material or table of a file, or the model of that name; a file goes before a model."""
+    """The material or table of a file, or the model of this name; a file takes precedence."""
     from lambent.cli.convert import subject_of
     from lambent.materials.models import models
 
@@ -112,7 +112,7 @@ def _subject(name: str, values: list[str], reconstruction: Between = "auto") -> 
 
 
 def _value(text: str) -> tuple[str, object]:
-    """("ks", [.1, .2, .3]) of "ks=.1,.2,.3"."""
+    """Parse "ks=.1,.2,.3" to ("ks", [.1, .2, .3])."""
     name, equals, numbers = text.partition("=")
     try:
         value = [float(number) for number in numbers.split(",")]

@@ -1,4 +1,4 @@
-"""Shared by all commands: the result on stdout, the progress bar on stderr, sizes as a user types them."""
+"""Code shared by all commands: results on stdout, progress on stderr, parsing of sizes."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def show(result: Mapping[str, Any], text: str, as_json: bool) -> None:
 
 
 def table(lines: Iterable[Iterable[str]]) -> str:
-    """Rows of words as aligned columns."""
+    """Rows of words in aligned columns."""
     rows = [tuple(map(printable, line)) for line in lines]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join("  ".join(word.ljust(width) for word, width in zip(row, widths, strict=True)).rstrip()
@@ -80,7 +80,7 @@ def metric_errors(errors: Mapping[str, float], share: Mapping[str, float]) -> st
 
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """A bar with the time left on stderr; where stderr is no terminal, a line for each step with its time."""
+    """A bar with the time left on stderr; if stderr is no terminal, a line for each step with its time."""
     if not sys.stderr.isatty():
         lines = _StepLines()
         try:
@@ -110,7 +110,7 @@ def progress_bar() -> Iterator[Progress]:
 
 
 class _StepLines:
-    """Prints a line on stderr for each step longer than half a second, and one a minute while a step goes on."""
+    """Prints a line on stderr for each step longer than half a second, and one per minute during a step."""
 
     SHORTEST_S = 0.5
     STILL_S = 60.0
@@ -137,7 +137,7 @@ class _StepLines:
 
 
 def parse_size(text: str, option: str = "--size") -> tuple[int, int]:
-    """(width, height) in pixels of "1280x720", the value of an option."""
+    """Parse an option's value such as "1280x720" to (width, height), pixels; `UserError` if malformed."""
     width, _, height = text.lower().partition("x")
     if not (width.isdecimal() and height.isdecimal() and 0 < int(width) <= 16384 and 0 < int(height) <= 16384):
         raise UserError(
@@ -147,12 +147,12 @@ def parse_size(text: str, option: str = "--size") -> tuple[int, int]:
 
 
 def say(text: str) -> None:
-    """A line on stderr that is not part of the result."""
+    """Print a line on stderr, outside of the result."""
     sys.stderr.write(_lines(text) + "\n")
 
 
 def log_to_stderr() -> None:
-    """Warnings of all rooms as lines on stderr."""
+    """Print warnings of all packages as lines on stderr."""
     handler = logging.StreamHandler()
     handler.setFormatter(_LogLine("lambent: %(message)s"))
     logging.basicConfig(handlers=[handler], level=logging.WARNING)
@@ -164,5 +164,5 @@ class _LogLine(logging.Formatter):
 
 
 def _lines(text: str) -> str:
-    """Text of several lines, each `printable`: names in it are from files."""
+    """Make each line of a text `printable`, because it may contain names from files."""
     return "\n".join(map(printable, text.split("\n")))

@@ -58,7 +58,7 @@ def subject_of(file: Path, reconstruction: Between = "auto") -> Subject:
 
 
 def is_document(head: bytes) -> bool:
-    """Whether a file that begins so is a material document, with a byte order mark or without."""
+    """Whether a file that begins with `head` is a material document; a byte order mark is allowed."""
     return head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{")
 
 

@@ -48,7 +48,7 @@ PACKAGES = {
     },
 }
 
-# Drivers and native libraries can end the process that loads them: each program runs in a process of its own.
+# Drivers and native libraries can crash the process that loads them, so each program runs in a separate process.
 _ASK_GRAPHICS = """
 import json
 from dataclasses import asdict
@@ -153,7 +153,7 @@ CHECKS: tuple[tuple[str, bool, Callable[[], tuple[bool, str]]], ...] = (
 
 
 def missing_packages(checks: list[Check]) -> list[str]:
-    """System packages that the failed checks want, for this machine's package manager."""
+    """System packages that the failed checks need, for this machine's package manager."""
     manager, failed = _manager() or "", [check.name for check in checks if not check.ok]
     return [package for name in failed for package in PACKAGES.get(name, {}).get(manager, [])]
 
@@ -180,7 +180,7 @@ def _first_known(manager: str, names: list[str]) -> str:
 
 
 def _ask(program: str) -> tuple[object, str]:
-    """The answer of a small program in a process of its own, or (None, the reason in one line)."""
+    """The answer of a small program run in a separate process, or (None, the reason in one line)."""
     command = [sys.executable, "-c", program]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=PROBE_SECONDS, check=False)

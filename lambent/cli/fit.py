@@ -123,7 +123,7 @@ def command(
 
 
 def _check_environment(file: Path, report: Path | None) -> None:
-    """Reject an unusable image before the fit."""
+    """Raise `UserError` for an unusable image before the fit."""
     from lambent.core.images import read_image
 
     if report is None:
@@ -162,7 +162,7 @@ def left_out(measurement: MeasuredTable, samples: MeasuredSamples) -> dict[str, 
 
 
 def describe_tuples(used: int, left_out: dict[str, int]) -> str:
-    """How many tuples were used and left out."""
+    """Numbers of tuples used and left out."""
     gone = [(f"{count}", f"left out: {why}") for why, count in left_out.items()]
     return table([(f"{used}", "tuples fitted"), *(gone or [("0", "left out")])])
 

@@ -15,7 +15,7 @@ from lambent.core.inputs import read_head
 from lambent.core.plain import plain
 
 ALBEDO_AT_DEG = (0, 30, 60)
-HEAD_BYTES = 1 << 16  # in which a Mitsuba scene says that it is one
+HEAD_BYTES = 1 << 16  # a Mitsuba scene identifies itself within these
 PICTURES = (b"v/1\x01", b"#?RADIANCE", b"#?RGBE", b"\x89PNG", b"\xff\xd8\xff")
 Facts = dict[str, Any]
 
@@ -56,7 +56,7 @@ def command(
 
 
 def inspector_of(file: str) -> Callable[..., Facts]:
-    """The function that describes a file, chosen by its place and its first bytes."""
+    """The function that describes a file, chosen by its path and its first bytes."""
     from lambent.scenes.loaders.load import BUILTIN_PREFIX, is_scene
 
     path = Path(file)
@@ -73,7 +73,7 @@ def inspector_of(file: str) -> Callable[..., Facts]:
 
 
 def inspect_table(file: str, plot: Path | None = None, reconstruction: Between = "auto") -> Facts:
-    """A measured table: its description, how much of it is usable, its albedo, its faults."""
+    """A measured table: its description, usable share, albedo and faults."""
     from lambent.materials import measured
     from lambent.materials.measured import inspection
 
@@ -162,7 +162,7 @@ def inspect_store(file: str) -> Facts:
 
 
 def _variants(variants: Iterable[Any]) -> dict[str, str]:
-    """What each variant changes: materials, and light groups."""
+    """Changes of each variant: materials and light groups."""
     found = {}
     for one in variants:
         changed = [", ".join(one.looks)] * bool(one.looks)
@@ -210,7 +210,7 @@ def _health(store: Any, artefact: Any) -> str:
 
 
 def _rows(facts: Facts, indent: str = "") -> Iterator[tuple[str, str]]:
-    """(name, words) of every fact that is not empty; facts within facts are indented."""
+    """(name, words) of every non-empty fact; nested facts are indented."""
     for name, value in facts.items():
         label = indent + name
         if isinstance(value, dict) and value:
@@ -221,7 +221,7 @@ def _rows(facts: Facts, indent: str = "") -> Iterator[tuple[str, str]]:
 
 
 def _is_prose(value: Any) -> bool:
-    """Whether a fact is a list of sentences, which stand below the table."""
+    """Whether a fact is a list of sentences, which are printed below the table."""
     return isinstance(value, list) and bool(value) and all(isinstance(item, str) and " " in item for item in value)
 
 

@@ -1,9 +1,10 @@
 """`lambent`: finds the commands and reports errors.
 
-Every module of this folder with a function `command` is a command of the module's name; nothing else to register.
-Exit codes: 0 done; 1 done, and the answer is no (a failed check, a missing part); 2 wrong input; 130 interrupted.
+Every module in this folder with a function `command` is a command named after the module; no registration is needed.
+Exit codes: 0 done; 1 done with a negative result (a failed check, a missing part); 2 wrong input; 130 interrupted.
 
-Nothing is imported at the top but what Python has loaded: Ctrl-C must be answered while the rest is imported.
+The top of the file imports only modules that Python has already loaded, so that Ctrl-C works while the rest is
+imported.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 AGAIN_S = 0.02
 INTERRUPTION = "lambent: interrupted; finished work is kept\n"
-NO_ROOM = "failed to map segment"  # message of the ImportError where a library does not fit into memory
+NO_ROOM = "failed to map segment"  # message of the ImportError if a library does not fit into memory
 MEMORY = "out of memory; close other programs, raise the limit (ulimit -v), or ask for less"
 FAULTS_OF_THE_DISK = {
     errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR,
@@ -32,14 +33,14 @@ FAULTS_OF_THE_DISK = {
 def main() -> None:
     """Entry point of the `lambent` command."""
     signal.signal(signal.SIGINT, _leave)
-    build_app()  # imports the commands; nothing has begun that could be lost
+    build_app()  # imports the commands; no work can be lost yet
     sys.unraisablehook = _unraisable
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         code = run(sys.argv[1:])
-    except KeyboardInterrupt:  # while the end of the command was reported
+    except KeyboardInterrupt:  # during the report at the end of the command
         code = INTERRUPTED
-    signal.signal(signal.SIGINT, lambda *_: os._exit(code))  # the result is out; skip the libraries' clean-up
+    signal.signal(signal.SIGINT, lambda *_: os._exit(code))  # the result is printed; skip the libraries' clean-up
     sys.exit(code)
 
 
@@ -66,7 +67,7 @@ def build_app() -> typer.Typer:
 
 
 def run(arguments: list[str]) -> int:
-    """Run one command line and return its exit code; faults of the user are one line on stderr."""
+    """Run one command line and return its exit code; user errors are one line on stderr."""
     from typer.exceptions import TyperException
 
     from lambent.cli.console import log_to_stderr
@@ -76,7 +77,7 @@ def run(arguments: list[str]) -> int:
     log_to_stderr()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")  # a terminal that lacks a letter still shows the rest
+            stream.reconfigure(errors="backslashreplace")  # a terminal without a character still shows the rest
     try:
         code = build_app()(arguments or ["--help"], prog_name="lambent", standalone_mode=False) or 0
         sys.stdout.flush()
@@ -87,7 +88,7 @@ def run(arguments: list[str]) -> int:
     except (Cancelled, KeyboardInterrupt):
         code = INTERRUPTED
     except BrokenPipeError:
-        # The reader of the output is gone; flushing at exit must not fail again.
+        # The reader of the output has closed; flushing at exit must not fail again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except Exception as error:
@@ -105,14 +106,14 @@ def run(arguments: list[str]) -> int:
 
 
 def _usage_fault(error: TyperException) -> str:
-    """The message of a wrong command line, and the command that shows the right one."""
+    """The message for a wrong command line, with the command that shows help."""
     message = error.format_message().replace("Value error, ", "").replace("Input should be", "it has to be")
     context = getattr(error, "ctx", None)
     return message if context is None else f"{message.removesuffix('.')} (see `{context.command_path} --help`)"
 
 
 def _is_interruption(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind an error: half an import fails in many ways."""
+    """Whether Ctrl-C caused an error: an interrupted import fails in many ways."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
@@ -125,7 +126,7 @@ def _leave(*_: object) -> None:
 
 
 def _unraisable(fault: sys.UnraisableHookArgs) -> None:
-    """Interrupt again, a moment later, where Ctrl-C met a place that cannot raise, such as the end of an object."""
+    """Interrupt again, a moment later, if Ctrl-C hit code that cannot raise, such as a destructor."""
     if issubclass(fault.exc_type, KeyboardInterrupt):
         import threading
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from lambent.render import Settings
 
 SHEET_SIZE = "640x360"  # of each picture in a sheet
-MEASURED = {"luminance": "full", "illuminance": "light-map"}  # quantity -> the part of the light that is shown
+MEASURED = {"luminance": "full", "illuminance": "light-map"}  # quantity -> value of --show
 SHOWN_BY = (
     "store",
     "output",
@@ -259,7 +259,7 @@ def command(
 
 
 def _check_still(context: typer.Context, settings: Settings) -> None:
-    """Reject options that apply to films only."""
+    """Raise `UserError` for options that apply to films only."""
     if _is_said(context, "fps"):
         raise UserError("applies to films only", field="--fps", hint="write to .mp4, or add --path NAME")
     for name, keys in settings.light.groups.items() if settings.light is not None else ():
@@ -271,7 +271,7 @@ def _check_still(context: typer.Context, settings: Settings) -> None:
 
 
 def parse_exposure(text: str | None, *, variants: bool) -> tuple[float | None, str]:
-    """The value of --exposure: EV or None, and how the pictures of a contact sheet share an exposure."""
+    """Parse --exposure: EV or None, and how the pictures of a contact sheet share an exposure."""
     from lambent.render.sheet import BY_LIGHT, EXPOSURES
 
     if text is None:
@@ -290,7 +290,7 @@ def parse_exposure(text: str | None, *, variants: bool) -> tuple[float | None, s
 
 
 def _exposure_of(ev100: float, exposure: str | None) -> float:
-    """Stops on radiance of an EV100."""
+    """Convert an EV100 to stops on radiance."""
     from lambent.core.exposure import ev100_of, exposure_of
     from lambent.render.images import MOST_EV
 
@@ -304,7 +304,7 @@ def _exposure_of(ev100: float, exposure: str | None) -> float:
 
 
 def parse_range(text: str, *, log: bool) -> Range:
-    """The range of "10:500"; `log` where its colours stand at even decades."""
+    """Parse a range such as "10:500"; `log`: a logarithmic scale."""
     from lambent.core.false_colour import Range
 
     low, _, high = text.partition(":")
@@ -317,7 +317,7 @@ def parse_range(text: str, *, log: bool) -> Range:
 
 
 def parse_surfaces(text: str) -> tuple[int, int]:
-    """The range of "3" or "2:3"."""
+    """Parse "3" or "2:3" to least and most surfaces."""
     least, _, most = text.rpartition(":")
     try:
         found = int(least or 1), int(most)
@@ -337,7 +337,7 @@ def _is_said(context: typer.Context, name: str) -> bool:
 
 
 def _check_edit(context: typer.Context, session: Path) -> None:
-    """Reject options that the session fixes."""
+    """Raise `UserError` for options that the session fixes."""
     for parameter in context.command.params:
         if parameter.name not in SHOWN_BY and _is_said(context, parameter.name or ""):
             raise UserError("excludes --edit", field=parameter.opts[0], hint=f"{session} fixes camera, size and light")
