@@ -28,20 +28,20 @@ def run(
     Parameters
     ----------
     path : Path
-        Of "walk" and "view": a store that holds at least geometry and the scene record.
+        For "walk" and "view": a store with at least geometry and the scene record.
     mode : str
-        A name of `starts`: "walk" starts on foot, "view" orbiting the camera's target.
+        A name in `starts`: "walk" starts on foot, "view" orbits the camera's target.
     size, frames : (width, height), int or None
-        Of the window, in logical pixels; frames to draw without a pause before it closes.
+        Size of the window, logical pixels; number of frames to draw without a pause before the window closes.
     folder : Path, optional
-        Where pictures and materials are saved; by default the working folder.
+        Folder for saved pictures and materials; by default the working folder.
     **options
-        Of the mode.
+        Options of the mode.
 
     Raises
     ------
     UserError
-        Where there is no display or adapter, `path` cannot be shown, or the mode is unknown.
+        If there is no display or adapter, `path` cannot be shown, or the mode is unknown.
     """
     found = starts()
     module = found[known("mode", mode, found)]
@@ -61,12 +61,12 @@ def run(
 
 
 def starts() -> dict[str, ModuleType]:
-    """Name that a mode is opened by -> the mode's module."""
+    """Modules of the modes, by the names that open them."""
     return {name: module for module in modules_in(modes, having="STARTS").values() for name in module.STARTS}
 
 
 def check_display(hint: str) -> None:
-    """`UserError` where no window can be opened; `hint` says what to do instead."""
+    """Raise `UserError` if no window can be opened; `hint` suggests an alternative."""
     import glfw
 
     with warnings.catch_warnings():

@@ -1,8 +1,8 @@
 """Camera motion for mouse and keys: pure functions from one camera to the next.
 
-Two modes. Orbit turns the camera about its target. Walking stands on the floor: the eye is `EYE_HEIGHT_M` above what is
-under it, and never leaves the scene's bounds. In both the horizon stays level (up is +y) and the pitch stays short of
-the poles. Angles in radians, lengths in metres, mouse distances in pixels of the window (x right, y down).
+Two modes. Orbiting turns the camera about its target. Walking keeps the eye `EYE_HEIGHT_M` above the floor and inside
+the scene's bounds. In both modes the horizon stays level (up is +y) and the pitch stays short of the poles. Angles are
+in radians, lengths in metres, mouse distances in pixels of the window (x right, y down).
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def yaw_pitch(camera: Camera) -> tuple[float, float]:
 
 
 def orbit(camera: Camera, dx_px: float, dy_px: float, pivot: Triple | None = None) -> Camera:
-    """Rotate the camera about `pivot` (default: the target), which keeps its place in the picture."""
+    """Rotate the camera about `pivot` (default: the target), whose position in the picture does not change."""
     pivot = camera.target if pivot is None else pivot
     yaw, pitch = yaw_pitch(camera)
     before, after = _axes(yaw, pitch), _axes(yaw + TURN_RAD_PX * dx_px, pitch - TURN_RAD_PX * dy_px)
@@ -72,7 +72,7 @@ def zoom(camera: Camera, steps: float, bounds: Bounds, pivot: Triple | None = No
 
 
 def nearer(camera: Camera, pivot: Triple, share: float) -> Camera:
-    """Move to this share of the distance from `pivot`, which keeps its place in the picture."""
+    """Move to this share of the distance from `pivot`, whose position in the picture does not change."""
     eye = np.array(pivot) + share * np.subtract(camera.position, pivot)
     ahead = direction(*yaw_pitch(camera)) * max(share * _distance(camera), NEAREST_M)
     return _placed(camera, eye, pivot if pivot == camera.target else eye + ahead)
@@ -114,9 +114,9 @@ def walk(
 ) -> Camera:
     """Move for `dt_s` seconds by the held `keys` (names as in `KEYS`; others are ignored).
 
-    On foot the eye moves level, as far as `allowed(eye, step)` permits, and settles at eye height above `floor_y`
-    (the scene's lowest point where it is None). Flying, it moves along the line of sight, through everything, and up
-    and down by the keys for it.
+    On foot, the eye moves horizontally as far as `allowed(eye, step)` permits, and settles at eye height above
+    `floor_y` (None: the scene's lowest point). Flying, it moves along the line of sight and, by other keys, up and
+    down, through all obstacles.
     """
     right, up, forward = np.sum([KEYS[key] for key in keys if key in KEYS] or [(0, 0, 0)], axis=0)
     if not (right or forward or (up and flying)):
@@ -138,7 +138,7 @@ def walk(
 
 
 def standing(camera: Camera, bounds: Bounds, floor_y: float | None, height_m: float) -> Camera:
-    """The camera with its eye `height_m` above `floor_y` (the scene's lowest point where it is None)."""
+    """The camera with its eye `height_m` above `floor_y` (None: the scene's lowest point)."""
     return lifted(camera, (bounds[0][1] if floor_y is None else floor_y) + height_m - camera.position[1])
 
 
@@ -149,7 +149,7 @@ def lifted(camera: Camera, lift_m: float) -> Camera:
 
 
 def confined(eye: np.ndarray, before: Triple, bounds: Bounds) -> np.ndarray:
-    """Keep `eye` inside the bounds; where `before` was outside already, let it get no farther out."""
+    """Keep `eye` inside the bounds; if `before` was outside, let the eye get no farther out."""
     low, high = np.array(bounds)
     margin = np.minimum(WALL_M, 0.1 * (high - low))
     return np.asarray(np.clip(eye, np.minimum(low + margin, before), np.maximum(high - margin, before)))

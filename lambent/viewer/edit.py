@@ -29,15 +29,15 @@ def run(
         A measured table in any known format or a material document; or a scene, a store or a session, whose materials
         are edited in place.
     material : Path, optional
-        A document: the material to start from, or, where `path` is one too, the material B to compare with.
+        A document: the material to start from, or, if `path` is also a document, the material B to compare with.
     environments : sequence of Path
         Lat-long pictures to light the preview with; the .hdr files beside `path` are offered too. In place, at most
         one, which replaces the scene's environment.
     camera, picture, store, crease_deg : str, (width, height), Path, float, optional
-        In place: the name of the camera, the size of the picture in pixels, the folder that keeps the transport, and
-        above how many degrees edges are hard where normals lean.
+        In place: the name of the camera, the size of the picture in pixels, the folder for the transport, and the
+        crease angle in degrees, above which edges with leaning normals are hard.
     **window
-        `size`, `frames`, `folder` as in `app.run`, which raises what this raises.
+        `size`, `frames`, `folder` as in `app.run`, with the same errors.
     """
     mode = editing_mode(path)
     if mode == "material":
@@ -69,6 +69,6 @@ def _refuse(path: Path, **options: object) -> None:
 
 
 def editing_mode(path: Path) -> str:
-    """Name of the mode that edits this kind of file; the material editor by default, which names faults of the file."""
+    """Name of the mode that edits this kind of file; by default the material editor, which reports unreadable files."""
     found = app.starts().items()
     return next((name for name, mode in found if hasattr(mode, "edits") and mode.edits(path)), "material")

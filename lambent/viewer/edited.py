@@ -66,21 +66,21 @@ class SentCanvas(HostCanvas):
 
 
 def sums(device: Any) -> bool:
-    """Whether a device sums faster than the CPU: a real GPU does."""
+    """Whether a device sums faster than the CPU, as hardware GPUs do."""
     return not adapter_info(device).is_software
 
 
 def backend(device: Any) -> Backend:
     """Factory of the canvas for a picture that a device shows.
 
-    A real GPU sums by shaders. On a software adapter numba sums: both use the same cores, and numba is faster
+    On a hardware GPU shaders sum. On a software adapter numba sums: both use the CPU, and numba is faster
     (docs/editing.md).
     """
     return partial(ShadedCanvas if sums(device) else SentCanvas, device)
 
 
 def on_device(device: Any, make: Callable[[Backend], EditedPicture], say: Callable[[str], None]) -> EditedPicture:
-    """The picture made by `make` on the device's backend, or on the CPU, with a note, where the GPU lacks memory."""
+    """The picture made by `make` on the device's backend or, with a note if the GPU lacks memory, on the CPU."""
     try:
         return make(backend(device))
     except OutOfGpuMemory as error:

@@ -62,7 +62,7 @@ class MaterialEdits:
 
     @property
     def other(self) -> RoomState | None:
-        """The state of the room that the present one is compared with; None where there is none."""
+        """The state of the room that the present one is compared with, if any."""
         return self._history.now.other
 
     @property
@@ -207,7 +207,7 @@ def rescue_file(folder: Path, name: str) -> Path:
 
 
 def file_in(folder: Path, name: str) -> Path:
-    """The file for a name or path, in `folder` if relative; raise `UserError` where no file can be written."""
+    """The file for a name or path, in `folder` if relative; `UserError` if it cannot be written."""
     file = folder / Path(name).expanduser()
     if not file.parent.is_dir():
         raise UserError("folder does not exist", file=file.parent)

@@ -27,10 +27,10 @@ def framed(camera: Camera, bounds: Bounds, aspect: float, free_m: Callable[[Floa
     camera, aspect : Camera, float
         The present camera, and width / height of the picture.
     bounds : (low, high)
-        Of the object, in metres.
+        Box of the object, in metres.
     free_m : callable
-        (point (3,), unit direction (3,)) -> metres without an obstacle. The line of sight that is nearest to the
-        present one and long enough is taken; where none is, the one that comes closest.
+        (point (3,), unit direction (3,)) -> metres without an obstacle. Of the lines of sight that are long enough, the
+        one nearest to the present one is taken; without any, the longest relative to the needed distance.
     """
     low, high = np.array(bounds)
     centre, corners = (low + high) / 2, np.array(list(product(*np.stack([low, high]).T))) - (low + high) / 2
@@ -50,7 +50,7 @@ def framed(camera: Camera, bounds: Bounds, aspect: float, free_m: Callable[[Floa
 
 
 def _filling_m(corners: Floats, ahead: Floats, fov_y_deg: float, aspect: float) -> float:
-    """Distance of the eye from the middle at which all corners (8, 3), seen along `ahead`, lie in the picture."""
+    """Least distance of the eye from the box's middle at which all corners (8, 3), seen along `ahead`, are in view."""
     right = np.cross(ahead, (0.0, 1.0, 0.0))
     right /= np.linalg.norm(right)
     half = FILLS * math.tan(math.radians(fov_y_deg) / 2)

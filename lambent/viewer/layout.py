@@ -48,7 +48,7 @@ _BARE = FIXED | imgui.WindowFlags_.no_background | imgui.WindowFlags_.no_scrollb
 
 @dataclass(frozen=True)
 class Regions:
-    """Places of the picture, the column of panels, and, where there are some, the plots right and below."""
+    """Rectangles of the picture, the column of panels, and the plots right and below, if any."""
 
     picture: Rect
     column: Rect

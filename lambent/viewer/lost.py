@@ -1,7 +1,7 @@
 """Save unsaved work when the window is lost: by an error, a signal, or a lost display.
 
-An X server that dies ends the process from within Xlib, past every `finally` and `atexit` of Python; Xlib offers one
-call before it does. A process that is killed outright (SIGKILL), or dies in the graphics driver, keeps nothing.
+If the X server dies, Xlib ends the process without running Python's `finally` and `atexit`, but calls a handler first.
+Nothing can be saved if the process is killed by SIGKILL or crashes in the graphics driver.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ def rescued(what: str, write: Callable[[], Iterable[object]]) -> None:
 
 @contextmanager
 def kept(rescue: Callable[[], None]) -> Iterator[None]:
-    """While the window is open, call `rescue` once if it is lost.
+    """Context that calls `rescue` once if the window is lost.
 
-    Signals that end a process, and Xlib's error of the connection, are taken over inside and given back after.
+    Within it, handlers of terminating signals and of Xlib's connection error are replaced; they are restored after.
     """
     over = False
 
@@ -64,7 +64,7 @@ def kept(rescue: Callable[[], None]) -> Iterator[None]:
     mine = [number for number in SIGNALS if main and signal.getsignal(number) == signal.SIG_DFL]
     for number in mine:
         signal.signal(number, on_signal)
-    handler = _IoErrorHandler(on_io_error)  # kept alive until it is given back
+    handler = _IoErrorHandler(on_io_error)  # kept alive until Xlib's handler is restored
     xlib = _xlib()
     before = xlib.XSetIOErrorHandler(ctypes.cast(handler, ctypes.c_void_p)) if xlib is not None else None
     try:
@@ -80,7 +80,7 @@ def kept(rescue: Callable[[], None]) -> Iterator[None]:
 
 
 def _xlib() -> Any:
-    """The Xlib that the window uses; None where there is none."""
+    """The Xlib that the window uses, if any."""
     if not sys.platform.startswith("linux") or not os.environ.get("DISPLAY"):
         return None
     try:

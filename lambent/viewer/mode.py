@@ -1,6 +1,6 @@
 """The contract between the window and its modes: `Mode`, its panels, and the `Drawing` of the picture.
 
-A mode is a folder of `lambent.viewer.modes`; the window uses nothing of it but this contract.
+A mode is a folder of `lambent.viewer.modes`; the window uses modes only through this contract.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Beside:
-    """Plots right of the picture and below it; `images` are textures that they need beside the drawing's."""
+    """Plots right of the picture and below it; `images` are textures they need in addition to the drawing's."""
 
     right: Callable[[Textures], None]
     below: Callable[[Textures], None]
@@ -55,9 +55,9 @@ class Beside:
 
 
 class Drawing:
-    """Fills the picture's place with `views` of textures: of A and, beside a `divider`, of B.
+    """Fills the picture's place with `views` of textures: of A and, with a `divider`, of B.
 
-    `images` are further textures by name, arrays or views; one called "picture A" takes the place of A's view.
+    `images` are further textures by name, arrays or views; one named "picture A" replaces A's view.
     """
 
     def __init__(self, device: Any) -> None:
@@ -80,7 +80,7 @@ class Drawing:
         return None
 
     def within(self, place: Rect) -> Rect:
-        """Place of the views within the picture's place; a picture with another aspect leaves borders."""
+        """Rectangle of the views within the picture's place; a picture with another aspect leaves borders."""
         return place
 
     def wait_s(self) -> float | None:
@@ -153,6 +153,6 @@ class Mode:
 
 
 def check_there(path: Path) -> None:
-    """Raise `UserError` where `path` is neither a file or folder nor a built-in scene."""
+    """Raise `UserError` if `path` is neither a file, a folder, nor a built-in scene."""
     if not path.exists() and not str(path).startswith(BUILTIN_PREFIX):
         raise UserError("file does not exist", file=path)

@@ -1,11 +1,14 @@
 """When to draw the picture, how large, and with which integrator.
 
-A changed material is drawn over the last picture at full size, on its objects only. In motion: the few-sample
-integrator, on fewer pixels where the adapter is too slow, and without the mirrored views of planar reflectors (which
-show their probes then) where even half of the width and height takes too long with them. Light that changes by itself,
-after an edit, does not replace a picture of full size by a smaller one: the picture stays until the whole frame with
-the new light is complete. `REST_S` after the last change: the same once more, whole and with everything; then every
-frame adds samples of `qmc` to the picture, up to a stated count; then nothing is drawn any more.
+A changed material is drawn over the last picture at full size, on its objects only.
+
+In motion, the few-sample integrator draws fewer pixels if the adapter is too slow. If even half of the width and height
+is too slow, planar reflectors lose their mirrored views and show their probes. Light that changes by itself, after an
+edit, does not replace a picture of full size by a smaller one: the picture stays until the whole frame with the new
+light is complete.
+
+`REST_S` after the last change, the same picture is drawn whole, with mirrored views. Then every frame adds samples of
+`qmc`, up to a set count; after that, nothing is drawn.
 """
 
 from __future__ import annotations
@@ -173,8 +176,8 @@ class Pacer:
 def prior_share(accumulated: int, accumulate_to: int, samples: int) -> float:
     """Share of the last picture in motion that is blended with the mean of `accumulated` frames of `samples` each.
 
-    Few frames of `qmc` are noise, worse than that sharp picture: with its share at a/(a + N), the noise shown is never
-    more than that of 4 a frames. The share is 0 at the end.
+    A mean of few `qmc` frames is noisy and looks worse than the sharp picture in motion. With a share of a/(a + N) for
+    that picture, the shown noise never exceeds that of 4 a frames. The share is 0 at the end.
     """
     weight = PRIOR_SAMPLES / samples
     share = weight / (accumulated + weight)

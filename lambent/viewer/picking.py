@@ -49,7 +49,7 @@ def first_hit(origin: Floats, direction: Floats, triangles: Floats) -> float:
 
 
 def hits(origin: Floats, direction: Floats, triangles: Floats) -> Floats:
-    """Distances (T,) to triangles (T, 3, 3), on either side; inf where a ray misses (Moller & Trumbore 1997)."""
+    """Distances (T,), m, to triangles (T, 3, 3), on either side; inf for a miss (Moller & Trumbore 1997)."""
     edge1, edge2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     p = np.cross(direction, edge2)
     det = np.sum(edge1 * p, axis=-1)

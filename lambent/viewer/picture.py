@@ -78,7 +78,7 @@ class Picture:
         self._refine = pace.refine if refine is None else refine
         self.pacer.aim(share * pace.target_ms / 1e3)
         rests = wanted == self.pacer.shown
-        soon = pace.dragging or self._renderer.mixer.lags  # rather than sharp: the user waits for this light
+        soon = pace.dragging or self._renderer.mixer.lags  # soon rather than sharp: the user waits for this light
         relit = not rests and not soon and is_relit(wanted, self.pacer.shown)
         over = not rests and bool(self._renderer.redrawn(wanted))
         under_way = None if self._under_way is None else self._under_way.plan
@@ -115,7 +115,7 @@ class Picture:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of `radiance`; 0, 0 where there is none."""
+        """Width and height of `radiance`; 0, 0 without one."""
         return (0, 0) if self.radiance is None else self.radiance.size[:2]
 
     @property
@@ -130,7 +130,7 @@ class Picture:
         return self.radiance is not None and not over
 
     def work(self) -> bool:
-        """Draw a part of the frame under way; whether there is a new picture to show.
+        """Draw a part of the frame in progress; returns whether there is a new picture to show.
 
         Slices take about `slices.SLICE_S`, so that events are handled in between. The last frame stays in `view` until
         the new one is complete.
@@ -176,7 +176,7 @@ class Picture:
     def save(self, name: str) -> str | None:
         """Write the picture at full size, PNG as shown and EXR as linear radiance, called after the scene's `name`.
 
-        Returns the files' common stem; None where they could not be written.
+        Returns the files' common stem; None if they could not be written.
         """
         self._under_way = None  # the renderer draws one frame at a time; this one restarts later
         folder, say = self._screen.folder, self._screen.say
@@ -262,7 +262,7 @@ class Shown(Protocol):
 
 
 class Pair(Drawing):
-    """The picture A and, where two are compared, B: `shown` in this order."""
+    """The picture A and, in a comparison, B: `shown` in this order."""
 
     shown: tuple[Shown, ...] = ()
 

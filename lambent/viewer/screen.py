@@ -39,7 +39,7 @@ class Message:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Cost of the last frame. Times in ms; `gpu_ms` is empty where the adapter has no timers."""
+    """Cost of the last frame. Times are in ms; `gpu_ms` is empty on adapters without timers."""
 
     adapter: str = ""
     integrator: str = ""
@@ -60,9 +60,9 @@ class Pace:
     """The user's pacing choices, and the time of the last event."""
 
     refine: bool = True  # accumulate samples at rest
-    adaptive: bool = True  # draw fewer pixels in motion where the adapter is slow
+    adaptive: bool = True  # draw fewer pixels in motion if the adapter is slow
     target_ms: float = 1e3 * BUDGET_S  # target time of a frame in motion
-    covers: bool | None = None  # several depth samples per pixel in motion; None: where the adapter is fast enough
+    covers: bool | None = None  # several depth samples per pixel in motion; None: if the adapter is fast enough
     touched_s: float = -math.inf  # time of the last event
     dragging: bool = False  # a material is being dragged: its light is shown soon rather than sharp
     answering: bool = False  # an event was just handled: draw the interface before refining the picture

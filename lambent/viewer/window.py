@@ -31,8 +31,8 @@ EVENTS = ("pointer_down", "pointer_move", "pointer_up", "pointer_leave", "wheel"
 def _interrupt_between_frames() -> None:
     """Let Ctrl-C close the window between two frames.
 
-    The handler of the running loop closes the canvas at once. Within a frame that destroys the surface which is drawn
-    to, and the graphics library aborts the process.
+    The event loop's own handler closes the canvas at once. Within a frame this destroys the surface being drawn to, and
+    the graphics library aborts the process.
     """
     close = signal.getsignal(signal.SIGINT)
     if callable(close):
@@ -202,10 +202,10 @@ class Window:
             self._frames -= 1
             if self._frames <= 0:
                 loop.call_soon(self.canvas.close)
-        # Dear ImGui takes quick typing and clicking up one by one, a frame each.
+        # Dear ImGui handles quick key presses and clicks one by one, one per frame.
         unread = len(self._imgui.imgui_context.input_events_queue) > 0
         told = [message.text for message in self.screen.messages]
-        if unread or told != self._told:  # news from the background change the sizes of windows and tables, too
+        if unread or told != self._told:  # messages from the background also change sizes
             self._extra_frames = SETTLE_FRAMES
         else:
             self._extra_frames = max(0, self._extra_frames - 1)

@@ -33,11 +33,11 @@ class WorkerProcess:
         Called in the thread with each line and its stream; bytes may follow a line. A line with "error" is not passed
         on: it ends the process and becomes its `error`.
     ends : bool
-        Whether it ends by itself when it is done; otherwise its end is an error.
+        Whether the worker ends by itself when it is done; if not, its end is an error.
     """
 
     def __init__(self, module: str, words: Sequence[str], name: str, take: Take, *, ends: bool) -> None:
-        self.error = ""  # why it failed, in one line; else empty
+        self.error = ""  # reason of a failure, in one line; else empty
         self._name, self._take, self._ends = name, take, ends
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
         command = [sys.executable, "-m", module, *words]
@@ -51,7 +51,7 @@ class WorkerProcess:
         return self._work is not None
 
     def ask(self, said: Mapping[str, Any]) -> bool:
-        """Send a line; return False where the process has ended."""
+        """Send a line; return False if the process has ended."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(json.dumps(said).encode() + b"\n")

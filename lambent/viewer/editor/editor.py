@@ -112,7 +112,7 @@ class Editor:
 
     @property
     def busy(self) -> bool:
-        """Whether background work runs whose end no event announces."""
+        """Whether background work runs that ends without an event."""
         return self.subject.edits.in_stroke or bool(self._queue or self._works)
 
     @property

@@ -23,7 +23,7 @@ BY_HAND = "edited by hand"
 
 
 def kind_of(path: Path) -> Kind:
-    """Kind of a file, by its suffix and its first bytes; `UserError` where it cannot be read."""
+    """Kind of a file, by its suffix and its first bytes; `UserError` if it cannot be read."""
     if path.suffix.lower() in ENVIRONMENTS:
         return "environment"
     head = read_head(path, 64)
@@ -33,7 +33,7 @@ def kind_of(path: Path) -> Kind:
 def with_account(
     material: Material, origin: Material, measurement: Measurement | None, errors: Mapping[str, float]
 ) -> Material:
-    """The material to save, with the provenance of its `origin` and a note where numbers changed.
+    """The material to save, with the provenance of its `origin` and a note if numbers changed.
 
     `errors` are the errors E against the measurement, by metric; empty without a measurement.
     """
@@ -57,7 +57,7 @@ def with_account(
 def document_file(folder: Path, text: str, *, bare: bool = False) -> Path:
     """The .json file of a typed name or path, in `folder` if relative; a `bare` name may have no folder.
 
-    Raises a `UserError` where the name cannot be used, or nothing can be written there.
+    Raises `UserError` if the name cannot be used or the file cannot be written.
     """
     name = text.strip()
     if not name.endswith(".json") or Path(name).name == ".json" or (bare and Path(name).name != name):
@@ -66,7 +66,7 @@ def document_file(folder: Path, text: str, *, bare: bool = False) -> Path:
 
 
 def typed_path(text: str) -> Path:
-    """A path as typed or dropped: without blanks and quotes around it, ~ expanded; `UserError` where there is none."""
+    """A typed or dropped path, without surrounding blanks and quotes, ~ expanded; `UserError` if it is empty."""
     plain = text.strip().removeprefix("file://").strip("'\" ")
     if not plain:
         raise UserError("no file name given", hint="type a path")
@@ -84,7 +84,7 @@ class Files:
         self.name = f"{plain_name(subject.material.name)}.json"
         self.typed: dict[str, str] = {}  # texts of the fields for paths, by label
         self.loading: Work | None = None
-        self.open_environment: Callable[[Path], None] | None = None  # where there is a preview
+        self.open_environment: Callable[[Path], None] | None = None  # None without a preview
         self._may_replace: set[Path] = set()
 
     def open(self, text: str) -> None:
@@ -126,7 +126,7 @@ class Files:
         self.loading = pending(self.loading)
 
     def came_from(self, path: Path) -> None:
-        """Save to `path` from now on without asking twice: the material came from there."""
+        """Save to `path` from now on without asking for confirmation: the material came from there."""
         self.name = str(path)
         self._may_replace.add(path.resolve())
 

@@ -14,7 +14,7 @@ LARGEST_PX = 170.0
 
 @dataclass
 class Matrix:
-    """Places (x, y) in pixels from the upper left corner, of disks and of their titles."""
+    """Positions (x, y) of disks and of their titles, in pixels from the upper left corner."""
 
     step: float  # width and height of a disk
     tiles: dict[tuple[int, int, bool], tuple[float, float]] = field(default_factory=dict)  # by (kind, incident, far)

@@ -37,8 +37,8 @@ class Measurement:
     samples: MeasuredSamples
     few: MeasuredSamples  # at most `FEW`
     gathered: tuple[Incidence, ...]  # by incident direction, for disks and curves
-    disks: Floats  # (K, pixels, 3) as `readings.Disks.measured` of `FINE_PX` gives it
-    mirrored: Floats  # the same of `Disks.mirrored`
+    disks: Floats  # (K, pixels, 3) from `readings.Disks.measured` at `FINE_PX`
+    mirrored: Floats  # (K, pixels, 3) from `Disks.mirrored`
     lambertian: Mapping[str, float]  # metric -> E of the best Lambertian surface
 
     @property
@@ -69,7 +69,7 @@ class Measurement:
 
 
 def read_measurement(path: Path, progress: Progress = silent) -> Measurement:
-    """Load a measured file in any known format and prepare it; raises as `lambent.materials.measured.load` does."""
+    """Load a measured file in any known format and prepare it; errors as in `lambent.materials.measured.load`."""
     from lambent.materials.fitting.account import lambertian_errors
 
     progress(0, 5, "reading")
@@ -104,7 +104,7 @@ def thinned(samples: MeasuredSamples, count: int) -> MeasuredSamples:
 
 
 def _channels(f: Floats, samples: MeasuredSamples) -> Floats:
-    """The model's f (N, 3) in the table's channels: a grey table sees the mean."""
+    """The model's f (N, 3) in the table's channels; for a grey table, its mean."""
     return f if samples.f.shape[1] == 3 else f.mean(axis=1, keepdims=True)
 
 

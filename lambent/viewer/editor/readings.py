@@ -1,7 +1,7 @@
 """Values of a material that the editor plots: disks, curves in the plane of incidence, albedo.
 
-Everything is evaluated by the material's own BSDF. While a slider moves, disks have fewer pixels and the albedo fewer
-samples, so that a frame stays short.
+All values come from the material's own BSDF. While a slider moves, disks have fewer pixels and the albedo fewer
+samples, to keep frames short.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Disks:
         return np.asarray(np.cbrt(f * cosine), np.float32).reshape(len(self.tiles), -1, 3)
 
     def measured(self, gathered: Sequence[Incidence]) -> Floats:
-        """(K, inside, 3) brightness, NaN where nothing was measured."""
+        """(K, inside, 3) brightness, NaN without a measurement."""
         return self._of(gathered)
 
     def mirrored(self, gathered: Sequence[Incidence]) -> Floats:
@@ -95,9 +95,9 @@ class Disks:
         return values
 
     def picture(self, values: Floats, white: float, guessed: Floats | None = None) -> Image:
-        """RGBA picture of all disks, black to `white`; off the disks it is transparent.
+        """RGBA picture of all disks, black to `white`; transparent outside of the disks.
 
-        Where `values` are NaN, `guessed` is shown, hatched.
+        NaN in `values` shows `guessed`, hatched.
         """
         unknown = np.isnan(values[..., :1])
         if guessed is not None:
@@ -121,7 +121,7 @@ class Disks:
 
 
 def white_of(values: Floats) -> float:
-    """The brightness that is shown as white."""
+    """The brightness shown as white."""
     known = values[np.isfinite(values)]
     return max(float(np.percentile(known, WHITE_PERCENTILE)), 1e-6) if len(known) else 1.0
 
@@ -133,7 +133,7 @@ def in_plane(material: Material, incident: Incident, far: bool) -> Floats:
 
 
 def albedo(material: Material, phi_deg: float, samples: int) -> tuple[Floats, Floats]:
-    """Reflected and transmitted share (18, 3) each, of light from `ALBEDO_THETA_DEG`."""
+    """Reflected and transmitted albedo, (18, 3) each, for incidence at `ALBEDO_THETA_DEG`."""
     bsdf = MaterialBSDF(material)
     wo = direction(np.radians(ALBEDO_THETA_DEG), np.radians(phi_deg))
     wo = np.broadcast_to(wo[:, None], (len(wo), samples, 3))

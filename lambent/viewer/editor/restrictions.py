@@ -93,5 +93,5 @@ def _values(material: Material) -> Iterator[tuple[str, Value]]:
 
 
 def _plain(value: Value) -> Value:
-    """One number where three are equal."""
+    """One number if all three are equal."""
     return value[0] if isinstance(value, tuple) and value[0] == value[1] == value[2] else value

@@ -1,4 +1,4 @@
-"""The present plots of the editor, updated only where an input has changed."""
+"""The present plots of the editor, updated only if an input has changed."""
 
 from __future__ import annotations
 

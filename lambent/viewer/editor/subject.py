@@ -41,7 +41,7 @@ class Subject:
 
     @property
     def compared(self) -> Material | None:
-        """The material B, where there is one."""
+        """The material B, if any."""
         found = {
             "as loaded": self.loaded,
             "as saved": self.edits.saved.get(self.name),

@@ -2,10 +2,10 @@
 
 Its module defines
 
-- `STARTS`: the names that it is opened by, as `app.run` takes them;
-- `NO_DISPLAY`: what to do where there is no display, for the error message;
+- `STARTS`: the names that open it, for `app.run`;
+- `NO_DISPLAY`: an alternative without a display, for the error message;
 - `start(path, name, screen, **options)`: the `Mode` (see `lambent.viewer.mode`) that shows `path`, opened by `name`;
 - `edits(path)`, optional: whether `lambent edit` opens `path` in this mode.
 
-The module itself is light: `start` imports what the mode draws with. Panels, drawing and input stand beside it.
+The module itself loads quickly: `start` imports the mode's other modules, such as panels, drawing and input.
 """

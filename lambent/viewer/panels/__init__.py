@@ -1,1 +1,1 @@
-"""Panels that more than one mode shows. Each draws the parts of a state that it is given."""
+"""Panels shared by several modes. Each draws the parts of a state passed to it."""

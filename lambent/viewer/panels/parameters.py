@@ -35,8 +35,8 @@ def edited(
 ) -> tuple[Material, bool]:
     """The material after this frame, and whether mx and my keep their ratio.
 
-    `all_terms`: show the diffuse transmittance even where it is 0. `heading` draws the heading of a lobe and may
-    change the lobe.
+    `all_terms`: show the diffuse transmittance even if it is 0. `heading` draws the heading of a lobe and may change
+    the lobe.
     """
     changes: dict[str, object] = {}
     for name in ("kd", "kt_d") if all_terms or any(material.kt_d) else ("kd",):

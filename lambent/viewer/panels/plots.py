@@ -131,7 +131,7 @@ def _curves(editor: Editor, textures: Textures) -> None:
 
 def _in_plane(editor: Editor) -> None:
     shown, plots, curves = editor.shown, editor.plots, editor.shown.curves
-    # The axis holds the measurement where there is one.
+    # The axis covers the measurement, if there is one.
     tops = [p for (kind, _), (_, p) in curves.items() if kind == "measured" and len(p)]
     top = max(1e-3, *(float(p.max()) for p in tops or (curves["A", False][1], curves["A", True][1])))
     _axes("theta_o in degrees; the light is on the left", "p in 1/sr", range(-90, 91, 30))

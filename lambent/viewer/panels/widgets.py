@@ -114,7 +114,7 @@ def typed_field(label: str, typed: dict[str, str], button: str, hint: str, meani
 def explain(text: str) -> None:
     """Tooltip of the previous control; not during a drag.
 
-    It is placed left of the panel, where there is room, so that it covers no line.
+    It is placed left of the panel if there is room, so that it covers no line.
     """
     if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip) and not imgui.is_any_item_active():
         left = imgui.get_window_pos().x - TOOLTIP_GAP_PX
@@ -141,7 +141,7 @@ def wrapped(lines: Sequence[str], colour: Colour = AMBER) -> None:
 def status(lines: Sequence[str], longest: Sequence[str]) -> None:
     """Dim texts, wrapped, in the height of the `longest` ones, so that no control below moves with the texts.
 
-    A text that does not fit ends with dots; the tooltip has all of it.
+    A text that does not fit ends with dots; its tooltip shows the whole text.
     """
     width = imgui.get_content_region_avail().x
     for line, most in zip(lines, longest, strict=True):

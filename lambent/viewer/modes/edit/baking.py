@@ -20,14 +20,14 @@ from lambent.viewer.worker_process import WorkerProcess
 
 LIGHTS = (400, 4000)
 WORKER, BOUNCES = "lambent.viewer.modes.edit.worker", "--bounces"
-ONE_CURVE, TWO_CURVES = 0.6, 12.0  # time of transport for a whole view, relative to that of visibility
+ONE_CURVE, TWO_CURVES = 0.6, 12.0  # time of transport for a whole view, relative to the time of visibility
 LEAST_DONE = 0.02  # least share done before the remaining time is estimated
 _NUMBER = re.compile(r"(\d+) lights$")
 
 
 @dataclass
 class Stage:
-    """Progress of the transport for `lights` lights: its steps, by name, with their weights; visibility has 1."""
+    """Progress of the transport for `lights` lights: its steps, by name, with weights relative to visibility."""
 
     weights: Mapping[str, float]
     began_s: float
@@ -46,7 +46,7 @@ class Stage:
         self.share, self.reported_s = share, now_s
 
     def left_s(self, now_s: float) -> float | None:
-        """Estimated seconds until these lights are done; None while too little is done for an estimate."""
+        """Estimated seconds until these lights are done; None until there is enough progress for an estimate."""
         total = 1.0 + sum(self.weights.values())
         done = (self.before + self.share * self._weight(self.step)) / total
         if done < LEAST_DONE:
@@ -84,20 +84,20 @@ class Passes:
 
 
 class Baking:
-    """One run of the worker: transport for a number of lights, interreflections, or a proposal for these.
+    """One run of the worker: transport for a number of lights, interreflections, or a proposal for interreflections.
 
     Attributes
     ----------
     document : SessionDocument
-        The session that it bakes for.
+        The session to bake for.
     error : str
-        Why the worker failed, in one line; empty where it did not.
+        Reason of a failure, in one line; else empty.
     arrived : list of int
         Numbers of lights that have arrived in the store, in order; the reader removes them.
     has_view : bool
         Whether the points of the view are in the store.
     samples : int
-        Samples of interreflections that all points have now.
+        Present samples of interreflections at all points.
     proposal : Proposal or None
         The requested proposal, once it is finished.
     """

@@ -42,7 +42,7 @@ class EditDrawing(Drawing):
 
     @property
     def views(self) -> list[Any]:
-        """A and B where two are compared, else only the picture."""
+        """A and B in a comparison, else only the picture."""
         return self._pair if self.divider is not None else self._alone
 
     @property
@@ -84,7 +84,7 @@ class EditDrawing(Drawing):
         self._state.screen.statistics = Statistics(self._adapter, frame_ms=1e3 * frame.seconds, resolution=size)
 
     def save(self) -> None:
-        """Write the picture as shown (PNG) and as radiance (EXR), and the picture A where two are compared."""
+        """Write the picture as shown (PNG) and as radiance (EXR); in a comparison also the picture A."""
         frame, screen = self._frame, self._state.screen
         if frame is None:
             screen.say("picture not saved: nothing is drawn yet")

@@ -41,7 +41,7 @@ class Files:
     Attributes
     ----------
     home : Path or None
-        Where the session is saved; None until it has a file.
+        File of the session; None before the first save.
     exported : ExportedMaterial or None
         The last exported material.
     """

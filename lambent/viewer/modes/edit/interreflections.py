@@ -41,17 +41,17 @@ class Bounced:
     series, wanted
         Series of bands and samples of the bake; see `bake.bounces`.
     fixed : frozenset of str or None
-        Materials whose edits do not change the light on others: from the store, the proposal, or the user. None
-        before.
+        Materials whose edits do not change the light on others: from the store, the proposal, or the user; None
+        before that.
     proposal : Proposal or None
-        Costs of a bake for these.
+        Costs of a bake with this choice.
     shown : str
         A key of `SHOWN`.
     samples : int
         Paths per pixel of the shown light; 0 without interreflections.
     noise : float or None
-        Standard error of a point's shown interreflections relative to their mean: measured between passes, or before
-        that as noted by the bake. None where neither is known.
+        Standard error of a point's shown interreflections relative to their mean: measured between passes or, before
+        that, noted by the bake. None if unknown.
     """
 
     def __init__(self, painter: Painter, bake: Callable[..., Baking] = Baking) -> None:
@@ -207,7 +207,7 @@ class Bounced:
                 return
             light = interreflections(store, view.camera, view.size, originals)
             self._painter.run(partial(self._painter.give, light))
-            if self.baking is None:  # what the store has is what goes on
+            if self.baking is None:  # the next bake continues the store's samples
                 self.series = ",".join(map(str, series_of(store, copy)))
                 self.fixed = frozenset(originals) - {name for name, side in light.tails.slots if side != FIXED}
             self._see_noise(light, originals)

@@ -31,7 +31,7 @@ class ViewMap:
     ----------
     backdrop : (H, W, 3) float32
     object : (H, W) int32
-        Index of the object; -1 where there is none.
+        Index of the object; -1 for none.
     objects : tuple of (name, material)
     """
 
@@ -72,7 +72,7 @@ class ViewMap:
 
 
 def read_view(store: Store, view: SessionDocument) -> ViewMap | None:
-    """The map of a view; None where the store does not have it yet."""
+    """The map of a view; None if the store does not have it yet."""
     names = [view_artefact_name(view.camera, *view.size, "view_points", n) for n in ("pixel", "object", "backdrop")]
     if any(name not in store for name in names):
         return None
@@ -116,7 +116,7 @@ class Loading:
             self._work = None
 
     def start(self, session: Session, lights: int | None, failed: Callable[[UserError], None]) -> None:
-        """Read the transport for a number of lights; None: the most there is, 0: the view only."""
+        """Read the transport for a number of lights; None: the most available, 0: only the view."""
         view, wanted = session.document, {name: session.original(name) for name in session.document.materials}
         copy = Session(view, session.folder)
 
@@ -147,5 +147,5 @@ class Loading:
         self.lights = max(self.lights, lights)
 
     def has(self, name: str, made: Editable, lights: int) -> bool:
-        """Whether transport for at least this number of lights was read that applies to a material."""
+        """Whether transport that applies to a material was read for at least this number of lights."""
         return any(count >= lights and same_quotients(one, made) for count, one in self._loaded.get(name, []))

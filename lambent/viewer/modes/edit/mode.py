@@ -1,4 +1,4 @@
-"""The edit mode: its panels, its input, and what is drawn over the picture."""
+"""The edit mode: its panels, its input, and the overlays of the picture."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Draws the edited picture in a thread of its own: wishes go in, frames come out.
+"""Draws the edited picture in its own thread, from wishes to frames.
 
 When new transport arrives, for more lights or another environment, the picture blends over in `FADE_S`: the difference
-between before and after is added and fades out, while every frame shows the edits.
+from the previous picture is added and fades out, and every frame shows the edits.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Materials = Mapping[str, Editable]
 class Wish:
     """The wanted picture: B, the materials with their edits, and A to compare with, if any.
 
-    A has other materials, or those of B in `direct` light. With `difference`, B shows its difference from A.
+    A has other materials, or B's materials in `direct` light. With `difference`, B shows its difference from A.
     """
 
     now: Materials = field(default_factory=dict)
@@ -69,7 +69,7 @@ class Frame:
 
     @property
     def compared(self) -> Shown | None:
-        """A where it is shown beside B, None for a difference."""
+        """A, if shown beside B; None for a difference."""
         return self.against if self.wish.difference is None else None
 
     @property
@@ -81,8 +81,8 @@ class Painter:
     """Draws frames of `size` (height, width) until it is closed. `frame` is the last one, `error` an error, and
     `notice` a line for the user.
 
-    Only this thread touches the picture; `run` executes a function in it between two frames. The next frame is drawn as
-    soon as the last one was taken, or another is wanted: no time goes to frames that a slower window never shows.
+    Only this thread touches the picture; `run` executes a function in it between two frames. The next frame starts only
+    when the last one was taken or another one is wanted, so that no frame is drawn that a slower window never shows.
     """
 
     def __init__(
@@ -144,7 +144,7 @@ class Painter:
     # Functions for `run`.
 
     def begin(self, backdrop: Image) -> None:
-        """Restart with the backdrop, without transport, which another light has made useless."""
+        """Restart with the backdrop and without transport, which does not apply to the new light."""
         before = self._image()
         self._picture.close()
         self._parts, self._given, self._light, self._compared = {}, {}, None, None
@@ -222,7 +222,7 @@ class Painter:
         self.frame = Frame(number, wish, shown, against, needed, settled, seconds)
 
     def _show(self, name: str, made: Editable) -> bool:
-        """Change the picture to a material; return False where it has no transport for it."""
+        """Change the picture to a material; return False without transport for it."""
         if name not in self._parts or self._given.get(name) is made:
             return True
         with suppress(TransportNeeded):

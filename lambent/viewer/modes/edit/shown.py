@@ -17,7 +17,7 @@ from lambent.viewer.edited import ShadedCanvas, sums
 from lambent.viewer.modes.edit.tone import Bytes, difference, displayed
 
 Look = tuple[str, float, Range]  # view transform, exposure in EV, scale of false colours
-Fading = tuple[Image, float]  # a difference added to a picture, and the share of it that is left
+Fading = tuple[Image, float]  # a difference added to a picture, and its remaining share
 
 
 class Shown(Protocol):
@@ -98,7 +98,7 @@ class OnHost:
 
 @dataclass(frozen=True)
 class GpuShown:
-    """`Shown` in textures that the next frame overwrites; reading them back waits for the GPU."""
+    """`Shown` in textures, which the next frame overwrites; reading them back waits for the GPU."""
 
     device: Any
     light: Any

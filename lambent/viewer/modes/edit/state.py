@@ -35,7 +35,7 @@ Fixed = tuple[object, ...]  # everything that transport depends on
 class Compared:
     """The content of picture A: nothing, direct light only, the materials as opened, or a snapshot.
 
-    With `is_difference`, B shows its difference from A, on a `scale` that is fitted where it is None.
+    With `is_difference`, B shows its difference from A, on `scale`; if None, it is fitted.
     """
 
     chosen: str = OFF
@@ -58,7 +58,7 @@ class Compared:
         self.kept[self.chosen] = materials
 
     def fit(self, frame: Frame) -> None:
-        """Fit the scale to a frame with this A, where there is none."""
+        """Fit a missing scale to a frame with this A."""
         shows_a = frame.wish.compared is self.materials and frame.wish.direct == (self.chosen == DIRECT)
         if self.scale is None and self.is_difference and shows_a and frame.compared_radiance is not None:
             self.scale = SignedRange.fitting(photometric(frame.radiance - frame.compared_radiance))
@@ -102,7 +102,7 @@ class EditState:
 
     @property
     def busy(self) -> bool:
-        """Whether background work runs whose progress is shown."""
+        """Whether background work with visible progress runs."""
         return self.baking is not None or self.loading.busy or self.files.busy or self.bounced.busy
 
     @property
@@ -124,7 +124,7 @@ class EditState:
 
     @property
     def materials(self) -> tuple[str, ...]:
-        """Selectable materials: those in view, or, before that is known, all."""
+        """Selectable materials: those in view or, before these are known, all."""
         view = self.loading.view
         return view.materials if view is not None and view.materials else tuple(self.session.document.materials)
 
@@ -212,7 +212,7 @@ class EditState:
             self.baking = None
 
     def _have_transport(self) -> None:
-        """Bake missing transport where a material's source has changed."""
+        """Bake missing transport if a material's source has changed."""
         document = self.session.document
         sources = (document.environment, document.merged, *(one.source for one in document.materials.values()))
         if len(sources) == len(self._sources) and all(map(operator.is_, sources, self._sources)):

@@ -44,9 +44,9 @@ class Subject:
     store : Path
         Folder of the store that has, or will have, the transport of the view under the environment `lit_by`.
     lit_by : Surroundings or None
-        The environment at the start; None where it is the scene's.
+        The environment at the start; None for the scene's own.
     home : Path or None
-        The file that the session came from.
+        File of the session, if it was opened from one.
     """
 
     session: Session
@@ -68,7 +68,7 @@ class Subject:
 
 
 def kind_of(path: Path) -> Kind | None:
-    """The kind of a path; None where `lambent edit` must open it as a material."""
+    """The kind of a path; None if `lambent edit` must open it as a material."""
     if str(path).startswith(BUILTIN_PREFIX):
         return "scene"
     if path.is_dir():
@@ -95,19 +95,19 @@ def opened(
     Parameters
     ----------
     camera, picture
-        Name of a camera or saved view, and width and height in pixels; by default those of the session, else the first
-        camera, or an overview, and 512 x 512.
+        Name of a camera or saved view, and (width, height) in pixels; by default the session's, else the first camera
+        or an overview, and 512 x 512.
     environment
         An image that lights the scene instead of its own environment.
     store
-        Folder for transport. By default a store keeps its own, and a scene's is made in `folder`.
+        Folder for transport; by default the opened store itself, or for a scene a new store in `folder`.
     crease_deg
-        As for `load_scene`; by default that of the session.
+        As for `load_scene`; by default the session's.
 
     Raises
     ------
     UserError
-        The path cannot be read, the camera is unknown, or the store is another scene's.
+        If the path cannot be read, the camera is unknown, or the store belongs to another scene.
     """
     if picture is not None and max(picture) > LARGEST_PX:
         got = f"{picture[0]}x{picture[1]}"
@@ -148,7 +148,7 @@ def opened(
 def _changes(
     session: Session, scene: Scene, base: Path | None, camera: str | None, picture: tuple[int, int] | None
 ) -> dict[str, object]:
-    """Changes to a saved session for another view, and the scene's materials that it does not edit."""
+    """Changes to a saved session for another view, and the scene's materials that the session does not edit."""
     changes: dict[str, object] = {}
     if camera is not None:
         changes["camera"] = camera_named(scene, base, camera)
@@ -187,7 +187,7 @@ def default_store(folder: Path, name: str, environment: Surroundings | None, bas
 
 
 def check_store(folder: Path, place: str) -> None:
-    """Raise `UserError` where a folder is no store, or the store of another scene than that at `place`."""
+    """Raise `UserError` if a folder is no store, or its scene is not the one at `place`."""
     if not (folder / MANIFEST).exists() or folder == Path(place):
         return
     source = Store.open(folder).documents.get("source")
@@ -221,7 +221,7 @@ def _scene_at(place: str, crease_deg: float | None) -> Scene:
 
 
 def _merged_in(base: Path | None, scene: Scene) -> dict[str, str]:
-    """Materials that were merged before the store's views were baked, and their replacements."""
+    """Replacements of materials that were merged before the store's views were baked, by name."""
     worn = worn_in_views(Store.open(base)) if base is not None else {}
     pairs = {o.material: worn.get(o.name, o.material) for o in scene.objects}
     return {name: other for name, other in pairs.items() if name != other and other in scene.materials}

@@ -17,13 +17,13 @@ from lambent.realtime.frame_state import FALSE_COLOUR
 
 Bytes = NDArray[np.uint8]
 ROWS = 64  # rows per block, so that intermediate values stay in the cache
-BY_CHANNEL = ("filmic", "linear")  # transforms per channel: a table over all half floats has them
+BY_CHANNEL = ("filmic", "linear")  # transforms per channel, tabulated for all half floats
 
 
 def displayed(radiance: Image, view: str, exposure_ev: float, scale: Range) -> Bytes:
-    """(H, W, 4) bytes that a display shows, of radiance (H, W, 3) in W/(sr m^2).
+    """Display bytes (H, W, 4) of radiance (H, W, 3), W/(sr m^2).
 
-    False colours, on `scale`, are of the luminance without exposure.
+    False colours show the luminance, without exposure, on `scale`.
     """
     if view in BY_CHANNEL:
         return looked_up(radiance, _table(view, exposure_ev))

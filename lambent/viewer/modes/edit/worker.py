@@ -2,10 +2,10 @@
 
 python -m lambent.viewer.modes.edit.worker SESSION STORE LIGHTS...
 python -m lambent.viewer.modes.edit.worker SESSION STORE --bounces JSON
-python -m lambent.viewer.modes.edit.worker SESSION STORE --bounces JSON KEPT, to propose what to edit besides KEPT
+python -m lambent.viewer.modes.edit.worker SESSION STORE --bounces JSON KEPT  (proposes materials to edit beside KEPT)
 
-Every line is a JSON object: "what", "done" and "total" of a step; "lights", a number for which all transport is there
-now; "samples", those that all interreflections have now; "proposal"; or "error", a line for the user.
+Every line is a JSON object: "what", "done" and "total" of a step; "lights", a number of lights with complete transport;
+"samples", the present samples of all interreflections; "proposal"; or "error", a line for the user.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ SHORTCUTS = (
 
 @dataclass
 class MaterialState:
-    """Parts that know little of each other; a panel takes those that it needs."""
+    """Loosely coupled parts of the state; a panel takes the parts that it needs."""
 
     screen: Screen
     look: Look

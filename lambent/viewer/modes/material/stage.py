@@ -1,4 +1,4 @@
-"""The preview's pictures: A and, where two materials are compared, B, drawn by the real-time renderer."""
+"""The preview's pictures, drawn by the real-time renderer: A and, in a comparison, B."""
 
 from __future__ import annotations
 

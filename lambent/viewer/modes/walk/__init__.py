@@ -14,7 +14,7 @@ NO_DISPLAY = "use `lambent render` or `lambent demo --headless`"
 
 
 def check(path: Path) -> None:
-    """Raise `UserError` where there is no store at `path`; called before a window is opened."""
+    """Raise `UserError` if there is no store at `path`; called before a window is opened."""
     Store.open(path).close()
 
 
@@ -22,7 +22,7 @@ def start(
     path: Path, name: str, screen: Screen, light_field_mb: float | None = None, policy: str = LEAST_RECENT,
     sky_turn_deg: float = 0.0, replaced: tuple[str, ...] = (),
 ) -> Mode:  # fmt: skip
-    """Start the mode on a store; `light_field_mb`: GPU memory for light field maps, `policy`: of their cache."""
+    """Start the mode on a store; parameters as in `mode.open_store`."""
     from lambent.viewer.modes.walk.mode import open_store
 
     return open_store(

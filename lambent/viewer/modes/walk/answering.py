@@ -1,8 +1,8 @@
 """Light that follows edited materials while the camera moves: computed in a thread, shown as soon as it is ready.
 
 The light map comes first, then the probes one by one. A new edit drops the probes of the previous one, so that the
-light map lags by at most one computation. On a real GPU, shaders compute the light map in its texture, and the thread
-reads it back only for the probes and for the error estimate.
+light map lags by at most one computation. On a hardware GPU, shaders compute the light map in its texture, and the
+thread reads it back only for the probes and for the error estimate.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ WITHOUT = "light on other surfaces stays as baked: the store has no answer data 
 
 @dataclass
 class Answering:
-    """State for the panel: whether light follows edits, a line about it, and the likely relative error."""
+    """State for the panel: whether light follows edits, a line of status, and the likely relative error."""
 
     possible: bool = False
     on: bool = True
@@ -52,8 +52,8 @@ class Answering:
 class _Maps:
     """Light maps of edited materials.
 
-    `groups` are for the light mixer, where the store has light groups; else probes follow. `layers` are the light maps,
-    None for light that is already on the GPU, whose error is estimated with its probes.
+    `groups` are for the light mixer, if the store has light groups; else probes follow. `layers` are the light maps;
+    None for light that is already on the GPU, whose error is estimated later, with its probes.
     """
 
     light: Lit

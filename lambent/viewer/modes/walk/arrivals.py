@@ -16,14 +16,14 @@ from lambent.store.contract import probe_name
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Front side of a light map by light group (n, H, W, 3), W/m^2, valid where `finished` (H, W)."""
+    """Front side of a light map by light group (n, H, W, 3), W/m^2; texels are valid if `finished` (H, W)."""
 
     light: NDArray[np.float16]
     finished: Flags
 
     @classmethod
     def read(cls, shape: tuple[int, int, int], stream: IO[bytes]) -> Region | None:
-        """Read a region as `rebaking_worker` writes it; None where the stream ends early."""
+        """Read a region in the format of `rebaking_worker`; None if the stream ends early."""
         count, height, width = shape
         size, flags = 2 * 3 * count * height * width, height * width
         found = stream.read(size + flags)
@@ -35,7 +35,7 @@ class Region:
 
 @dataclass(frozen=True)
 class Arrived:
-    """Arrived light of one edit: a region, whether the light map is whole, arrays of probes, whether all is whole."""
+    """Arrived light of one edit: region, completeness of the light map, arrays of probes, completeness of all."""
 
     region: Region | None = None
     light_map: bool = False

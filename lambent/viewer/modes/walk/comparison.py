@@ -1,7 +1,7 @@
 """Comparison of the picture A with B, drawn by another integrator or the path tracer.
 
-By default B uses the unbiased `qmc`, which accumulates at rest: the difference is then the error of A's few samples.
-Compared with the path tracer it includes the error of the bake. Figures compare displayed pictures; the map of
+By default B uses the unbiased `qmc`, which accumulates at rest: the difference is then the error of A's few samples. A
+difference from the path tracer includes the error of the bake. Figures compare displayed pictures; the map of
 differences compares luminances.
 """
 
@@ -52,7 +52,7 @@ class Figures:
 
     psnr_db: float
     difference_percent: float
-    of: int  # samples per pixel and lobe of B; 0 where B does not accumulate
+    of: int  # samples per pixel and lobe of B; 0 if B does not accumulate
     flip_mean: float | None = None
     flip_of: int = 0
     flip_step: int = 1  # side of the pixel blocks that were averaged before FLIP

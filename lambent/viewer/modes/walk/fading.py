@@ -50,7 +50,7 @@ class Fade:
 
     @property
     def left(self) -> tuple[str, ...]:
-        """Objects whose probes the bake lacks, which keep their light."""
+        """Objects without a probe in the bake; they keep their light."""
         scene, resources = self.lane.renderer.scene, self._resources
         owners = probe_users(scene, resources, range(len(resources.objects)))
         return tuple(name for name in owners if self.shown is None or name not in self.shown.scene.probes)
@@ -61,11 +61,11 @@ class Fade:
 
     @property
     def _groups(self) -> GroupArrays | None:
-        """The bake's light by group, where the scene has light groups."""
+        """The bake's light by group, if the scene has light groups."""
         return None if self.shown is None or self.lane.renderer.scene.groups is None else self.shown.scene.groups
 
     def serves(self, lane: Lane, light: Factors) -> bool:
-        """Whether this light is for the state that the lane shows; once complete, it serves every light mix."""
+        """Whether this light applies to the lane's state; once complete, it serves every light mix."""
         same_mix = light == self._light or (self.done and self._groups is not None)
         materials = lane.room.materials, lane.room.textures
         same_lane = lane is self.lane and lane.shown.on == self._answered
@@ -93,8 +93,8 @@ class Fade:
     def end(self) -> None:
         """Return the lane to its own light.
 
-        Complete light stays until that changes, because it may belong to a state that is now beside. Where edits have
-        no answer, the lane shows its earlier light.
+        Complete light stays until that light changes, because it may belong to the state on the other side. Without an
+        answer to its edits, the lane shows its earlier light.
         """
         self._thread.shutdown(cancel_futures=True)
         lane, own = self.lane, self.lane.renderer.scene.groups

@@ -63,10 +63,10 @@ def film_file(folder: Path, text: str) -> Path:
 
 
 class Filming:
-    """A running film of frames like `frame` along `path`. `error` says why it ended early.
+    """A running film of frames like `frame` along `path`; `error` is the reason of an early end.
 
-    The window draws with another renderer. `quality` is in samples of `qmc` per pixel, lobe and frame; with 0 the
-    integrator is that of `frame`. `light` is the mix of light groups by time in seconds; without it that of `frame`.
+    The window draws with another renderer. `quality` is in samples of `qmc` per pixel, lobe and frame; 0 keeps the
+    integrator of `frame`. `light` is the mix of light groups by time in seconds, by default the mix of `frame`.
     """
 
     def __init__(

@@ -17,7 +17,7 @@ SUPERSAMPLES = 2
 
 @dataclass
 class GlareMeter:
-    """Request and result of the panel; `camera` belongs to `found`, `share` is the drawn share of the faces."""
+    """Request and result of the panel: `found` was rated at `camera`; `share` of the faces is drawn."""
 
     wanted: bool = False
     found: Glare | None = None

@@ -39,7 +39,7 @@ SHORTCUTS = (
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show the panels"),
 )
-LARGE = 0.5  # radius / distance from which orbit turns about the clicked point, not about the object's middle
+LARGE = 0.5  # radius / distance of objects from which on orbit turns about the clicked point, not the object's middle
 PIECE_PX = 12.0  # length of the pieces of a drag in orbit that are checked for walls
 TAP_S = 0.05  # least time that a key press counts
 
@@ -119,7 +119,7 @@ class WalkInput(Input):
         return self._state.selection.pivot or super().pivot
 
     def turned(self, dx: float, dy: float) -> Camera:
-        """Orbit; a camera within the scene stays there, and moves towards the pivot where a wall is in the way."""
+        """Orbit; a camera within the scene stays inside, and moves towards the pivot if a wall is in the way."""
         navigation, pivot = self.navigation, self.pivot
         camera, bounds = navigation.camera, navigation.bounds
         pieces = math.ceil(math.hypot(dx, dy) / PIECE_PX)

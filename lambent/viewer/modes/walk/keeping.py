@@ -26,7 +26,7 @@ class SessionKeeper:
     Attributes
     ----------
     fault : str
-        Why the session cannot be saved, in one line; else empty.
+        Reason why the session cannot be saved, in one line; else empty.
     """
 
     def __init__(self, edits: MaterialEdits, folder: Path | None, screen: Screen) -> None:
@@ -68,7 +68,7 @@ class SessionKeeper:
         return tuple(lines)
 
     def _take_lock(self, folder: Path) -> str:
-        """Make this window the owner of the session; return why that is impossible, or an empty text."""
+        """Make this window the owner of the session; return the reason of a failure, else an empty text."""
         try:
             self._lock = SessionLock(folder)
         except UserError as error:
@@ -159,7 +159,7 @@ class SessionKeeper:
         return None if self._due_s is None else max(0.0, self._due_s - self._screen.clock())
 
     def rescue(self) -> Iterator[str]:
-        """Back up unsaved changes because the window is lost; yield the place, for people. May raise `UserError`."""
+        """Back up unsaved changes of a lost window; yield the backup's place as text. May raise `UserError`."""
         self._finish()
         if not self.unsaved or self.fault or self._folder is None or not self._folder.is_dir():
             return

@@ -1,8 +1,7 @@
 """A lane: a renderer with its own baked light, its picture, and the light that follows its edits.
 
-The edited room has a lane. A state beside it has a second one, because light maps and probes of two states differ;
-geometry and textures are then on the GPU twice. When the states are swapped, so are the lanes, and nothing is computed
-again.
+The edited room has a lane. A state shown beside it has a second lane, because light maps and probes of two states
+differ; geometry and textures are then on the GPU twice. Swapping the states swaps the lanes, without recomputation.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ class Lane:
 
     @classmethod
     def of(cls, renderer: Renderer, screen: Screen, answering: AnsweringLight | None, shown: Answering) -> Lane:
-        """Make a lane whose frames do not wait for light field maps; it is drawn again when they arrive."""
+        """Make a lane. Its frames do not wait for light field maps; it is drawn again when maps arrive."""
         renderer.waits = False
         return cls(renderer, Picture(renderer, screen), answering, shown)
 

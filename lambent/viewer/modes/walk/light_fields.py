@@ -106,7 +106,7 @@ def shows_choice(frame: FrameState) -> bool:
 
 
 def colours_of(numbers: Floats) -> Floats:
-    """(P, 3) in [.2, .8]: a colour for each point, with its hue in `light_field-choice`."""
+    """Colour (P, 3) in [.2, .8] of each point, with the same hue as in `light_field-choice`."""
     return np.asarray(0.2 + 0.6 * np.modf(numbers[:, None] * HUES)[0])
 
 
@@ -127,7 +127,7 @@ def map_image(light_field: LightField, point: int, shows: Shows, transform: str,
 
 
 def distances_m(light_field: LightField, point: int) -> tuple[float, float]:
-    """The largest and the smallest distance in a point's map; 1, 1 where it sees only the sky."""
+    """The largest and the smallest distance, m, in a point's map; 1, 1 if it sees only the sky."""
     inverse = np.asarray(light_field.inverse_distance[point], np.float64)
     hits = inverse[np.isfinite(inverse) & (inverse > 0)]
     return (float(1 / hits.min()), float(1 / hits.max())) if len(hits) else (1.0, 1.0)

@@ -26,7 +26,7 @@ def mix_at(track: MixTrack, time_s: float) -> LightMix:
 def with_key(track: MixTrack | None, time_s: float, mix: LightMix, groups: Collection[str]) -> MixTrack:
     """The track with this mix of all `groups` at a time, replacing a key nearer than `SAME_S`.
 
-    A group that is new in the track is as baked at its other times.
+    At all other times, a group that is new in the track is as baked.
     """
     times = key_times(track)
     time_s = min((at for at in times if abs(at - time_s) < SAME_S), key=lambda at: abs(at - time_s), default=time_s)
@@ -39,7 +39,7 @@ def with_key(track: MixTrack | None, time_s: float, mix: LightMix, groups: Colle
 
 
 def without_key(track: MixTrack, time_s: float) -> MixTrack | None:
-    """The track without its key at a time; None where nothing is left."""
+    """The track without its key at a time; None if nothing is left."""
     left = {name: tuple(key for key in keys if key[0] != time_s) for name, keys in track.groups.items()}
     kept = {name: keys for name, keys in left.items() if keys}
     return MixTrack(kept) if kept else None

@@ -16,7 +16,7 @@ from lambent.viewer.navigation import Navigation
 
 @dataclass
 class Lights:
-    """The store's light `groups`, if any, and their mix, which is one of the `edits` and shares their undo.
+    """The store's light `groups`, if any, and their mix, which belongs to the `edits` and shares their undo.
 
     `fields`: whether an object has a light field, which follows the mix only approximately.
     """
@@ -36,7 +36,7 @@ class Lights:
         self.edits.mix(mix)
 
     def visit(self, navigation: Navigation, saved: Views) -> None:
-        """Apply the mix of a saved view where the camera has moved to one."""
+        """Apply the mix of a saved view after the camera has moved to it."""
         camera = navigation.camera
         if camera not in saved.cameras:
             self.at_view = ""
@@ -47,7 +47,7 @@ class Lights:
             self.edits.end_stroke()
 
     def known(self, factors: Mapping[str, Triple]) -> dict[str, Triple]:
-        """The part of a mix whose groups the store has: the store may have been baked again since."""
+        """The part of a mix whose groups are in the store, which may have been baked again since."""
         names = {group.name for group in self.groups}
         return {name: factor for name, factor in factors.items() if name in names}
 
@@ -70,7 +70,7 @@ class RecordedLight:
         self.last_s = time_s
 
     def track(self, began_s: float) -> MixTrack | None:
-        """The track of the recording, with times from `began_s`; None where all light was as baked."""
+        """The track of the recording, with times from `began_s`; None if all light was as baked."""
         names = {name for _, mix in self.keys for name in mix.groups}
         groups = {}
         for name in sorted(names):

@@ -84,7 +84,7 @@ class Marks:
 
 
 def projected(camera: Camera, points: Floats, size: Size) -> tuple[Floats, Floats]:
-    """Places (P, 2) in shares of the picture from its upper left, and depths (P,) in metres, of points (P, 3)."""
+    """Positions (P, 2), as shares of the picture from its upper left, and depths (P,), m, of points (P, 3)."""
     clip = np.concatenate([points, np.ones((len(points), 1))], axis=1) @ clip_from_world(camera, *size, NEAR_M).T
     depth_m = clip[:, 3]
     x, y = clip[:, :2].T / np.where(np.abs(depth_m) < 1e-9, 1e-9, depth_m)
@@ -92,7 +92,7 @@ def projected(camera: Camera, points: Floats, size: Size) -> tuple[Floats, Float
 
 
 def outline(corners: Floats, camera: Camera, size: Size) -> Line | None:
-    """A polygon (P, 3) projected to the screen and clipped at the eye; None where all of it is behind the eye."""
+    """A polygon (P, 3) projected to the screen and clipped at the eye; None if it is behind the eye."""
     _, depths_m = projected(camera, corners, size)
     kept = []
     for a, b, da, db in zip(corners, np.roll(corners, -1, axis=0), depths_m, np.roll(depths_m, -1), strict=True):

@@ -32,7 +32,7 @@ class Reading:
 
 
 def read(radiance: Floats, quantity: Quantity = LUMINANCE) -> Reading | None:
-    """Reading of a picture (H, W, 3) of radiance, or of another quantity; None where all of it is black."""
+    """Reading of a picture (H, W, 3) of radiance, or of another quantity; None if it is black."""
     every = max(1, math.isqrt(radiance.shape[0] * radiance.shape[1] // PIXELS))
     some = np.asarray(radiance[every // 2 :: every, every // 2 :: every], np.float64)
     values = photometric(some, quantity).ravel()
@@ -63,7 +63,7 @@ class Meter:
     wanted: bool = False
     fit_wanted: bool = False  # whether the next reading sets the range of false colours
     expose_wanted: bool = False  # whether the next reading sets the exposure
-    fitted: set[bool] = field(default_factory=set)  # ranges that were fitted: of noise (True), of light (False)
+    fitted: set[bool] = field(default_factory=set)  # fitted ranges: of noise (True), of light (False)
     reading: Reading | None = None
     cursor: tuple[float, float] | None = None  # mouse position as shares of the picture
     readout_on: bool = False  # whether the luminance under the mouse is shown; always in false colours

@@ -169,7 +169,7 @@ class Pictures(Pair):
     # comparing
 
     def _follow_exchange(self) -> None:
-        """Swap the lanes where the room and the state beside it were swapped."""
+        """Swap the lanes after the room and the other state were swapped."""
         edits, lane, beside = self._state.materials.edits, self._lane, self._beside
         if beside is None or edits.room == edits.other:
             return

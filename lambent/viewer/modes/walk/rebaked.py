@@ -14,7 +14,7 @@ class Rebaking:
     on : bool
         Whether edits are baked in the background.
     possible : bool
-        Whether there is a store and a scene file to bake from.
+        Whether a store and a scene file exist to bake from.
     line : str
         Line on the bake; empty without one.
     share : float or None

@@ -45,13 +45,13 @@ class Rebaked:
     Attributes
     ----------
     scene : BakedScene
-        Light map, probes and light by group from the copy, in the units of the shown scene. It has the arrived probes;
-        before the light map arrives, `region` has a part of it.
+        Light map, arrived probes and light by group from the copy, in the units of the shown scene. Before the light
+        map arrives, `arrived.region` holds a part of it.
     texel_object : (H, W) int64
-        Number of the object that each texel of the light map belongs to; the count of objects where there is none.
+        Index of the object of each texel of the light map; the number of objects for texels without one.
     arrived : Arrived
     lit : bool array
-        By object number, whether all of its texels have arrived.
+        By object index, whether all of its texels have arrived.
     """
 
     scene: BakedScene
@@ -61,9 +61,9 @@ class Rebaked:
 
     @classmethod
     def read(cls, copy: Path, shown: BakedScene, arrived: Arrived, before: Rebaked | None = None) -> Rebaked:
-        """Read the arrived light from the copy, except what was read `before`.
+        """Read the arrived light from the copy into memory, except light that was read `before`.
 
-        Everything is read into memory, because another bake may change the copy.
+        In memory it is safe from another bake, which may change the copy.
         """
         texel_object = texel_objects(shown) if before is None else before.texel_object
         count = len(shown.record.objects)
@@ -87,7 +87,7 @@ class Rebaked:
         return cls(replace(scene, probes=probes, groups=groups), texel_object, arrived, np.ones(count, bool))
 
     def layers(self, light: Factors, shown: Layers) -> Layers:
-        """Layers (H, W, 4), as of `resources.light_layers`, for a light mix; `shown` where no light has arrived."""
+        """Layers (H, W, 4), as in `resources.light_layers`, for a light mix; `shown` for texels without new light."""
         scene, groups, region = self.scene, self.scene.groups, self.arrived.region
         if not self.arrived.light_map:
             if region is None:
@@ -103,7 +103,7 @@ class Rebaked:
         return list(light_layers(sides[0], sides[1], scene.dominant_direction, scene.probe_share))
 
     def probe(self, name: str, light: Factors) -> Probe | None:
-        """An object's probe without the sun's disc, for a light mix; None where it has not arrived."""
+        """An object's probe without the sun's disc, for a light mix; None before it has arrived."""
         scene, groups = self.scene, self.scene.groups
         found = scene.probes.get(name)
         if found is None:
@@ -136,7 +136,7 @@ def light_name(side: str) -> str:
 
 
 def texel_objects(scene: BakedScene) -> Indices:
-    """(H, W) index of the object on each texel of the light map; the number of objects where there is none."""
+    """(H, W) index of the object on each texel of the light map; the number of objects for texels without one."""
     assert scene.irradiance is not None, "there is a light map"
     height, width = scene.irradiance.shape[:2]
     geometry: dict[str, Any] = {"positions": scene.positions, "faces": scene.faces, "uv2": scene.uv2}
@@ -151,7 +151,7 @@ def texel_objects(scene: BakedScene) -> Indices:
 
 
 def in_view_order(record: SceneRecord, camera: Camera, size: tuple[int, int]) -> list[int]:
-    """Indices of the objects: those in view first, each part sorted by distance."""
+    """Indices of the objects: objects in view first, each group sorted by distance."""
     across, up, forward = image_plane(camera, *size)
 
     def place(o: ObjectRecord) -> tuple[bool, float]:
@@ -228,7 +228,7 @@ def steps(
 
 
 def _has_more_texels(rebaked: Rebaked, since: Rebaked | None) -> bool:
-    """Whether there is more of the light map than `since`: all of it, or the texels of further objects."""
+    """Whether more of the light map has arrived than in `since`: all of it, or texels of further objects."""
     if rebaked.arrived.light_map:
         return since is None or not since.arrived.light_map
     return bool((rebaked.lit if since is None else rebaked.lit & ~since.lit).any())

@@ -78,7 +78,7 @@ class RebakedLight:
         self._update_line()
 
     def wait_s(self) -> float | None:
-        """Seconds until there may be news; None: never."""
+        """Seconds until something may have changed; None: never."""
         if self._fade is not None and self._fade.moves:
             return FRAME_S
         if self._process is not None or self._reading is not None:
@@ -212,7 +212,7 @@ class RebakedLight:
 
 
 def first_bake_s(store: Path) -> float:
-    """Seconds that the store's own bake took for the same arrays; 0 where unknown."""
+    """Seconds that the store's own bake took for the same arrays; 0 if unknown."""
     timings = Store.open(store).documents.get(TIMINGS, {})
     return float(sum(timings.get(kind, 0.0) for kind in KINDS))
 

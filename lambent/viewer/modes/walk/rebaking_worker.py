@@ -2,11 +2,11 @@
 
 python -m lambent.viewer.modes.walk.rebaking_worker STORE COPY
 
-The first line of stdin is a JSON object with "materials", documents by name, and "textures", names by name; the end of
-stdin ends the process, at any moment, and the copy goes on from there the next time. Every line of stdout is a JSON
-object: "what", "done" and "total" of a step; "error", a line for the user; "kind" and "there", names of arrays that the
-copy holds now; "region", the shape (n, H, W) of light that is finished before its light map (`bake.watch`), followed by
-its bytes, n H W 3 half floats, and H W of flags; or "baked", when all of it is there.
+The first line of stdin is a JSON object with "materials", documents by name, and "textures", names by name. The end of
+stdin ends the process at any moment; the next bake continues the copy. Every line of stdout is a JSON object: "what",
+"done" and "total" of a step; "error", a line for the user; "kind" and "there", names of arrays that are now in the
+copy; "region", the shape (n, H, W) of light that is finished before its light map (`bake.watch`), followed by its
+bytes, n H W 3 half floats and H W flags; or "baked", when everything is complete.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def main(store: Path, copy: Path, asked: bytes, out: BinaryIO) -> None:
 
 
 def _end_with(stream: BinaryIO) -> None:
-    """End the process when the window has ended: a store may be left at any moment."""
+    """End the process when the window has ended; stopping at any moment leaves the store valid."""
     while stream.read(1):
         pass
     os._exit(0)

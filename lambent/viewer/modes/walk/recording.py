@@ -60,7 +60,7 @@ class Recording:
         return self.times_s[1] if waited else self.times_s[0]
 
     def path(self, name: str, smooth_s: float = SMOOTH_S) -> CameraPath | None:
-        """The recorded path; None where nothing moved.
+        """The recorded path; None if nothing moved.
 
         Keys are `KEY_S` apart. Positions, lines of sight and fields of view are smoothed with a Gaussian of standard
         deviation `smooth_s`; the ends stay in place.
@@ -102,7 +102,7 @@ class Recorder:
         return self.on and now_s - self.began_s > LONGEST_S
 
     def stop(self) -> CameraPath | None:
-        """End the recording and make a draft of it; None where nothing moved."""
+        """End the recording and make a draft of it; None if nothing moved."""
         self.on = False
         self.smooth(self.smooth_s)
         return self.draft
@@ -117,7 +117,7 @@ class Recorder:
 
     @property
     def track(self) -> MixTrack | None:
-        """The light of the draft over time; None where it was as baked."""
+        """The light of the draft over time; None if it was as baked."""
         return self.light.track(self.recording.start_s) if self.recording.times_s else None
 
 
@@ -147,7 +147,7 @@ class Recordings:
 
     @property
     def light(self) -> dict[str, Triple]:
-        """Factors of the light groups in the picture: of the played walk, else of the mix."""
+        """Factors of the light groups in the picture, from the played walk, else from the mix."""
         play = self.navigation.path
         keying = self.keying and play is not None and not play.playing
         track = None if play is None or keying else self.track_of(play.path)
@@ -288,7 +288,7 @@ class Recordings:
         return added.name if added is not None else None
 
     def rescue(self) -> tuple[str, ...]:
-        """Save the recording in the store, or, where that fails, in a file of its own; yield the place."""
+        """Save the recording in the store or, if that fails, in a separate file; yield the place."""
         name = self.keep()
         if name is not None:
             return (f"the store as {name!r}",)

@@ -36,13 +36,13 @@ from lambent.viewer.screen import Screen
 class Selection:
     """The selected object `name`; `reveal`: the list of objects must scroll to it.
 
-    Objects are whole, also those that the bake has cut into parts.
+    Selected objects are whole, even if the bake has cut them into parts.
     """
 
     objects: tuple[ObjectRecord, ...]
     name: str | None = None
     reveal: bool = False
-    pointed: Triple | None = None  # the clicked point, where orbit does not turn about the object's middle
+    pointed: Triple | None = None  # the clicked point, if it is the centre of orbit instead of the object's middle
 
     def choose(self, name: str | None, pointed: Triple | None = None) -> None:
         self.name, self.reveal, self.pointed = name, name is not None, pointed
@@ -82,7 +82,7 @@ class Materials:
     def save(self, name: str) -> None:
         """Write the material into the screen's folder, and report success or failure.
 
-        Its provenance stays, with a note where numbers were changed by hand.
+        Its provenance stays, with a note if numbers were changed by hand.
         """
         file_name, material, folder = self.file_name(name), self.edits.current(name), self.screen.folder
         try:
@@ -120,7 +120,7 @@ class Materials:
 
 @dataclass
 class WalkState:
-    """Parts that know little of each other; a panel takes those that it needs."""
+    """Loosely coupled parts of the state; a panel takes the parts that it needs."""
 
     scene: SceneRecord
     screen: Screen
@@ -149,13 +149,13 @@ class WalkState:
 
     @property
     def selected_parts(self) -> frozenset[str]:
-        """Parts of the selected object where the bake has cut it, else its name."""
+        """Parts of the selected object if the bake has cut it, else its name."""
         name = self.selection.name
         return frozenset(o.name for o in self.scene.objects if name is not None and name in (o.name, o.part_of))
 
     @property
     def divider(self) -> Divider | None:
-        """The divider, where two pictures are shown."""
+        """The divider, if two pictures are shown."""
         if self.states.split:
             return self.states.divider
         return self.comparison.divider if self.comparison.mode == "side by side" else None

@@ -53,7 +53,7 @@ class States:
         Raises
         ------
         UserError
-            Where the name cannot be used.
+            If the name cannot be used.
         """
         typed, stored = self.typed_name, self.edits.stored
         name = checked_name(typed, {BAKED}) if typed.strip() else free_name("state", set(stored))

@@ -63,7 +63,7 @@ class TracedPicture:
 
     @property
     def fault(self) -> str:
-        """Why there is no picture, in one line; else empty."""
+        """Reason why there is no picture, in one line; else empty."""
         if self._of is not None and self._of[0].show != ALL_LIGHT:
             return "The path tracer shows all light: set 'show' to full."
         return self._tracing.error
@@ -103,7 +103,7 @@ class TracedPicture:
             self._shown = how
 
     def wait_s(self) -> float | None:
-        """Seconds until there may be something new; None: never."""
+        """Seconds until something may have changed; None: never."""
         if self.fault:
             return None
         if not self._asked:
@@ -147,5 +147,5 @@ def size_of(traced: Traced) -> tuple[int, int]:
 
 
 def _traced_of(frame: FrameState) -> FrameState:
-    """A frame reduced to what paths depend on."""
+    """A frame reduced to the fields that path tracing depends on."""
     return FrameState(frame.camera, *frame.size, materials=dict(frame.materials), show=frame.show)

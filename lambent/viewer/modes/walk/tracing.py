@@ -20,7 +20,7 @@ MOST_SAMPLES = 1024  # samples per pixel after which tracing stops
 
 @dataclass(frozen=True)
 class Wish:
-    """A view to trace, numbered; without a `camera`, nothing.
+    """A numbered request to trace a view; without a `camera`, a request to stop.
 
     `materials` replace the scene's, by name; `textures` replace those of materials, given as the name of the material
     that owns them, "" for none.
@@ -78,7 +78,7 @@ class Tracing:
 
     @property
     def error(self) -> str:
-        """Why the process ended, in one line; empty while it runs."""
+        """Reason for the end of the process, in one line; empty while it runs."""
         return "" if self._process is None else self._process.error
 
     @property

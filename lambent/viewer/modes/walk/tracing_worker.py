@@ -1,11 +1,10 @@
 """Worker process that path traces views of a store's scene for the window, pass after pass.
 
-python -m lambent.viewer.modes.walk.tracing_worker STORE DEGREES, by which the sky is turned
+python -m lambent.viewer.modes.walk.tracing_worker STORE DEGREES  (rotation of the sky)
 
-Every line on stdin is a `Wish` as a JSON object; a newer one ends those before it, at the next pass, and the end of
-stdin ends the process. Every line on stdout is a JSON object: "error", a line for the user; "what", a step; or
-"number", that of the wish, "samples", "width" and "height", followed by the bytes of the mean so far, float32 of
-(height, width, 3).
+Every line on stdin is a `Wish` as a JSON object; a newer wish ends older ones at the next pass, and the end of stdin
+ends the process. Every line on stdout is a JSON object: "error", a line for the user; "what", a step; or "number" (of
+the wish), "samples", "width" and "height", followed by the bytes of the mean so far, float32 (height, width, 3).
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ COARSE, COARSE_SAMPLES = 4, 4  # the first picture is reduced by this factor, to
 
 
 class Wishes:
-    """Reads wishes from a stream; `newest` waits for a wish other than `but`, None at the stream's end."""
+    """Reads wishes from a stream; `newest` waits for a wish other than `but`, and is None at the stream's end."""
 
     def __init__(self, stream: Iterable[bytes]) -> None:
         self._changed = threading.Condition()
@@ -81,7 +80,7 @@ class Views:
         return traced(self._built, camera, *size, samples, seed)[0]
 
     def apply_materials(self, materials: Mapping[str, Material], textures: Mapping[str, str]) -> bool:
-        """Set materials and textures in place of the scene's; return whether the scene must be built."""
+        """Set materials and textures that replace the scene's; return whether the scene must be rebuilt."""
         if self._built is not None and (materials, textures) == self._applied:
             return False
         from lambent.bake.reference.path_traced import built

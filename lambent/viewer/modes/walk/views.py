@@ -49,7 +49,7 @@ class SavedViews:
         return free_name(STEMS[kind], self._names(kind, self.saved))
 
     def add(self, item: Item, name: str | None = None, light: LightMix | MixTrack | None = None) -> Item | None:
-        """Save a camera or path with its light as `name`, or under the next free name; None where that fails."""
+        """Save a camera or path with its light as `name`, or under the next free name; None on failure."""
         kind: Kind = "camera" if isinstance(item, Camera) else "path"
         named: list[Item] = []
 
@@ -134,6 +134,6 @@ def _lit(views: Views, kind: Kind, lights: Mapping[str, LightMix | MixTrack]) ->
 
 
 def write_alone(file: Path, path: CameraPath, track: MixTrack | None = None) -> None:
-    """Write one path to a `views.json` of another name, where the store cannot be written."""
+    """Write one path to a file in the format of `views.json`, for a store that cannot be written."""
     tracks = {} if track is None else {path.name: track}
     write_text(file, json.dumps(Views(paths=(path,), tracks=tracks).model_dump(mode="json"), indent=1) + "\n")

@@ -1,7 +1,7 @@
 """Floors that carry a walker, and obstacles between knee and eye, seen from above.
 
-The walker is a circle of `BODY_M` around the eye, obstacles are the triangles' outlines on the floor plan. A step that
-would come nearer slides along the outline; a walker who is too near already may always step away.
+The walker is a circle of radius `BODY_M` around the eye; obstacles are the triangles' outlines on the floor plan. A
+step into an outline slides along it; a walker who is already too near may always step away.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Walls:
         self._floors, self._floors_low, self._floors_high = triangles[level], self._low[level], self._high[level]
 
     def floor_below(self, eye: Sequence[float], eye_height_m: float) -> float | None:
-        """Height of the highest floor below the eye within reach of a step; None where there is none."""
+        """Height of the highest floor below the eye within reach of a step; None without one."""
         x, y, z = eye
         reach = y - eye_height_m + STEP_M
         low, high = self._floors_low, self._floors_high

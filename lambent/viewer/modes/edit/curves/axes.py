@@ -51,7 +51,7 @@ class Axis:
 
 
 def within_curve(axis: Axis) -> Axis:
-    """Move the range of angles into 0 to 90 degrees, and shorten it where needed."""
+    """Move the range of angles into 0 to 90 degrees, and shorten it if needed."""
     length = min(max(axis.high - axis.low, LEAST_DEG), END_DEG)
     low = min(max(axis.low, 0.0), END_DEG - length)
     return Axis(low, low + length)
@@ -59,7 +59,7 @@ def within_curve(axis: Axis) -> Axis:
 
 @dataclass(frozen=True)
 class Place:
-    """A place in the window, in pixels."""
+    """A rectangle in the window, in pixels."""
 
     x: float
     y: float

@@ -40,7 +40,7 @@ class Drag:
     base: Point = (0.0, 0.0)
 
     def operators(self, end: Point, direction: Direction) -> tuple[Operator, ...]:
-        """The layers of a drag that ends here, that in y first; none where nothing changes."""
+        """The layers of a drag that ends here, the layer in y first; empty if nothing changes."""
         if self.tool == "translate":
             x = 0.0 if direction == "y" else float(np.radians(end[0] - self.begin[0]))
             y = 0.0 if direction == "x" else end[1] - self.begin[1]

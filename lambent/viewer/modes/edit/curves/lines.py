@@ -45,7 +45,7 @@ def is_grey(values: Floats) -> bool:
 
 
 def feature_deg(values: Floats) -> float:
-    """Angle in degrees beyond which a curve hardly changes; 90 where it never does."""
+    """Angle in degrees beyond which a curve hardly changes; 90 for a constant curve."""
     mean = values.mean(axis=1)
     changed = np.flatnonzero(np.abs(mean - mean[-1]) > FEATURE * np.ptp(mean)) if np.ptp(mean) > 0 else np.empty(0, int)
     return float(ANGLES_DEG[min(changed[-1] + 1, len(mean) - 1)]) if len(changed) else END_DEG

@@ -35,7 +35,7 @@ def draw(state: CurveState, session: Session, material: str, shown: Shown, name:
          over: str, outlined: Region | None) -> Axes | None:  # fmt: skip
     """Draw the plot at `size` pixels; `over` names its angle, `outlined` is a region to highlight.
 
-    Returns its axes; None where there is no room.
+    Returns its axes; None without room.
     """
     curve, original = shown.editable.curves[name], shown.original.curves[name]
     view = state.view(material, name, curve)
@@ -85,7 +85,7 @@ def number(value: float) -> str:
 
 @lru_cache(maxsize=8)
 def points(curve: Curve, low_deg: float, high_deg: float, least: float) -> tuple[Line, ...]:
-    """Lines of a curve, clamped to `least`: one where its channels agree, else three."""
+    """Lines of a curve, clamped to `least`: one if its channels agree, else three."""
     if is_grey(curve.values):
         return ((None, *_kept(curve.values[:, 0], low_deg, high_deg, least)),)
     return tuple((k, *_kept(curve.values[:, k], low_deg, high_deg, least)) for k in range(3))

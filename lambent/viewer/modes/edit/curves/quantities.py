@@ -48,7 +48,7 @@ def draw_numbers(state: CurveState, session: Session, material: str, shown: Show
 
 
 def title(shown: Shown) -> str | None:
-    """Title above the parameters; None where there are none."""
+    """Title above the parameters; None without parameters."""
     source = shown.document.source
     if isinstance(source, OfTable):
         return None

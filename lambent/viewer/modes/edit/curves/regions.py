@@ -45,7 +45,7 @@ def edges_deg(region: Region) -> tuple[float, float, float, float]:
 
 
 def with_edge(region: Region, edge: Edge, angle_deg: float) -> Region:
-    """Move an edge; it pushes the other edges along where they would cross."""
+    """Move an edge, which pushes other edges along instead of crossing them."""
     edges, index = list(edges_deg(region)), EDGES.index(edge)
     low, high = LIMITS[edge]
     edges[index] = min(max(angle_deg, low), high)
@@ -64,7 +64,7 @@ def moved(region: Region, by_deg: float) -> Region:
 
 
 def spanned(begin_deg: float, end_deg: float) -> Region | None:
-    """Full strength between two angles, with ramps half as wide; None where they are too close."""
+    """Full strength between two angles, with ramps half as wide; None if they are too close."""
     b, c = sorted((begin_deg, end_deg))
     ramp = max((c - b) / 2, GAP_DEG)
     return region_of(b - ramp, b, c, c + ramp) if c - b > GAP_DEG else None
@@ -94,7 +94,7 @@ def peak(values: Floats) -> Region | None:
 
 
 def tail(values: Floats) -> Region | None:
-    """Region from where a curve has fallen to a tenth of its largest value; None where it does not fall."""
+    """Region from the angle at which a curve has fallen by 9/10 of its range; None if it does not fall so far."""
     mean = values.mean(axis=1)
     least, span = float(mean.min()), float(np.ptp(mean))
     top = int(mean.argmax())

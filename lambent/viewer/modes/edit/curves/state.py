@@ -155,12 +155,12 @@ class CurveState:
         return self.views[key]
 
     def toggle(self, channel: Literal[0, 1, 2]) -> None:
-        """Toggle whether edits act on a channel; all act where none would be left."""
+        """Toggle whether edits act on a channel; if none would be left, edits act on all."""
         kept: Channels = tuple(one for one in ALL if (one in self.channels) != (one == channel))
         self.channels = kept or ALL
 
     def press(self, session: Session, material: str, axes: Axes, x: float, y: float) -> None:
-        """Grab what is under the mouse: a handle, the curve, or an end of a new region."""
+        """Grab the item under the mouse: a handle, the curve, or an end of a new region."""
         shown = self.shown(session, material)
         name = self.curve(material, shown)
         curve = shown.editable.curves[name]
@@ -175,7 +175,7 @@ class CurveState:
             self.move(session, x, y)
 
     def move(self, session: Session, x: float, y: float, *, shift: bool = False, ctrl: bool = False) -> None:
-        """Drag what the mouse holds to this pixel."""
+        """Drag the held item to this pixel."""
         hold = self.hold
         if hold is None or hold.seen == (x, y, shift, ctrl):
             return
@@ -223,7 +223,7 @@ class CurveState:
             hold.painted, hold.last = values, end
 
     def _edited(self, session: Session, act: Callable[[], object]) -> bool:
-        """Edit within the stroke; where an undo came between, release instead. Return whether the edit was made."""
+        """Edit within the stroke, or release it after an undo. Return whether the edit was made."""
         if self.strokes.has_left(session):
             self.hold = None
             self.strokes.end(session)

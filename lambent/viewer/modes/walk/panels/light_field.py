@@ -52,7 +52,7 @@ def without(name: str | None, others: tuple[str, ...], store: str) -> str:
 
 
 def warn_of_look_up(state: WalkState) -> None:
-    """Warn where a light field is chosen as the look-up of an object that has none."""
+    """Warn if a light field is chosen as the look-up of an object without one."""
     name, parts = state.selection.name, state.selected_parts
     wanted = state.look.lookups.get(name or "", state.look.lookup)
     if name is not None and wanted.startswith("light_field") and not any(part in state.fields.fields for part in parts):
