@@ -1,4 +1,4 @@
-"""`lambent doctor`: what Lambent can use on this machine, what is missing, and the one command that installs it."""
+"""`lambent doctor`: usable and missing parts of this machine, and the one command that installs the missing ones."""
 
 from __future__ import annotations
 

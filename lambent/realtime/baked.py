@@ -76,19 +76,19 @@ class BakedScene:
     missing: tuple[str, ...] = ()
     uv: Floats | None = None
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
-    shared_probes: Mapping[str, str] = field(default_factory=dict)  # by object, whose probe it shows
+    shared_probes: Mapping[str, str] = field(default_factory=dict)  # owner of the shown probe, by object
     noise: Floats | None = None  # (H, W), relative standard error of the light map
     noise_back: Floats | None = None
-    dominant_direction: Floats | None = None  # (H, W, 3), that light comes from; may be absent
-    probe_share: Floats | None = None  # (H, W, 4), of the probes' light (`store.occlusion`); may be absent
-    share_objects: frozenset[str] = frozenset()  # that it counts for
+    dominant_direction: Floats | None = None  # (H, W, 3), mean direction of incident light
+    probe_share: Floats | None = None  # (H, W, 4), visible share of the probes' light (`store.occlusion`)
+    share_objects: frozenset[str] = frozenset()  # objects that use `probe_share`
     unit: float = 1.0
-    light_field_mb: float | None = None  # that the maps of all light fields may take on the GPU; None: any
-    policy: str = LEAST_RECENT  # of their caches
-    sun: SunRecord | None = None  # whose direct light the light maps leave out
-    sunlit: NDArray[np.uint8] | None = None  # (H, W), 0 where it does not get (`store.sunlit`); may be absent
-    groups: GroupArrays | None = None  # the light by group; None where it was baked as one
-    replaced: bool = False  # whether a mesh stands in the place of an object: light maps are not the store's then
+    light_field_mb: float | None = None  # GPU budget of the maps of all light fields; None: unlimited
+    policy: str = LEAST_RECENT  # eviction policy of their caches
+    sun: SunRecord | None = None  # its direct light is not in the light maps
+    sunlit: NDArray[np.uint8] | None = None  # (H, W), 0 for texels that the sun does not reach (`store.sunlit`)
+    groups: GroupArrays | None = None  # light by group; None if baked without groups
+    replaced: bool = False  # whether a mesh replaces an object; light maps then differ from the store's
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
         """The object's own or shared probe, else the nearest one, else the environment, else None.

@@ -63,7 +63,7 @@ class AppliedMaterials:
         return answer, AnswerShown(self._renderer, answer)
 
     def _note_limits(self, materials: Mapping[str, Material]) -> None:
-        """Note what is estimated for these materials, and what the bake lacks for them."""
+        """Note estimated light of these materials, and data that the bake lacks for them."""
         scene = self._renderer.scene
         self._once(ESTIMATED if self.answers else f"light and probes stay as baked: {NO_ANSWER}")
         if scene.light_fields:

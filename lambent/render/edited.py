@@ -81,7 +81,7 @@ def edited_still(
 
 
 def _bake_command(store: Store, wanted: Session, session: Path) -> str:
-    """The command that bakes what a session needs, with as many lights as the store has for the view."""
+    """The command that bakes a session's transport, with as many lights as the store has for the view."""
     place = store.documents.get(SOURCE)
     scene = "SCENE" if not isinstance(place, str) else place if place.startswith("builtin:") else store.folder / place
     view = wanted.document

@@ -168,7 +168,7 @@ def film(
     keyframes : path, optional
         A file of materials and light over time (`scenes.loaders.keyframes`).
 
-    The other parameters and the errors are those of `still`.
+    Other parameters and errors as in `still`.
     """
     began, file = time.perf_counter(), Path(file)
     check_writable(file, (FILM, *SEQUENCES))

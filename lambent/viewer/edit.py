@@ -1,4 +1,4 @@
-"""`lambent edit`: opens the mode that edits what a path names."""
+"""`lambent edit`: opens the editing mode for the kind of a path."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ def set_style() -> None:
     style.window_border_size = 0
     for part, colour in COLOURS.items():
         style.set_color_(part, colour)
-    implot.create_context()  # of its own: ImPlot asserts without one
+    implot.create_context()  # ImPlot needs its own context
     plots = implot.get_style()
     plots.plot_border_size = 1.0
     plots.plot_padding, plots.label_padding = imgui.ImVec2(8, 6), imgui.ImVec2(4, 3)

@@ -13,7 +13,7 @@ POLL_S = 0.1  # interval of polling for background work
 
 
 class Work:
-    """One task in a thread of its own; `poll` reports its end in the window's thread.
+    """One task in a separate thread; `poll` reports its end in the window's thread.
 
     `run` gets a `Progress`, which raises `Cancelled` after `cancel`; `done` gets the result, `failed` a `UserError` of
     `run`. `poll` raises other errors.

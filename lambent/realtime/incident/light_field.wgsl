@@ -97,7 +97,7 @@ fn change_along(s: Surface, r: vec3f, u: f32, half_log2_omega: f32) -> vec3f {
     return min(here, around);
 }
 
-// Cosine between an axis and the direction from x to a point; -2 where there is none.
+// Cosine between an axis and the direction from x to a point; -2 without a point.
 fn cosine_to(point: u32, axis: vec3f, x: vec3f) -> f32 {
     let to = place_of_point(min(point, NO_POINT - 1u)) - x;
     return select(dot(axis, to) * inverseSqrt(max(dot(to, to), 1e-30)), -2.0, point == NO_POINT);

@@ -52,7 +52,7 @@ class EditDrawing(Drawing):
 
     @property
     def images(self) -> Mapping[str, Image]:
-        """The outline of the object under the mouse, and for a moment that of a new selection."""
+        """The outline of the object under the mouse and, for a moment, of a new selection."""
         view, wanted = self._state.loading.view, self._state.outlined
         if view is None or not wanted:
             return {}

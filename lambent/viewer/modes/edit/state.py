@@ -130,7 +130,7 @@ class EditState:
 
     @property
     def outlined(self) -> tuple[str, ...]:
-        """Outlined objects: the one under the mouse, and for a moment those of a new selection."""
+        """Outlined objects: the one under the mouse and, for a moment, the objects of a new selection."""
         view = self.loading.view
         if view is not None and self.selection_is_new:
             return tuple(name for name, material in view.objects if material == self.material)

@@ -81,7 +81,7 @@ class TracedPicture:
     def update(self, wanted: FrameState, textures: Mapping[str, str]) -> None:
         """Request a view once it rests, and show its present picture.
 
-        `textures` replace those of materials. Light mixes are not traced.
+        `textures` replace textures of materials. Light mixes are not traced.
         """
         self._tracing.tick()
         of, self._is_mixed = (_traced_of(wanted), dict(textures)), bool(wanted.light)

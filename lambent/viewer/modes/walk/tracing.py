@@ -22,8 +22,8 @@ MOST_SAMPLES = 1024  # samples per pixel after which tracing stops
 class Wish:
     """A numbered request to trace a view; without a `camera`, a request to stop.
 
-    `materials` replace the scene's, by name; `textures` replace those of materials, given as the name of the material
-    that owns them, "" for none.
+    `materials` replace the scene's, by name. `textures` maps a material to the one whose textures it gets; "" removes
+    its textures.
     """
 
     number: int

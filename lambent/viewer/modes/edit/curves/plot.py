@@ -109,7 +109,7 @@ def _axes(view: View, over: str) -> None:
 
 
 def _region(state: CurveState, view: View) -> Region:
-    """The shown region: during a drag that of the layer, which may be wider."""
+    """The shown region; during a drag, the region of the layer, which may be wider."""
     layers = state.hold.layers if state.hold is not None else ()
     return layers[-1].region if layers else view.region
 
@@ -167,7 +167,7 @@ def keys(state: CurveState, session: Session, view: View, values: Floats) -> Non
 
 
 def _pointer(state: CurveState, view: View, axes: Axes) -> None:
-    """Set the mouse pointer to what a press would do."""
+    """Set the mouse pointer to the action of a press."""
     mouse = imgui.get_io().mouse_pos
     grip = state.hold.grip if state.hold is not None else grip_at(view.region, axes, mouse.x, mouse.y)
     if state.tool == "draw" or grip is None or grip == "paint":
