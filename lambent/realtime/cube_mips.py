@@ -21,7 +21,7 @@ from lambent.core.cubemap import directions_at, sample, texel_solid_angles
 BLUR = (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)  # along rows and columns: variance 1 texel^2
 # Variance of a look-up in texel^2 per axis: box 1/12, linear interpolation 1/6, blur 1.
 SMOOTH_AREA = 5.0
-FAINT = 1e-4  # of the mean light of a cube map: darker texels count as unchanged
+FAINT = 1e-4  # of the mean light of a cube map, added to both sides of a ratio: dark texels count as unchanged
 
 
 def halved(cube: Floats) -> Floats:

@@ -28,7 +28,7 @@ class NeededPoints:
         self._shares = seen / np.bincount(self._faces, seen, minlength=len(triangles))[self._faces]
 
     def of_view(self, eye: Floats, runs: Ranges) -> NDArray[np.int64]:
-        """Points ordered by the solid angle, seen from `eye`, that they serve; `runs` (first, count) are in view."""
+        """Points by the solid angle, seen from `eye`, that they serve, largest first; `runs` (first, count) in view."""
         inside = np.zeros(len(self._centres), bool)
         for first, count in runs:
             inside[first : first + count] = True

@@ -86,8 +86,8 @@ fn light_of(point: u32, w: vec3f, half_log2_omega: f32) -> vec3f {
     return light;
 }
 
-// Sky to add to the finest level: its texels hold surfaces only, even if they also show the sky, because a march that
-// hits a surface needs its light alone. Coarser levels hold both.
+// Correction of the finest level for the sky: its texels hold surfaces only, even if they also show the sky, because a
+// march that hits a surface needs its light alone. Coarser levels hold both.
 fn edge_sky(map: Map, place: vec2f, w: vec3f) -> vec3f {
     let at = place * f32(field.side) - 0.5;
     let low = floor(at);
