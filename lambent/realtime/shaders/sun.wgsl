@@ -140,12 +140,13 @@ const SUN_HIDDEN = 1.0;
 const SUN_DOUBTFUL = 0.5; // something nearer to the sun hides from the map what is on the way
 
 // Whether a blocker about `guess_m` away hides a place of the part's disc, `across` times its radius. The first look-up
-// starts from the guess, the second from the distance that the first found. Rises of the surface itself are no blockers.
+// starts from the guess, the second from the distance that the first found. Gentle rises of the surface are no blockers.
 fn sun_hides(at: SunPlace, across: vec2f, px_per_m: f32, guess_m: f32, bias_m: f32) -> f32 {
-    let first_m = sun_rise(at, max(px_per_m * guess_m, SUN_LEAST_PX) * across);
+    let offset = max(px_per_m * guess_m, SUN_LEAST_PX) * across;
+    let first_m = sun_rise(at, offset);
     let second_m = sun_rise(at, max(px_per_m * first_m, SUN_LEAST_PX) * across);
     let apart_px = px_per_m * abs(second_m - first_m) * length(across);
-    let doubtful = select(0.0, SUN_DOUBTFUL, second_m > first_m && px_per_m * first_m > SUN_LEAST_PX);
+    let doubtful = select(0.0, SUN_DOUBTFUL, second_m > first_m && first_m > length(offset) * at.texel_m);
     return select(0.0, select(doubtful, SUN_HIDDEN, apart_px < SUN_APART_PX), min(first_m, second_m) > bias_m);
 }
 
