@@ -12,7 +12,7 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.scenes.scene import Scene
 
 if TYPE_CHECKING:
-    from lambent.bake.tracing.viewed import Viewers
+    from lambent.bake.tracing.viewers import Viewers
 
 
 @dataclass(frozen=True)
@@ -56,15 +56,15 @@ class Sight:
 
     @cached_property
     def viewers(self) -> Viewers | None:
-        """Where viewers are, as `tracing.viewed.viewers_of` finds it."""
-        from lambent.bake.tracing.viewed import viewers_of
+        """Where viewers are, as `tracing.viewers.viewers_of` finds it."""
+        from lambent.bake.tracing.viewers import viewers_of
 
-        return viewers_of(self)
+        return viewers_of(self.scene, self.traced)
 
     @cached_property
     def met(self) -> tuple[Floats, Indices, Floats]:
         """Directions (M, 3) of the viewers' rays that meet an opaque triangle, which of all (M,), how far away (M,)."""
-        from lambent.bake.tracing.viewed import RAYS, met
+        from lambent.bake.tracing.viewers import RAYS, met
 
         assert self.viewers is not None, "without viewers there are no rays"
         directions, face, distance = met(self.traced, self.viewers.eyes, RAYS)
