@@ -12,7 +12,7 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.scenes.scene import Scene
 
 if TYPE_CHECKING:
-    from lambent.bake.tracing.viewed import Viewers
+    from lambent.bake.tracing.viewers import Viewers
 
 
 @dataclass(frozen=True)
@@ -56,15 +56,15 @@ class Sight:
 
     @cached_property
     def viewers(self) -> Viewers | None:
-        """The viewers found by `tracing.viewed.viewers_of`, if any."""
-        from lambent.bake.tracing.viewed import viewers_of
+        """The viewers found by `tracing.viewers.viewers_of`, if any."""
+        from lambent.bake.tracing.viewers import viewers_of
 
-        return viewers_of(self)
+        return viewers_of(self.scene, self.traced)
 
     @cached_property
     def met(self) -> tuple[Floats, Indices, Floats]:
         """Viewers' rays that hit an opaque triangle: directions (M, 3), triangle indices (M,), distances (M,), m."""
-        from lambent.bake.tracing.viewed import RAYS, met
+        from lambent.bake.tracing.viewers import RAYS, met
 
         assert self.viewers is not None, "without viewers there are no rays"
         directions, face, distance = met(self.traced, self.viewers.eyes, RAYS)

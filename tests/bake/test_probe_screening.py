@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.surfaces.cutting import cut_across
-from lambent.bake.tracing.solids import is_closed
+from lambent.bake.tracing.solids import closed, is_closed
 from lambent.core.geometry import triangle_areas
 from lambent.scenes.geometry import box, merge, patch, placed, signed_volume, sphere
 from lambent.scenes.scene import Mesh, Scene, SceneObject
@@ -103,3 +103,15 @@ def test_no_face_has_two_sides_of_a_plane_after_a_cut(mesh: Mesh, plane: tuple[f
 def test_a_plane_beside_a_mesh_or_along_its_faces_cuts_nothing() -> None:
     for plane in ((1.0, 0.0, 0.0, -2.0), (1.0, 0.0, 0.0, -0.5), (5.0, 0.0, 0.0, 2.5)):
         assert len(cut_across(box((1, 1, 1)), plane).faces) == 12
+
+
+def test_which_of_many_meshes_are_closed_is_found_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Open ones, one whose faces turn about, one with an edge of four faces, and a copy beside each other."""
+    monkeypatch.setattr("lambent.scenes.mesh.TRIANGLES_AT_ONCE", 40)
+    block, ball = box((1, 1, 1)), sphere(0.5, 8, 4)
+    sheet = replace(block, faces=block.faces[:-1])
+    turned = replace(block, faces=np.concatenate([block.faces[:-1], block.faces[-1:, ::-1]]))
+    doubled = replace(block, faces=np.concatenate([block.faces, block.faces]))
+    meshes = [block, sheet, ball, turned, placed(block, (1, 0, 0)), doubled, ball]
+    assert closed(meshes).tolist() == [True, False, True, False, True, False, True]
+    assert [bool(closed([mesh])[0]) for mesh in meshes] == closed(meshes).tolist()

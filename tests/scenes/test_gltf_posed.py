@@ -159,3 +159,12 @@ def test_what_is_found_of_many_meshes_is_what_is_found_of_each(monkeypatch: pyte
     assert np.array_equal(areas_of(meshes), np.concatenate([areas_of([mesh]) for mesh in meshes]))
     assert np.array_equal(leaning_faces(meshes), np.concatenate([leaning_faces([mesh]) for mesh in meshes]))
     assert leaning_faces(meshes)[-3:].tolist() == [12, 0, 12]
+
+
+def test_a_ground_of_any_size_is_no_matter_of_units(tmp_path: Path) -> None:
+    """A plain of 50 km is as sane as the house on it; a house of 5 km is not."""
+    nodes = [{"mesh": 0, "rotation": [0.5**0.5, 0, 0, 0.5**0.5], "scale": [5e4] * 3}, {"mesh": 0, "scale": [8] * 3}]
+    content = document(nodes=nodes, scenes=[{"nodes": [0, 1]}])
+    assert not [w for w in loaded(tmp_path, content).warnings if "unit" in w]
+    nodes[1]["scale"] = [5e3] * 3
+    assert [w for w in loaded(tmp_path, content).warnings if "is its unit the metre" in w]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from typing import Any
 
 import drjit as dr
@@ -16,22 +17,45 @@ from lambent.core.arrays import Flags, Floats
 from lambent.core.geometry import triangle_normals
 from lambent.core.sequences import cosine_hemisphere, hammersley
 from lambent.scenes.geometry import merge
-from lambent.scenes.scene import Mesh, Scene, SceneObject
+from lambent.scenes.mesh import Mesh, batches_of
+from lambent.scenes.scene import Scene, SceneObject
 
 RAYS = 16
 EMBEDDED_SHARE = 0.25  # share of a point's rays that hit the inner side of a solid
 POINTS_AT_ONCE = 1 << 16
 
 
-def is_closed(mesh: Mesh) -> bool:
-    """Whether every edge joins exactly two faces of opposite direction, after merging coincident vertices."""
-    _, vertex = np.unique(mesh.positions, axis=0, return_inverse=True)
-    corners = vertex.reshape(-1)[mesh.faces.astype(np.int64)]
+def closed(meshes: Sequence[Mesh]) -> Flags:
+    """(N,) whether every edge joins exactly two faces of opposite direction, after merging coincident vertices."""
+    return np.concatenate([np.zeros(0, bool), *(_closed_at_once(meshes[some]) for some in batches_of(meshes))])
+
+
+def _closed_at_once(meshes: Sequence[Mesh]) -> Flags:
+    counts = [len(mesh.positions) for mesh in meshes]
+    positions = np.concatenate([mesh.positions for mesh in meshes]) + np.float32(0)  # -0 is 0
+    rows = np.column_stack([np.repeat(np.arange(len(meshes)), counts).astype(np.float64), positions])
+    order = np.lexsort(rows.T[::-1])
+    is_new = np.append(True, (rows[order[1:]] != rows[order[:-1]]).any(axis=1))
+    vertex = np.empty(len(order), np.int64)
+    vertex[order] = np.cumsum(is_new)
+    faces = np.concatenate([mesh.faces + first for mesh, first in zip(meshes, np.cumsum(counts) - counts, strict=True)])
+    corners = vertex[faces.astype(np.int64)]
     edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
-    edges = edges[edges[:, 0] != edges[:, 1]]
-    code = edges[:, 0] * (len(vertex) + 1) + edges[:, 1]
-    back = edges[:, 1] * (len(vertex) + 1) + edges[:, 0]
-    return len(np.unique(code)) == len(code) and bool(np.array_equal(np.sort(code), np.sort(back)))
+    owner = np.tile(np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes]), 3)
+    has_length = edges[:, 0] != edges[:, 1]
+    edges, owner = edges[has_length], owner[has_length]
+    code, back = (edges @ weights for weights in ((len(order) + 1, 1), (1, len(order) + 1)))
+    order = np.argsort(code, kind="stable")
+    twice = order[1:][code[order[1:]] == code[order[:-1]]]
+    found = np.ones(len(meshes), bool)
+    found[owner[twice]] = False
+    found[owner[~np.isin(back, code)]] = False
+    return found
+
+
+def is_closed(mesh: Mesh) -> bool:
+    """`closed` of one mesh."""
+    return bool(closed([mesh])[0])
 
 
 def _closed(scene: Scene) -> set[str]:
@@ -39,7 +63,8 @@ def _closed(scene: Scene) -> set[str]:
     wholes: dict[str, list[SceneObject]] = {}
     for o in scene.objects:
         wholes.setdefault(scene.parts.get(o.name, o.name), []).append(o)
-    return {o.name for parts in wholes.values() if is_closed(merge(o.mesh for o in parts)) for o in parts}
+    meshes = [parts[0].mesh if len(parts) == 1 else merge(o.mesh for o in parts) for parts in wholes.values()]
+    return {o.name for parts, one in zip(wholes.values(), closed(meshes), strict=True) if one for o in parts}
 
 
 class SolidTest:

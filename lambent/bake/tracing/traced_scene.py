@@ -153,6 +153,7 @@ class TracedScene:
         """Points that light can reach, on the normals' side (sign +1) or the other (-1)."""
         if sign not in self._sides:
             ours = np.ones(self.texels.face.shape, bool) if sign > 0 else self._two_sided[self.texels.face]
+            self.progress(0, 1, "visibility")
             kind = self._at_hand
             solids = SolidTest(self.builder(**kind), self.whole(**kind))
             within = self._of_points(ours, sign, solids.embedded)

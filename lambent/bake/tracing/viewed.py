@@ -7,7 +7,6 @@ the viewers.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,45 +15,17 @@ from lambent.bake.sight import Sight
 from lambent.bake.surfaces.atlas import areas_of, even, scales_of
 from lambent.bake.surfaces.charts import Piece
 from lambent.bake.surfaces.density import Views, coarse_objects, sizes_seen
-from lambent.bake.tracing.rays import rays_from, towards
-from lambent.bake.tracing.visibility import viewing_places
+from lambent.bake.tracing.rays import towards
+from lambent.bake.tracing.viewers import RAYS
 from lambent.core.arrays import Floats, Indices
 from lambent.core.geometry import points_on_triangles, triangle_areas, triangle_normals
 
 log = logging.getLogger(__name__)
 
-RAYS = 1 << 18
 FEW = 64  # parts hit by fewer rays are tested in reverse
 LOOKS, LEAST_LOOKS = 256, 16  # reverse looks per part, and for very many parts...
 MOST_LOOKS = 1 << 22  # ...when the total would exceed this
 NEAREST = 0.1  # share of the viewing distance: anything closer is behind viewers, like the wall a camera stands against
-
-
-@dataclass(frozen=True)
-class Viewers:
-    """Eyes (E, 3) of a scene's viewers, and their reach: nine tenths of their looks end within `reach_m`."""
-
-    eyes: Floats
-    reach_m: float
-
-
-def viewers_of(sight: Sight) -> Viewers | None:
-    """Eyes at the cameras and at free places in their view, half each; None without cameras, or if they see nothing.
-
-    Places beyond the cameras' reach are left out, because rays through a window end far outside.
-    """
-    scene = sight.scene
-    cameras = [*scene.cameras, *(key for path in scene.paths for key in path.keys)]
-    if not cameras or sight.traced is None:
-        return None
-    eyes = np.array([camera.position for camera in cameras], float)
-    _, _, distance = met(sight.traced, eyes, RAYS // 16)
-    if not len(distance):
-        return None
-    reach = float(np.quantile(distance, 0.9))
-    places = viewing_places(scene, sight.traced)
-    places = places[np.linalg.norm(places[:, None] - eyes, axis=2).min(axis=1) < reach]
-    return Viewers(np.concatenate([np.resize(eyes, (max(len(places), len(eyes)), 3)), places]), reach)
 
 
 def texel_sizes(sight: Sight, pieces: list[Piece], texels: int) -> Floats:
@@ -99,16 +70,6 @@ def seen_from_behind(sight: Sight, least: float) -> list[str]:
     normals = triangle_normals(sight.scene.corners[seen])[which.reshape(-1)]
     counts = np.bincount(sight.owner[face[(normals * ray).sum(axis=1) > 0]], minlength=len(objects))
     return sorted(objects[number].name for number in np.flatnonzero(counts > least * len(face)))
-
-
-def met(traced: Any, eyes: Floats, count: int) -> tuple[Floats, Indices, Floats]:
-    """Of `count` rays from the eyes, those that hit: directions (M, 3), triangles (M,), distances (M,)."""
-    rng = np.random.default_rng(0)
-    z, phi = 1 - 2 * rng.random(count), 2 * np.pi * rng.random(count)
-    directions = np.stack([np.sqrt(1 - z**2) * np.cos(phi), z, np.sqrt(1 - z**2) * np.sin(phi)], axis=-1)
-    found = traced.ray_intersect_preliminary(rays_from(eyes[np.arange(count) % len(eyes)], directions))
-    hit = np.flatnonzero(np.array(found.is_valid()))
-    return directions[hit], np.array(found.prim_index)[hit].astype(np.int64), np.array(found.t)[hit].astype(float)
 
 
 def _looked_back(
