@@ -230,7 +230,7 @@ class Store:
             if not artefact.is_same(files.artefact, growing=True):
                 raise self._error("was rewritten while it was read", name, "read it again")
             if artefact.version(chunk) == version:
-                raise self._error("chunk is damaged", field, "bake again")
+                raise self._error("chunk is damaged", field, "bake again with --anew")
         raise self._error("chunk is not written", field, "bake it first")
 
     def _error(self, message: str, field: str, hint: str) -> UserError:

@@ -146,7 +146,7 @@ def test_a_damaged_chunk_is_noticed(tmp_path: Path) -> None:
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
     path.write_bytes(data)
-    with pytest.raises(UserError, match=r"irradiance 1\.0\.0: chunk is damaged"):
+    with pytest.raises(UserError, match=r"irradiance 1\.0\.0: chunk is damaged; bake again with --anew"):
         Store.open(tmp_path / "s").read("light_map/irradiance")
 
 

@@ -22,14 +22,13 @@ from lambent.scenes import load_scene
 from lambent.store.store import Store
 from lambent.viewer.modes.walk import rebaking
 from lambent.viewer.modes.walk.answering import AnsweringLight
-from lambent.viewer.modes.walk.arrivals import Arrived, Region
+from lambent.viewer.modes.walk.arrivals import Arrived
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.rebaked_light import (
     FADE_STEPS,
     Rebaked,
     batches_of,
     in_view_order,
-    steps,
     texel_objects,
     texel_steps,
 )
@@ -349,24 +348,6 @@ def test_objects_whose_light_is_finished_go_over_while_others_are_baked(boxes, s
     off = np.abs(shown - whole)[theirs].mean() / np.abs(estimate - whole)[theirs].mean()
     assert off < 0.5, "early light is near to the final one"
     room.pictures.close()
-
-
-def test_a_region_that_finishes_no_object_changes_nothing(store):
-    """The picture goes on refining."""
-    renderer = Renderer(open_device(), Store.open(store))
-    scene, size = renderer.scene, renderer.scene.irradiance.shape[:2]
-
-    def arrived(finished, before=None):
-        light = np.zeros((1, *size, 3), np.float16)
-        return Rebaked.read(store, scene, Arrived(Region(light, np.full(size, finished))), before)
-
-    def uploads(rebaked, since):
-        return list(steps(rebaked, since, scene, renderer.resources, {}, scene.record.cameras[0], SIZE))
-
-    nothing, everything = arrived(False), arrived(True)
-    assert not nothing.lit.any() and uploads(nothing, None) == []
-    assert len(uploads(everything, nothing)) >= FADE_STEPS
-    assert uploads(arrived(True, everything), everything) == []
 
 
 def test_light_of_an_edit_that_was_given_up_is_not_shown(store, screen, monkeypatch, tmp_path):

@@ -99,6 +99,7 @@ def relight(renderer, factor):
 def test_light_that_follows_an_edit_keeps_the_picture_sharp(pictures, state, renderer):
     rest(pictures, state)
     before = shown(pictures)
+    pictures._a._whole_s = 10.0
     relight(renderer, 0.5)
     pictures.update(PLACE, 1.0)
     assert pictures.under_way, "drawn in parts, beside the picture"
