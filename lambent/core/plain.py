@@ -1,10 +1,10 @@
-"""Plain values: JSON-ready results, words that are numbers, tuples of floats, file names."""
+"""Plain values: JSON-ready results, words that are numbers, tuples of floats, lists of names, file names."""
 
 from __future__ import annotations
 
 import math
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,13 @@ def printable(text: str) -> str:
     Escapes control characters, line ends among them, bidirectional and zero-width marks, and lone surrogates.
     """
     return "".join(c if unicodedata.category(c) not in _UNSHOWN else ascii(c)[1:-1] for c in text)
+
+
+def first_of(names: Sequence[str], most: int = 3) -> str:
+    """`names` in a line of text: all of them, or the first `most` and the count of the rest."""
+    if len(names) <= most + 1:
+        return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+    return f"{', '.join(names[:most])} and {len(names) - most:,} more"
 
 
 def is_number(word: str) -> bool:

@@ -13,7 +13,7 @@ from lambent.core.arrays import Floats
 from lambent.core.discovery import known
 from lambent.core.light_field import LightField
 from lambent.core.map_cache import LEAST_RECENT, POLICIES
-from lambent.core.plain import triple
+from lambent.core.plain import first_of, triple
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.group_arrays import GroupArrays, groups_in
 from lambent.scenes.scene import MaterialTextures
@@ -165,13 +165,16 @@ def read_baked(store: Store, light_field_mb: float | None = None, policy: str = 
     two_sided = any(
         contract.is_two_sided(record.materials[o.material], masked=o.material in masked) for o in record.objects
     )
-    probes, shared = {}, contract.shared_probes(store)
+    probes, without, shared = {}, [], contract.shared_probes(store)
     for obj in (o for o in record.objects if o.name not in shared):
         name = contract.probe_name(obj.name, "radiance")
-        wanted = obj.probe and contract.needs_probe(record.materials[obj.material])
-        radiance = light(name, "the nearest probe or the environment is used" if wanted else None)
+        radiance = light(name, None)
         if radiance is not None:
             probes[obj.name] = _probe(store, obj.name, radiance)
+        elif obj.probe and contract.needs_probe(record.materials[obj.material]):
+            without.append(obj.name)
+    if without:
+        missing.append(f"no probe of {first_of(without)}: the nearest probe or the environment is used")
     shares, share_objects = probe_shares(store)
     sun = contract.sun_beside(store)
     back = "light through two-sided sheets is black" if two_sided else None

@@ -16,6 +16,7 @@ from lambent.bake.tracing.solids import is_closed
 from lambent.core.camera import Camera
 from lambent.core.cubemap import texel_solid_angles
 from lambent.core.geometry import triangle_areas
+from lambent.realtime.baked import read_baked
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.contract import scene_record, whole_objects
@@ -80,7 +81,15 @@ def test_too_few_probes_are_told(tmp_path: Path, caplog: pytest.LogCaptureFixtur
     with caplog.at_level(logging.WARNING):
         store = bake(scene, tmp_path / "s", quality=TINY)
     assert "bar" in [o.name for o in scene_record(store).objects]
-    assert "bar: its probe misses" in caplog.text and "ball" not in caplog.text
+    assert "object mirrors: bar (" in caplog.text and "ball" not in caplog.text
+
+
+def test_missing_probes_are_one_line(tmp_path: Path) -> None:
+    scene = two_rooms()
+    balls = tuple(replace(scene.object("ball"), name=f"ball{k}") for k in range(9))
+    store = bake(replace(scene, objects=balls), tmp_path / "s", quality=TINY, only={"geometry"})
+    expected = "no probe of ball0, ball1, ball2 and 6 more: the nearest probe or the environment is used"
+    assert [line for line in read_baked(store).missing if "probe" in line] == [expected]
 
 
 def test_parts_of_a_solid_are_solid() -> None:

@@ -128,6 +128,17 @@ def test_a_camera_whose_node_has_no_size_is_left_out(tmp_path: Path) -> None:
     assert scene.warnings == ("flat: left out, its node's scale is zero",)
 
 
+def test_a_camera_that_is_too_wide_is_left_out(tmp_path: Path) -> None:
+    cameras = [{"type": "perspective", "perspective": {"yfov": yfov, "znear": 0.1}} for yfov in (3.3, -0.5, 0.8)]
+    nodes = [{"mesh": 0}, *({"camera": k, "name": name} for k, name in enumerate(("wide", "negative", "good")))]
+    scene = loaded(tmp_path, document(nodes=nodes, scenes=[{"nodes": [0, 1, 2, 3]}], cameras=cameras))
+    assert [camera.name for camera in scene.cameras] == ["good"]
+    assert scene.warnings == (
+        "wide: left out, a field of view of 189 degrees",
+        "negative: left out, a field of view of -28.6 degrees",
+    )
+
+
 def matrices(count: int) -> np.ndarray:
     """Affine, every third one mirroring, and pairs that only move."""
     random = np.random.default_rng(1)

@@ -18,6 +18,7 @@ from lambent.bake.methods import ProbeMethod, sorts_light
 from lambent.bake.probes.division import HIDDEN
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import seed_of
+from lambent.core.plain import first_of
 from lambent.scenes.variants import documents_of
 from lambent.store.contract import SHARED_PROBES, needs_probe, probe_name, shared_probes
 from lambent.store.store import Store
@@ -32,9 +33,8 @@ HELD = "held"  # key in the document of shared probes: objects that no probe lea
 SHARING = "sharing"  # the step that assigns shared probes
 PARTS = ("radiance", "distance", "planes")
 GROUPS = "groups"  # an additional part if light is separated
-TOO_FEW = (
-    "%s: its probe misses %.0f %% of what the object mirrors; a tenth of its look-ups are %.0f degrees or more off"
-)
+TOO_FEW = "one probe does not see all that the object mirrors: %s"
+MISSED = "{} ({:.0f} % hidden, a tenth of its look-ups {:.0f} degrees or more off)"
 log = logging.getLogger(__name__)
 
 
@@ -94,15 +94,18 @@ def bake(context: BakeContext) -> None:
     probes = ProbeSet(context.traced, front_or_none, back, depth, backs_of(context.store), _held(context.store))
     if sorts_light(context.methods):
         probes.sort_light(*(finished_groups(context) if _cached(context) else (None, None)))
+    poor: list[tuple[float, str]] = []  # hidden share, and its words
     for i, name in enumerate(missing):
         context.progress(i, len(missing), f"probe of {name}")
         seed = seed_of(context.seed, "probe", name)
         result, meta = probes.bake(name, how.texels, how.samples, how.noise, seed, sharing(owners, name))
         if meta["hidden_share"] > HIDDEN:
-            log.warning(TOO_FEW, name, 100 * meta["hidden_share"], meta["parallax_deg"])
+            poor.append((meta["hidden_share"], MISSED.format(name, 100 * meta["hidden_share"], meta["parallax_deg"])))
         for part in parts:
             context.put(KIND, probe_name(name, part), result[part], context.provenance(**meta))
         context.watch.arrived(KIND, [probe_name(name, part) for part in parts])
+    if poor:
+        log.warning(TOO_FEW, first_of([words for _, words in sorted(poor, reverse=True)]))
     context.progress(1, 1, "probes")
 
 

@@ -30,6 +30,7 @@ from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
 from lambent.scenes.scene import DirectionalLight, Light, Mesh, PointLight, SceneObject
 
 FAR = 1e9  # metres
+WIDEST_RAD = 3.1  # exclusive, of cameras
 _Key = tuple[int, int, int, tuple[float, ...], int]  # of a mesh: its number, primitive, uv set, morph weights, skin
 DRACO = "KHR_draco_mesh_compression"
 
@@ -249,6 +250,9 @@ class _Reading:
         wanted = node_name or camera.name or f"camera_{index}"
         if camera.yfov is None:
             self._warnings.append(f"{wanted}: left out, a camera without perspective")
+            return
+        if not 0 < camera.yfov < WIDEST_RAD:
+            self._warnings.append(f"{wanted}: left out, a field of view of {math.degrees(camera.yfov):.3g} degrees")
             return
         if _volume(world) < 1e-18:
             self._warnings.append(f"{wanted}: left out, its node's scale is zero")

@@ -229,7 +229,7 @@ class MaterialDocument(_Extended):
 class CameraDocument(_Part):
     type: str
     name: str | None = None
-    yfov: Annotated[float, Field(gt=0, lt=3.1)] | None = _at("perspective", "yfov", default=None)
+    yfov: float | None = _at("perspective", "yfov", default=None)
 
 
 class SceneNodes(_Part):
