@@ -95,7 +95,7 @@ def copies_under(mesh: Mesh, matrices: Floats) -> list[Mesh]:
 
 def _some(count: int, vertices: int) -> Iterable[slice]:
     """Copies of a mesh of so many vertices, as many at a time as VERTICES_AT_ONCE allows."""
-    step = max(1, VERTICES_AT_ONCE // vertices)
+    step = max(1, VERTICES_AT_ONCE // max(vertices, 1))
     return (slice(first, first + step) for first in range(0, count, step))
 
 
