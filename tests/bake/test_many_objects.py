@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.engine import engine
-from lambent.materials.document import Material
+from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import box, patch, transformed
 from lambent.scenes.scene import Scene, SceneObject
 
@@ -111,3 +111,28 @@ def test_few_objects_stay_shapes_of_their_own() -> None:
     whole = builder.build()
     assert len(whole.shapes()) == 21
     assert np.array_equal(seen_from_above(builder, whole, 20)[0], 1 + np.arange(20))
+
+
+def test_of_many_shiny_objects_the_largest_are_judged_for_probes(monkeypatch: pytest.MonkeyPatch) -> None:
+    from lambent.bake.probes import sharing
+    from lambent.bake.tracing.scene_builder import SceneBuilder
+
+    scene = boxes()
+    mirror = Material(lobes=(Lobe(mx=0.01, my=0.01, r0=0.9),))
+    objects = [scene.objects[0]]
+    for i, o in enumerate(scene.objects[1:]):
+        shrunk = np.diag([0.2, 0.2, 0.2, 1.0]) if i % 2 else np.eye(4)
+        shrunk[:3, 3] = PLACES[i] - shrunk[:3, :3] @ PLACES[i]
+        objects.append(replace(o, mesh=transformed(o.mesh, shrunk), material="mirror", emission=(0.0, 0.0, 0.0)))
+    scene = replace(scene, objects=tuple(objects), materials=scene.materials | {"mirror": mirror})
+    names = [o.name for o in objects[1:]]
+    monkeypatch.setattr(sharing, "JUDGED", 100)
+    builder = SceneBuilder(scene)
+    whole = builder.build()
+    places = PLACES.mean(axis=0) + np.random.default_rng(2).normal(size=(64, 3)) + np.array([0.0, 3.0, 0.0])
+    found = sharing.shared(builder, whole, places, names)
+    own = set(names) - found.owners.keys()
+    assert 0 < len(own) <= sharing.MOST
+    assert set(found.owners.values()) <= own, "whose probe is shown has one"
+    assert len(found.held) >= COUNT - 100, "what is not judged stays in every probe"
+    assert not [name for name in own if int(name.removeprefix("box")) % 2], "small ones have none"

@@ -25,20 +25,24 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from lambent.bake.probes.centre import flat_axis, outside
 from lambent.bake.probes.division import HIDDEN
 from lambent.bake.probes.hidden import SHORT, spread
+from lambent.bake.probes.screening import median_distances, widths
 from lambent.bake.probes.selection import viewers_of, widest_lobe
 from lambent.bake.tracing.rays import leaving, rays_from
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
 from lambent.core.directions import normalize, reflect
 from lambent.core.geometry import triangle_areas
+from lambent.scenes.mesh import boxes_of
 from lambent.scenes.scene import Mesh
 
 POINTS = 256  # per object
 NEIGHBOURS = 12  # candidates per object for sharing a probe
+JUDGED = 1024  # objects
 MOST = 64  # probes per scene, about two CPU seconds each at `preview`; exceeded only if the scene places more
 MEDIUM, SMALL = 0.1, 0.06  # radians
 NEAR, REACH = 0.5, 0.75  # limit relative to the mirrored distance, for wide lobes, and the quantile of that distance
@@ -85,11 +89,30 @@ def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[
     """Assign shared probes to the objects `names`.
 
     `whole` is the Mitsuba scene of the builder, `places` (m, 3) are the viewers'; without viewers, no probe is shared.
-    Objects whose probe the scene places keep their own.
+    Objects whose probe the scene places keep their own. Beyond the JUDGED objects that look largest, objects show the
+    nearest probe: judging takes time and memory by pairs.
     """
     scene, names = builder.scene, list(names)
     if not names or not len(places):
         return Sharing({}, frozenset())
+    meshes = [scene.object(name).mesh for name in names]
+    size = widths(meshes)
+    size /= np.maximum(median_distances(meshes, places), size)
+    size[[name in scene.probe_centres or name in scene.probe_planes for name in names]] = np.inf
+    judged = np.zeros(len(names), bool)
+    judged[np.argsort(-size, kind="stable")[: max(JUDGED, int(np.isinf(size).sum()))]] = True
+    found = _judged(builder, whole, places, [names[i] for i in np.flatnonzero(judged)])
+    if judged.all():
+        return found
+    own = np.array([i for i in np.flatnonzero(judged) if names[i] not in found.owners])
+    middles, rest = boxes_of(meshes).mean(axis=1), np.flatnonzero(~judged)
+    nearest = own[KDTree(middles[own]).query(middles[rest])[1]]
+    shown = {names[i]: names[owner] for i, owner in zip(rest, nearest, strict=True)}
+    return Sharing(found.owners | shown, found.held | shown.keys())
+
+
+def _judged(builder: SceneBuilder, whole: Any, places: Floats, names: list[str]) -> Sharing:
+    scene = builder.scene
     meshes = [scene.object(name).mesh for name in names]
     middle = np.mean(scene.bounds, axis=0)
     centres = np.stack([outside(mesh, middle, whole) for mesh in meshes])
