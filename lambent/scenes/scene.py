@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -302,7 +303,11 @@ class Scene:
         return replace(self, objects=tuple(replace(o, material=same.get(o.material, o.material)) for o in self.objects))
 
     def object(self, name: str) -> SceneObject:
-        return next(o for o in self.objects if o.name == name)
+        return self._by_name[name]
+
+    @cached_property
+    def _by_name(self) -> dict[str, SceneObject]:
+        return {o.name: o for o in self.objects}
 
 
 def bounds_of(objects: Iterable[SceneObject]) -> tuple[Array, Array]:

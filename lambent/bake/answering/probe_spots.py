@@ -40,7 +40,7 @@ class ProbeEyes:
 
     def __init__(self, traced: TracedScene) -> None:
         builder = self._builder = traced.builder(diffuse=False)
-        self._whole, self._numbers = traced.whole(diffuse=False), builder.object_numbers()
+        self._whole, self._numbers = traced.whole(diffuse=False), builder.numbers
         self._size = traced.texels.width, traced.texels.height
         looks = dict(builder.scene.materials) | dict.fromkeys(builder.measured, Material())
         self._names = [o.name for o in builder.scene.objects]
@@ -57,7 +57,7 @@ class ProbeEyes:
         met = si.is_valid()
         cosine = mi.Frame3f.cos_theta(si.wi)
         texel = light_map_texel(si, *self._size, met) * 2 + dr.select(cosine < 0, mi.UInt32(1), mi.UInt32(0))
-        number = dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, si.shape), met)
+        number = self._numbers.at(si, met)
         shown = dr.select(dr.gather(mi.Bool, self._coupled, number, met), under_fresnel(dr.abs(cosine), dr), 1.0)
         tint = mi.Color3f(1.0) * shown
         if self._textured:
@@ -81,7 +81,7 @@ def _behind(scene, ray, numbers, own, holes):  # type: ignore[no-untyped-def]
     again, count = dr.full(mi.Bool, True, dr.width(ray.o)), dr.zeros(mi.UInt32, dr.width(ray.o))
     while again:
         si = rays.intersect(scene, ray, again, holes)
-        number = dr.gather(mi.UInt32, numbers, dr.reinterpret_array(mi.UInt32, si.shape), again & si.is_valid())
+        number = numbers.at(si, again & si.is_valid())
         mine = dr.gather(mi.Bool, own, number, again & si.is_valid())
         ray = rays.leaving(scene, si.p, si.n, ray.d)
         count += 1

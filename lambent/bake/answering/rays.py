@@ -38,7 +38,7 @@ class RayEnds:
 
     def __init__(self, traced: TracedScene) -> None:
         builder = traced.builder(diffuse=False)
-        self._whole, self._numbers = traced.whole(diffuse=False), builder.object_numbers()
+        self._whole, self._numbers = traced.whole(diffuse=False), builder.numbers
         self._size = traced.texels.width, traced.texels.height
         looks = dict(builder.scene.materials) | dict.fromkeys(builder.measured, Material())
         worn = [looks[o.material] for o in builder.scene.objects]
@@ -108,7 +108,7 @@ def _followed(scene, sampler, ray, numbers, diffuse, coupled, size, textured, ho
     while active:
         si = rays.intersect(scene, ray, active, holes)
         active &= si.is_valid()
-        number = dr.gather(mi.UInt32, numbers, dr.reinterpret_array(mi.UInt32, si.shape), active)
+        number = numbers.at(si, active)
         bsdf, cosine = si.bsdf(ray), mi.Frame3f.cos_theta(si.wi)
         sample, value = bsdf.sample(ctx, si, sampler.next_1d(active), sampler.next_2d(active), active)
         sent = dr.select((sample.pdf > 0) & (depth < DEPTH), mi.luminance(value), 0.0)

@@ -20,6 +20,7 @@ from lambent.bake.bsdfs.material_plugin import TANGENT_ATTRIBUTE
 from lambent.bake.interreflection import directions
 from lambent.bake.tracing import rays
 from lambent.bake.tracing.rays import vectors
+from lambent.bake.tracing.shapes import ObjectNumbers
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.core.arrays import Floats
 from lambent.store.tails import FIXED, Tails
@@ -36,8 +37,7 @@ class Surfaces:
     Attributes
     ----------
     scene : mi.Scene
-    object_numbers : mi.UInt32
-        Object number by Mitsuba's shape number.
+    numbers : ObjectNumbers
     slots : (objects, 2) int
         Slot of each object for reflected and for transmitted light, or NONE.
     scatters : (objects,) uint32
@@ -49,7 +49,7 @@ class Surfaces:
     """
 
     scene: Any
-    object_numbers: Any
+    numbers: ObjectNumbers
     slots: np.ndarray
     scatters: np.ndarray
     factors: np.ndarray
@@ -58,7 +58,7 @@ class Surfaces:
 
     @classmethod
     def of(
-        cls, scene: Any, object_numbers: Any, worn: Sequence[str], tails: Tails, shapes: Mapping[str, Floats]
+        cls, scene: Any, numbers: ObjectNumbers, worn: Sequence[str], tails: Tails, shapes: Mapping[str, Floats]
     ) -> Surfaces:
         """Describe objects by their materials; `shapes` as from `as_baked.shapes_of`."""
         number = {slot: k for k, slot in enumerate(tails.slots)}
@@ -78,7 +78,7 @@ class Surfaces:
         as_it_is = np.broadcast_to(np.array([[1.0], [0.0]]), (2, 2, 3))
         factors = [shapes[name] if how == BAKED else as_it_is for name, how in zip(worn, scatters, strict=True)]
         return cls(
-            scene, object_numbers, np.array(rows, np.uint32), np.array(scatters, np.uint32),
+            scene, numbers, np.array(rows, np.uint32), np.array(scatters, np.uint32),
             np.array(factors, np.float32), tuple(map(str, names)), material,
         )  # fmt: skip
 
@@ -163,7 +163,7 @@ def trace(surfaces: Surfaces, points: ViewPoints, sides: np.ndarray, tails: Tail
     material = dr.full(mi.UInt32, NONE, width if slow else 1)
     begin = np.cumsum([0, *(len(order) for order in orders)])
     arrived = _follow(
-        surfaces.scene, sampler, ray, (pdf > 0) & ~passes, light, surfaces.object_numbers,
+        surfaces.scene, sampler, ray, (pdf > 0) & ~passes, light, surfaces.numbers,
         mi.UInt32(np.ascontiguousarray(surfaces.slots[:, 0])), mi.UInt32(np.ascontiguousarray(surfaces.slots[:, 1])),
         mi.UInt32(np.concatenate(orders).astype(np.uint32)), mi.UInt32(begin.astype(np.uint32)),
         dr.opaque(mi.UInt32, len(tails.slots)), dr.opaque(mi.UInt32, tails.most_hits),
@@ -204,7 +204,7 @@ def _follow(  # type: ignore[no-untyped-def]
         arrived |= dr.select(met, 1 << entry, 0)
 
         active &= si.is_valid() & (depth < most)
-        shape = dr.gather(mi.UInt32, objects, dr.reinterpret_array(mi.UInt32, si.shape), active)
+        shape = objects.at(si, active)
         slot, slot_through = dr.gather(mi.UInt32, reflect, shape, active), mi.UInt32(NONE)
         if dr.hint(sheets, mode="scalar"):
             slot_through = dr.gather(mi.UInt32, transmit, shape, active)

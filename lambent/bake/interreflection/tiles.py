@@ -173,7 +173,7 @@ class TileTracer:
         tracer = self._tracer = self._tracer or ViewTracer(self.scene, editables)  # created on demand, for its scene
         worn = [o.material for o in self.scene.objects]
         shapes = {} if self._diffuse_seen else shapes_of(self.scene, editables)
-        return Surfaces.of(tracer.scene, tracer.object_numbers, worn, self.tails, shapes)
+        return Surfaces.of(tracer.scene, tracer.numbers, worn, self.tails, shapes)
 
     @cached_property
     def _seconds(self) -> list[SecondTerm]:

@@ -30,7 +30,7 @@ class LightMapCache:
         # A measured table is traced without the cache: its object has no diffuse term.
         looks = dict(builder.scene.materials) | dict.fromkeys(builder.measured, Material())
         materials = [looks[o.material] for o in builder.scene.objects]
-        self._numbers = builder.object_numbers()
+        self._numbers = builder.numbers
         self._reflected = mi.Color3f(np.array([m.kd for m in materials], np.float32).T / np.float32(np.pi))
         self._coupled = mi.Bool(np.array([m.kd_coupled for m in materials], bool))
         self._transmitted = mi.Color3f(np.array([m.kt_d for m in materials], np.float32).T / np.float32(np.pi))
@@ -49,7 +49,7 @@ class LightMapCache:
 
     def _shown(self, si: Any, active: Any, irradiance: list[tuple[Any, Any]]) -> list[Any]:
         """Diffuse radiance (mi.Color3f) of surfaces for each pair of irradiances on the normal's side and the other."""
-        number = dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, si.shape), active)
+        number = self._numbers.at(si, active)
         outside = mi.Frame3f.cos_theta(si.wi) > 0
         reflected = dr.gather(mi.Color3f, self._reflected, number, active)
         transmitted = dr.gather(mi.Color3f, self._transmitted, number, active)

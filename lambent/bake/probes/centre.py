@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 
@@ -127,5 +126,6 @@ def encloses(builder: SceneBuilder, name: str, centre: Floats, whole: Any) -> bo
     w = normalize(face_directions(8).reshape(-1, 3))
     si = whole.ray_intersect(rays_from(centre, w), mi.RayFlags.Minimal, True)
     facing = (array_of(si.n) * w).sum(axis=1) < 0
-    own = np.array(dr.reinterpret_array(mi.UInt32, si.shape)) == builder.shape_number(name)
+    met = builder.numbers.at(si, si.is_valid())
+    own = np.array(si.is_valid() & (met == list(builder.meshes).index(name)))
     return bool((facing & own).mean() > ENCLOSING_SHARE)

@@ -80,7 +80,8 @@ class ProbeSet:
         """Rays that viewers see mirrored in objects, or through them; None if there are too few."""
         if self._cache is None:
             return None
-        own = [self._builder.shape_number(part) for part in self._own(names)]
+        numbers = list(self._builder.meshes)
+        own = [numbers.index(part) for part in self._own(names)]
         count = max(RAYS // len(names), min(LEAST_POINTS, MOST_POINTS // len(names)))
         surfaces = [spread(self._scene.object(name).mesh, count) for name in names]
         for i, name in enumerate(names):
@@ -93,7 +94,17 @@ class ProbeSet:
         clear = np.repeat([material.transmits for material in worn], each)
         r0 = np.repeat([largest_r0(material) for material in worn], each)
         return mirrored(
-            points, normals, clear, r0, self._traced.places, self._whole, self._cache, MIRROR_DEPTH, own, seed
+            points,
+            normals,
+            clear,
+            r0,
+            self._traced.places,
+            self._whole,
+            self._cache,
+            MIRROR_DEPTH,
+            self._builder.numbers,
+            own,
+            seed,
         )
 
     def _own(self, names: tuple[str, ...]) -> frozenset[str]:

@@ -22,7 +22,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 
 from lambent.bake.light.cache import LightMapCache
@@ -30,6 +29,7 @@ from lambent.bake.probes.planes import bounding_planes
 from lambent.bake.probes.probe import Probe
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.rays import array_of, independent, leaving, rays_from, towards
+from lambent.bake.tracing.shapes import ObjectNumbers
 from lambent.core.arrays import Flags, Floats
 from lambent.core.colour import luminance
 from lambent.core.cubemap import sample
@@ -67,12 +67,12 @@ class Mirrored:
 
 def mirrored(
     points: Floats, normals: Floats, clear: Flags, r0: Floats, places: Floats, scene: Any, cache: LightMapCache,
-    depth: int, family: list[int], seed: int,
+    depth: int, numbers: ObjectNumbers, family: list[int], seed: int,
 ) -> Mirrored | None:  # fmt: skip
     """Rays that viewers at `places` (m, 3) see mirrored in points (n, 3) of unit normals (n, 3), one viewer per point.
 
     At `clear` (n,) materials rays continue straight; `r0` (n,) is the reflectance at normal incidence. None if too few
-    points are in view. `family` has the Mitsuba shape numbers of the objects and of their other parts.
+    points are in view. `family` are the indices in the scene of the objects and of their other parts.
     """
     found, eyes = viewers_of(points, normals, places, scene, np.random.default_rng(seed))
     if found.sum() < LEAST_RAYS:
@@ -82,8 +82,8 @@ def mirrored(
     directions = np.where(clear[found, None], -view, reflect(view, n))
     ray = leaving(scene, at, n, directions)
     radiance = light_along(scene, ray, depth, cache, seed)
-    met = scene.ray_intersect_preliminary(ray).shape
-    own = np.isin(np.array(dr.reinterpret_array(mi.UInt32, met)), family)
+    met = scene.ray_intersect_preliminary(ray)
+    own = np.array(met.is_valid()) & np.isin(np.array(numbers.at(met, met.is_valid())), family)
     below = scene.ray_intersect(rays_from(array_of(leaving(scene, at, n, n).o), -n))
     lit = array_of(cache.irradiance(below, below.is_valid(), sun=False)).astype(float)
     irradiance = np.nan_to_num(lit, posinf=0.0)

@@ -23,24 +23,26 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from lambent.bake.probes.centre import flat_axis, outside
 from lambent.bake.probes.division import HIDDEN
 from lambent.bake.probes.hidden import SHORT, spread
+from lambent.bake.probes.screening import median_distances, widths
 from lambent.bake.probes.selection import viewers_of, widest_lobe
 from lambent.bake.tracing.rays import leaving, rays_from
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
 from lambent.core.directions import normalize, reflect
 from lambent.core.geometry import triangle_areas
+from lambent.scenes.mesh import boxes_of
 from lambent.scenes.scene import Mesh
 
 POINTS = 256  # per object
 NEIGHBOURS = 12  # candidates per object for sharing a probe
+JUDGED = 1024  # objects
 MOST = 64  # probes per scene, about two CPU seconds each at `preview`; exceeded only if the scene places more
 MEDIUM, SMALL = 0.1, 0.06  # radians
 NEAR, REACH = 0.5, 0.75  # limit relative to the mirrored distance, for wide lobes, and the quantile of that distance
@@ -87,11 +89,30 @@ def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[
     """Assign shared probes to the objects `names`.
 
     `whole` is the Mitsuba scene of the builder, `places` (m, 3) are the viewers'; without viewers, no probe is shared.
-    Objects whose probe the scene places keep their own.
+    Objects whose probe the scene places keep their own. Beyond the JUDGED objects that look largest, objects show the
+    nearest probe: judging takes time and memory by pairs.
     """
     scene, names = builder.scene, list(names)
     if not names or not len(places):
         return Sharing({}, frozenset())
+    meshes = [scene.object(name).mesh for name in names]
+    size = widths(meshes)
+    size /= np.maximum(median_distances(meshes, places), size)
+    size[[name in scene.probe_centres or name in scene.probe_planes for name in names]] = np.inf
+    judged = np.zeros(len(names), bool)
+    judged[np.argsort(-size, kind="stable")[: max(JUDGED, int(np.isinf(size).sum()))]] = True
+    found = _judged(builder, whole, places, [names[i] for i in np.flatnonzero(judged)])
+    if judged.all():
+        return found
+    own = np.array([i for i in np.flatnonzero(judged) if names[i] not in found.owners])
+    middles, rest = boxes_of(meshes).mean(axis=1), np.flatnonzero(~judged)
+    nearest = own[KDTree(middles[own]).query(middles[rest])[1]]
+    shown = {names[i]: names[owner] for i, owner in zip(rest, nearest, strict=True)}
+    return Sharing(found.owners | shown, found.held | shown.keys())
+
+
+def _judged(builder: SceneBuilder, whole: Any, places: Floats, names: list[str]) -> Sharing:
+    scene = builder.scene
     meshes = [scene.object(name).mesh for name in names]
     middle = np.mean(scene.bounds, axis=0)
     centres = np.stack([outside(mesh, middle, whole) for mesh in meshes])
@@ -155,9 +176,9 @@ def _looked(builder: SceneBuilder, whole: Any, places: Floats, names: list[str])
     view = normalize(np.where(found[:, None], eyes - points, normals))
     clear = np.repeat([scene.materials[scene.object(name).material].transmits for name in names], POINTS)
     directions = np.where(clear[:, None], -view, reflect(view, normals))
-    numbers = _numbers(builder, names)
-    t, met = _first(whole, leaving(whole, points, normals, directions), numbers)
-    open_ = _nothing_behind(whole, points, directions, t, met, numbers)
+    first = _FirstHits(builder, whole, names)
+    t, met = first(leaving(whole, points, normals, directions))
+    open_ = _nothing_behind(first, points, directions, t, met)
     far = SKY * float(np.linalg.norm(np.ptp(np.array(scene.bounds), axis=0)))
     t = np.where(np.isfinite(t), t, far)
     valid, distance = (a.reshape(count, POINTS) for a in (found, np.linalg.norm(eyes - points, axis=1)))
@@ -172,7 +193,7 @@ def _looked(builder: SceneBuilder, whole: Any, places: Floats, names: list[str])
 
 
 def _nothing_behind(
-    whole: Any, points: Floats, ways: Floats, t: Floats, met: NDArray[np.int64], numbers: NDArray[np.int64]
+    first: _FirstHits, points: Floats, ways: Floats, t: Floats, met: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
     """Whether rays (n,) along `ways` (n, 3), which `met` an object after `t`, hit no other object beyond it."""
     found, at, left = np.zeros(len(points), bool), t.copy(), np.flatnonzero(met != NOTHING)
@@ -180,7 +201,7 @@ def _nothing_behind(
         if not len(left):
             break
         at[left] += SHORT * (1 + at[left])
-        ahead, other = _first(whole, rays_from(points[left] + ways[left] * at[left, None], ways[left]), numbers)
+        ahead, other = first(rays_from(points[left] + ways[left] * at[left, None], ways[left]))
         found[left[~np.isfinite(ahead)]] = True
         again = np.isfinite(ahead) & (other == met[left])
         left = left[again]
@@ -188,20 +209,20 @@ def _nothing_behind(
     return found
 
 
-def _numbers(builder: SceneBuilder, names: list[str]) -> NDArray[np.int64]:
-    """Index in `names` by Mitsuba's shape number, NOTHING for other shapes."""
-    shapes = [builder.shape_number(name) for name in names]
-    table = np.full(max(shapes) + 1, NOTHING)
-    table[shapes] = np.arange(len(names))
-    return table
+class _FirstHits:
+    """Finds the first hits of rays in `whole`, and their objects' indices in `names`, NOTHING for other objects."""
 
+    def __init__(self, builder: SceneBuilder, whole: Any, names: list[str]) -> None:
+        places = {name: i for i, name in enumerate(names)}
+        self._places = np.array([places.get(o.name, NOTHING) for o in builder.scene.objects])
+        self._whole, self._numbers = whole, builder.numbers
 
-def _first(whole: Any, ray: Any, numbers: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
-    """Distances (n,) of the first hits, and the hit objects' indices in `names`."""
-    found = whole.ray_intersect_preliminary(ray)
-    shape = np.array(dr.reinterpret_array(mi.UInt32, found.shape)).astype(np.int64)
-    known = shape < len(numbers)
-    return np.array(found.t).astype(float), np.where(known, numbers[np.where(known, shape, 0)], NOTHING)
+    def __call__(self, ray: Any) -> tuple[Floats, NDArray[np.int64]]:
+        """Distances (n,), infinite without a hit, and indices (n,)."""
+        found = self._whole.ray_intersect_preliminary(ray)
+        met = found.is_valid()
+        place = self._places[np.array(self._numbers.at(found, met))]
+        return np.array(found.t).astype(float), np.where(np.array(met), place, NOTHING)
 
 
 def _lost(looked: Looked, rays: NDArray[np.bool_], held: NDArray[np.bool_]) -> Floats:
@@ -234,7 +255,7 @@ def _wrong(
     distance = np.linalg.norm(offset, axis=1)
     w = offset / np.maximum(distance, 1e-9)[:, None]
     start = SHORT * (1 + distance)
-    t, between = _first(whole, rays_from(hits + w * start[:, None], w), _numbers(builder, names))
+    t, between = _FirstHits(builder, whole, names)(rays_from(hits + w * start[:, None], w))
     left_out = ((between == one) | (between == other)) & ~held[between]
     blocked = (t < distance - 2 * start) & ~left_out
     blocked &= (met != one) & (met != other)

@@ -65,7 +65,7 @@ class DenoisedView:
         ray = camera_rays(self._camera, self._size, samples, sampler)
         si = intersect(self._scene, ray, mi.Bool(True), has_holes(self._scene))
         hit, bsdf = si.is_valid(), si.bsdf()
-        number = dr.gather(mi.UInt32, self._builder.object_numbers(), dr.reinterpret_array(mi.UInt32, si.shape), hit)
+        number = self._builder.numbers.at(si, hit)
         albedo = mi.Color3f(0.0)
         for values, texture in ((self._diffuse, DIFFUSE_ATTRIBUTE), (self._specular, SPECULAR_ATTRIBUTE)):
             albedo += dr.gather(mi.Color3f, values, number, hit) * bsdf.eval_attribute_3(texture, si, hit)

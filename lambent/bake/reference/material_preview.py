@@ -16,7 +16,8 @@ import numpy as np
 
 from lambent.bake.bsdfs.material_plugin import material_dict, register_material_plugin
 from lambent.bake.bsdfs.table_plugin import table_dict
-from lambent.bake.tracing.scene_builder import environment_dict, mesh_of
+from lambent.bake.tracing.scene_builder import environment_dict
+from lambent.bake.tracing.shapes import mesh_of
 from lambent.core.arrays import Flags, Floats
 from lambent.core.directions import normalize
 from lambent.core.metrics import display_pair, flip, psnr, tile_means

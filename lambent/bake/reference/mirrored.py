@@ -98,8 +98,8 @@ class MirrorTracer:
     def _seen(self, eye: Floats, w: Floats) -> Shown:
         """The rays (r, 3) from the eye that hit the object."""
         si = self._scene.ray_intersect(rays_from(eye, w))
-        number = self._builder.shape_number(self._name)
-        mine = si.is_valid() & (dr.reinterpret_array(mi.UInt32, si.shape) == number)
+        number = list(self._builder.meshes).index(self._name)
+        mine = si.is_valid() & (self._builder.numbers.at(si, si.is_valid()) == number)
         uv2 = light_map_uv(si, mine)
         dr.eval(si, mine, uv2)
         n, flat = (array_of(normal).astype(float) for normal in (si.sh_frame.n, si.n))

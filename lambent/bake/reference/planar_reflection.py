@@ -37,7 +37,7 @@ class ReflectionTracer:
         builder = SceneBuilder(scene, uv2)
         self._scene = builder.build(leave_out={plane})
         self._cache = LightMapCache(builder, irradiance, None)
-        self._numbers = builder.object_numbers()
+        self._numbers = builder.numbers
         self._emission = mi.Color3f(np.array([o.emission for o in scene.objects], np.float32).T.copy())
         self._lamps = [_ball_around(o.mesh.positions.astype(float)) for o in scene.objects if max(o.emission) > 0]
         self._sky = mi.Color3f(*sky)
@@ -92,7 +92,7 @@ class ReflectionTracer:
         gain = tint * wi.y / ((wi.y * view.y) ** lobe.alpha * h.y)
         si = self._scene.ray_intersect(mi.Ray3f(origin, wi), mi.RayFlags.All, True, valid)
         hit = valid & si.is_valid()
-        number = dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, si.shape), hit)
+        number = self._numbers.at(si, hit)
         seen = self._cache(si, hit) + dr.gather(mi.Color3f, self._emission, number, hit)
         r2 = (h.x / (h.y * lobe.mx)) ** 2 + (h.z / (h.y * lobe.my)) ** 2
         slopes = 1 / (1 + r2) ** 2 if lobe.distribution == "ggx" else dr.exp(-r2)

@@ -1,6 +1,6 @@
 """Conversion of a scene to Mitsuba.
 
-Mitsuba's world is ours: right-handed, y up, metres. Every object stays one Mitsuba mesh, with its name as id.
+Mitsuba's world is ours: right-handed, y up, metres.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ import mitsuba as mi
 import numpy as np
 
 from lambent.bake.bsdfs.edited_plugin import edited_dict
-from lambent.bake.bsdfs.material_plugin import TANGENT_ATTRIBUTE, material_dict, register_material_plugin
+from lambent.bake.bsdfs.material_plugin import material_dict, register_material_plugin
 from lambent.bake.bsdfs.table_plugin import table_dict
 from lambent.bake.sky.daylight import sky_image
 from lambent.bake.tracing.ies_emitter import ies_emitter
+from lambent.bake.tracing.shapes import UV2_ATTRIBUTE, ObjectNumbers, Shapes
 from lambent.core.arrays import Floats
 from lambent.materials.factored.terms import Editable
 from lambent.materials.measured.patch_sheet import Lookup
@@ -32,11 +33,9 @@ from lambent.scenes.scene import (
     Light,
     PointLight,
     Scene,
-    SceneObject,
     SunSky,
 )
 
-UV2_ATTRIBUTE = "vertex_uv2"
 COARSE = 4  # pixels along each side that become one pixel of a coarse sky
 FEW_PIXELS = 128  # least pixels along the shorter side of a coarse picture; otherwise it stays unchanged
 
@@ -91,7 +90,7 @@ class SceneBuilder:
             tables[name] = mi.load_dict(edited_dict(scene.materials[name], made, scene.textures.get(name)))
         # Equal materials share a BSDF: each BSDF adds a function to every kernel.
         bsdfs: dict[object, Any] = {}
-        self.meshes = {}
+        worn = []
         for o in scene.objects:
             bsdf = tables.get(o.material)
             if bsdf is None:
@@ -101,7 +100,9 @@ class SceneBuilder:
                 if look not in bsdfs:
                     bsdfs[look] = mi.load_dict(said)
                 bsdf = bsdfs[look]
-            self.meshes[o.name] = mesh_of(o, bsdf, (uv2 or {}).get(o.name))
+            worn.append(bsdf)
+        self._shapes = Shapes(scene.objects, worn, uv2 or {})
+        self.meshes = self._shapes.meshes
         self.lights = [emitter_of(light) for light in scene.lights]
         self.environment: Any = _emitter_of(scene.environment, COARSE if coarse_sky else 1)
         if sampling is not None:
@@ -114,7 +115,7 @@ class SceneBuilder:
         One in 100,000 rays slips between two triangles that share an edge; none does if the scene is `watertight`,
         which takes a third more time per ray. Graphics cards are always watertight.
         """
-        parts: dict[str, Any] = {f"object_{i}": m for i, (n, m) in enumerate(self.meshes.items()) if n not in leave_out}
+        parts: dict[str, Any] = {f"object_{i}": mesh for i, mesh in enumerate(self._shapes.without(leave_out))}
         parts |= {f"light_{i}": light for i, light in enumerate(self.lights)}
         if self.environment is not None:
             parts["environment"] = self.environment
@@ -145,16 +146,10 @@ class SceneBuilder:
             parameters["sampling_weight"] = float(weight)
             parameters.update()
 
-    def shape_number(self, name: str) -> int:
-        """Mitsuba's number of an object's shape, `si.shape` reinterpreted."""
-        return int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(self.meshes[name]))[0])
-
-    def object_numbers(self) -> Any:
-        """mi.UInt32 that maps Mitsuba's shape number (reinterpreted `si.shape`) to the object's index in the scene."""
-        ids = [self.shape_number(name) for name in self.meshes]
-        table = np.zeros(max(ids) + 1, np.uint32)
-        table[ids] = np.arange(len(ids))
-        return mi.UInt32(table)
+    @property
+    def numbers(self) -> ObjectNumbers:
+        """Finds the objects that rays have hit in this builder's scenes."""
+        return self._shapes.numbers
 
 
 def light_map_uv(si: Any, active: Any) -> Any:
@@ -169,26 +164,6 @@ def light_map_texel(si: Any, width: int, height: int, active: Any) -> Any:
     column = dr.clip(mi.Int32(dr.floor(uv2.x * width)), 0, width - 1)
     row = dr.clip(mi.Int32(dr.floor(uv2.y * height)), 0, height - 1)
     return mi.UInt32(row * width + column)
-
-
-def mesh_of(o: SceneObject, bsdf: Any, uv2: Floats | None = None) -> Any:
-    """mi.Mesh of an object with a BSDF, its brushing direction and, if given, its light map coordinates."""
-    props = mi.Properties()
-    props["mesh_bsdf"] = bsdf
-    if any(o.emission):
-        props["mesh_emitter"] = mi.load_dict({"type": "area", "radiance": _rgb(o.emission)})
-    vertices, faces = len(o.mesh.positions), len(o.mesh.faces)
-    mesh = mi.Mesh(o.name, vertices, faces, props=props, has_vertex_normals=True, has_vertex_texcoords=True)
-    parameters = mi.traverse(mesh)
-    for name, values in (("positions", o.mesh.positions), ("normals", o.mesh.normals), ("texcoords", o.mesh.uv)):
-        parameters[f"vertex_{name}"] = mi.Float(values.astype(np.float32).ravel())
-    parameters["faces"] = mi.UInt32(o.mesh.faces.astype(np.uint32).ravel())
-    parameters.update()
-    mesh.add_attribute(TANGENT_ATTRIBUTE, 3, o.mesh.tangents.astype(np.float32).ravel())
-    if uv2 is not None:
-        padded = np.concatenate([uv2, np.zeros((vertices, 1))], axis=1)
-        mesh.add_attribute(UV2_ATTRIBUTE, 3, padded.astype(np.float32).ravel())
-    return mesh
 
 
 def bare_scene(corners: Floats) -> Any:

@@ -78,11 +78,9 @@ class SolidTest:
         open_ = {n for n, m in materials.items() if m.transmits} | {n for n, t in textures.items() if t.opacity}
         closed = {o.name for o in builder.scene.objects} if sheets else _closed(builder.scene)
         solid = [o.name in closed and o.material not in open_ for o in builder.scene.objects]
-        self._scene, self._numbers = scene, builder.object_numbers()
+        self._scene, self._numbers = scene, builder.numbers
         self._solid = mi.UInt32(np.array(solid, np.uint32))
         # Normals by triangle, because an interaction would be compiled for each mesh of the scene.
-        counts = [len(o.mesh.faces) for o in builder.scene.objects]
-        self._first_face = mi.UInt32(np.cumsum([0, *counts])[:-1].astype(np.uint32))
         self._flat = vectors(mi.Vector3f, triangle_normals(builder.scene.corners))
 
     def within(self, scene: Any) -> SolidTest:
@@ -108,8 +106,8 @@ class SolidTest:
         direction = mi.Frame3f(n).to_world(dr.gather(mi.Vector3f, local, k))
         hit = self._scene.ray_intersect_preliminary(leaving(self._scene, p, n, direction), True)
         met = hit.is_valid()
-        number = dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, hit.shape), met)
-        face = dr.gather(mi.UInt32, self._first_face, number, met) + hit.prim_index
+        number = self._numbers.at(hit, met)
+        face = self._numbers.faces(hit, met)
         outwards = dr.gather(mi.Vector3f, self._flat, face, met)
         solid = dr.gather(mi.UInt32, self._solid, number, met) > 0
         inner = met & solid & (dr.dot(outwards, direction) > 0)

@@ -85,7 +85,7 @@ def view_points(builder: SceneBuilder, scene: Any, camera: Camera, width: int, h
     t = dr.normalize(t - n * dr.dot(n, t))
     b = dr.cross(n, t)
     wo = mi.Vector3f(dr.dot(to_viewer, t), dr.dot(to_viewer, b), dr.dot(to_viewer, n))
-    number = dr.gather(mi.UInt32, builder.object_numbers(), dr.reinterpret_array(mi.UInt32, si.shape), hit)
+    number = builder.numbers.at(si, hit)
     names = (DIFFUSE_ATTRIBUTE, SPECULAR_ATTRIBUTE, ROUGHNESS_ATTRIBUTE, SHEET_ATTRIBUTE)
     *textures, rough, sheet = (bsdf.eval_attribute_3(name, si, hit) for name in names)
     sheet = dr.select(below, -sheet, sheet)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from lambent.bake.interreflection.as_baked import unlike_documents
 from lambent.bake.tracing.rays import array_of, has_holes, intersect, rays_from
 from lambent.bake.tracing.scene_builder import SceneBuilder
+from lambent.bake.tracing.shapes import ObjectNumbers
 from lambent.bake.transport.lights import Samples, environment_rows, environment_samples, scene_lights
 from lambent.bake.transport.view_points import ViewPoints, view_points
 from lambent.bake.view import View
@@ -39,9 +40,9 @@ class ViewTracer:
         self.lights = cache(self._lights)
 
     @property
-    def object_numbers(self) -> Any:
-        """mi.UInt32: object number by Mitsuba's shape number."""
-        return self._builder.object_numbers()
+    def numbers(self) -> ObjectNumbers:
+        """Finds the objects that rays have hit."""
+        return self._builder.numbers
 
     def _points(self, view: View) -> ViewPoints:
         """The points of a view, traced watertight: a ray through a crack would leave a black pixel."""
