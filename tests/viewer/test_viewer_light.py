@@ -70,15 +70,17 @@ def test_a_saved_view_keeps_its_mix(state, tmp_path):
     recordings.view_name = "evening"
     recordings.save_view()
     assert read_views(tmp_path).lights == {"evening": HALF}
-    state.lights.visit(state.navigation, recordings.views.saved)
     state.lights.mix = OFF
-    state.lights.visit(state.navigation, recordings.views.saved)
-    assert state.lights.mix == OFF, "whoever stands there may change it"
-    state.navigation.jump(state.scene.cameras[1])
-    state.lights.visit(state.navigation, recordings.views.saved)
-    state.navigation.jump(recordings.views.saved.cameras[0])
-    state.lights.visit(state.navigation, recordings.views.saved)
+    recordings.visit(state.scene.cameras[1])
+    assert state.lights.mix == OFF, "a camera of the scene has no mix"
+    evening = recordings.views.saved.cameras[0]
+    recordings.visit(evening)
     assert state.lights.mix == HALF
+    state.lights.mix = OFF
+    recordings.visit(evening)
+    assert state.lights.mix == HALF, "the camera did not move"
+    state.lights.edits.undo()
+    assert (state.lights.mix, state.navigation.camera) == (OFF, evening)
     assert recordings.views.rename("camera", "evening", "night")
     assert read_views(tmp_path).lights == {"night": HALF}
     assert recordings.views.delete("camera", "night")

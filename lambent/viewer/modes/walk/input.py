@@ -175,7 +175,7 @@ class WalkInput(Input):
         elif key == "r":
             state.recordings.record()
         elif key in "123456789" and int(key) <= len(state.recordings.cameras):
-            navigation.jump(state.recordings.cameras[int(key) - 1])
+            state.recordings.visit(state.recordings.cameras[int(key) - 1])
 
     def saved(self) -> None:
         editor = self._state.materials.editor

@@ -9,9 +9,7 @@ from itertools import groupby
 from lambent.core.light_mix import LightMix, MixTrack
 from lambent.core.plain import Triple
 from lambent.store.light_groups import LightGroupRecord
-from lambent.store.views import Views
 from lambent.viewer.edits import MaterialEdits
-from lambent.viewer.navigation import Navigation
 
 
 @dataclass
@@ -24,7 +22,6 @@ class Lights:
     groups: tuple[LightGroupRecord, ...] = ()
     edits: MaterialEdits = field(default_factory=lambda: MaterialEdits({}))
     fields: bool = False
-    at_view: str = ""  # the saved view whose mix was last applied
 
     @property
     def mix(self) -> LightMix:
@@ -34,17 +31,6 @@ class Lights:
     @mix.setter
     def mix(self, mix: LightMix) -> None:
         self.edits.mix(mix)
-
-    def visit(self, navigation: Navigation, saved: Views) -> None:
-        """Apply the mix of a saved view after the camera has moved to it."""
-        camera = navigation.camera
-        if camera not in saved.cameras:
-            self.at_view = ""
-        elif camera.name != self.at_view:
-            self.at_view = camera.name
-            self.edits.end_stroke()
-            self.mix = saved.lights.get(camera.name, self.mix)
-            self.edits.end_stroke()
 
     def known(self, factors: Mapping[str, Triple]) -> dict[str, Triple]:
         """The part of a mix whose groups are in the store, which may have been baked again since."""

@@ -127,7 +127,6 @@ class WalkMode(Mode):
     def advance(self, dt_s: float) -> None:
         self.input.walk(dt_s)
         self.state.navigation.play(dt_s)
-        self.state.lights.visit(self.state.navigation, self.state.recordings.views.saved)
         self.state.recordings.follow()
         if self.state.materials.editor is not None:
             self.state.materials.editor.tick()

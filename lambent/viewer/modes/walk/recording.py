@@ -206,6 +206,14 @@ class Recordings:
             self.lights.mix = mix_at(track, time_s)
             self.lights.edits.end_stroke()
 
+    def visit(self, camera: Camera) -> None:
+        """Go to a camera of the list and apply its light mix, also if the camera is already there."""
+        self.navigation.jump(camera)
+        if camera in self.views.saved.cameras and camera.name in self.views.saved.lights:
+            self.lights.edits.end_stroke()
+            self.lights.mix = self.views.saved.lights[camera.name]
+            self.lights.edits.end_stroke()
+
     def save_view(self) -> None:
         """Save the camera as a view, under the typed name or the next free one."""
         mix = self.lights.mix if self.lights.groups else None

@@ -62,7 +62,7 @@ def _cameras(navigation: Navigation, recordings: Recordings) -> None:
         mark = "  (saved)" if index >= own else ""
         meaning = f"jumps to {camera.name}" + (f" ({index + 1})" if index < 9 else "")
         if listed(f"{key}{camera.name}{mark}##{index}", camera == navigation.camera, meaning):
-            navigation.jump(camera)
+            recordings.visit(camera)
     imgui.end_child()
 
 
