@@ -115,6 +115,7 @@ def dragged(store: Store, materials: Mapping[str, Material], edit: Edit, seconds
     if not baked.record.cameras:
         return {"drag_frames_per_s": None, "drag_edits_per_s": None}
     renderer, camera = Renderer(open_device(), baked), first_camera(store, baked.record)
+    renderer.waits = False  # as in the window: probes of a mix follow in a thread
     answering = AnsweringLight(store, renderer, Answering())
 
     def draw(frame: int) -> None:
