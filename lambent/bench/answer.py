@@ -19,13 +19,14 @@ can exceed 1.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lambent.bench.answer_times import Edit, changed, darkened, dragged, timed
+from lambent.bench.bake_context import context_of
 from lambent.bench.views import given_or_baked
 from lambent.core.answer import answered, upsampled
 from lambent.core.arrays import Flags, Floats, Indices
@@ -134,7 +135,7 @@ class Truth:
     """Some texels of a store, with their light path traced before and after edits."""
 
     def __init__(self, store: Store, stored: StoredAnswer, effort: Effort, progress: Progress) -> None:
-        self._context, self._stored, self._effort, self._progress = context_of(store), stored, effort, progress
+        self._context, self._stored, self._effort, self._progress = _context(store), stored, effort, progress
         traced = self._context.traced
         self.scene = traced.scene
         sides, labels = traced.in_view(1.0)
@@ -252,22 +253,10 @@ def _drawn(lit: Flags, label: Indices, count: int) -> Indices:
     return np.sort(np.random.default_rng(SEED).permutation(seen)[:count])
 
 
-def context_of(store: Store) -> BakeContext:
-    """The bake context of a store, as far as geometry and light map need it."""
-    from lambent.bake.bake import found
-    from lambent.bake.context import BakeContext
-    from lambent.bake.cuts import cut_for_viewers
+def _context(store: Store) -> BakeContext:
     from lambent.bake.engine import engine
-    from lambent.bake.methods import METHODS
-    from lambent.bake.probes.division import divided
     from lambent.bake.quality import quality_named
-    from lambent.bake.sight import Sight
-    from lambent.bake.timing import untimed
-    from lambent.scenes.textures import prepared
     from lambent.store.source import scene_of
 
     engine()
-    scene = scene_of(store)
-    ready = replace(scene, textures=prepared(scene.textures))
-    as_baked = cut_for_viewers(divided(Sight(ready), store, silent, untimed), store, untimed).scene
-    return BakeContext(as_baked, store, found(), quality_named("preview"), store.documents.get(METHODS, {}))
+    return context_of(store, scene_of(store), quality_named("preview"))

@@ -5,7 +5,7 @@ The scene is lit by its baked light map, for both maps and truth.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lambent.bake.quality import Quality
+from lambent.bench.bake_context import context_of
 from lambent.bench.reference import Reference
 from lambent.core import metrics
 from lambent.core.arrays import Floats, Indices
@@ -25,7 +26,6 @@ from lambent.core.light_field_lookup import Place
 from lambent.core.progress import Progress, silent
 from lambent.realtime.sun_disc import sky_without
 from lambent.scenes.scene import Scene
-from lambent.scenes.textures import prepared
 from lambent.store.contract import sun_beside
 
 if TYPE_CHECKING:
@@ -162,15 +162,7 @@ class LightFieldView:
 
 def _lit(scene: Scene, folder: Path, quality: Quality, progress: Progress) -> BakeContext:
     """The context of a bake of the scene's light map."""
-    from lambent.bake.bake import bake, found
-    from lambent.bake.context import BakeContext
-    from lambent.bake.cuts import cut_for_viewers
-    from lambent.bake.methods import METHODS
-    from lambent.bake.probes.division import divided
-    from lambent.bake.sight import Sight
-    from lambent.bake.timing import untimed
+    from lambent.bake.bake import bake
 
     store = bake(scene, folder, quality=quality, only=("light_map", "environment"), progress=progress)
-    ready = replace(scene, textures=prepared(scene.textures))
-    as_baked = cut_for_viewers(divided(Sight(ready), store, progress, untimed), store, untimed).scene
-    return BakeContext(as_baked, store, found(), quality, store.documents.get(METHODS, {}))
+    return context_of(store, scene, quality, progress)

@@ -147,8 +147,7 @@ def write(block: Any, mode: int, partition: int, ends: Any, index: Any) -> None:
     if two:
         at = _put(block, at, partition, 5)
     for i in range(TEXELS):
-        short = 1 if i == 0 or (two and i == ANCHOR[partition]) else 0
-        at = _put(block, at, index[i], (3 if two else 4) - short)
+        at = _put(block, at, index[i], _index_bits(two, partition, i))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -173,7 +172,7 @@ def read(blocks: Any, texels: Any) -> None:
         at += 5 if two else 0
         _make_whole(mode, ends)
         for i in range(TEXELS):
-            count = (3 if two else 4) - (1 if i == 0 or (two and i == ANCHOR[partition]) else 0)
+            count = _index_bits(two, partition, i)
             k = _get(block, at, count)
             at += count
             first = 2 * SECOND[partition, i] if two else 0
@@ -193,6 +192,12 @@ def _make_whole(mode: int, ends: Any) -> None:
                 ends[e, c] = (ends[0, c] + difference) & ((1 << bits) - 1)
         for e in range(2 * SUBSETS[mode]):
             ends[e, c] = unquantised(ends[e, c], bits)
+
+
+@numba.njit(cache=True, nogil=True)
+def _index_bits(two: bool, partition: int, i: int) -> int:
+    """Bits of texel i's index; those of anchors omit the highest."""
+    return (3 if two else 4) - (1 if i == 0 or (two and i == ANCHOR[partition]) else 0)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -108,15 +108,18 @@ class ObjectNumbers:
 
     def at(self, hit: Any, active: Any) -> Any:
         """Objects (mi.UInt32) of interactions, preliminary or not."""
-        found = dr.gather(mi.UInt32, self._by_shape, dr.reinterpret_array(mi.UInt32, hit.shape), active)
+        found = self._of_shape(hit, active)
         return found if self._alone else dr.gather(mi.UInt32, self._object, found + hit.prim_index, active)
 
     def faces(self, hit: Any, active: Any) -> Any:
         """Triangles (mi.UInt32) of interactions, preliminary or not."""
-        found = dr.gather(mi.UInt32, self._by_shape, dr.reinterpret_array(mi.UInt32, hit.shape), active)
+        found = self._of_shape(hit, active)
         if self._alone:
             return dr.gather(mi.UInt32, self._first_face, found, active) + hit.prim_index
         return dr.gather(mi.UInt32, self._face, found + hit.prim_index, active)
+
+    def _of_shape(self, hit: Any, active: Any) -> Any:
+        return dr.gather(mi.UInt32, self._by_shape, dr.reinterpret_array(mi.UInt32, hit.shape), active)
 
 
 def mesh_of(o: SceneObject, bsdf: Any, uv2: Floats | None = None) -> Any:
