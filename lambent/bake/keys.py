@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from lambent.core.environment_layouts import layout_of
-from lambent.core.images import read_image
 from lambent.core.inputs import sha256_of
 from lambent.scenes.computed import lat_long_image
+from lambent.scenes.environment_images import read_surroundings
 from lambent.scenes.light_groups import names_of_lights
 from lambent.scenes.scene import ComputedEnvironment, Environment, ImageEnvironment, Scene, SceneObject, SunSky
 from lambent.scenes.textures import digest, parts
@@ -125,7 +125,7 @@ def group_inputs(scene: Scene) -> object:
 @lru_cache(maxsize=16)
 def _layout(file: Path, content: str) -> str:
     """The detected layout of a picture; `content` is its hash, for the cache."""
-    return layout_of(read_image(file), file)
+    return layout_of(read_surroundings(file), file)
 
 
 def environment_inputs(environment: Environment | None) -> object:

@@ -49,6 +49,7 @@ class Ceiling:
 
 
 PIXELS = Ceiling("picture is too large", 1 << 26, "pixels")  # 8192 x 8192: 800 MB as float32 RGB
+SURROUNDINGS_PIXELS = Ceiling("picture is too large", 1 << 27, "pixels")  # 16384 x 8192
 LOBES = Ceiling("too many lobes", 64, "lobes")
 TRIANGLES = Ceiling("scene is too large", 20_000_000, "triangles")
 CORNERS = Ceiling("scene is too large", 240_000_000, "corners of faces")

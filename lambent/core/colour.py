@@ -14,6 +14,8 @@ from lambent.core.arrays import Floats
 RGB_TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 XYZ_TO_RGB = np.linalg.inv(RGB_TO_XYZ)
 WHITE_XYZ = RGB_TO_XYZ.sum(axis=1)
+REC_709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # x and y of red, green, blue and white
+_BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 _LAB_EDGE = 6 / 29
 HALF_MAX = 65504.0  # largest half float; brighter light is clipped to it
 MOST_UNIT = 2.0**24  # largest unit of light stored as half floats
@@ -51,6 +53,28 @@ def rgb_to_xyz(rgb: Floats) -> Floats:
 def xyz_to_rgb(xyz: Floats) -> Floats:
     """CIE XYZ to linear RGB; colours outside Rec.709 come out negative."""
     return np.asarray(xyz @ XYZ_TO_RGB.T.astype(xyz.dtype))
+
+
+def from_primaries(xy: Floats) -> NDArray[np.float32] | None:
+    """(3, 3) matrix to linear Rec.709 from linear RGB of other primaries, or None if they span no colours.
+
+    `xy` (4, 2) are chromaticities of red, green, blue and white. White becomes white, adapted as by Bradford (the ICC
+    profile specification, annex E).
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        primaries, white = (_xyz_of(points) for points in (xy[:3], xy[3]))
+    if not (np.isfinite(primaries).all() and np.isfinite(white).all()) or np.linalg.cond(primaries) > 1e4:
+        return None
+    to_xyz = primaries.T * np.linalg.solve(primaries.T, white)
+    gains = (_BRADFORD @ WHITE_XYZ) / (_BRADFORD @ white)
+    adapted = np.linalg.solve(_BRADFORD, gains[:, None] * _BRADFORD)
+    return np.asarray(XYZ_TO_RGB @ adapted @ to_xyz, np.float32)
+
+
+def _xyz_of(xy: Floats) -> Floats:
+    """(..., 3) XYZ with Y = 1 of chromaticities (..., 2)."""
+    x, y = xy[..., 0].astype(float), xy[..., 1].astype(float)
+    return np.stack([x / y, np.ones_like(y), (1 - x - y) / y], axis=-1)
 
 
 def rgb_to_lab(rgb: Floats) -> Floats:

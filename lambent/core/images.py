@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lambent.core import exr, rgbe
 from lambent.core.arrays import Image
-from lambent.core.ceilings import PICTURE_BYTES, PIXELS
+from lambent.core.ceilings import PICTURE_BYTES, PIXELS, Ceiling
 from lambent.core.colour import srgb_decode, srgb_encode
 from lambent.core.errors import UserError
 from lambent.core.files import atomic_path
@@ -28,8 +28,10 @@ HDR_SUFFIXES = (".exr", ".hdr")
 WRITABLE = (".exr", ".hdr", ".png")
 
 
-def read_image(path: Path) -> Image:
+def read_image(path: Path, ceiling: Ceiling = PIXELS) -> Image:
     """Linear RGB (H, W, 3) float32 of an EXR, HDR, PNG or JPEG file; an alpha channel is dropped.
+
+    `ceiling` limits the pixels of EXR and HDR files; PNG and JPEG have at most `PIXELS`.
 
     Raises
     ------
@@ -39,9 +41,9 @@ def read_image(path: Path) -> Image:
     path = Path(path)
     data = read_bytes(path, PICTURE_BYTES)
     if data.startswith(exr.MAGIC):
-        image = exr.decode(path)
+        image = exr.decode(path, ceiling)
     elif data.startswith(rgbe.MAGICS):
-        image = rgbe.decode(data, path)
+        image = rgbe.decode(data, path, ceiling)
     elif data.startswith((b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")):
         image = _linear(_stored(path))
     else:

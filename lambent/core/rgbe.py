@@ -13,27 +13,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Image
-from lambent.core.ceilings import PIXELS
+from lambent.core.ceilings import PIXELS, Ceiling
 from lambent.core.colour import xyz_to_rgb
 from lambent.core.errors import UserError
 from lambent.core.outputs import MARK
 from lambent.core.plain import is_number
 
 MAGICS = (b"#?RADIANCE", b"#?RGBE")
-REC_709 = ".64 .33 .30 .60 .15 .06 .3127 .3290"  # x and y of red, green, blue and white
+PRIMARIES = ".64 .33 .30 .60 .15 .06 .3127 .3290"  # x and y of red, green, blue and white of Rec.709
 _RESOLUTION = re.compile(rb"([-+])([XY]) (\d{1,9}) ([-+])([XY]) (\d{1,9})\n")
 FORWARD = {b"Y": b"-", b"X": b"+"}  # signs for rows from the top and columns from the left
 _MIN_RUN_WIDTH, _MAX_RUN_WIDTH = 8, 0x7FFF  # other widths are never run-length encoded per channel
 
 
-def decode(data: bytes, file: Path) -> Image:
-    """Linear RGB (H, W, 3) of a whole file's bytes; errors name `file`."""
+def decode(data: bytes, file: Path, ceiling: Ceiling = PIXELS) -> Image:
+    """Linear RGB (H, W, 3) of a whole file's bytes, within a `ceiling` of pixels; errors name `file`."""
     header_end = data.find(b"\n\n", 0, 1 << 16)
     match = _RESOLUTION.match(data, header_end + 2) if header_end >= 0 else None
     if match is None or match[2] == match[5]:
         raise UserError("Radiance header has no '-Y height +X width' line", file=file)
     height, width = int(match[3]), int(match[6])  # of scanlines, which are columns if X comes first
-    PIXELS.check(width * height, file=file, got=f"{width} x {height}")
+    ceiling.check(width * height, file=file, got=f"{width} x {height}")
     if width * height == 0:
         raise UserError("picture has no pixels", file=file, got=f"{width} x {height}")
     header = data[:header_end]
@@ -72,7 +72,7 @@ def encode(image: Image, view: str | None = None) -> bytes:
     pixels = np.concatenate([mantissa, exponent[..., None]], axis=-1).astype(np.uint8)
     height, width = image.shape[:2]
     seen = f"VIEW= {view}\n" if view else ""
-    about = f"SOFTWARE={MARK}\n{seen}EXPOSURE=1\nPRIMARIES= {REC_709}\n"
+    about = f"SOFTWARE={MARK}\n{seen}EXPOSURE=1\nPRIMARIES= {PRIMARIES}\n"
     header = f"#?RADIANCE\n{about}FORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n"
     return header.encode("ascii") + pixels.tobytes()
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.arrays import Floats, Image
+from lambent.core.ceilings import PIXELS, SURROUNDINGS_PIXELS
 from lambent.core.environment_layouts import as_lat_long, layout_of
 from lambent.core.errors import UserError
 from lambent.core.images import read_image
@@ -37,8 +38,28 @@ def read_lat_long(file: Path, layout: Layout | None = None) -> Image:
     UserError
         If the file is not a picture, or not of that layout, or its layout is ambiguous.
     """
-    picture = np.maximum(read_image(file)[..., :3], np.float32(0))
+    picture = read_surroundings(file)
+    np.maximum(picture, 0, out=picture)
     return as_lat_long(picture, layout or layout_of(picture, file), file)
+
+
+def read_surroundings(file: Path) -> Image:
+    """(H, W, 3) float32 picture of a file; means of 2x2 pixels of one that has more than `PIXELS`.
+
+    Raises
+    ------
+    UserError
+        If the file is not a picture, or has more than `SURROUNDINGS_PIXELS`.
+    """
+    picture = read_image(file, SURROUNDINGS_PIXELS)
+    height, width = (side // 2 * 2 for side in picture.shape[:2])
+    if height * width <= PIXELS.most:
+        return picture
+    reduced = picture[:height:2, :width:2].copy()
+    for row, column in ((0, 1), (1, 0), (1, 1)):
+        reduced += picture[row:height:2, column:width:2]
+    reduced /= 4
+    return reduced
 
 
 def up_turn(up: Axis) -> Floats:

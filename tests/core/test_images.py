@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lambent.core import exr, rgbe
+from lambent.core import colour, exr, rgbe
 from lambent.core.errors import UserError
 from lambent.core.images import check_writable, read_encoded, read_image, write_image
 
@@ -197,7 +197,7 @@ def test_exr_files_that_are_refused(
     assert "found Z" in _refused(_exr_of(tmp_path / "z.exr", OpenEXR.ZIP_COMPRESSION, Z=PICTURE[..., 0].copy()))
     monkeypatch.setattr(exr, "PIXELS", replace(exr.PIXELS, most=20 * 37 - 1))
     with pytest.raises(UserError, match="found 37 x 20, 1 channels; expected at most 739 pixels"):
-        exr.decode(tmp_path / "z.exr")
+        exr.decode(tmp_path / "z.exr", exr.PIXELS)
     assert capfd.readouterr() == ("", "")
 
 
@@ -214,3 +214,43 @@ def test_a_place_is_tried_before_long_work(tmp_path: Path) -> None:
     for place, word in (("file/a.png", "cannot be written"), ("folder.png", "is a folder")):
         with pytest.raises(UserError, match=word):
             check_writable(tmp_path / place)
+
+
+ACES = (0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.32168, 0.33767)  # AP1: red, green, blue, white
+
+
+def test_exr_of_other_primaries_becomes_rec_709(tmp_path: Path) -> None:
+    """ACEScg's white becomes white; its red lies outside Rec.709, with published coordinates."""
+    path = tmp_path / "a.exr"
+
+    def write(*chromaticities: float) -> None:
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "chromaticities": chromaticities}
+        OpenEXR.File(header, {"RGB": np.float32([[[1, 1, 1], [1, 0, 0], [0, 1, 0]]])}).write(str(path))
+
+    write(*ACES)
+    expected = [[1, 1, 1], [1.7051, -0.1302, -0.0240], [-0.6218, 1.1408, -0.1290]]
+    np.testing.assert_allclose(read_image(path)[0], expected, atol=2e-3)
+    write(*(0.3, 0.3) * 4)
+    assert "chromaticities: primaries span no colours" in _refused(path)
+
+
+def test_exr_in_layers_and_in_xyz(tmp_path: Path) -> None:
+    """A layer alone, Blender's combined one among others, and XYZ; two equal layers are a question for the user."""
+    r, g, b = (PICTURE[..., c].copy() for c in range(3))
+    zip_of = OpenEXR.ZIP_COMPRESSION
+
+    def layer(name: str, shade: float = 1.0) -> dict[str, Any]:
+        return {f"{name}.R": r * np.float32(shade), f"{name}.G": g, f"{name}.B": b}
+
+    for channels in (
+        layer("sky"),
+        {**layer("v.Combined"), **layer("v.Diffuse", 2)},
+        {"R": r, "G": g, "B": b, **layer("x", 3)},
+    ):
+        np.testing.assert_array_equal(read_image(_exr_of(tmp_path / "a.exr", zip_of, **channels)), PICTURE)
+    found = _refused(_exr_of(tmp_path / "a.exr", zip_of, **layer("sky"), **layer("v")))
+    assert "several layers with colour; found sky, v; save one of them" in found
+    x, y, z = np.moveaxis(colour.rgb_to_xyz(PICTURE), -1, 0)
+    stored = _exr_of(tmp_path / "a.exr", zip_of, X=x.copy(), Y=y.copy(), Z=z.copy())
+    np.testing.assert_allclose(read_image(stored), PICTURE, rtol=1e-4, atol=1e-3)
+    assert "found G, R; expected R, G, B" in _refused(_exr_of(tmp_path / "a.exr", zip_of, R=r, G=g))

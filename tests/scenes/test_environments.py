@@ -7,9 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lambent.core.ceilings import Ceiling
 from lambent.core.cubemap import face_directions, texel_solid_angles
 from lambent.core.directions import normalize
+from lambent.core.errors import UserError
 from lambent.core.images import write_image
+from lambent.scenes import environment_images
 from lambent.scenes.environment_images import read_lat_long
 from lambent.scenes.environments import daylight, from_lat_long
 
@@ -49,3 +52,16 @@ def test_values_below_zero_are_black(tmp_path: Path) -> None:
     picture = np.random.default_rng(0).normal(0.2, 1, (8, 16, 3)).astype(np.float32)
     write_image(tmp_path / "sharpened.exr", picture)
     np.testing.assert_array_equal(read_lat_long(tmp_path / "sharpened.exr"), np.maximum(picture, 0))
+
+
+def test_a_picture_with_too_many_pixels_is_averaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Means of 2x2 pixels keep the light of a lamp of one pixel; beyond its own ceiling a picture is refused."""
+    picture = np.random.default_rng(2).random((8, 16, 3)).astype(np.float32)
+    picture[3, 5] = 1e5
+    write_image(tmp_path / "sky.exr", picture)
+    monkeypatch.setattr(environment_images, "PIXELS", Ceiling("picture is too large", 8 * 16 - 1, "pixels"))
+    read = environment_images.read_lat_long(tmp_path / "sky.exr")
+    np.testing.assert_allclose(read, picture.reshape(4, 2, 8, 2, 3).mean(axis=(1, 3)), rtol=1e-6)
+    monkeypatch.setattr(environment_images, "SURROUNDINGS_PIXELS", Ceiling("picture is too large", 100, "pixels"))
+    with pytest.raises(UserError, match="found 16 x 8, 3 channels; expected at most 100 pixels"):
+        environment_images.read_lat_long(tmp_path / "sky.exr")
