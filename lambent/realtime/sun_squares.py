@@ -10,14 +10,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from lambent.core.arrays import Floats
 from lambent.core.directions import basis, normalize
 from lambent.core.geometry import points_on_triangles, triangle_areas
 
-SIDE, MOST_SQUARES, RATIO = 2048, 4, 4.0  # texels along a square; squares; times as large as the one before, at least
+SIDE, MOST_SQUARES, RATIO = 2048, 4, 4.0  # texels along a square; squares; times as large as the one before, about
 POINTS = 1 << 15  # of surfaces, that tell where cameras look
-MIDDLE = 0.96  # of what they see lies in the first square, along each axis
+LARGEST, MOST_CUTS = 1.0, 24  # a triangle's radius, by its distance from the nearest eye; how often one is cut
+MIDDLE = 0.94  # of what they see lies in the first square, along each axis
 RIM_PX = 4  # texels around the scene
 WIDE_RAD = 0.0175  # a degree; the sun of the sky has .27
 PARTS = 4  # of a wide sun
@@ -81,7 +83,7 @@ def squares_of(direction: Sequence[float] | Floats, corners: Floats, eyes: Float
     about, width = (low_seen + high_seen) / 2, float(np.max(high_seen - low_seen))
     squares = [whole]
     if 0 < width < size / 1.5:
-        count = min(MOST_SQUARES - 1, int(np.ceil(np.log(size / width) / np.log(RATIO))))
+        count = min(MOST_SQUARES - 1, int(np.ceil(np.log(size / width) / np.log(RATIO) - 0.1)))
         sizes = width * (size / width) ** (np.arange(count) / count)
         squares = [np.array([*(about - one / 2), one]) for one in sizes] + squares
     rim = 1e-4 * float(high[2] - low[2]) + 1e-3
@@ -94,18 +96,46 @@ def _seen(corners: Floats, eyes: Floats, axes: Floats) -> tuple[Floats, Floats]:
     Surfaces count by area over the cube of the distance, of which far ones hold a bounded share however large they are;
     nothing counts as nearer than 1 m. Without cameras there is no more than nothing to see.
     """
-    area = triangle_areas(corners)
-    if not len(eyes) or not area.sum() > 0:
+    if not len(eyes) or not triangle_areas(corners).sum() > 0:
         return np.zeros(2), np.zeros(2)
+    cut = _cut_about(eyes, corners)
+    area = triangle_areas(cut)
     rng = np.random.default_rng(0)
-    share = np.sqrt(area) / np.sqrt(area).sum()
+    share = np.sqrt(area) / _distances(cut.mean(axis=1), eyes)
+    share /= share.sum()
     face = rng.choice(len(area), size=POINTS, p=share)
-    points = points_on_triangles(corners, face, rng)
-    nearest = np.min([np.linalg.norm(points - eye, axis=1) for eye in eyes], axis=0)
-    weight = area[face] / share[face] / np.maximum(nearest, 1) ** 3
+    points = points_on_triangles(cut, face, rng)
+    weight = area[face] / share[face] / _distances(points, eyes) ** 3
     bounds = np.array([_quantiles(values, weight) for values in (points @ axes.T).T])
     own = eyes @ axes.T
     return np.minimum(bounds[:, 0], own.min(axis=0)), np.maximum(bounds[:, 1], own.max(axis=0))
+
+
+def _cut_about(eyes: Floats, corners: Floats) -> Floats:
+    """Triangles (n, 3, 3), those larger than their distance from the nearest eye cut into four until none is.
+
+    Points drawn on a triangle of kilometres would miss the metres around an eye.
+    """
+    done = []
+    for _ in range(MOST_CUTS):
+        middle = corners.mean(axis=1)
+        radius = np.linalg.norm(corners - middle[:, None], axis=-1).max(axis=1)
+        long = radius > LARGEST * np.maximum(_distances(middle, eyes) - radius, 1)
+        done.append(corners[~long])
+        if not long.any():
+            break
+        a, b, c = np.moveaxis(corners[long], 1, 0)
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        cut = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        corners = np.concatenate([np.stack(quarter, axis=1) for quarter in cut])
+    else:
+        done.append(corners)
+    return np.concatenate(done)
+
+
+def _distances(points: Floats, eyes: Floats) -> Floats:
+    """Distances (n,) of points (n, 3) from the nearest eye, at least 1 m."""
+    return np.maximum(cKDTree(eyes).query(points)[0], 1.0)
 
 
 def _quantiles(values: Floats, weight: Floats) -> tuple[float, float]:

@@ -21,7 +21,7 @@ from lambent.realtime.baked import BakedScene
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.sun import BLOCK, block_ranges
-from lambent.realtime.sun_squares import squares_of
+from lambent.realtime.sun_squares import MIDDLE, squares_of
 from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import box, merge, patch, placed
 from lambent.scenes.scene import Mesh
@@ -281,11 +281,15 @@ def test_first_square_holds_what_cameras_see_and_the_last_all() -> None:
     corners = np.concatenate([mesh.corners for mesh in (floor(25e3), plate())])
     found = squares_of(TOWARDS, corners, np.array([DOWN.position]))
     assert len(found.squares) == 4
-    assert found.squares[0][2] < 20 and found.squares[-1][2] > 5e4
+    assert found.squares[0][2] < 30 and found.squares[-1][2] > 5e4
     places = corners.reshape(-1, 3) @ found.axes[:2].T
     u, v, side = found.squares[-1]
     assert np.all(places >= [u, v]) and np.all(places <= [u + side, v + side])
     assert len(squares_of(TOWARDS, corners, np.zeros((0, 3))).squares) == 1
+    small = np.concatenate([floor(25e3).corners, 0.01 * plate().corners])
+    width = squares_of(TOWARDS, small, np.array([DOWN.position])).squares[0][2]
+    expected = 2 * DOWN.position[1] * np.tan(np.pi * MIDDLE / 2)  # of a plane's solid angle, along one axis
+    assert width == pytest.approx(expected, rel=0.05)
 
 
 def test_blocks_know_the_least_and_the_greatest_depth_about_them() -> None:
