@@ -272,6 +272,10 @@ def test_materials_are_assigned_by_pattern(tmp_path: Path) -> None:
     assert over.object("sphere").material == "black"
     near = load_scene(written(tmp_path, MATERIALS + '[assign]\nspher = "metal"\n'))
     assert "assign.spher matches no object and no material: did you mean 'sphere'?" in near.warnings
+    named = load_scene(written(tmp_path, MATERIALS + '[materials."g*"]\nkd = 0.1\n'))
+    assert [w for w in named.warnings if "g*" in w] == [
+        "materials.g* is a name, not a pattern, and no object has it: assign it under [assign]"
+    ]
 
 
 def test_a_material_of_the_scene_puts_away_the_files_picture(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -90,6 +90,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         *(note for note in whole.warnings if note not in needless),
         *unfit,
         *missing,
+        *_idle_patterns(described, objects),
         *lights_that_stay(objects, dressings),
     )
     if environment is None and not lights and not any(any(o.emission) for o in objects):
@@ -169,6 +170,15 @@ def _geometry(entry: GeometrySection, path: Path, files: SceneFiles, read_geomet
             for light in contents.lights
         ),
     )
+
+
+def _idle_patterns(described: Iterable[str], objects: Iterable[SceneObject]) -> list[str]:
+    """A warning for each described material that is named by a pattern and that no object has."""
+    worn = {o.material for o in objects}
+    idle = [name for name in described if {*name} & {*"*?"} and name not in worn]
+    return [
+        f"materials.{name} is a name, not a pattern, and no object has it: assign it under [assign]" for name in idle
+    ]
 
 
 def _materials(document: SceneDocument, path: Path, files: SceneFiles) -> dict[str, Material]:
