@@ -135,7 +135,7 @@ def _cut_about(eyes: Floats, corners: Floats) -> Floats:
 
 def _distances(points: Floats, eyes: Floats) -> Floats:
     """Distances (n,) of points (n, 3) from the nearest eye, at least 1 m."""
-    return np.maximum(cKDTree(eyes).query(points)[0], 1.0)
+    return np.asarray(np.maximum(cKDTree(eyes).query(points)[0], 1.0))
 
 
 def _quantiles(values: Floats, weight: Floats) -> tuple[float, float]:
