@@ -110,8 +110,10 @@ def keys(context: BakeContext) -> dict[str, str]:
             inputs.append(context.settings("light_map").max_depth)
         if wish.without_object:  # keys of other light fields stay as they were
             inputs.append("volume" if wish.volume else "refracts")
-        if not wish.volume and (patches := _patches(context, name)):
-            inputs += [*patches, wish.patch_density]
+        if not wish.volume:
+            inputs += _patches(context, name)
+        if wish.patch_density is not None:
+            inputs.append(wish.patch_density)
         found |= dict.fromkeys(
             (light_field_name(name, part) for part in parts_of(how, wish)), key_of(KIND, REVISION, *inputs)
         )

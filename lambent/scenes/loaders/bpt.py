@@ -8,6 +8,7 @@ points. Numbers are separated by white space or commas; line ends have no meanin
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,6 +31,7 @@ MOST_TRIANGLES = 2_000_000  # beyond which triangles may deviate more
 MOST_DEGREE = 3
 POINTS = 16  # of a bicubic patch
 TOLD = 5  # patches named in a warning
+NUMBER = re.compile(rb"[+-]?(\d+\.?\d*([eE][+-]?\d+)?|\.\d+([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
 
 
 def load(path: Path, root: Path | None = None) -> Contents:
@@ -94,15 +96,15 @@ class _Numbers:
     def __init__(self, path: Path) -> None:
         self._path, self._at = path, 0
         self._data = read_bytes(path, BPT_BYTES).removeprefix(b"\xef\xbb\xbf").replace(b",", b" ")
-        words = self._data.split()
         try:
-            self._values = np.array(words, dtype=np.bytes_).astype(float) if words else np.zeros(0)
-        except ValueError as error:
-            place = next(i for i, word in enumerate(words) if not _is_number(word))
-            bad = self._word(place)
+            self._values = np.fromstring(self._data, sep=" ")
+        except ValueError:
+            self._values = np.zeros(0)
+        if len(self._values) != _words_in(self._data):  # "1.2.3" would be read as two numbers
+            bad = self._word(lambda _, word: not _is_number(word))
             raise UserError(
-                "has a word that is not a number", file=path, field=f"line {bad.line}", got=repr(bad.text)[:40]
-            ) from error
+                "has a word that is not a number", file=path, field=f"line {bad.line}", got=repr(bad.text[:40])
+            )
 
     def integer(self, what: str, *, least: int, most: int | None = None) -> int:
         """The next number, which must be whole and within bounds."""
@@ -161,19 +163,26 @@ class _Numbers:
             self._refuse(f"has more numbers {where}", "the end of the file")
 
     def _refuse(self, fault: str, expected: str) -> None:
-        bad = self._word(self._at)
+        bad = self._word(lambda number, _: number == self._at)
         raise UserError(fault, file=self._path, field=f"line {bad.line}", got=bad.text[:40], expected=expected)
 
-    def _word(self, number: int) -> _Word:
-        """Found again only for an error."""
-        place = next(found for i, found in enumerate(re.finditer(rb"\S+", self._data)) if i == number)
+    def _word(self, wanted: Callable[[int, bytes], bool]) -> _Word:
+        """The first word that is wanted by its number and text, or the last one: found again only for an error."""
+        place = None
+        for number, place in enumerate(re.finditer(rb"\S+", self._data)):
+            if wanted(number, place.group()):
+                break
+        if place is None:
+            return _Word("", 1)
         line = self._data[: place.start()].replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
         return _Word(place.group().decode("latin-1"), line)
 
 
+def _words_in(data: bytes) -> int:
+    """The number of words between white space."""
+    letters = ~np.isin(np.frombuffer(data, np.uint8), np.frombuffer(b" \t\n\r\v\f", np.uint8))
+    return int(np.count_nonzero(letters[1:] & ~letters[:-1])) + int(letters[:1].sum())
+
+
 def _is_number(word: bytes) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
+    return NUMBER.fullmatch(word) is not None
