@@ -53,7 +53,7 @@ def load(path: Path, root: Path | None = None) -> Contents:
     mesh = tessellated(control, steps)
     shown = np.zeros(len(control), bool)
     shown[mesh.patch_of_faces] = True
-    notes += _left_out("it has no area", usable & ~shown)
+    notes += _left_out("no area", usable & ~shown)
     if not len(mesh.faces):
         raise UserError("holds no patch with an area", file=path, hint="; ".join(notes) or None)
     grey = Material(name="default", kd=(0.5, 0.5, 0.5))
@@ -65,8 +65,9 @@ def _left_out(why: str, patches: Flags) -> list[str]:
     numbers = (np.flatnonzero(patches) + 1).tolist()
     if not numbers:
         return []
-    named = ", ".join([*map(str, numbers[:TOLD]), *(["..."] if len(numbers) > TOLD else [])])
-    return [f"{len(numbers)} patches left out: {why} ({named})"]
+    more = f" and {len(numbers) - TOLD} more" if len(numbers) > TOLD else ""
+    named = ", ".join(map(str, numbers[:TOLD])) + more
+    return [f"patch{'es' if len(numbers) > 1 else ''} {named} left out: {why}"]
 
 
 def read(path: Path) -> Floats:
@@ -123,7 +124,7 @@ class _Numbers:
 
     def patches(self, count: int) -> Floats:
         """Patches with their degrees and points."""
-        self._need(count * (2 + 4 * 3), f"{count} patches")  # before anything of their number is allocated
+        self._need(count * (2 + 4 * 3), "patches")  # before anything of their number is allocated
         control = np.empty((count, 4, 4, 3))
         for number in range(count):
             of_patch = f"of patch {number + 1}"
@@ -131,19 +132,19 @@ class _Numbers:
             v = self.integer(f"degree in v {of_patch}", least=1, most=MOST_DEGREE)
             points = self._take(3 * (u + 1) * (v + 1), f"control points {of_patch}").reshape(v + 1, u + 1, 3)
             control[number] = points if u == v == MOST_DEGREE else bezier.elevated(points)
-        self._end(f"after {count} patches")
+        self._end("patch")
         return control
 
     def indexed(self, count: int) -> Floats:
         """Patches that share a table of points."""
-        first, index = self._at, self._take(POINTS * count, f"numbers of points of {count} patches")
+        first, index = self._at, self._take(POINTS * count, "numbers of points of patches")
         points = self.integer("number of points", least=1)
         bad = np.flatnonzero(~((index >= 1) & (index <= points) & (index == np.floor(index))))
         if len(bad):
             self._at = first + int(bad[0])
             self._refuse(f"point of patch {bad[0] // POINTS + 1} does not exist", f"a whole number from 1 to {points}")
-        table = self._take(3 * points, f"{points} points").reshape(-1, 3)
-        self._end(f"after {points} points")
+        table = self._take(3 * points, "points").reshape(-1, 3)
+        self._end("point")
         return np.asarray(table[index.astype(np.int64) - 1].reshape(count, 4, 4, 3))
 
     def _take(self, count: int, what: str) -> Floats:
@@ -158,9 +159,9 @@ class _Numbers:
                 "file is truncated", file=self._path, field=what, got=f"{left} numbers", expected=f"at least {count}"
             )
 
-    def _end(self, where: str) -> None:
+    def _end(self, what: str) -> None:
         if self._at < len(self._values):
-            self._refuse(f"has more numbers {where}", "the end of the file")
+            self._refuse(f"has numbers after its last {what}", "the end of the file")
 
     def _refuse(self, fault: str, expected: str) -> None:
         bad = self._word(lambda number, _: number == self._at)
