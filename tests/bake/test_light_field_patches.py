@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -130,6 +131,22 @@ def test_density_by_patch(mi: Any) -> None:
     assert np.allclose(counts, [320, 0, 40, 40], atol=8)
     even = placing.points(floor, 400, 0, emphasis=Emphasis(0, 0)).positions[:, 0]
     assert [int(((even > left) & (even < left + 1)).sum()) for left in (0, 2, 4, 6)] == pytest.approx([100] * 4, abs=8)
+
+
+def test_trials_ask_for_the_same_density(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The number of points that an error needs is found with points that lie as those of the bake."""
+    from lambent.bake.light_fields import choosing
+
+    wish = LightFieldWish(error=0.1, patch_density=(4.0, 1.0))
+    scene = replace(coloured_room(), light_fields={"ball": wish})
+    asked: dict[str, Any] = {}
+    monkeypatch.setattr(choosing, "probe_light", lambda *_: None)
+    monkeypatch.setattr(choosing, "tried", lambda *_, **more: asked.update(more))
+    monkeypatch.setattr(choosing, "turned_to_viewers", lambda mesh, *_: mesh)
+    nothing: Any = None
+    around: Any = SimpleNamespace(scene=None)
+    choosing.Chooser(scene, nothing, nothing, around, np.zeros((0, 3)), 16, 0).trial("ball", nothing, 1.0, 64)
+    assert asked == {"most": 64, "patch_density": (4.0, 1.0)}
 
 
 def test_points_of_the_teapot_are_on_it_and_nothing_is_lost(mi: Any) -> None:

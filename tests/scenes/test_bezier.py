@@ -204,6 +204,8 @@ def test_patches_are_turned_to_the_side_of_their_neighbours() -> None:
     reversed_ = np.random.default_rng(0).random(32) < 0.35
     mixed = np.where(reversed_[:, None, None, None], TEAPOT[:, :, ::-1], TEAPOT)
     assert np.array_equal(oriented_alike(mixed), TEAPOT)
+    far = 1e-3 * mixed + 1e14 / 1024
+    assert len(oriented_alike(far)) == 32, "numbers that overflow nothing"
     alone = octant()[None, :, ::-1]
     assert np.array_equal(oriented_alike(alone), alone), "nothing tells which side is outside"
 

@@ -15,6 +15,7 @@ from lambent.scenes.mesh import NO_PATCH, Mesh, Patches
 
 MOST_STEPS = 64  # along a side; a power of two, at which shared edges are bitwise equal
 POINTS_AT_ONCE = 1 << 18
+COINCIDENT = 1e-9  # of the box of all patches, within which control points are one
 SIDES = "v = 0", "v = 1", "u = 0", "u = 1"  # the order of edges below
 _MIXING = np.random.default_rng(0).integers(-(2**63), 2**63, 12) | 1
 Steps = NDArray[np.int64]  # (n, 6): inner steps along u and v, then those of the four edges
@@ -167,8 +168,10 @@ def _edges(control: Floats) -> tuple[Indices, Flags]:
     around = np.stack([control[:, 0], control[:, :, 3], control[:, 3, ::-1], control[:, ::-1, 0]], axis=1).reshape(
         -1, 4, 3
     )
-    size = float(np.nanmax(bezier.extents(control), initial=0.0)) or 1.0
-    rounded = np.nan_to_num(np.round(around / (1e-7 * size))) + 0.0
+    finite = control[np.isfinite(control).all(axis=(1, 2, 3))].reshape(-1, 3)
+    low = finite.min(axis=0, initial=np.inf)
+    size = float((finite.max(axis=0, initial=-np.inf) - low).max()) if len(finite) else 1.0
+    rounded = np.nan_to_num(np.round((around - low) / (COINCIDENT * (size or 1.0))), posinf=0.0, neginf=0.0)
     ahead, back = rounded.reshape(-1, 12), rounded[:, ::-1].reshape(-1, 12)
     differs = (ahead != back).argmax(axis=1)[:, None]
     forward = np.take_along_axis(ahead, differs, 1) <= np.take_along_axis(back, differs, 1)
