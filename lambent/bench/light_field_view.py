@@ -127,7 +127,7 @@ class LightFieldView:
         from lambent.bake.light_fields.sample_map import sample_map
 
         traced, context = self._context.traced, self._context
-        mesh = traced.scene.object(self._name).mesh
+        mesh = context.scene.object(self._name).mesh  # with its Bezier patches, which the store does not hold
         placing = Placing(traced.builder(diffuse=False), traced.whole(diffuse=False))
         placed = placing.points(mesh, points, SEED)
         at = placed.positions.astype(np.float32)

@@ -59,7 +59,7 @@ def test_a_new_format_is_one_file(toy: Path) -> None:
 
 def test_every_format_says_what_it_is() -> None:
     assert sorted(ending for module in formats() for ending in module.ENDINGS) == [
-        ".glb", ".gltf", ".obj", ".ply", ".xml",
+        ".bpt", ".glb", ".gltf", ".obj", ".ply", ".xml",
     ]  # fmt: skip
     assert len({module.NAME for module in formats()}) == len(formats())
     assert is_scene(Path("a.toml"), b"") and is_scene(Path("a.GLB"), b"") and not is_scene(Path("a.png"), b"")
@@ -67,9 +67,9 @@ def test_every_format_says_what_it_is() -> None:
 
 
 def test_what_no_loader_reads_is_told_with_every_ending(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"unknown scene format; found .fbx; expected .glb, .gltf, .*.ply, .toml"):
+    with pytest.raises(UserError, match=r"unknown scene format; found .fbx; expected .bpt, .*.gltf, .*.ply, .toml"):
         load_scene(tmp_path / "a.fbx")
-    with pytest.raises(UserError, match=r"unknown scene format; found a folder; expected .glb"):
+    with pytest.raises(UserError, match=r"unknown scene format; found a folder; expected .bpt"):
         load_scene(tmp_path)
     with pytest.raises(
         UserError, match=r"found rom; expected box, cornell, .*, room, teatray, vase; did you mean 'room'"

@@ -98,12 +98,22 @@ def keys(context: BakeContext) -> dict[str, str]:
     found = dict[str, str]()
     for name, wish in wished(context).items():
         how = settings_of(context, wish)
-        inputs = [context.keys("light_map")["light_map/irradiance"], name, asdict(how), wish.offset_m, wish.error]
+        inputs: list[Any] = [
+            context.keys("light_map")["light_map/irradiance"],
+            name,
+            asdict(how),
+            wish.offset_m,
+            wish.error,
+        ]
         inputs += [context.seed, context.methods["probes"]]
         if not _cached(context):
             inputs.append(context.settings("light_map").max_depth)
         if wish.without_object:  # keys of other light fields stay as they were
             inputs.append("volume" if wish.volume else "refracts")
+        if not wish.volume:
+            inputs += _patches(context, name)
+        if wish.patch_density is not None:
+            inputs.append(wish.patch_density)
         found |= dict.fromkeys(
             (light_field_name(name, part) for part in parts_of(how, wish)), key_of(KIND, REVISION, *inputs)
         )
@@ -155,6 +165,12 @@ def settings_of(context: BakeContext, wish: LightFieldWish) -> Settings:
     return replace(how, **asked)
 
 
+def _patches(context: BakeContext, name: str) -> list[Array]:
+    """The Bezier patches of an object as inputs of a key; empty if it has none."""
+    patches = context.scene.object(name).mesh.patches
+    return [] if patches is None else [patches.control, patches.number, patches.uv]
+
+
 def _shiny(context: BakeContext) -> list[str]:
     """Names of the objects that mirror what is around them."""
     return [o.name for o in context.scene.objects if needs_probe(context.scene.materials[o.material])]
@@ -170,7 +186,8 @@ def _choice(context: BakeContext) -> list[dict[str, Any]]:
         return []
     how, budget_mb = context.settings(KIND), float(context.methods[request.MEGABYTES])
     named = sorted(context.scene.light_fields)
-    inputs = [context.keys("light_map"), context.keys("probe"), asdict(how), named, budget_mb, context.seed]
+    curved = [part for name in _shiny(context) for part in _patches(context, name)]
+    inputs = [context.keys("light_map"), context.keys("probe"), asdict(how), named, budget_mb, context.seed, *curved]
     key = key_of(LIGHT_FIELD_CHOICE, 2, *inputs)
     said = context.store.documents.get(LIGHT_FIELD_CHOICE)
     if not isinstance(said, dict) or said.get("key") != key:
@@ -314,7 +331,7 @@ def _placed(context: BakeContext, name: str, wish: LightFieldWish, traced: Trace
         if (seen := chooser.watched(name)) is not None:
             count = chooser.trial(name, seen, most=most).count_for(wish.error)
     mesh = turned_to_viewers(mesh, context.traced.places, traced.around.scene, seed)
-    return traced.placing.points(mesh, count, seed, wish.offset_m)
+    return traced.placing.points(mesh, count, seed, wish.offset_m, patch_density=wish.patch_density)
 
 
 def _sample_map(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced, start: float) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Iterable
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +74,9 @@ class Chooser:
         They are relative to a `level` of luminance, by default the object's own.
         """
         probe = probe_light(self._store, name)
-        more = {} if most is None else {"most": most}
+        wish = self._scene.light_fields.get(name)
+        more: dict[str, Any] = {} if most is None else {"most": most}
+        more |= {"patch_density": wish.patch_density} if wish is not None else {}
         mesh, seed = self._turned(name), self._seed_of(name)
         return tried(self._placing, mesh, seen, probe, self._around, seed, self._texels, level or seen.level, **more)
 

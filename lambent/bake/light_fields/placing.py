@@ -7,6 +7,7 @@ to it, and is dropped in gaps too narrow for that.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lambent.bake.light_fields.on_patches import surface_areas
 from lambent.bake.light_fields.sampling import (
     CANDIDATES,
     Emphasis,
@@ -21,6 +23,7 @@ from lambent.bake.light_fields.sampling import (
     densities,
     spread_evenly,
     thinned,
+    weights_of_faces,
 )
 from lambent.bake.tiles import slices
 from lambent.bake.tracing.rays import distances, leaving, vectors
@@ -43,7 +46,7 @@ POINTS_AT_ONCE = 1 << 16
 class Placed(SurfacePoints):
     """Points off a surface, with the normals below them, and how far off they are, less in gaps."""
 
-    offset_m: float
+    offset_m: float = 0.0
 
 
 class Placing:
@@ -54,9 +57,10 @@ class Placing:
         self._solids, self._sheets = SolidTest(builder, scene), SolidTest(builder, scene, sheets=True)
 
     def points(
-        self, mesh: Mesh, count: int, seed: int, offset_m: float | None = None, emphasis: Emphasis | None = None
-    ) -> Placed:
-        """`count` points over a mesh, or less where little of it is in the open.
+        self, mesh: Mesh, count: int, seed: int, offset_m: float | None = None, emphasis: Emphasis | None = None,
+        patch_density: Sequence[float] | None = None,
+    ) -> Placed:  # fmt: skip
+        """`count` points over a mesh, or less where little of it is in the open; by relative densities of its patches.
 
         Raises
         ------
@@ -64,16 +68,16 @@ class Placing:
             Where nothing of it is.
         """
         rng = np.random.default_rng(seed)
-        area_m2 = float(triangle_areas(mesh.corners).sum())
+        area_m2 = float((surface_areas(mesh) * weights_of_faces(mesh, patch_density)).sum())
         offset = usual_offset_m(mesh, count) if offset_m is None else offset_m
-        places = spread_evenly(mesh, CANDIDATES * count, rng)
+        places = spread_evenly(mesh, CANDIDATES * count, rng, patch_density)
         places, heights = self.in_the_open(places, offset)
         if not len(places):
             raise UserError("its surface is hidden everywhere", hint="leave out its light field")
         density = densities(places, area_m2, count, self.free_m(places), emphasis or Emphasis())
         kept = thinned(places, density, count, rng)
         chosen = places[kept]
-        return Placed(chosen.positions + heights[kept, None] * chosen.normals, chosen.normals, offset)
+        return Placed(chosen.positions + heights[kept, None] * chosen.normals, chosen.normals, offset_m=offset)
 
     def in_the_open(self, places: SurfacePoints, offset_m: float) -> tuple[SurfacePoints, Floats]:
         """The places above which there is room, and how far off the surface (n,) points may stand."""

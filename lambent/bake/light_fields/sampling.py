@@ -2,19 +2,21 @@
 
 Candidates, several to a point, are drawn by area. Those whose neighbours are closest are taken away until as many are
 left as are wanted (Yuksel 2015, "Sample elimination for generating Poisson disk sample sets"), distances measured by
-the spacing that the density gives at each.
+the spacing that the density gives at each. On Bezier patches, area, normal and curvature are exact.
 """
 
 from __future__ import annotations
 
 import heapq
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from lambent.bake.light_fields.on_patches import even_in_area, exact_places, surface_areas
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import normalize
-from lambent.core.geometry import triangle_areas, triangle_normals
+from lambent.core.geometry import triangle_normals
 from lambent.scenes.scene import Mesh
 
 CANDIDATES = 8  # for each point
@@ -26,13 +28,21 @@ OPPOSED = 0.2  # cosine to the triangle's normal below which a shading normal is
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """Points of a surface and its unit normals there, (n, 3) float64 each."""
+    """Points of a surface and its unit normals there, (n, 3) float64 each.
+
+    `turning` (n,) is how fast the normal turns, 1/m, NaN where it is not known. `weight` (n,) is how much denser than
+    by area the points are drawn, and asked for.
+    """
 
     positions: Floats
     normals: Floats
+    turning: Floats | None = None
+    weight: Floats | None = None
 
     def __getitem__(self, chosen: Indices | Flags | slice) -> SurfacePoints:
-        return SurfacePoints(self.positions[chosen], self.normals[chosen])
+        turning = None if self.turning is None else self.turning[chosen]
+        weight = None if self.weight is None else self.weight[chosen]
+        return SurfacePoints(self.positions[chosen], self.normals[chosen], turning, weight)
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -49,34 +59,63 @@ class Emphasis:
     nearness: float = 2.0
 
 
-def spread_evenly(mesh: Mesh, count: int, rng: np.random.Generator) -> SurfacePoints:
-    """Points in equal shares of a mesh's area, with its shading normals; none where it has no area."""
-    corners = mesh.corners
-    areas = triangle_areas(corners)
+def spread_evenly(
+    mesh: Mesh, count: int, rng: np.random.Generator, patch_density: Sequence[float] | None = None
+) -> SurfacePoints:
+    """Points in equal shares of a surface's area, with its shading normals; none where it has no area.
+
+    With `patch_density`, in equal shares of area times the density of its patch, 1 where there is no patch.
+    """
+    areas = surface_areas(mesh)
+    weight_of_faces = weights_of_faces(mesh, patch_density)
+    areas *= weight_of_faces
     if not areas.sum() > 0:
         return SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)))
     up_to = np.cumsum(areas)
     face = np.searchsorted(up_to, (np.arange(count) + rng.random(count)) / count * up_to[-1], side="right")
     face = np.minimum(face, np.flatnonzero(areas)[-1])
-    weights = rng.dirichlet((1, 1, 1), size=count)
-    positions = np.einsum("kc,kcx->kx", weights, corners[face])
-    flat = triangle_normals(corners[face])
+    weights = even_in_area(mesh, face, rng.dirichlet((1, 1, 1), size=count), rng)
+    corners = mesh.corners_of(face)
+    positions = np.einsum("kc,kcx->kx", weights, corners)
+    flat = triangle_normals(corners)
     leaning = normalize(np.einsum("kc,kcx->kx", weights, mesh.normals[mesh.faces[face]].astype(float)))
     opposed = (leaning * flat).sum(axis=1, keepdims=True) < OPPOSED
-    return SurfacePoints(positions, np.where(opposed, flat, leaning))
+    normals, turning = np.where(opposed, flat, leaning), np.full(count, np.nan)
+    exact = exact_places(mesh, face, weights)
+    positions[exact.found], normals[exact.found], turning[exact.found] = exact.positions, exact.normals, exact.turning
+    return SurfacePoints(positions, normals, turning, weight_of_faces[face])
+
+
+def weights_of_faces(mesh: Mesh, patch_density: Sequence[float] | None) -> Floats:
+    """(F,) relative densities of triangles: those of their patches, 1 where there is none."""
+    weights = np.ones(len(mesh.faces))
+    patch = mesh.patch_of_faces
+    if patch_density is not None:
+        weights[patch >= 0] = np.asarray(patch_density, float)[patch[patch >= 0]]
+    return weights
 
 
 def densities(points: SurfacePoints, area_m2: float, count: int, free_m: Floats, emphasis: Emphasis) -> Floats:
-    """Points per m^2 (n,) at evenly spread points of a surface, for `count` points in all.
+    """Points per m^2 (n,) at points drawn by `spread_evenly`, for `count` points in all.
 
     Curvature and nearness are both shares from 0 to 1, by the spacing s of evenly spread points: k s/(1 + k s) of the
-    curvature k, and the mean of s/(s + d) over the distances d that rays travel in `free_m` (n, rays).
+    curvature k, and the mean of s/(s + d) over the distances d that rays travel in `free_m` (n, rays). `area_m2` is
+    that of the surface, times the weight of its points.
     """
     spacing = np.sqrt(area_m2 / count)
-    curved = curvatures(points) * spacing
+    curved = turning_of(points) * spacing
     near = (spacing / (spacing + free_m)).mean(axis=1)
     relative = 1 + emphasis.curvature * curved / (1 + curved) + emphasis.nearness * near
-    return np.asarray(relative * count / (area_m2 * relative.mean()))
+    weight = 1.0 if points.weight is None else points.weight
+    return np.asarray(weight * relative * count / (area_m2 * relative.mean()))
+
+
+def turning_of(points: SurfacePoints) -> Floats:
+    """How fast the normal turns (n,), 1/m: exact where it is known, elsewhere found from the points."""
+    if points.turning is None:
+        return curvatures(points)
+    unknown = np.isnan(points.turning)
+    return np.where(unknown, curvatures(points), points.turning) if unknown.any() else points.turning
 
 
 def curvatures(points: SurfacePoints) -> Floats:
@@ -92,8 +131,9 @@ def curvatures(points: SurfacePoints) -> Floats:
 
 
 def thinned(points: SurfacePoints, density: Floats, count: int, rng: np.random.Generator) -> Indices:
-    """Which of evenly spread points to keep, `count` or all: blue noise of a `density` (n,), points per m^2."""
-    kept = np.flatnonzero(rng.random(len(points)) * density.max(initial=0) <= density)
+    """Which points of `spread_evenly` to keep, `count` or all: blue noise of a `density` (n,), points per m^2."""
+    wanted = density if points.weight is None else density / points.weight
+    kept = np.flatnonzero(rng.random(len(points)) * wanted.max(initial=0) <= wanted)
     if len(kept) < 2 * count:  # too few to choose from
         kept = np.arange(len(points))
     radius = np.sqrt(1 / (2 * np.sqrt(3) * density[kept]))  # of the densest packing of discs (Yuksel 2015, eq. 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,7 +85,7 @@ class Trial:
 
 def tried(
     placing: Placing, mesh: Mesh, seen: Watched, probe: ProbeLight, around: Around, seed: int, texels: int,
-    level: float, most: int = COUNTS[-1],
+    level: float, most: int = COUNTS[-1], patch_density: Sequence[float] | None = None,
 ) -> Trial:  # fmt: skip
     """The errors of an object's probe, and of light fields of COUNTS points and of `most`, as far as it has room."""
     by_probe = probe.seen(seen)
@@ -93,7 +94,7 @@ def tried(
     errors, checks = dict[int, float](), {0: seen.of(held_out).error(by_probe[held_out], level)}
     views = views_in(around.scene)
     for count in (*(count for count in COUNTS if count < most), most):
-        field = small_field(placing, mesh, count, min(texels, MOST_TEXELS), around, seed)
+        field = small_field(placing, mesh, count, min(texels, MOST_TEXELS), around, seed, patch_density)
         near = nearest_points(seen.x, seen.normals, field.points, views).astype(np.int64)
         every = np.arange(len(near)).repeat(seen.directions.shape[1])
         place = Place(seen.x[every], seen.normals[every], near[every])
@@ -106,9 +107,12 @@ def tried(
     return Trial(by_itself, errors, seen.size_sr, checks)
 
 
-def small_field(placing: Placing, mesh: Mesh, count: int, texels: int, around: Around, seed: int) -> LightField:
+def small_field(
+    placing: Placing, mesh: Mesh, count: int, texels: int, around: Around, seed: int,
+    patch_density: Sequence[float] | None = None,
+) -> LightField:  # fmt: skip
     """A light field of small maps, without a sample map."""
-    found = placing.points(mesh, count, seed)
+    found = placing.points(mesh, count, seed, patch_density=patch_density)
     p, n = found.positions.astype(np.float32), found.normals.astype(np.float32)
     radiance = radiance_maps(around, p, texels, 1, seed, normals=n)
     inverse = inverse_distances(around.scene, p, texels)

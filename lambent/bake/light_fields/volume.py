@@ -40,7 +40,7 @@ def volume_points(builder: SceneBuilder, mesh: Mesh, name: str, count: int) -> P
     free = places[_is_free(builder, scene, places, (low, high))][:count]
     if not len(free):
         raise UserError("its box has no free space", hint="leave out its light field")
-    return Placed(free, normalize(free - (low + high) / 2 + 1e-9), margin)
+    return Placed(free, normalize(free - (low + high) / 2 + 1e-9), offset_m=margin)
 
 
 def even_places(count: int) -> Floats:

@@ -110,7 +110,8 @@ def _seams(charts: list[Chart], corners: list[Floats]) -> tuple[Indices, NDArray
 def _split(mesh: Mesh, corner: Indices, faces: NDArray[np.uint32]) -> Mesh:
     """The mesh with a vertex for each of these corners (V,) of its faces, numbered consecutively."""
     source = mesh.faces.reshape(-1)[corner]
-    return Mesh(mesh.positions[source], mesh.normals[source], mesh.tangents[source], mesh.uv[source], faces)
+    patches = None if mesh.patches is None else mesh.patches.at_vertices(source)
+    return Mesh(mesh.positions[source], mesh.normals[source], mesh.tangents[source], mesh.uv[source], faces, patches)
 
 
 def merged(atlas: Atlas) -> dict[str, Floats]:
@@ -132,8 +133,11 @@ def separated(scene: Scene, arrays: dict[str, Floats], width: int, height: int) 
     for o in scene.objects:
         faces = arrays["faces"][first_face : first_face + len(o.mesh.faces)]
         low, high = int(faces.min()), int(faces.max()) + 1
-        parts = {name: arrays[name][low:high] for name in ("positions", "normals", "tangents", "uv")}
-        objects.append(replace(o, mesh=Mesh(faces=(faces - low).astype(np.uint32), **parts)))
+        positions, normals, tangents, uv = (
+            arrays[name][low:high] for name in ("positions", "normals", "tangents", "uv")
+        )
+        mesh = Mesh(positions, normals, tangents, uv, (faces - low).astype(np.uint32))
+        objects.append(replace(o, mesh=mesh))
         uv2[o.name] = arrays["uv2"][low:high]
         first_face += len(o.mesh.faces)
     return Atlas(replace(scene, objects=tuple(objects)), uv2, width, height)

@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from lambent.core.directions import Floats, normalize
+from lambent.scenes.geometry import bezier
 from lambent.scenes.geometry.grid import grid, merge, transformed
-from lambent.scenes.scene import Mesh
+from lambent.scenes.mesh import Mesh, Patches
 
 KAPPA = 0.56  # Newell's handle length of a quarter circle, by radius
 KNOB_PULL = 0.45  # the handle length of one circle that differs: the lid's knob, radius .8
@@ -81,14 +82,6 @@ def patches() -> dict[str, list[Floats]]:
     return turned | mirrored
 
 
-def _bernstein(t: Floats) -> tuple[Floats, Floats]:
-    """Cubic Bernstein polynomials and their derivatives, (N, 4) each."""
-    s = 1 - t
-    values = np.stack([s**3, 3 * t * s**2, 3 * t**2 * s, t**3], axis=-1)
-    slopes = np.stack([-3 * s**2, 3 * s * (s - 2 * t), 3 * t * (2 * s - t), 3 * t**2], axis=-1)
-    return values, slopes
-
-
 def evaluate(points: Floats, steps: int) -> tuple[Floats, Floats, Floats, Floats]:
     """Positions, normals, and the directions along and across, (N, N, 3) each, N = steps + 1, of one patch (4, 4, 3).
 
@@ -96,7 +89,7 @@ def evaluate(points: Floats, steps: int) -> tuple[Floats, Floats, Floats, Floats
     is zero there, and that of its neighbour row takes its place in the limit.
     """
     t = np.linspace(0, 1, steps + 1)
-    b, db = _bernstein(t)
+    b, db = bezier.bernstein(t), bezier.bernstein_slopes(t)
     positions, along, across = (np.einsum("ui,vj,ijk->uvk", u, v, points) for u, v in ((b, b), (db, b), (b, db)))
     for row, neighbour in ((0, 1), (3, 2)):
         if np.ptp(points[row], axis=0).max() == 0:
@@ -116,11 +109,14 @@ def teapot_parts(length: float = 0.25, steps: int = 12) -> dict[str, Mesh]:
     """The parts of `teapot`: rim, body, knob, lid, bottom, handle, spout."""
     parts: dict[str, list[Mesh]] = {}
     uv = np.stack(np.meshgrid(*[np.linspace(0, 1, steps + 1)] * 2, indexing="ij"), axis=-1)
+    vertices = uv[..., ::-1].reshape(-1, 2)  # rows of control points run along the profile: the v of a patch
     for part, members in patches().items():
         for i, points in enumerate(members):
             positions, normals, along, across = evaluate(points, steps)
             name = "knob" if part == "lid" and i < 4 else part
-            parts.setdefault(name, []).append(grid(positions, normals, across if part in TURNED else along, uv))
+            own = Patches(points[None], np.zeros(len(vertices), np.int32), vertices)
+            sheet = grid(positions, normals, across if part in TURNED else along, uv, own)
+            parts.setdefault(name, []).append(sheet)
     matrix = np.eye(4)
     matrix[:3, :3] = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]) * length / LENGTH  # z up to y up
     return {name: transformed(merge(sheets), matrix) for name, sheets in parts.items()}

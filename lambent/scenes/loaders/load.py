@@ -38,8 +38,8 @@ def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> 
     Parameters
     ----------
     path_or_builtin : str or Path
-        "builtin:room", "builtin:box", or the path of a scene.toml, .glb, .gltf, .obj, .ply or Mitsuba's .xml; light and
-        a camera are added to a file without them.
+        "builtin:room", "builtin:box", or the path of a scene.toml, .glb, .gltf, .obj, .ply, .bpt or Mitsuba's .xml;
+        light and a camera are added to a file without them.
     crease_deg : float, optional
         0 to 180. Normals that lean far from their faces are recomputed: smooth where faces meet at less than this
         angle.

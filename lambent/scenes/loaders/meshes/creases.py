@@ -85,7 +85,7 @@ def creased(mesh: Mesh, angle_deg: float) -> Mesh:
     return Mesh(
         mesh.positions[source], new.astype(np.float32),
         tangents_along(new, mesh.tangents[source].astype(float)).astype(np.float32), mesh.uv[source],
-        index.reshape(-1, 3).astype(np.uint32),
+        index.reshape(-1, 3).astype(np.uint32), None if mesh.patches is None else mesh.patches.at_vertices(source),
     )  # fmt: skip
 
 

@@ -1,0 +1,218 @@
+"""Bezier patches: surfaces known by hand, finite differences, poles, and tessellations without cracks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lambent.scenes.geometry import bezier
+from lambent.scenes.geometry.teapot import patches
+from lambent.scenes.geometry.tessellation import oriented_alike, steps_to, tessellated, triangles_of
+from lambent.scenes.mesh import Mesh
+from lambent.scenes.validation import mesh_faults
+from tests.scenes.test_geometry import boundary_edges
+
+HANDLE = 4 / 3 * (np.sqrt(2) - 1)  # of a cubic quarter circle: its radius is right within .03 %
+ARC = np.array([[1, 0], [1, HANDLE], [HANDLE, 1], [0, 1]])
+THIRDS = np.arange(4) / 3
+TEAPOT = np.array([points for members in patches().values() for points in members])
+
+
+def sheet(heights: np.ndarray | float = 0.0) -> np.ndarray:
+    """Control points (4, 4, 3) over the unit square: x is u, y is v."""
+    u, v = np.meshgrid(THIRDS, THIRDS)
+    return np.stack([u, v, np.broadcast_to(heights, u.shape)], axis=-1).astype(float)
+
+
+def quarter_cylinder(radius: float, length: float) -> np.ndarray:
+    """About the z axis: u runs around it, v along it; S_u x S_v points away from it."""
+    points = np.zeros((4, 4, 3))
+    points[..., :2], points[..., 2] = radius * ARC, length * THIRDS[:, None]
+    return points
+
+
+def octant(radius: float = 1.0) -> np.ndarray:
+    """An eighth of a ball: u runs around the axis, v up to the pole, where an edge is one point."""
+    points = np.zeros((4, 4, 3))
+    points[..., :2] = radius * ARC[:, :1, None] * ARC
+    points[..., 2] = radius * ARC[:, 1:]
+    return points
+
+
+def random_patch() -> np.ndarray:
+    return sheet() + 0.3 * np.random.default_rng(3).standard_normal((4, 4, 3))
+
+
+def some(count: int = 200) -> tuple[np.ndarray, np.ndarray]:
+    u, v = np.random.default_rng(0).random((2, count))
+    return u, v
+
+
+def test_a_plane() -> None:
+    u, v = some()
+    flat = sheet() * (3, 2, 1)
+    assert np.allclose(bezier.positions(flat, u, v), np.stack([3 * u, 2 * v, 0 * u], axis=-1), atol=1e-14)
+    assert np.allclose(bezier.normals(flat, u, v), (0, 0, 1))
+    assert bezier.areas(flat) == pytest.approx(6, rel=1e-12)
+    assert np.allclose(bezier.curvatures(flat, u, v), 0, atol=1e-12) and not bezier.turning(flat, u, v).any()
+
+
+def test_a_cylinder() -> None:
+    """Cubic arcs: radius within .03 %, curvature within 3 %."""
+    u, v = some()
+    tube = quarter_cylinder(0.5, 2.0)
+    at = bezier.positions(tube, u, v)
+    assert np.allclose(np.hypot(at[:, 0], at[:, 1]), 0.5, rtol=3e-4) and np.allclose(at[:, 2], 2 * v)
+    outwards = at * (1, 1, 0) / np.hypot(at[:, 0], at[:, 1])[:, None]
+    assert (bezier.normals(tube, u, v) * outwards).sum(axis=1).min() > 0.9999
+    assert bezier.areas(tube) == pytest.approx(np.pi / 2 * 0.5 * 2, rel=3e-4)
+    mean, gaussian = bezier.curvatures(tube, u, v)
+    assert np.allclose(mean, -1 / (2 * 0.5), rtol=0.03), "bends away from the normal"
+    assert np.allclose(gaussian, 0, atol=1e-10)
+    assert np.allclose(bezier.turning(tube, u, v), 1 / 0.5 / np.sqrt(2), rtol=0.03)
+
+
+def test_a_ball_and_its_pole() -> None:
+    u, v = some()
+    ball = octant(2.0)
+    at = bezier.positions(ball, u, v)
+    assert np.allclose(np.linalg.norm(at, axis=1), 2, rtol=6e-4)
+    assert (bezier.normals(ball, u, v) * at / 2).sum(axis=1).min() > 0.999
+    assert bezier.areas(ball) == pytest.approx(4 * np.pi * 4 / 8, rel=1e-3)
+    assert np.allclose(bezier.turning(ball, u, v), 1 / 2, rtol=0.04)
+    around = np.linspace(0, 1, 9)
+    pole = np.ones(9)
+    assert np.allclose(bezier.positions(ball, around, pole), (0, 0, 2))
+    assert np.allclose(bezier.normals(ball, around, pole), (0, 0, 1), atol=1e-6)
+    assert np.allclose(bezier.turning(ball, around, pole), 1 / 2, rtol=0.04)
+
+
+def test_derivatives_are_those_of_finite_differences() -> None:
+    points, (u, v), h = random_patch(), some(), 1e-5
+    u, v = 0.1 + 0.8 * u, 0.1 + 0.8 * v
+    s_u, s_v = bezier.tangents(points, u, v)
+    assert np.allclose((bezier.positions(points, u + h, v) - bezier.positions(points, u - h, v)) / (2 * h), s_u)
+    assert np.allclose((bezier.positions(points, u, v + h) - bezier.positions(points, u, v - h)) / (2 * h), s_v)
+    s_uu, s_uv, s_vv = bezier.bends(points, u, v)
+    by_u = [(a - b) / (2 * h) for a, b in zip(*(bezier.tangents(points, u + k, v) for k in (h, -h)), strict=True)]
+    by_v = [(a - b) / (2 * h) for a, b in zip(*(bezier.tangents(points, u, v + k) for k in (h, -h)), strict=True)]
+    for found, expected in zip((s_uu, s_uv, s_uv, s_vv), (*by_u, *by_v), strict=True):
+        assert np.allclose(found, expected, atol=1e-6)
+
+
+def test_turning_is_that_of_the_normals() -> None:
+    """Weingarten: the normal turns by the shape operator; its Frobenius norm over sqrt 2 is the root mean square."""
+    points, (u, v), h = random_patch(), some(), 1e-5
+    u, v = 0.1 + 0.8 * u, 0.1 + 0.8 * v
+    n_u = (bezier.normals(points, u + h, v) - bezier.normals(points, u - h, v)) / (2 * h)
+    n_v = (bezier.normals(points, u, v + h) - bezier.normals(points, u, v - h)) / (2 * h)
+    s_u, s_v = bezier.tangents(points, u, v)
+    along = s_u / np.linalg.norm(s_u, axis=1)[:, None]
+    across = np.cross(bezier.normals(points, u, v), along)
+    jacobian = np.stack([[(s * t).sum(1) for s in (s_u, s_v)] for t in (along, across)]).transpose(2, 0, 1)
+    turned = np.stack([[(n * t).sum(1) for n in (n_u, n_v)] for t in (along, across)]).transpose(2, 0, 1)
+    operator = turned @ np.linalg.inv(jacobian)
+    expected = np.linalg.norm(operator, axis=(1, 2)) / np.sqrt(2)
+    assert np.allclose(bezier.turning(points, u, v), expected, rtol=1e-4)
+
+
+def test_normals_of_the_teapot_at_its_poles() -> None:
+    """Top of the knob and middle of the bottom: along the axis, outwards, from every patch that meets there."""
+    u = np.linspace(0, 1, 5)
+    for part, v, up in (("lid", 0.0, 1.0), ("bottom", 1.0, -1.0)):
+        for points in patches()[part][:4]:
+            assert np.allclose(bezier.normals(points, u, np.full(5, v)), (0, 0, up), atol=1e-6)
+
+
+def test_patches_without_area_have_no_normal_and_no_curvature() -> None:
+    u, v = some(20)
+    for points in (np.zeros((4, 4, 3)), sheet() * (1, 0, 0), np.tile(sheet()[:1], (4, 1, 1))):
+        assert not bezier.normals(points, u, v).any() and bezier.areas(points) == pytest.approx(0, abs=1e-12)
+        assert np.isfinite(bezier.curvatures(points, u, v)).all()
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (2, 4), (3, 2), (4, 3), (4, 4)])
+def test_elevation_keeps_the_surface(shape: tuple[int, int]) -> None:
+    from math import comb
+
+    points = np.random.default_rng(1).random((*shape, 3))
+    u, v = some(50)
+
+    def basis(t: np.ndarray, degree: int) -> np.ndarray:
+        return np.stack([comb(degree, i) * t**i * (1 - t) ** (degree - i) for i in range(degree + 1)], axis=1)
+
+    expected = np.einsum("ni,nj,ijx->nx", basis(v, shape[0] - 1), basis(u, shape[1] - 1), points)
+    assert np.allclose(bezier.positions(bezier.elevated(points), u, v), expected, atol=1e-14)
+
+
+def deviation(mesh: Mesh) -> float:
+    """Largest distance between triangles and their patches, along the normal."""
+    assert mesh.patches is not None
+    places = np.random.default_rng(0).dirichlet((1, 1, 1), 40)
+    uv = np.einsum("kc,fcx->fkx", places, mesh.patches.uv[mesh.faces])
+    control = mesh.patches.control[mesh.patch_of_faces][:, None]
+    away = np.einsum("kc,fcx->fkx", places, mesh.corners) - bezier.positions(control, uv[..., 0], uv[..., 1])
+    return float(np.abs((away * bezier.normals(control, uv[..., 0], uv[..., 1])).sum(-1)).max())
+
+
+@pytest.mark.parametrize("tolerance", [0.05, 0.01])
+def test_tessellation_within_a_tolerance(tolerance: float) -> None:
+    """Bulges of different size beside each other: patches get different steps, and still share their edges."""
+    steps = steps_to(TEAPOT, tolerance)
+    mesh = tessellated(TEAPOT, steps)
+    assert len(np.unique(steps[:, :2])) > 1 and (steps[:, 2:] != steps[:, [0, 0, 1, 1]]).any()
+    assert tolerance / 20 < deviation(mesh) < tolerance
+    assert mesh_faults(mesh) == []
+    assert len(mesh.faces) <= triangles_of(steps)
+
+
+def test_edges_of_neighbours_coincide_bitwise() -> None:
+    """Four sheets about a corner, one with a bulge, one transposed and one reversed: the rim alone is open."""
+    ridge = np.array([0.0, 0.1, 0.2, 0.0]) / 7  # heights along the edges that the patches share
+    parts = [sheet(np.pad(np.full((2, 2), 3.0), 1)), *(sheet() for _ in range(3))]
+    for i, part in enumerate(parts):
+        part[:, 0 if i % 2 else 3, 2] += ridge
+        part[..., :2] += (i % 2, i // 2)
+    parts[1] = parts[1].transpose(1, 0, 2)
+    parts[2] = parts[2][:, ::-1]
+    steps = steps_to(np.array(parts), 0.004)
+    assert len(np.unique(steps, axis=0)) > 1
+    mesh = tessellated(np.array(parts), steps)
+    places, at = np.unique(mesh.positions, axis=0, return_inverse=True)  # no rounding
+    ends = np.sort(np.concatenate([at[mesh.faces][:, pair] for pair in ([0, 1], [1, 2], [2, 0])]), axis=1)
+    edges, count = np.unique(ends, axis=0, return_counts=True)
+    rim = places[edges[count == 1]][..., :2]
+    assert len(rim) and ((rim == 0) | (rim == 2)).any(axis=-1).all()
+
+
+def test_a_fixed_number_of_steps() -> None:
+    ball = tessellated(octant()[None], 8)
+    assert len(ball.faces) == 2 * 64 - 8, "those at the pole have one triangle"
+    assert ball.patches is not None and np.array_equal(ball.uv, ball.patches.uv.astype(np.float32))
+    assert np.allclose(np.linalg.norm(ball.positions, axis=1), 1, rtol=6e-4)
+
+
+def test_patches_that_are_not_finite_or_flat_have_no_triangles() -> None:
+    broken = sheet()
+    broken[1, 2, 0] = np.nan
+    mesh = tessellated(np.array([broken, sheet(), np.zeros((4, 4, 3))]), 4)
+    assert set(mesh.patch_of_faces.tolist()) == {1} and len(mesh.faces) == 32
+    assert mesh_faults(mesh) == []
+
+
+def test_patches_are_turned_to_the_side_of_their_neighbours() -> None:
+    reversed_ = np.random.default_rng(0).random(32) < 0.35
+    mixed = np.where(reversed_[:, None, None, None], TEAPOT[:, :, ::-1], TEAPOT)
+    assert np.array_equal(oriented_alike(mixed), TEAPOT)
+    far = 1e-3 * mixed + 1e14 / 1024
+    assert len(oriented_alike(far)) == 32, "numbers that overflow nothing"
+    alone = octant()[None, :, ::-1]
+    assert np.array_equal(oriented_alike(alone), alone), "nothing tells which side is outside"
+
+
+def test_a_closed_ball_has_no_open_edge() -> None:
+    turn = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    upper = [octant() @ np.linalg.matrix_power(turn, k) for k in range(4)]
+    control = oriented_alike(np.array([*upper, *(points * (1, 1, -1) for points in upper)]))
+    mesh = tessellated(control, steps_to(control, 0.002))
+    assert boundary_edges(mesh) == 0 and mesh_faults(mesh) == []

@@ -1,0 +1,191 @@
+"""Files of Bezier patches: both layouts, lower degrees, repairs, and one line for everything that is broken."""
+
+from __future__ import annotations
+
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lambent.core.errors import UserError
+from lambent.scenes import load_scene
+from lambent.scenes.geometry import signed_volume, teapot
+from lambent.scenes.loaders import bpt
+from lambent.scenes.replacement import mesh_of
+from tests.scenes.test_bezier import TEAPOT, sheet
+
+
+def text_of(*patches: np.ndarray, count: int | None = None) -> str:
+    """In the layout of PatchOff; patches (p, q, 3) of degrees q - 1 and p - 1."""
+    lines = [str(len(patches) if count is None else count)]
+    for points in patches:
+        lines.append(f"{points.shape[1] - 1} {points.shape[0] - 1}")
+        lines += [" ".join(map(repr, point)) for point in points.reshape(-1, 3).tolist()]
+    return "\n".join(lines) + "\n"
+
+
+def written(path: Path, text: str | bytes) -> Path:
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def test_the_teapot_is_the_built_in_one(tmp_path: Path) -> None:
+    """z up becomes y up; normals point outwards, and the volume is that of the finer of both meshes."""
+    scene = load_scene(written(tmp_path / "pot.bpt", text_of(*TEAPOT)))
+    mesh, built_in = scene.objects[0].mesh, teapot(6.525, 24)
+    assert scene.objects[0].name == "pot" and mesh.patches is not None and len(mesh.patches.control) == 32
+    assert built_in.patches is not None and np.allclose(mesh.patches.control, built_in.patches.control, atol=1e-6)
+    assert signed_volume(mesh) == pytest.approx(signed_volume(built_in), rel=2e-3)
+    assert np.allclose(mesh.bounds, built_in.bounds, atol=1e-2)
+    assert not scene.warnings
+
+
+def test_points_by_number(tmp_path: Path, shared_data: Path) -> None:
+    """The published teapot, in the layout of its first distributions."""
+    found = bpt.read(shared_data / "geometry" / "newell_teapot.bpt.txt")
+    assert found.shape == (32, 4, 4, 3)
+
+    def key(points: np.ndarray) -> tuple[tuple[float, ...], ...]:
+        return tuple(sorted(tuple(p) for p in (points.reshape(-1, 3).round(5) + 0.0).tolist()))
+
+    assert {key(points) for points in found} == {key(points) for points in TEAPOT}
+    points = np.unique(sheet().reshape(-1, 3), axis=0)
+    numbers = [1 + int(np.flatnonzero((points == p).all(axis=1))[0]) for p in sheet().reshape(-1, 3)]
+    lines = ["1", ",".join(map(str, numbers)), str(len(points)), *(",".join(map(repr, p)) for p in points.tolist())]
+    assert np.array_equal(bpt.read(written(tmp_path / "a.bpt", "\r\n".join(lines))), sheet()[None])
+
+
+def test_u_runs_first_and_degrees_are_elevated(tmp_path: Path) -> None:
+    """A "1 2" patch: the first two points are the first edge, the last two the far one (Holmes)."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 1], [1, 1, 1], [0, 2, 0], [1, 2, 0]], float).reshape(3, 2, 3)
+    found = bpt.read(written(tmp_path / "a.bpt", text_of(points)))[0]
+    assert np.allclose(found[0, :, 0], [0, 1 / 3, 2 / 3, 1]) and np.allclose(found[0, :, 1], 0)
+    assert np.allclose(found[:, 0, 1], [0, 2 / 3, 4 / 3, 2]) and np.allclose(found[:, 0, 2], [0, 2 / 3, 2 / 3, 0])
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r", "\n\n \t\n"])
+def test_line_ends_and_blank_lines(tmp_path: Path, end: str) -> None:
+    text = "\ufeff" + end + text_of(sheet(), sheet() + 1.0).replace("\n", end)
+    assert np.array_equal(bpt.read(written(tmp_path / "a.bpt", text)), [sheet(), sheet() + 1.0])
+
+
+def test_broken_patches_are_left_out_and_keep_their_numbers(tmp_path: Path) -> None:
+    broken = sheet()
+    broken[0, 0, 1] = np.nan
+    far = sheet() * 1e30
+    scene = load_scene(written(tmp_path / "a.bpt", text_of(broken, sheet() + 1, np.zeros((4, 4, 3)), sheet(), far)))
+    mesh = scene.objects[0].mesh
+    assert set(mesh.patch_of_faces.tolist()) == {1, 3} and mesh.patches is not None
+    assert len(mesh.patches.control) == 5 and np.isfinite(mesh.patches.control).all()
+    assert scene.warnings[:2] == (
+        "a: patches 1, 5 left out: a control point is not finite",
+        "a: patch 3 left out: no area",
+    )
+
+
+SOUND = text_of(sheet(), sheet() + 1.0)
+BROKEN = {
+    "empty": ("", r"number of patches: file is truncated; found 0 numbers"),
+    "no number": ("patches\n" + SOUND, r"line 1: has a word that is not a number; found 'patches'"),
+    "a word later": (SOUND.replace("3 3\n0.0", "3 3\nzero", 1), r"line 3: .* not a number; found 'zero'"),
+    "two points in a number": (SOUND.replace("3 3\n0.0", "3 3\n0.0.0", 1), r"line 3: .* found '0.0.0'"),
+    "a long word": ("1\n3 3\n" + "x" * 10**6, r"line 3: has a word that is not a number; found 'xxx"),
+    "no patches": ("0\n", r"line 1: number of patches cannot be read; found 0; expected a whole number from 1"),
+    "half a patch": ("1.5\n" + SOUND, r"line 1: number of patches cannot be read; found 1.5"),
+    "a count that is not finite": ("nan\n" + SOUND, r"line 1: number of patches cannot be read; found nan"),
+    "too many": (
+        text_of(sheet(), count=900_000_000_000),
+        r"a.bpt: patches: file is truncated; found 50 numbers; expected at least 12600000000000",
+    ),
+    "one missing": (text_of(sheet(), sheet(), count=3), r"file is truncated"),
+    "one too many": (text_of(sheet(), sheet(), count=1), r"line 19: has numbers after its last patch; found 3"),
+    "degree 4": (text_of(sheet()).replace("3 3", "4 3"), r"line 2: degree in u of patch 1 .* found 4; .* from 1 to 3"),
+    "degree 0": (text_of(sheet()).replace("3 3", "3 0"), r"line 2: degree in v of patch 1 .* found 0"),
+    "degree 2.5": (text_of(sheet()).replace("3 3", "2.5 3"), r"degree in u of patch 1 cannot be read; found 2.5"),
+    "a short last patch": (SOUND[: SOUND.rindex("\n", 0, -2)], r"control points of patch 2: file is truncated"),
+    "nothing finite": (
+        text_of(sheet() * np.nan),
+        r"holds no patch with an area; patch 1 left out: a control point is not finite",
+    ),
+    "nothing but points": (text_of(np.ones((4, 4, 3))), r"holds no patch with an area"),
+    "no area": (text_of(sheet() * (1, 0, 0)), r"holds no patch with an area"),
+    "point 0": (
+        "1\n" + "0 " * 16 + "\n1\n1 2 3\n",
+        r"line 2: point of patch 1 does not exist; found 0; .* from 1 to 1",
+    ),
+    "point 2 of 1": ("1\n" + "1 " * 15 + "2\n1\n1 2 3\n", r"line 2: point of patch 1 .* found 2"),
+    "points of points": ("1\n" + "1 " * 16 + "\n9999999999999\n1 2 3\n", r"points: file is truncated"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_broken_files_are_one_line(tmp_path: Path, name: str) -> None:
+    text, said = BROKEN[name]
+    with pytest.raises(UserError, match=said) as error:
+        load_scene(written(tmp_path / "a.bpt", text))
+    assert "\n" not in str(error.value) and "a.bpt" in str(error.value)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=5))
+def test_damaged_bytes_are_one_line_or_a_scene(tmp_path_factory: pytest.TempPathFactory, damage: list) -> None:
+    data = bytearray(SOUND.encode())
+    for at, byte in damage:
+        data[at % len(data)] = byte
+    path = written(tmp_path_factory.getbasetemp() / "damaged.bpt", bytes(data))
+    try:
+        assert load_scene(path).objects
+    except UserError as error:
+        assert "\n" not in str(error)
+
+
+def test_many_patches_are_read_within_bounds(tmp_path: Path) -> None:
+    """100,000 patches: at two triangles each, where none is large enough to bend visibly."""
+    one = text_of(sheet()).split("\n", 1)[1]
+    path = written(tmp_path / "a.bpt", "100000\n" + "".join(chain.from_iterable([one] * 99_999)) + one)
+    assert len(bpt.read(path)) == 100_000
+    mesh = load_scene(
+        written(tmp_path / "b.bpt", text_of(*(np.add(sheet(), (i % 30, i // 30, 0)) for i in range(900))))
+    )
+    assert len(mesh.objects[0].mesh.faces) == 1800
+
+
+def test_patches_replace_an_object_and_stand_in_a_scene_toml(tmp_path: Path) -> None:
+    """Scaled from the file's unit; densities by patch are checked against the patches of each object."""
+    file = written(tmp_path / "pot.bpt", text_of(*TEAPOT))
+    assert len(mesh_of(str(file)).faces) > 5000
+    head = 'format = "lambent-scene"\nversion = 1\nname = "s"\ngeometry = { file = "pot.bpt", scale = 0.05 }\n'
+
+    def scene(light_field: str) -> Path:
+        return written(tmp_path / "scene.toml", f"{head}[objects.pot]\nlight_field = {light_field}\n")
+
+    loaded = load_scene(scene("{ patch_density = { 1 = 4.0, 5-8 = 0.5 } }"))
+    patches = loaded.objects[0].mesh.patches
+    assert patches is not None and np.allclose(np.ptp(patches.control[..., 1]), 0.05 * np.ptp(TEAPOT[..., 2]))
+    assert loaded.light_fields["pot"].patch_density == (4.0, 1, 1, 1, *[0.5] * 4, *[1.0] * 24)
+    listed = load_scene(scene(f"{{ patch_density = {[2.0] * 31 + [0]} }}")).light_fields["pot"].patch_density
+    assert listed == (*[2.0] * 31, 0.0)
+    for told, said in {
+        "{ patch_density = [1.0, 2.0] }": r"objects.pot.light_field.patch_density: pot has 32 patches; found 2 dens",
+        "{ patch_density = { 33 = 1.0 } }": r"pot has 32 patches; found patch 33",
+        "{ patch_density = { 1-999999999 = 1.0 } }": r"pot has 32 patches; found patch 999999999",
+        "{ patch_density = { 0 = 1.0 } }": r"'0' is no number of a patch",
+        "{ patch_density = { 5-3 = 1.0 } }": r"'5-3' is no number of a patch",
+        "{ patch_density = { lid = 1.0 } }": r"'lid' is no number of a patch",
+        "{ patch_density = { 1 = -1.0 } }": r"a density of -1.0 is not a number from 0",
+        "{ patch_density = { 1 = nan } }": r"a density of nan is not",
+        "{ patch_density = { 1 = true } }": r"a density of True is not",
+        "{ patch_density = { 1-32 = 0 } }": r"pot would have no points: every density is 0",
+        "{ patch_density = 2.0 }": r"must be a list with a number for each patch, or a table",
+        "{ patch_density = [] }": r"must be a list",
+        "{ patch_density = [1.0], volume = true }": r"not to a volume",
+    }.items():
+        with pytest.raises(UserError, match=said):
+            load_scene(scene(told))
+    other = head.replace('{ file = "pot.bpt", scale = 0.05 }', '"builtin:box"')
+    text = f"{other}[objects.sphere]\nlight_field = {{ patch_density = {{ 1 = 2 }} }}\n"
+    with pytest.raises(UserError, match=r"sphere has no Bezier patches"):
+        load_scene(written(tmp_path / "scene.toml", text))
