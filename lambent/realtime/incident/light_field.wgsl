@@ -23,6 +23,7 @@ override FIRST: f32 = 0.15;
 override LAST: f32 = 1.0;
 override TOLERANCE: f32 = 0.15;
 override ALIKE: f32 = 0.15;
+override STEEPNESS: f32 = 3.0;
 override SURFACE: bool = false; // points also show the surface itself
 override HAS_SKY: bool = true; // a separate sky; else the maps hold the sky
 
@@ -38,6 +39,7 @@ const MARCHED = 5u;
 const CHOSEN = 6u;
 
 const NO_POINT = 0xffffu;
+const UNCUT = 2.0;
 
 fn points_near(uv2: vec2f) -> vec4u {
     let texel = vec2i(floor(uv2 * field.grid - field.corner));
@@ -229,8 +231,33 @@ fn found_by_points(s: Surface, r: vec3f) -> vec4f {
 // whose edges lie beside the ray, if all points do.
 fn is_sky(s: Surface, found: vec4f, half_log2_omega: f32) -> bool {
     let asked = (vec4u(0u, 1u, 2u, 3u) < vec4u(MARCHES)) & (s.points != vec4u(NO_POINT));
-    let sharp = half_log2_omega + log2(0.5 * f32(field.side)) < 0.0;
-    return largest_of(found) == SKY && (sharp || all(!asked | (found == vec4f(SKY))));
+    return largest_of(found) == SKY && (is_narrow(half_log2_omega) || all(!asked | (found == vec4f(SKY))));
+}
+
+// Whether a bundle of rays is narrower than a texel.
+fn is_narrow(half_log2_omega: f32) -> bool {
+    return half_log2_omega + log2(0.5 * f32(field.side)) < 0.0;
+}
+
+// Light of a surface at x, relative to the object, as points with weights see it, and its share before the sky: by the
+// points' mean coverage, between quarters of texels, made steeper. The share is UNCUT where no point sees an edge.
+fn edge_at(s: Surface, x: vec3f, weights: vec4f) -> vec4f {
+    var cut = false;
+    for (var j = 0u; j < MARCHES; j++) {
+        if (s.points[j] == NO_POINT) { continue; }
+        cut |= cover_along(map_of(s.points[j]), x - place_of_point(s.points[j])) != 15u;
+    }
+    var light = vec3f(0.0);
+    var shows = 1e-9;
+    var sum = vec2f(0.0, 1e-9); // of shares, and number of points
+    for (var j = 0u; j < MARCHES && cut; j++) {
+        if (s.points[j] == NO_POINT) { continue; }
+        let edge = edge_along(map_of(s.points[j]), x - place_of_point(s.points[j]));
+        light += weights[j] * edge.light;
+        shows += weights[j] * edge.shows;
+        sum += vec2f(edge.share, 1.0);
+    }
+    return select(vec4f(0.0, 0.0, 0.0, UNCUT), vec4f(light / shows, saturate((sum.x / sum.y - 0.5) * STEEPNESS + 0.5)), cut);
 }
 
 // Light of the nearest surface that a point verifies, blended over the points that agree on it. If no point verifies a
@@ -241,8 +268,13 @@ fn marched_light(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
         return light_of_sky(r, half_log2_omega) * object.sky_change.rgb;
     }
     let nearest = max(largest_of(found), 0.0);
-    let light = weighted(s, r, max(found, vec4f(0.0)), weights_of_found(s, found), half_log2_omega);
-    return light * change_along(s, r, nearest, half_log2_omega);
+    let weights = weights_of_found(s, found);
+    let light = weighted(s, r, max(found, vec4f(0.0)), weights, half_log2_omega);
+    let change = change_along(s, r, nearest, half_log2_omega);
+    if (!HAS_SKY || !QUARTERS || nearest <= 0.0 || !is_narrow(half_log2_omega)) { return light * change; }
+    let edge = edge_at(s, s.x + object.centre.xyz + r / nearest, weights);
+    if (edge.a == UNCUT) { return light * change; }
+    return mix(light_of_sky(r, half_log2_omega) * object.sky_change.rgb, edge.rgb * change, edge.a);
 }
 
 // Weights of the points that agree on the nearest surface; of all points if none has found one.
