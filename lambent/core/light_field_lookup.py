@@ -218,35 +218,26 @@ def _answered(
     if sky is not None and (either := in_sky | met).any():
         other[either] = sky(w[either])
     radiance = np.where(met[:, None], seen, other)
-    if edges is not None and field.cover is not None and met.any():
-        at = np.flatnonzero(met)
-        shown, share, cut = _edges(
-            field, place.x[at] + first[at, None] * w[at], place.named(count)[at], weight[at], known[at]
-        )
-        mixed = share[:, None] * shown + (1 - share[:, None]) * other[at]
-        radiance[at[cut]] = mixed[cut]
+    if edges is not None and field.cover is not None:
+        point = place.named(count)
+        at_edge = known & (open_sky | (np.isfinite(t) & (cover_along(field, point, q) != WHOLE)))
+        at = np.flatnonzero(met & at_edge.any(axis=1))
+        hit = place.x[at] + first[at, None] * w[at]
+        shown, share = _edge(field, hit, point[at], weight[at], known[at])
+        radiance[at] = share[:, None] * shown + (1 - share[:, None]) * other[at]
     return Marched(radiance, met, in_sky, first)
 
 
-def _edges(
-    field: LightField, hit: Floats, point: Indices, weight: Floats, known: Flags
-) -> tuple[Floats, Floats, Flags]:
-    """At hits (k, 3): radiance of the surface, its share before the sky, and whether any point sees an edge there.
+def _edge(field: LightField, hit: Floats, point: Indices, weight: Floats, known: Flags) -> tuple[Floats, Floats]:
+    """Radiance of the surface at hits (k, 3), as points (k, j) with weights see it, and its share before the sky.
 
-    Marches end at the surface if one of the points sees it there, so that edges seen by four points spread. The points'
-    mean coverage, between quarters of texels, places the edge; steeper, it is as sharp as a quarter.
+    A hit counts if one of four points sees it, so that edges spread. Here the points' mean coverage, between quarters
+    of texels, places the edge; made steeper, it is as sharp as a quarter.
     """
-    q = hit[:, None] - field.points[point]
-    light, shows, share = surface_along(field, point, q)
-    count = np.maximum(known.sum(axis=1), 1)
-    mean = (share * known).sum(axis=1) / count
-    total = np.maximum(np.einsum("kj,kj->k", weight, shows), 1e-9)
-    cut = ((cover_along(field, point, q) != WHOLE) & known).any(axis=1)
-    return (
-        np.einsum("kj,kjc->kc", weight, light) / total[:, None],
-        np.clip((mean - 0.5) * EDGE_STEEPNESS + 0.5, 0, 1),
-        np.asarray(cut),
-    )
+    light, shows, share = surface_along(field, point, hit[:, None] - field.points[point])
+    mean = (share * known).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    total = np.maximum(np.einsum("kj,kj->k", weight, shows), 1e-9)[:, None]
+    return np.einsum("kj,kjc->kc", weight, light) / total, np.clip((mean - 0.5) * EDGE_STEEPNESS + 0.5, 0, 1)
 
 
 def surface(field: LightField, place: Place) -> tuple[Floats, Flags]:

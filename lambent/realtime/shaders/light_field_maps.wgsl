@@ -134,11 +134,6 @@ fn edge_along(map: Map, w: vec3f) -> Edge {
     return found;
 }
 
-fn cover_along(map: Map, w: vec3f) -> u32 {
-    let texel = min(vec2u(map_place(w) * f32(field.side)), vec2u(field.side - 1u));
-    return texel_of(map, texel + 1u).cover;
-}
-
 // A texel of a tile. In half floats, the flags of the quarters are the lowest bits of the distance, and its sign.
 fn texel_of(map: Map, texel: vec2u) -> Texel {
     if (BLOCKS) { return texel_of_block(map, texel); }
@@ -178,11 +173,12 @@ fn of_entry(map: Map, corner: vec2u, number: u32, i: u32) -> u32 {
     return (select(words.x, words.y, i >= 8u) >> (4u * (i & 7u))) & 15u;
 }
 
-// Inverse distance, 1/m, in the quarter of a texel that a direction falls into; 0 for the sky.
-fn inverse_distance(map: Map, w: vec3f) -> f32 {
+// The texel that a direction falls into; its inverse distance is 0 if the direction's quarter shows the sky.
+fn texel_along(map: Map, w: vec3f) -> Texel {
     let at = map_place(w) * f32(field.side);
     let texel = min(vec2u(at), vec2u(field.side - 1u));
     let found = texel_of(map, texel + 1u);
     let beyond = select(vec2u(0u), vec2u(1u), at - vec2f(texel) >= vec2f(0.5));
-    return select(0.0, found.inverse, ((found.cover >> (2u * beyond.y + beyond.x)) & 1u) == 1u);
+    let shows = ((found.cover >> (2u * beyond.y + beyond.x)) & 1u) == 1u;
+    return Texel(select(0.0, found.inverse, shows), found.cover);
 }
