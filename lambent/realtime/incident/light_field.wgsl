@@ -50,29 +50,6 @@ fn map_size() -> vec2i {
     return select(size, vec2i(size.x, size.y / 2), GLASS);
 }
 
-fn exit_of(texel: vec2i) -> vec4f {
-    let size = map_size();
-    let bits = textureLoad(sample_map, clamp(texel, vec2i(0), size - 1) + vec2i(0, size.y), 0);
-    return vec4f(unpack2x16float(bits.x | (bits.y << 16u)), unpack2x16float(bits.z | (bits.w << 16u)));
-}
-
-// The back face behind a point of the surface, interpolated between the four nearest texels; the nearest texel alone if
-// one of them has none. `front`: seen from the side of the normal.
-fn exit_near(uv2: vec2f, front: bool) -> vec4f {
-    if (!GLASS) { return vec4f(0.0); }
-    let at = uv2 * field.grid - field.corner - 0.5;
-    let low = vec2i(floor(at));
-    let share = fract(at);
-    let a = exit_of(low);
-    let b = exit_of(low + vec2i(1, 0));
-    let c = exit_of(low + vec2i(0, 1));
-    let d = exit_of(low + 1);
-    let between = mix(mix(a, b, share.x), mix(c, d, share.x), share.y);
-    let nearest = exit_of(vec2i(floor(at + 0.5)));
-    let whole = min(min(a.w, b.w), min(c.w, d.w)) >= 0.0;
-    return select(vec4f(0.0, 0.0, 0.0, -1.0), select(nearest, between, whole), front);
-}
-
 fn place_of_point(point: u32) -> vec3f {
     return textureLoad(points, vec2u(point & 255u, point >> 8u), 0).xyz;
 }
