@@ -6,12 +6,16 @@ directions (..., 3) need not be unit.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats, Indices
 from lambent.core.light_field import SKY_SHARE, LightField, Sky
 from lambent.core.octahedral import texel_directions, to_square
+
+WHOLE = 15  # `LightField.cover` of a texel without sky
 
 
 def nearest_points(field: LightField, uv2: Floats) -> Indices:
@@ -32,24 +36,34 @@ def radiance_along(field: LightField, point: Indices, w: Floats, sky: Sky | None
 
     Texels that show both surfaces and sky hold the light of the surfaces; a given `sky` is mixed in by its share.
     """
-    n = field.radiance.shape[1]
-    at = to_square(w) * n - 0.5
-    low = np.floor(at)
-    share = at - low
-    column, row = low[..., 0].astype(np.int64), low[..., 1].astype(np.int64)
     total, open_sky = np.zeros(w.shape), np.zeros(w.shape[:-1])
     mixes = sky is not None and field.cover is not None
-    for i in (0, 1):
-        for j in (0, 1):
-            weight = np.abs(1 - j - share[..., 0]) * np.abs(1 - i - share[..., 1])
-            texel = (point, *_on_map(row + i, column + j, n))
-            if mixes and field.cover is not None:
-                part = SKY_SHARE[field.cover[texel]] * weight
-                open_sky, weight = open_sky + part, weight - part
-            total += weight[..., None] * field.radiance[texel]
+    for weight, texel in _between(point, w, field.radiance.shape[1]):
+        if mixes and field.cover is not None:
+            part = SKY_SHARE[field.cover[texel]] * weight
+            open_sky, weight = open_sky + part, weight - part
+        total += weight[..., None] * field.radiance[texel]
     if sky is not None and (edge := open_sky > 0).any():
         total[edge] += open_sky[edge][:, None] * sky(w[edge])
     return total
+
+
+def surface_along(field: LightField, point: Indices, w: Floats) -> tuple[Floats, Floats, Floats]:
+    """Surfaces before the sky between the four nearest texels, in light fields with `cover`.
+
+    Returns the radiance (..., 3) of texels that show surfaces, times their share (...) of the interpolation, and the
+    share (...) of the sky that surfaces cover, between the four nearest quarters of texels.
+    """
+    assert field.cover is not None, "only quarters of texels tell edges"
+    n = field.radiance.shape[1]
+    light, shows, share = np.zeros(w.shape), np.zeros(w.shape[:-1]), np.zeros(w.shape[:-1])
+    for weight, texel in _between(point, w, n):
+        weight = np.where(field.cover[texel] != 0, weight, 0.0)
+        light, shows = light + weight[..., None] * field.radiance[texel], shows + weight
+    for weight, (_, row, column) in _between(point, w, 2 * n):
+        bit = field.cover[point, row // 2, column // 2] >> (2 * (row % 2) + column % 2).astype(np.uint8)
+        share += weight * (bit & 1)
+    return light, shows, share
 
 
 def whole_texels(radiance: Floats, cover: NDArray[np.uint8], sky: Sky) -> Floats:
@@ -68,15 +82,39 @@ def nearness_along(field: LightField, point: Indices, w: Floats) -> Floats:
 
     In texels that show both, the quarter decides.
     """
-    n = field.inverse_distance.shape[1]
-    place = to_square(w) * n
-    at = np.minimum(place.astype(np.int64), n - 1)
+    place, at = _texel_along(field, w)
     found = np.asarray(field.inverse_distance[point, at[..., 1], at[..., 0]], np.float64)
     if field.cover is None:
         return found
     half = place - at >= 0.5
     bit = field.cover[point, at[..., 1], at[..., 0]] >> (2 * half[..., 1] + half[..., 0]).astype(np.uint8)
     return np.where(bit & 1, found, 0.0)
+
+
+def cover_along(field: LightField, point: Indices, w: Floats) -> NDArray[np.uint8]:
+    """(...) bits of `LightField.cover` of the nearest texel along directions."""
+    assert field.cover is not None, "this light field has whole texels"
+    _, at = _texel_along(field, w)
+    return np.asarray(field.cover[point, at[..., 1], at[..., 0]])
+
+
+def _between(point: Indices, w: Floats, n: int) -> Iterator[tuple[Floats, tuple[Indices, Indices, Indices]]]:
+    """The four nearest texels of maps of n x n: weights (...) and indices of points, rows and columns."""
+    at = to_square(w) * n - 0.5
+    low = np.floor(at)
+    share = at - low
+    column, row = low[..., 0].astype(np.int64), low[..., 1].astype(np.int64)
+    for i in (0, 1):
+        for j in (0, 1):
+            weight = np.abs(1 - j - share[..., 0]) * np.abs(1 - i - share[..., 1])
+            yield weight, (point, *_on_map(row + i, column + j, n))
+
+
+def _texel_along(field: LightField, w: Floats) -> tuple[Floats, Indices]:
+    """Place (..., 2) on a map along directions, in texels, and the texel's column and row."""
+    n = field.inverse_distance.shape[1]
+    place = to_square(w) * n
+    return place, np.minimum(place.astype(np.int64), n - 1)
 
 
 def _on_map(row: Indices, column: Indices, n: int) -> tuple[Indices, Indices]:

@@ -1,8 +1,9 @@
 """Light through thin pieces of glass, refracted on entry and on exit.
 
 Thesis R, "Thin Lens Refractions", looks light up along the refracted direction. Here both faces refract; the second is
-approximated by the plane behind the first along its normal (`light_field.Glass`). A pane then displaces light and keeps
-its direction, a lens bends it, and a thick body is approximate. Light mirrored by inner faces comes from the surface's
+approximated by a plane (`light_field.Glass`): by the one behind the surface along its normal, it is found where the ray
+leaves about, and the plane behind that place is taken. A pane then displaces light and keeps its direction, a lens
+bends it, and a thick body is approximate. Light mirrored by inner faces comes from the surface's
 own mirror direction, as if all faces were parallel: clear glass in even light is then as bright as its background.
 Directions are unit, of rays from the viewer onwards. The shader is realtime/shaders/thin_glass.wgsl.
 """
@@ -16,6 +17,7 @@ import numpy as np
 from lambent.core.arrays import Floats
 
 MOST_R0 = 0.9  # largest r0 from which an index of refraction is derived
+SAME_FACE = 0.7  # least cosine between normals of one face at neighbouring places
 LEAST_COSINE = 0.1  # to the second face: at grazing rays the exit would be too far away
 
 
@@ -55,6 +57,31 @@ def refracted(w: Floats, n: Floats, ratio: float) -> tuple[Floats, Floats]:
     through = ratio * w + (ratio * cosine - np.sqrt(np.maximum(square, 0))) * n
     passes = square[..., 0] >= 0
     return np.where(passes[..., None], through, w + 2 * cosine * n), passes
+
+
+def sideways(offset: Floats, n: Floats) -> Floats:
+    """Offsets (k, 3) along surfaces of normals n (k, 3): from a place to the one above a ray's exit."""
+    return np.asarray(offset - np.sum(offset * n, axis=-1, keepdims=True) * n)
+
+
+def exits_beside(exits: Floats, beside: Floats, step: Floats, n: Floats) -> Floats:
+    """The face behind another place of the surface, as exits (k, 4) of the first place.
+
+    Parameters
+    ----------
+    exits, beside : (k, 4) as in `light_field.Glass`, of the place and of the other one.
+    step : (k, 3) from the place to the other one, across the normal.
+    n : (k, 3) normals of the place, towards the viewer.
+
+    Exits that do not continue the face (sheets, or normals more than acos(SAME_FACE) apart, as beyond an edge) are
+    left as they are.
+    """
+    share, other = (np.maximum(np.linalg.norm(of[:, :3], axis=-1), 1e-6) for of in (exits, beside))
+    along = np.sum(n * beside[:, :3], axis=-1)
+    same = np.sum(exits[:, :3] * beside[:, :3], axis=-1) > SAME_FACE * share * other
+    same &= (exits[:, 3] >= 0) & (beside[:, 3] >= 0) & (along < 0)
+    depth = beside[:, 3] - np.sum(step * beside[:, :3], axis=-1) / np.where(along < 0, along, -1.0)
+    return np.where(same[:, None], np.column_stack([beside[:, :3], np.maximum(depth, 0)]), exits)
 
 
 def through_glass(w: Floats, n: Floats, exits: Floats, eta: float) -> tuple[Floats, Floats, Floats, Floats]:

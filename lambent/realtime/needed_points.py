@@ -1,62 +1,104 @@
-"""Points of a light field that a view needs, computed on the CPU: the sample map's points on visible triangles."""
+"""Points of a light field that a view needs, computed on the CPU: the sample map's points where the object is visible.
+
+An object is visible where it lies in the picture and faces the eye. Its back is visible where no face of the same
+object that faces the eye lies before it, as on sheets and inside open vessels. Other objects hide nothing here.
+"""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.geometry import area_vectors
 from lambent.core.light_field import NO_POINT, LightField
-from lambent.realtime.clusters import Ranges
 from lambent.realtime.resident_maps import filled
 
 MOST_SIDE = 64  # most samples along a side of a triangle
-AWAY = 1e-3  # weight of back faces: sheets, and triangles of reversed winding
+APART = 0.5  # texels of the sample map between samples
+MARGIN = 1.05  # of the picture, relative to its half: antialiasing moves it by parts of pixels
 
 
 class NeededPoints:
-    """Finds the points of each triangle of one object once; then ranks the points for each view."""
+    """Divides the triangles of one object into patches, one for each point they name; ranks the points for views."""
 
     def __init__(self, triangles: Floats, uv2: Floats, field: LightField) -> None:
         """`triangles` (F, 3, 3) in the world, metres; `uv2` (F, 3, 2) of their corners."""
-        self._centres, self._areas = triangles.mean(axis=1), area_vectors(triangles)
         self._count = len(field.points)
-        faces, points = _named(uv2 * np.array(field.grid[::-1]) - np.array(field.corner[::-1]), field)
-        pairs, seen = np.unique(faces * NO_POINT + points, return_counts=True)
-        self._faces, self._points = np.divmod(pairs, NO_POINT)
-        self._shares = seen / np.bincount(self._faces, seen, minlength=len(triangles))[self._faces]
+        face, shares, point = _samples(uv2 * np.array(field.grid[::-1]) - np.array(field.corner[::-1]), field)
+        at = np.einsum("sc,scd->sd", shares, triangles[face])
+        pairs, patch, size = np.unique(face * NO_POINT + point, return_inverse=True, return_counts=True)
+        faces, self._points = np.divmod(pairs, NO_POINT)
+        sums = [np.bincount(patch, of, minlength=len(pairs)) for of in at.T]
+        self._at = np.stack(sums, axis=-1) / np.maximum(size, 1)[:, None]
+        self._radius_m = np.zeros(len(pairs))
+        np.maximum.at(self._radius_m, patch, np.linalg.norm(at - self._at[patch], axis=-1))
+        share = size / np.bincount(faces, size, minlength=len(triangles))[faces]
+        self._areas = area_vectors(triangles)[faces] * share[:, None]
+        if np.einsum("pd,pd", self._areas, field.points[self._points] - self._at) < 0:
+            self._areas *= -1  # towards the points, whatever the winding
 
-    def of_view(self, eye: Floats, runs: Ranges) -> NDArray[np.int64]:
-        """Points by the solid angle, seen from `eye`, that they serve, largest first; `runs` (first, count) in view."""
-        inside = np.zeros(len(self._centres), bool)
-        for first, count in runs:
-            inside[first : first + count] = True
-        towards = eye - self._centres
-        away = np.maximum(np.linalg.norm(towards, axis=-1), 1e-9)
-        angle = (self._areas * towards).sum(axis=-1) / away**3
-        weights = np.where(angle > 0, angle, -AWAY * angle) * inside
-        weights = np.bincount(self._points, weights[self._faces] * self._shares, minlength=self._count)
+    def of_view(self, eye: Floats, clip_from_world: Floats) -> NDArray[np.int64]:
+        """Points by the solid angle, seen from `eye`, that they serve, largest first.
+
+        `clip_from_world` (4, 4) takes column vectors to WebGPU's clip space.
+        """
+        x, y, _, w = clip_from_world
+        planes = np.stack([MARGIN * w + side for side in (x, -x, y, -y)])
+        within = np.einsum("pd,sd->sp", self._at, planes[:, :3]) + planes[:, 3:]  # `@` keeps all cores busy
+        beside = self._radius_m * np.linalg.norm(planes[:, :3], axis=1)[:, None]
+        seen = np.flatnonzero((within >= -beside).all(axis=0))
+        at, points = self._at[seen], self._points[seen]
+        towards = eye - at
+        away = np.maximum(np.sqrt(np.einsum("pd,pd->p", towards, towards)), 1e-9)
+        angle = np.einsum("pd,pd->p", self._areas[seen], towards) / (away * away * away)
+        across, up, depth = (np.einsum("pd,d->p", at, row[:3]) + row[3] for row in (x, y, w))
+        places = np.stack([across, up], axis=-1) / np.maximum(depth, 1e-9)[:, None]
+        shown = np.count_nonzero(np.bincount(points[angle >= 0], minlength=self._count))
+        cells = math.ceil(math.sqrt(shown))  # as far apart as points: patches leave none empty
+        angles = np.where(_hidden(places, away, angle >= 0, cells), 0.0, np.abs(angle))
+        weights = np.bincount(points, angles, minlength=self._count)
         order = np.argsort(-weights, kind="stable")
         return np.asarray(order[weights[order] > 0])
 
 
-def _named(texels: Floats, field: LightField) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs (triangle, point) of the sample map at samples about a texel apart; `texels` (F, 3, 2) are corners."""
+def _hidden(places: Floats, away: Floats, front: Flags, cells: int) -> Flags:
+    """Which patches at places (k, 2) of the picture are backs with a front at shorter distance (k,) in the same cell.
+
+    The bounding box of the places has `cells` cells a side.
+    """
+    if not front.any():
+        return np.zeros(len(front), bool)
+    low, size = places.min(axis=0), np.maximum(np.ptp(places, axis=0), 1e-9)
+    column, row = np.minimum((places - low) / size * cells, cells - 1).astype(np.int64).T
+    cell, nearest = row * cells + column, np.full(cells * cells, np.inf)
+    np.minimum.at(nearest, cell[front], away[front])
+    return np.asarray(~front & (nearest[cell] < away))
+
+
+def _samples(texels: Floats, field: LightField) -> tuple[Indices, Floats, Indices]:
+    """Samples of triangles about APART texels of the sample map apart; `texels` (F, 3, 2) are their corners.
+
+    Returns face (S,), barycentric shares (S, 3) and point (S,): one for each point that a place names.
+    """
     sample_map = filled(field.sample_map)
+    limits = np.array(sample_map.shape[1::-1]) - 1
     edges = np.linalg.norm(texels - np.roll(texels, 1, axis=1), axis=-1).max(axis=1)
-    sides = np.clip(np.ceil(np.nan_to_num(edges)), 1, MOST_SIDE).astype(int)
-    faces, points = [], []
+    sides = np.clip(np.ceil(np.nan_to_num(edges) / APART), 1, MOST_SIDE).astype(int)
+    faces, shares, points = [np.zeros(0, np.int64)], [np.zeros((0, 3))], [np.zeros(0, np.int64)]
     for side in np.unique(sides):
         of = np.flatnonzero(sides == side)
-        i, j = np.indices((side + 1, side + 1)).reshape(2, -1)
-        i, j = i[i + j <= side], j[i + j <= side]
-        shares = np.stack([i, j, side - i - j], axis=-1) / side
-        at = np.nan_to_num(np.einsum("mc,fcd->fmd", shares, texels[of]))
-        limits = np.array(sample_map.shape[1::-1]) - 1
+        i, j = np.indices((side, side)).reshape(2, -1)
+        i, j = i[i + j < side], j[i + j < side]
+        inside = (np.stack([i, j, side - 1 - i - j], axis=-1) + 1 / 3) / side
+        at = np.nan_to_num(np.einsum("mc,fcd->fmd", inside, texels[of]))
         column, row = np.moveaxis(np.clip(np.floor(at), 0, limits).astype(int), -1, 0)
-        named = sample_map[row, column].astype(np.int64).reshape(len(of), -1)
-        faces.append(np.repeat(of, named.shape[1])[named.ravel() != NO_POINT])
-        points.append(named.ravel()[named.ravel() != NO_POINT])
-    none = np.zeros(0, np.int64)
-    return np.concatenate([none, *faces]), np.concatenate([none, *points])
+        named = sample_map[row, column].astype(np.int64)
+        known = named != NO_POINT
+        face, place, _ = np.nonzero(known)
+        faces.append(of[face])
+        shares.append(inside[place])
+        points.append(named[known])
+    return np.concatenate(faces), np.concatenate(shares), np.concatenate(points)

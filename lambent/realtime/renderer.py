@@ -273,7 +273,7 @@ class Renderer:
         views = self._planar_views(state, data, panes)
         reflecting = {part.object for view in views for part in view.reflector.parts}
         draws = draws_of(state, self.resources, reflecting, panes)
-        self.streaming.follow(draws, data, self._clusters, waits=self.waits)
+        self.streaming.follow(draws, data, waits=self.waits)
         passing = target_view is not None and state.accumulate is None  # seen once, so half floats do
         halves = passing or self.resources.mixes_parts or panes  # single precision cannot be blended everywhere
         target = self._targets.fit(state.size, "rgba16float" if halves else "rgba32float", passing=passing)

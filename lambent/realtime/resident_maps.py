@@ -28,10 +28,17 @@ TURNED = 0.25  # distance that a unit difference of normals counts as, relative 
 
 @dataclass
 class Reads:
-    """Hits and misses of a cache, by map, since it was made."""
+    """Reads of maps: each frame reads each map that it needs once.
+
+    `hits` and `misses` count since the cache was made: the map was resident when the frame asked for it, or not.
+    `wanted` is the number of maps that the last frame needed, `no_room` of those beyond the budget, for which others
+    stand in.
+    """
 
     hits: int = 0
     misses: int = 0
+    wanted: int = 0
+    no_room: int = 0
 
 
 class ResidentMaps:
@@ -90,15 +97,17 @@ class ResidentMaps:
     def follow(self, wanted: Sequence[int], *, waits: bool) -> None:
         """Load the maps that a view needs, most needed first, as far as they fit.
 
-        With `waits`, return when all are resident. Otherwise write the batch that is prepared, and start the next one
-        in a thread.
+        With `waits`, return when all that fit are resident. Otherwise write the batch that is prepared, and start the
+        next one in a thread.
         """
+        found = sum(int(point) in self._place for point in wanted)
+        self.reads.hits, self.reads.misses = self.reads.hits + found, self.reads.misses + len(wanted) - found
+        self.reads.wanted, self.reads.no_room = len(wanted), max(len(wanted) - self.atlas.places, 0)
         wanted = [int(point) for point in wanted[: self.atlas.places]]
         missing = [point for point in wanted if point not in self._place]
-        self.reads.misses += len(missing)
-        self.reads.hits += len(wanted) - len(missing)
+        keep = set(wanted)
         for point in reversed(wanted):
-            self._cache.read(point)
+            self._cache.read(point, keep)
         if self._ready is not None and (waits or self._ready.done()):
             self._write(*self._ready.result())
             self._ready = None

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from lambent.realtime.baked import BakedScene
-from lambent.realtime.clusters import Clusters
 from lambent.realtime.draws import Draw
 from lambent.realtime.needed_points import NeededPoints
-from lambent.realtime.resident_maps import ResidentMaps
+from lambent.realtime.resident_maps import Reads, ResidentMaps
 from lambent.realtime.resources import ObjectResources
 from lambent.realtime.structs import Record
+
+COUNTS = tuple(count.name for count in fields(Reads))
 
 
 class Streaming:
@@ -23,17 +25,15 @@ class Streaming:
         self._scene, self._objects = scene, [item for item in objects if item.light.probe.most_bytes is not None]
         self._needed: dict[str, NeededPoints] = {}
 
-    def follow(self, draws: Iterable[Draw], data: Record, clusters: Clusters, *, waits: bool) -> None:
-        """Request the maps that the draws of a frame need; with `waits`, return when all are resident."""
+    def follow(self, draws: Iterable[Draw], data: Record, *, waits: bool) -> None:
+        """Request the maps that the draws of a frame need; with `waits`, return when all that fit are resident."""
         drawn = [draw for draw in draws if draw.item in self._objects]
         for draw in drawn:
             _ = draw.object_group  # makes the cache on first use
             if not (streams := draw.item.light.streams):
                 continue
-            record = draw.item.record
-            runs = clusters.seen(data["clip_from_world"].T).of(record.first_face, record.face_count)
-            within = [(first - record.first_face, count) for first, count in runs]
-            wanted = self._needed_of(draw.item).of_view(np.asarray(data["eye"][:3], float), within)
+            eye, clip_from_world = np.asarray(data["eye"][:3], float), np.asarray(data["clip_from_world"].T, float)
+            wanted = self._needed_of(draw.item).of_view(eye, clip_from_world)
             for maps in streams:
                 maps.follow(wanted.tolist(), waits=waits)
 
@@ -62,7 +62,7 @@ class Streaming:
 
     @property
     def statistics(self) -> dict[str, Any]:
-        """Policy of the caches; for light fields with a budget: maps, resident maps, their MB, hits and misses."""
+        """Of light fields beyond their budget: policy, maps, resident maps, their MB, and `resident_maps.Reads`."""
         caches = list(self._caches())
         if not caches:
             return {}
@@ -71,6 +71,5 @@ class Streaming:
             "maps": sum(one.maps for one in caches),
             "resident": sum(one.resident for one in caches),
             "resident_mb": round(sum(one.resident_mb for one in caches), 3),
-            "hits": sum(one.reads.hits for one in caches),
-            "misses": sum(one.reads.misses for one in caches),
+            **{count: sum(getattr(one.reads, count) for one in caches) for count in COUNTS},
         }

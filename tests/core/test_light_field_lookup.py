@@ -206,4 +206,4 @@ def test_quarters_of_texels_sharpen_the_edge_of_a_roof() -> None:
         for one in (field, replace(field, radiance=radiance, inverse_distance=inverse, cover=cover))
     ]
     plain, covered = (float(np.sqrt(np.mean(e**2))) for e in found)
-    assert covered < 0.95 * plain, (covered, plain)
+    assert covered < 0.89 * plain, (covered, plain)  # .92 if edges are where any of four points sees them

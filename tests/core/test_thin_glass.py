@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lambent.core.directions import normalize
-from lambent.core.thin_glass import eta_of, mirrored_back, refracted, through_glass
+from lambent.core.thin_glass import eta_of, exits_beside, mirrored_back, refracted, sideways, through_glass
 
 ETA, DEPTH = 1.5, 0.02
 
@@ -77,6 +77,41 @@ def test_a_thin_lens_brings_parallel_light_to_its_focus(most_deg: float) -> None
         focal = radius / (ETA - 1)
         slope = leaving[:, :2] / -leaving[:, 2:] - w[:, :2] / -w[:, 2:]
         np.testing.assert_allclose(slope, -x[:, :2] / focal, atol=2e-3)
+
+
+def test_oblique_rays_leave_a_lens_by_the_face_behind_their_exit() -> None:
+    """Up to 40 degrees: with the plane behind their entry alone, they err by four times as much and more."""
+    radius, thickness, rng = 1.0, 0.05, np.random.default_rng(4)
+    centre = np.array([0.0, 0.0, radius - thickness])
+
+    def exits(x: np.ndarray) -> np.ndarray:
+        depth = np.sqrt(radius**2 - (x[:, :2] ** 2).sum(axis=1)) - centre[2]
+        return np.column_stack([(x - [0, 0, 1] * depth[:, None] - centre) / radius, depth])
+
+    x = np.concatenate([0.2 * (rng.random((300, 2)) - 0.5), np.zeros((300, 1))], axis=1)
+    w, n = rays(300, 40.0), np.broadcast_to(UP, x.shape)
+    inside, _ = refracted(w, n, 1 / ETA)
+    along = np.sum(inside * (x - centre), axis=1)
+    t = -along + np.sqrt(along**2 - np.sum((x - centre) ** 2, axis=1) + radius**2)
+    exact, passes = refracted(inside, -(x + t[:, None] * inside - centre) / radius, ETA)
+    step = sideways(through_glass(w, n, exits(x), ETA)[0], n)
+    wrong = []
+    for of in (exits(x), exits_beside(exits(x), exits(x + step), step, n)):
+        _, leaving, _, _ = through_glass(w, n, of, ETA)
+        wrong.append(np.degrees(np.arccos(np.clip(np.sum(exact * leaving, axis=1), -1, 1)))[passes])
+    assert passes.mean() > 0.9 and np.median(wrong[1]) < 0.25 * np.median(wrong[0])
+    assert np.quantile(wrong[1], 0.95) < 0.25 * np.quantile(wrong[0], 0.95)
+
+
+def test_another_face_beside_does_not_continue_the_exit() -> None:
+    """Sheets, faces round an edge, and faces that the ray does not leave by."""
+    here = np.array([[0.0, 0.0, -0.9, DEPTH]])
+    n, step = UP[None], np.array([[0.01, 0.0, 0.0]])
+    for beside in ([0.9, 0.0, 0.0, DEPTH], [0.0, 0.0, 0.9, DEPTH], [0.0, 0.0, -0.9, -1.0]):
+        np.testing.assert_array_equal(exits_beside(here, np.array([beside]), step, n), here)
+    tilted = np.array([[-np.sin(0.2), 0.0, -np.cos(0.2), DEPTH]])  # passes DEPTH below the place beside
+    found = exits_beside(here, tilted, step, n)
+    np.testing.assert_allclose(found[0, 3], DEPTH + 0.01 * np.tan(-0.2))
 
 
 def test_the_index_follows_the_reflectance() -> None:

@@ -12,7 +12,7 @@ from lambent.core.cubemap import sample
 from lambent.core.light_field import NO_EXIT, Glass, LightField
 from lambent.core.light_field_lookup import March, Place, blended, marched
 from lambent.core.octahedral import texel_directions
-from lambent.core.thin_glass import mirrored_back, through_glass
+from lambent.core.thin_glass import exits_beside, mirrored_back, sideways, through_glass
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame_state import FrameState
@@ -48,6 +48,9 @@ def lens() -> Glass:
 def seen_through(field: LightField, glass: Glass, w: np.ndarray, place: Place, uv2: np.ndarray) -> tuple[Any, ...]:
     """Places behind the glass, directions there, and shares (k, 3) of light that faces let pass, and mirror back."""
     exits = between(glass.exits.astype(float), uv2)
+    step = sideways(through_glass(w, place.n, exits, glass.eta)[0], place.n)
+    beside = between(glass.exits.astype(float), uv2 + step[:, [0, 2]] * [1, -1])
+    exits = exits_beside(exits, beside, step, place.n)
     offset, leaving, cosine, share = through_glass(w, place.n, exits, glass.eta)
     first = np.array(CLEAR.lobes[0].k) * 0.96 * under_fresnel(-np.sum(w * place.n, axis=1))[:, None]
     second = share[:, None] * np.array(glass.tint) * under_fresnel(cosine)[:, None]

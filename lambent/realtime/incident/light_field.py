@@ -15,7 +15,7 @@ from lambent.core.arrays import Floats
 from lambent.core.cubemap import sample
 from lambent.core.errors import UserError
 from lambent.core.light_field import NO_POINT
-from lambent.core.light_field_lookup import POWER, March
+from lambent.core.light_field_lookup import EDGE_STEEPNESS, POWER, March
 from lambent.realtime.baked import DARK, BakedScene, Probe
 from lambent.realtime.cube_mips import finite, mip_chain
 from lambent.realtime.light_field_atlas import Atlas, coding
@@ -64,7 +64,7 @@ class LightFieldLookUp:
         return {
             "METHOD": self.METHOD, "POWER": self.POWER, "MARCHES": rule.candidates, "STEPS": rule.steps,
             "SECANTS": rule.secants, "FIRST": rule.first, "LAST": rule.last, "TOLERANCE": rule.tolerance,
-            "ALIKE": rule.alike, "HAS_SKY": probe.sky is not None, "SURFACE": self.SURFACE,
+            "ALIKE": rule.alike, "STEEPNESS": EDGE_STEEPNESS, "HAS_SKY": probe.sky is not None, "SURFACE": self.SURFACE,
             **maps,
         }  # fmt: skip
 

@@ -23,6 +23,7 @@ override FIRST: f32 = 0.15;
 override LAST: f32 = 1.0;
 override TOLERANCE: f32 = 0.15;
 override ALIKE: f32 = 0.15;
+override STEEPNESS: f32 = 3.0;
 override SURFACE: bool = false; // points also show the surface itself
 override HAS_SKY: bool = true; // a separate sky; else the maps hold the sky
 
@@ -47,29 +48,6 @@ fn points_near(uv2: vec2f) -> vec4u {
 fn map_size() -> vec2i {
     let size = vec2i(textureDimensions(sample_map));
     return select(size, vec2i(size.x, size.y / 2), GLASS);
-}
-
-fn exit_of(texel: vec2i) -> vec4f {
-    let size = map_size();
-    let bits = textureLoad(sample_map, clamp(texel, vec2i(0), size - 1) + vec2i(0, size.y), 0);
-    return vec4f(unpack2x16float(bits.x | (bits.y << 16u)), unpack2x16float(bits.z | (bits.w << 16u)));
-}
-
-// The back face behind a point of the surface, interpolated between the four nearest texels; the nearest texel alone if
-// one of them has none. `front`: seen from the side of the normal.
-fn exit_near(uv2: vec2f, front: bool) -> vec4f {
-    if (!GLASS) { return vec4f(0.0); }
-    let at = uv2 * field.grid - field.corner - 0.5;
-    let low = vec2i(floor(at));
-    let share = fract(at);
-    let a = exit_of(low);
-    let b = exit_of(low + vec2i(1, 0));
-    let c = exit_of(low + vec2i(0, 1));
-    let d = exit_of(low + 1);
-    let between = mix(mix(a, b, share.x), mix(c, d, share.x), share.y);
-    let nearest = exit_of(vec2i(floor(at + 0.5)));
-    let whole = min(min(a.w, b.w), min(c.w, d.w)) >= 0.0;
-    return select(vec4f(0.0, 0.0, 0.0, -1.0), select(nearest, between, whole), front);
 }
 
 fn place_of_point(point: u32) -> vec3f {
@@ -177,21 +155,36 @@ const SHARP = -20.0; // half the log2 of a solid angle smaller than any texel
 const SKY = 0.0;
 const MISSED = -1.0;
 
-// How far a ray from o, relative to the map's point, along r is behind the map's surface at distance 1/u: 1/m, < 0 in
-// front. Linear in u for planes, and finite at infinity.
-fn behind(map: Map, o: vec3f, r: vec3f, u: f32) -> f32 {
-    let q = r + u * o;
-    return inverse_distance(map, q) - u * inverseSqrt(dot(q, q));
+struct Behind {
+    g: f32,
+    at_edge: bool, // the texel also shows the sky
 }
 
-// Inverse distance, 1/m, of the ray's hit on the map's surface; SKY or MISSED. Steps grow from FIRST times the distance
-// of the point to the distance where the parallax is LAST texels of about 4/side rad, and end at infinity.
-fn marched(point: u32, o: vec3f, r: vec3f) -> f32 {
+struct Hit {
+    u: f32,        // inverse distance, 1/m, along the ray; SKY or MISSED
+    at_edge: bool, // the point sees the sky there, or nearby
+}
+
+struct Found {
+    u: vec4f, // of each point's Hit
+    at_edge: bool,
+}
+
+// How far a ray from o, relative to the map's point, along r is behind the map's surface at distance 1/u: 1/m, < 0 in
+// front. Linear in u for planes, and finite at infinity.
+fn behind(map: Map, o: vec3f, r: vec3f, u: f32) -> Behind {
+    let q = r + u * o;
+    let texel = texel_along(map, q);
+    return Behind(texel.inverse - u * inverseSqrt(dot(q, q)), texel.cover != 15u);
+}
+
+// The ray's hit on the map's surface. Steps grow from FIRST times the distance of the point to the distance where the parallax is LAST texels of about 4/side rad, and end at infinity.
+fn marched(point: u32, o: vec3f, r: vec3f) -> Hit {
     let map = map_of(point);
     let texel = 4.0 / f32(field.side);
     let growth = pow(FIRST * texel / LAST, 1.0 / f32(STEPS - 1u));
     var near = 1.0 / (max(length(o), 1e-9) * FIRST);
-    var g_near = behind(map, o, r, near);
+    var g_near = behind(map, o, r, near).g;
     var far = near;
     var g_far = g_near;
     var crossed = false;
@@ -199,28 +192,31 @@ fn marched(point: u32, o: vec3f, r: vec3f) -> f32 {
         near = far;
         g_near = g_far;
         far = select(near * growth, 0.0, i == STEPS);
-        g_far = behind(map, o, r, far);
+        g_far = behind(map, o, r, far).g;
         crossed = g_near < 0.0 && (g_far > 0.0 || (g_far == 0.0 && i < STEPS));
     }
-    if (!crossed) { return select(MISSED, SKY, g_far <= 0.0); }
+    if (!crossed) { return Hit(select(MISSED, SKY, g_far <= 0.0), g_far <= 0.0); }
     var u = far;
+    var last: Behind;
     for (var i = 0u; i < SECANTS; i++) {
         u = mix(near, far, clamp(g_near / min(g_near - g_far, -1e-30), 0.05, 0.95));
-        let g = behind(map, o, r, u);
-        if (g < 0.0) { near = u; g_near = g; } else { far = u; g_far = g; }
+        last = behind(map, o, r, u);
+        if (last.g < 0.0) { near = u; g_near = last.g; } else { far = u; g_far = last.g; }
     }
-    // the last crossing is `near` or `far`: |q|/d - 1 is g |r + u o|/u there, and |q|/t is |r + u o|
-    let g_u = select(g_far, g_near, u == near);
+    // |q|/d - 1 is g |r + u o|/u, and |q|/t is |r + u o|
     let stretch = length(r + u * o);
-    return select(MISSED, u, u > 0.0 && abs(g_u) * stretch * max(stretch, 1.0) < TOLERANCE * u);
+    let hit = u > 0.0 && abs(last.g) * stretch * max(stretch, 1.0) < TOLERANCE * u;
+    return Hit(select(MISSED, u, hit), hit && last.at_edge);
 }
 
-// By point: inverse distance, 1/m, of the ray's hit in its map; SKY or MISSED.
-fn found_by_points(s: Surface, r: vec3f) -> vec4f {
+fn found_by_points(s: Surface, r: vec3f) -> Found {
     let x = s.x + object.centre.xyz;
-    var found = vec4f(MISSED);
+    var found = Found(vec4f(MISSED), false);
     for (var j = 0u; j < MARCHES; j++) {
-        if (s.points[j] != NO_POINT) { found[j] = marched(s.points[j], x - place_of_point(s.points[j]), r); }
+        if (s.points[j] == NO_POINT) { continue; }
+        let hit = marched(s.points[j], x - place_of_point(s.points[j]), r);
+        found.u[j] = hit.u;
+        found.at_edge |= hit.at_edge;
     }
     return found;
 }
@@ -229,20 +225,46 @@ fn found_by_points(s: Surface, r: vec3f) -> vec4f {
 // whose edges lie beside the ray, if all points do.
 fn is_sky(s: Surface, found: vec4f, half_log2_omega: f32) -> bool {
     let asked = (vec4u(0u, 1u, 2u, 3u) < vec4u(MARCHES)) & (s.points != vec4u(NO_POINT));
-    let sharp = half_log2_omega + log2(0.5 * f32(field.side)) < 0.0;
-    return largest_of(found) == SKY && (sharp || all(!asked | (found == vec4f(SKY))));
+    return largest_of(found) == SKY && (is_narrow(half_log2_omega) || all(!asked | (found == vec4f(SKY))));
+}
+
+// Whether a bundle of rays is narrower than a texel.
+fn is_narrow(half_log2_omega: f32) -> bool {
+    return half_log2_omega + log2(0.5 * f32(field.side)) < 0.0;
+}
+
+// Light of a surface at x as points with weights see it, and its share before the sky: by the points' mean coverage,
+// between quarters of texels, made steeper.
+fn edge_at(s: Surface, x: vec3f, weights: vec4f) -> vec4f {
+    var light = vec3f(0.0);
+    var shows = 1e-9;
+    var sum = vec2f(0.0, 1e-9); // of shares, and number of points
+    for (var j = 0u; j < MARCHES; j++) {
+        if (s.points[j] == NO_POINT) { continue; }
+        let edge = edge_along(map_of(s.points[j]), x - place_of_point(s.points[j]));
+        light += weights[j] * edge.light;
+        shows += weights[j] * edge.shows;
+        sum += vec2f(edge.share, 1.0);
+    }
+    return vec4f(light / shows, saturate((sum.x / sum.y - 0.5) * STEEPNESS + 0.5));
 }
 
 // Light of the nearest surface that a point verifies, blended over the points that agree on it. If no point verifies a
 // surface, the ray ends in the sky if is_sky, else the result is B_n.
 fn marched_light(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
     let found = found_by_points(s, r);
-    if (HAS_SKY && is_sky(s, found, half_log2_omega)) {
-        return light_of_sky(r, half_log2_omega) * object.sky_change.rgb;
+    var sky = vec3f(0.0);
+    if (HAS_SKY) { sky = light_of_sky(r, half_log2_omega) * object.sky_change.rgb; }
+    if (HAS_SKY && is_sky(s, found.u, half_log2_omega)) { return sky; }
+    let nearest = max(largest_of(found.u), 0.0);
+    let weights = weights_of_found(s, found.u);
+    var light = vec4f(weighted(s, r, max(found.u, vec4f(0.0)), weights, half_log2_omega), 1.0);
+    // a loop, which software adapters leave before its first turn where they would take both sides of a branch
+    var at_edge = HAS_SKY && QUARTERS && nearest > 0.0 && found.at_edge && is_narrow(half_log2_omega);
+    for (; at_edge; at_edge = false) {
+        light = edge_at(s, s.x + object.centre.xyz + r / nearest, weights);
     }
-    let nearest = max(largest_of(found), 0.0);
-    let light = weighted(s, r, max(found, vec4f(0.0)), weights_of_found(s, found), half_log2_omega);
-    return light * change_along(s, r, nearest, half_log2_omega);
+    return mix(sky, light.rgb * change_along(s, r, nearest, half_log2_omega), light.a);
 }
 
 // Weights of the points that agree on the nearest surface; of all points if none has found one.
@@ -256,7 +278,7 @@ fn weights_of_found(s: Surface, found: vec4f) -> vec4f {
 // The result in colours of medium brightness: one colour per point, for the point of largest share; blue for the sky;
 // red if no point verifies a surface.
 fn chosen(s: Surface, r: vec3f) -> vec3f {
-    let found = found_by_points(s, r);
+    let found = found_by_points(s, r).u;
     var colour = vec3f(1.0, 0.0, 0.0);
     if (largest_of(found) == SKY) { colour = vec3f(0.0, 0.1, 1.0); }
     if (largest_of(found) > 0.0) {
@@ -277,7 +299,7 @@ fn rank_of(point: u32, x: vec3f, n: vec3f) -> f32 {
     let q = x - place_of_point(point);
     let away = length(q);
     let cosine = -dot(q, n) / max(away, 1e-12);
-    let sees = abs(away * inverse_distance(map_of(point), select(-n, q, away > 0.0)) - 1.0) < SURFACE_TOLERANCE;
+    let sees = abs(away * texel_along(map_of(point), select(-n, q, away > 0.0)).inverse - 1.0) < SURFACE_TOLERANCE;
     return select(UNSEEN, dot(select(vec2f(0.0), vec2f(1.0), vec2f(cosine) < CONES), vec2f(1.0)), sees);
 }
 

@@ -5,8 +5,8 @@ fn points_near(uv2: vec2f) -> vec4u {
     return vec4u(0u);
 }
 
-// The back face behind a point of refracting glass; none here.
-fn exit_near(uv2: vec2f, front: bool) -> vec4f {
+// The back face that a ray meets in refracting glass; none here.
+fn exit_near(place: OnMap, r: vec3f, n: vec3f, front: bool) -> vec4f {
     return vec4f(0.0);
 }
 

@@ -105,6 +105,35 @@ fn edge_sky(map: Map, place: vec2f, w: vec3f) -> vec3f {
     return found;
 }
 
+// Surfaces before the sky, between texels: radiance of those that show surfaces, times their share of the interpolation,
+// `shows`; and the share of the sky that surfaces cover, between quarters of texels.
+struct Edge {
+    light: vec3f,
+    shows: f32,
+    share: f32,
+}
+
+fn edge_along(map: Map, w: vec3f) -> Edge {
+    let at = map_place(w) * f32(field.side) - 0.5;
+    var found = Edge(vec3f(0.0), 0.0, 0.0);
+    for (var k = 0u; k < 4u; k++) {
+        let beside = floor(at) + vec2f(f32(k & 1u), f32(k >> 1u));
+        let texel = vec2u(vec2i(beside) + 1);
+        let cover = texel_of(map, texel).cover;
+        let away = at - beside;
+        let shows = select(0.0, (1.0 - abs(away.x)) * (1.0 - abs(away.y)), cover != 0u);
+        found.light += shows * textureLoad(atlas, light_corner(map, 0u) + texel, map.layer, 0).rgb;
+        found.shows += shows;
+        let low = max(1.0 - 2.0 * abs(away + 0.25), vec2f(0.0)); // of quarters
+        let high = max(1.0 - 2.0 * abs(away - 0.25), vec2f(0.0));
+        let beyond = (texel == vec2u(0u)) | (texel == vec2u(field.side + 1u)); // the border is turned by half a turn
+        let bits = select(cover, reverseBits(cover) >> 28u, beyond.x != beyond.y);
+        let quarters = vec4f((vec4u(bits) >> vec4u(0u, 1u, 2u, 3u)) & vec4u(1u));
+        found.share += dot(vec4f(low.x, high.x, low.x, high.x) * vec4f(low.yy, high.yy), quarters);
+    }
+    return found;
+}
+
 // A texel of a tile. In half floats, the flags of the quarters are the lowest bits of the distance, and its sign.
 fn texel_of(map: Map, texel: vec2u) -> Texel {
     if (BLOCKS) { return texel_of_block(map, texel); }
@@ -144,11 +173,12 @@ fn of_entry(map: Map, corner: vec2u, number: u32, i: u32) -> u32 {
     return (select(words.x, words.y, i >= 8u) >> (4u * (i & 7u))) & 15u;
 }
 
-// Inverse distance, 1/m, in the quarter of a texel that a direction falls into; 0 for the sky.
-fn inverse_distance(map: Map, w: vec3f) -> f32 {
+// The texel that a direction falls into; its inverse distance is 0 if the direction's quarter shows the sky.
+fn texel_along(map: Map, w: vec3f) -> Texel {
     let at = map_place(w) * f32(field.side);
     let texel = min(vec2u(at), vec2u(field.side - 1u));
     let found = texel_of(map, texel + 1u);
     let beyond = select(vec2u(0u), vec2u(1u), at - vec2f(texel) >= vec2f(0.5));
-    return select(0.0, found.inverse, ((found.cover >> (2u * beyond.y + beyond.x)) & 1u) == 1u);
+    let shows = ((found.cover >> (2u * beyond.y + beyond.x)) & 1u) == 1u;
+    return Texel(select(0.0, found.inverse, shows), found.cover);
 }

@@ -26,6 +26,19 @@ fn mesh_frame(v: Varyings) -> mat3x3f {
     return mat3x3f(t, cross(n, t), n);
 }
 
+// The place on the light map, by the differences between neighbouring pixels.
+fn on_map(v: Varyings) -> OnMap {
+    let across = dpdx(v.p_world);
+    let down = dpdy(v.p_world);
+    let flat_normal = cross(across, down);
+    let area = max(dot(flat_normal, flat_normal), 1e-30);
+    let a = cross(down, flat_normal) / area; // 1 along `across`, 0 along `down`
+    let b = cross(flat_normal, across) / area;
+    let u = dpdx(v.uv2);
+    let w = dpdy(v.uv2);
+    return OnMap(v.uv2, a * u.x + b * w.x, a * u.y + b * w.y);
+}
+
 // At silhouettes an interpolated normal may turn away from the viewer while the triangle faces the viewer. It is bent
 // back along `view` until cos_o is GRAZING, so that frame, mirror direction and lobe agree.
 fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
@@ -42,7 +55,7 @@ fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
     let n = normalize(given + max(GRAZING - dot(given, view), 0.0) * view);
     let along = rejection(brushed, n);
     let t = normalize(select(perpendicular(n), along, dot(along, along) > 1e-8));
-    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown, vec4f(0.0, 0.0, 0.0, 1.0), vec3f(0.0), points_near(v.uv2), exit_near(v.uv2, facing > 0.0));
+    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown, vec4f(0.0, 0.0, 0.0, 1.0), vec3f(0.0), points_near(v.uv2), exit_near(on_map(v), -view, n, facing > 0.0));
 }
 
 // Layers past the last are black.

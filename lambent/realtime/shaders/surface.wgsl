@@ -33,6 +33,13 @@ struct Object {
 @group(2) @binding(0) var<uniform> object: Object;
 @group(2) @binding(1) var radiance_cube: texture_cube<f32>;
 
+// A place on the light map: its coordinates, and their gradients, 1/m, along the surface.
+struct OnMap {
+    uv2: vec2f,
+    u: vec3f,
+    v: vec3f,
+}
+
 // Shading frame and position of a pixel, and its values of the material's textures; n faces the viewer, and
 // painted.widening is along t and b.
 struct Surface {
@@ -45,7 +52,7 @@ struct Surface {
     shares: vec4f, // (b, a): the share a + b.w of the probe's light along w arrives at the pixel
     niche: vec3f,  // additional light of near walls, the same from all directions
     points: vec4u,  // points of a light field near the pixel
-    exit: vec4f,    // glass with a light field: the face behind the pixel
+    exit: vec4f,    // glass with a light field: the face behind
 }
 
 // A lobe with its numbers changed by textures: the samples' slopes, made for the material's mx and my, grow by `growth`

@@ -1,6 +1,7 @@
 // Light through a thin piece of glass, refracted at entry and exit: see core/thin_glass.py.
 
 const LEAST_COSINE = 0.1;
+const SAME_FACE = 0.7;
 
 struct Through {
     offset: vec3f, // from the surface to the ray's exit from the glass
@@ -34,4 +35,46 @@ fn through_glass(w: vec3f, n: vec3f, exit: vec4f, eta: f32) -> Through {
     let away = max(-exit.w * dot(n, out) / max(dot(inside, out), LEAST_COSINE), 0.0);
     let leaving = refracted_at(inside, -out, eta);
     return Through(away * inside, leaving, abs(dot(leaving, out)), share);
+}
+
+// The face behind a place of the surface that is `step` away, as an exit of the first place; `exit` itself if that is
+// another face.
+fn exit_beside(exit: vec4f, beside: vec4f, step: vec3f, n: vec3f) -> vec4f {
+    let along = dot(n, beside.xyz);
+    let same = dot(exit.xyz, beside.xyz) > SAME_FACE * length(exit.xyz) * length(beside.xyz);
+    if (!same || min(exit.w, beside.w) < 0.0 || along >= 0.0) { return exit; }
+    return vec4f(beside.xyz, max(beside.w - dot(step, beside.xyz) / along, 0.0));
+}
+
+// The exit of a texel of the sample map, in the lower half of its texture.
+fn exit_of(texel: vec2i) -> vec4f {
+    let size = map_size();
+    let bits = textureLoad(sample_map, clamp(texel, vec2i(0), size - 1) + vec2i(0, size.y), 0);
+    return vec4f(unpack2x16float(bits.x | (bits.y << 16u)), unpack2x16float(bits.z | (bits.w << 16u)));
+}
+
+// The back face behind a point of the surface, interpolated between the four nearest texels; the nearest texel alone if
+// one of them has none.
+fn exit_at(uv2: vec2f) -> vec4f {
+    let at = uv2 * field.grid - field.corner - 0.5;
+    let low = vec2i(floor(at));
+    let share = fract(at);
+    let a = exit_of(low);
+    let b = exit_of(low + vec2i(1, 0));
+    let c = exit_of(low + vec2i(0, 1));
+    let d = exit_of(low + 1);
+    let between = mix(mix(a, b, share.x), mix(c, d, share.x), share.y);
+    let nearest = exit_of(vec2i(floor(at + 0.5)));
+    return select(nearest, between, min(min(a.w, b.w), min(c.w, d.w)) >= 0.0);
+}
+
+// The back face that a ray along `r` meets: behind the place above the exit that the face behind this place gives. A
+// sheet where viewers see the surface from behind.
+fn exit_near(place: OnMap, r: vec3f, n: vec3f, front: bool) -> vec4f {
+    if (!GLASS) { return vec4f(0.0); }
+    let exit = exit_at(place.uv2);
+    let offset = through_glass(r, n, exit, field.eta).offset;
+    let step = offset - dot(offset, n) * n;
+    let beside = exit_at(place.uv2 + vec2f(dot(place.u, step), dot(place.v, step)));
+    return select(vec4f(0.0, 0.0, 0.0, -1.0), exit_beside(exit, beside, step, n), front);
 }

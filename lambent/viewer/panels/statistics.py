@@ -30,7 +30,8 @@ def draw(screen: Screen, editor: Editor | None, notes: Sequence[str] = ()) -> No
     if maps := s.light_fields:
         table.append(("light fields", f"{maps['resident']} of {maps['maps']} maps, {maps['resident_mb']:.1f} MB"))
         share = maps["misses"] / max(maps["hits"] + maps["misses"], 1)
-        table.append(("map requests", f"{maps['hits']} hits, {maps['misses']} misses ({100 * share:.1f} %)"))
+        table.append(("map reads", f"{maps['hits']} hits, {maps['misses']} misses ({100 * share:.1f} %)"))
+        table.append(("maps in view", f"{maps['wanted']}, {maps['no_room']} of them without room"))
         table.append(("cache", str(maps["cache"])))
     table += [(f"GPU: {name}", f"{ms:.2f} ms") for name, ms in s.gpu_ms.items()]
     rows(table, "statistics")
