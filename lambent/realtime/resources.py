@@ -29,7 +29,8 @@ from lambent.realtime.sun import SunLight, sun_light
 from lambent.realtime.sun_disc import without_sun
 from lambent.realtime.textures import TextureCache
 from lambent.realtime.uploads import half, layers_of, upload, with_alpha
-from lambent.scenes.scene import Look
+from lambent.scenes.scene import ImageTexture, Look
+from lambent.scenes.variants import worn_by
 from lambent.store.contract import MOST_BORDERS, ObjectRecord
 
 LIGHT_MAP_USAGE = wgpu.TextureUsage.STORAGE_BINDING | wgpu.TextureUsage.COPY_SRC  # in addition to the usual ones
@@ -139,22 +140,37 @@ class SceneResources:
             name: MaterialBuffers(layouts, textures.sampler, textures.of_material(scene.textures.get(name)))
             for name in ("", *scene.record.materials)
         }
+        self._with_images: dict[tuple[str, ImageTexture], MaterialBuffers] = {}  # shown images, by material
         self.show_textures({})
         self.mixes_parts = any(beyond.values())
         self.sun = sun_light(layouts, scene, self)
         self.reflector_lamps = LampsOverReflectors(layouts, self)
 
     def show_textures(self, looks: Mapping[str, Look]) -> None:
-        """Show materials with other materials' textures; materials left out show their own.
+        """Show materials with images or other materials' textures; materials left out show their own.
 
-        Documents come from a frame's state. The sun's shadows keep the holes of the baked materials.
+        Documents come from a frame's state. The sun's shadows keep the holes of the baked materials. Raises `UserError`
+        for an image that cannot be read, and then changes nothing.
         """
         own = {name: self._textured[name] for name in self.scene.record.materials}
-        self.materials = {**own, **{name: self._textured[look.textures] for name, look in looks.items()}}
+        images: dict[tuple[str, ImageTexture], MaterialBuffers] = {}
+        for name, look in looks.items():
+            if not isinstance(look.textures, ImageTexture):
+                own[name] = self._textured[look.textures]
+                continue
+            key = name, look.textures
+            images[key] = own[name] = self._with_images.get(key) or self._with_image(name, look)
+        self.materials, self._with_images = own, images
         records = self.scene.record.objects
         self.masked = {record.name for record in records if self.materials[record.material].textures.masked}
         self.whole_ranges = lru_cache(8)(self._whole_ranges)
         self.light_version += 1
+
+    def _with_image(self, name: str, look: Look) -> MaterialBuffers:
+        """Buffers with a cache of their own, so that images that are no longer shown leave the memory."""
+        textures = TextureCache(self._layouts.device)
+        bound = textures.of_material(worn_by(name, look, self.scene.textures))
+        return MaterialBuffers(self._layouts, textures.sampler, bound)
 
     def _whole_ranges(self, panes: frozenset[str] = frozenset()) -> Ranges:
         """(first, count) of the faces of all objects without holes, except `panes`."""

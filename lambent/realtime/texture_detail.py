@@ -24,6 +24,7 @@ from lambent.core.directions import normalize
 from lambent.core.geometry import triangle_areas
 from lambent.materials.bsdf import under_fresnel
 from lambent.realtime.baked import BakedScene
+from lambent.scenes.retexturing import materials_without_uv
 from lambent.scenes.scene import MaterialTextures, Texture
 from lambent.scenes.textures import halved
 from lambent.store.answer import SeenSpots, StoredAnswer
@@ -242,11 +243,13 @@ def _uv(baked: BakedScene) -> Floats:
     return np.zeros((len(baked.positions), 2)) if baked.uv is None else np.nan_to_num(np.asarray(baked.uv, float))
 
 
-def has_uv(baked: BakedScene, material: str) -> bool:
-    """Whether any object of a material has texture coordinates."""
-    corners = _uv(baked)[baked.faces.astype(np.int64)]
-    ranges = ((o.first_face, o.first_face + o.face_count) for o in baked.record.objects if o.material == material)
-    return any(bool(np.ptp(corners[first:end].reshape(-1, 2), axis=0).any()) for first, end in ranges if end > first)
+def without_uv(baked: BakedScene) -> frozenset[str]:
+    """Materials of which no object has texture coordinates."""
+    uv, faces = _uv(baked), baked.faces.astype(np.int64)
+    objects = baked.record.objects
+    return materials_without_uv(
+        [(o.material, uv[faces[o.first_face : o.first_face + o.face_count].reshape(-1)]) for o in objects]
+    )
 
 
 def _diffuse(textures: MaterialTextures | None) -> Texture | None:
