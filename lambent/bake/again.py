@@ -15,7 +15,7 @@ from lambent.bake.watch import Watch
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
-from lambent.scenes.scene import Look, Scene
+from lambent.scenes.scene import ImageTexture, Look, Scene
 from lambent.scenes.variants import textures_worn
 from lambent.store.contract import LAST_RUN, SIDES, TIMINGS, needs_probe, probe_name, scene_record, shared_probes
 from lambent.store.source import SOURCE, scene_of
@@ -38,7 +38,7 @@ def bake_again(
     materials: Mapping[str, Material],
     progress: Progress = silent,
     *,
-    textures: Mapping[str, str] | None = None,
+    textures: Mapping[str, str | ImageTexture] | None = None,
     quality: Quality | None = None,
     watch: Watch | None = None,
 ) -> Store:
@@ -49,7 +49,7 @@ def bake_again(
     Parameters
     ----------
     textures : mapping, optional
-        By material, the name of the material whose textures it uses; "" for none.
+        By material, the name of the material whose textures it uses, "" for none, or an image.
     quality : Quality, optional
         By default the store's preset.
     watch : Watch, optional

@@ -140,7 +140,7 @@ class SceneResources:
             name: MaterialBuffers(layouts, textures.sampler, textures.of_material(scene.textures.get(name)))
             for name in ("", *scene.record.materials)
         }
-        self._with_images: dict[tuple[str, ImageTexture], MaterialBuffers] = {}  # shown images, by material
+        self._images: dict[str, TextureCache] = {}  # of shown images, by file
         self.show_textures({})
         self.mixes_parts = any(beyond.values())
         self.sun = sun_light(layouts, scene, self)
@@ -153,24 +153,20 @@ class SceneResources:
         for an image that cannot be read, and then changes nothing.
         """
         own = {name: self._textured[name] for name in self.scene.record.materials}
-        images: dict[tuple[str, ImageTexture], MaterialBuffers] = {}
+        images: dict[str, TextureCache] = {}  # images that are no longer shown leave the memory
         for name, look in looks.items():
-            if not isinstance(look.textures, ImageTexture):
-                own[name] = self._textured[look.textures]
+            of = look.textures
+            if not isinstance(of, ImageTexture):
+                own[name] = self._textured[of]
                 continue
-            key = name, look.textures
-            images[key] = own[name] = self._with_images.get(key) or self._with_image(name, look)
-        self.materials, self._with_images = own, images
+            images[of.file] = cache = self._images.get(of.file) or TextureCache(self._layouts.device)
+            bound = cache.of_material(worn_by(name, look, self.scene.textures))
+            own[name] = MaterialBuffers(self._layouts, cache.sampler, bound)
+        self.materials, self._images = own, images
         records = self.scene.record.objects
         self.masked = {record.name for record in records if self.materials[record.material].textures.masked}
         self.whole_ranges = lru_cache(8)(self._whole_ranges)
         self.light_version += 1
-
-    def _with_image(self, name: str, look: Look) -> MaterialBuffers:
-        """Buffers with a cache of their own, so that images that are no longer shown leave the memory."""
-        textures = TextureCache(self._layouts.device)
-        bound = textures.of_material(worn_by(name, look, self.scene.textures))
-        return MaterialBuffers(self._layouts, textures.sampler, bound)
 
     def _whole_ranges(self, panes: frozenset[str] = frozenset()) -> Ranges:
         """(first, count) of the faces of all objects without holes, except `panes`."""

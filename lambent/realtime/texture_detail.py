@@ -102,8 +102,8 @@ class TextureDetails:
         if not changed:
             return None
         factors = np.ones((len(own_rows(self._stored.answer)), 3))
-        for number, (before, after) in changed.items():
-            self._fill(factors, number, before, after)
+        for number, both in changed.items():
+            self._fill(factors, number, *both)
         return Detail(factors, changed)
 
     def _fill(self, factors: Floats, number: int, before: Texture | None, after: Texture | None) -> None:
@@ -171,7 +171,7 @@ class TextureDetails:
         of = np.where(texel >= 0, self._stored.material[np.maximum(texel, 0)], -1)
         for number, both in detail.changed.items():
             at = np.flatnonzero(of == number)
-            code = self._stored.texels[texel[at]]
+            code = self._stored.texels[texel[at]].astype(np.int64)
             uv, cosine, there = self._looked_at(name, seen.texel.shape[1], at, code // 2, self._of_material(number))
             coupled = self._baked.record.materials[self._stored.materials[number]].kd_coupled
             shown = (under_fresnel(cosine) if coupled else np.ones_like(cosine))[:, None]

@@ -135,8 +135,7 @@ class RebakedLight:
         self._began_s, self._first_s = self._screen.clock(), first_bake_s(self._store)
         words = [str(self._store), str(self._copy)]
         self._process = WorkerProcess(WORKER, words, "the bake of edited materials", self._take, ends=True)
-        said = self._wanted.model_dump(mode="json")
-        self._process.ask({"materials": said["materials"], "textures": dict(self._wanted.textures)})
+        self._process.ask(self._wanted.model_dump(mode="json"))
 
     def _take(self, said: Mapping[str, Any], stream: IO[bytes]) -> None:
         """Handle a line of the process; runs in its thread."""
