@@ -114,7 +114,8 @@ class RebakedLight:
     def _want(self, wanted: RoomState, now_s: float) -> None:
         """Want another state, and stop the bake of the previous one."""
         self._stop()
-        self._wanted, self._changed_s, self._failed = wanted, now_s, False
+        self._forgive()
+        self._wanted, self._changed_s = wanted, now_s
         self._arrivals = Arrivals()
         self._light = self._whole[1] if self._whole is not None and self._whole[0] == wanted else None
 
