@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.answer import Albedos, side_by_side, upsampled
+from lambent.core.answer import Albedos, Answer, side_by_side, upsampled
 from lambent.core.arrays import Floats
 from lambent.core.irradiance import irradiance_of
 from lambent.materials.diffuse_albedos import albedos_of, edited_albedos
@@ -60,6 +60,25 @@ class Lit:
         return self.on_gpu.irradiance()
 
 
+class _Computed:
+    """Light of an answer, by a GPU with enough memory, otherwise by the CPU."""
+
+    def __init__(self, answer: Answer, reference: Floats, texels: NDArray[np.uint32], device: Any) -> None:
+        self._answer, self._reference = answer, reference
+        self._gpu = None if device is None else gpu_answer(device, answer, reference, texels)
+
+    def light(self, albedos: Albedos) -> tuple[NDArray[np.float32] | None, TexelsOnGpu | None]:
+        """The light (G, T, 3) of the texels, in memory or in the GPU's."""
+        if self._gpu is not None:
+            try:
+                return None, self._gpu.begin(albedos)
+            except NoRoom:  # something else took the memory in the meantime
+                self._gpu = None
+            except Unsolved:
+                pass  # the CPU computes this edit
+        return self._answer.irradiance(albedos, self._reference), None
+
+
 class AnsweredLight:
     """Light of one baked scene for edited colours of its materials. Methods may run in any thread.
 
@@ -69,12 +88,12 @@ class AnsweredLight:
     def __init__(self, baked: BakedScene, stored: StoredAnswer, device: Any = None) -> None:
         self._baked, self._stored = baked, stored
         self._materials = [baked.record.materials[name] for name in stored.materials]
-        self._answer, self._rows = with_own_albedos(stored.answer), own_rows(stored.answer)
         self._details = TextureDetails(baked, stored)
         self._last: tuple[Textures, Detail | None] | None = None  # the last exchanged textures and their detail
-        self._reference = self._answer.reference()
+        self._reference = stored.answer.reference()
         self._as_baked = Lit(stored.answer.baked, *_shown(self._materials), is_baked=True)
-        self._gpu = None if device is None else gpu_answer(device, self._answer, self._reference, stored.texels)
+        self._device = device
+        self._by_material = _Computed(stored.answer, self._reference, stored.texels, device)
 
     @property
     def as_baked(self) -> Lit:
@@ -87,18 +106,18 @@ class AnsweredLight:
         detail, of_materials = self._detail(textures), edited_albedos(self._materials, now)
         if detail is None and of_materials.same_as(self._stored.answer.albedos):
             return self._as_baked
-        albedos = Albedos(of_materials.reflected[self._rows], of_materials.transmitted[self._rows])
-        albedos = albedos if detail is None else detail.albedos(albedos)
-        if self._gpu is not None:
-            try:
-                on_gpu = self._gpu.begin(albedos)
-                return Lit(None, *_shown(now), is_baked=False, on_gpu=on_gpu, detail=detail)
-            except NoRoom:  # something else took the memory in the meantime
-                self._gpu = None
-            except Unsolved:
-                pass  # the CPU computes this edit
-        light = self._answer.irradiance(albedos, self._reference)
-        return Lit(light, *_shown(now), is_baked=False, detail=detail)
+        by, albedos = self._by_material, of_materials
+        if detail is not None:
+            by, rows = self._by_point, own_rows(self._stored.answer)
+            albedos = detail.albedos(Albedos(of_materials.reflected[rows], of_materials.transmitted[rows]))
+        in_memory, on_gpu = by.light(albedos)
+        return Lit(in_memory, *_shown(now), is_baked=False, on_gpu=on_gpu, detail=detail)
+
+    @cached_property
+    def _by_point(self) -> _Computed:
+        """Light with an albedo for each point: made for the first exchanged texture, as it costs a quarter more."""
+        own = with_own_albedos(self._stored.answer)
+        return _Computed(own, self._reference, self._stored.texels, self._device)
 
     def _detail(self, textures: Textures) -> Detail | None:
         """The detail of exchanged textures; that of the last ones is kept, for drags of colours."""
