@@ -37,7 +37,8 @@ def mean_and_detail(file: Path) -> MeanAndDetail:
     try:
         changed_ns = file.stat().st_mtime_ns
     except (OSError, ValueError) as error:
-        raise UserError("image cannot be read", file=file, got=getattr(error, "strerror", None)) from error
+        why = getattr(error, "strerror", None) or error
+        raise UserError(f"image cannot be read ({why})", file=file) from error
     return _read(file, changed_ns)
 
 
