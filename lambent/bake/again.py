@@ -80,8 +80,8 @@ def bake_again(
     effort, seed = quality or str(made_with.get("quality")), int(made_with.get("seed", 0))
     with bake(scene, copy, only={"geometry"}, quality=effort, seed=seed, progress=progress) as copied:
         if not _same_geometry(store, copied):
-            hint = "bake the scene with these materials"
-            raise UserError("these materials need probes or parts that the store lacks", file=folder, hint=hint)
+            what = "these materials need probes or parts that the store lacks, or its geometry is of an older version"
+            raise UserError(what, file=folder, hint="bake the scene again, with these materials")
     return bake(scene, copy, only=set(KINDS), quality=effort, seed=seed, progress=progress, watch=watch)
 
 
