@@ -17,6 +17,7 @@ from lambent.core.arrays import Floats
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.plain import Triple, is_number
+from lambent.materials.diffuse_albedos import possible_kd
 from lambent.scenes.image_textures import MOST_REPEAT, mean_and_detail
 from lambent.scenes.scene import ImageTexture, Look, MaterialTextures
 
@@ -69,7 +70,9 @@ def retextured(
             if of and name in without_uv:
                 raise UserError("has no texture coordinates", field=FIELD, got=name, hint="add uv to its geometry")
             kd = mean_of(of, looks, textures)
-            material = looks[name].material if kd is None else looks[name].material.model_copy(update={"kd": kd})
+            material = looks[name].material
+            if kd is not None:
+                material = material.model_copy(update={"kd": possible_kd(material, kd)})
             found[name] = replace(looks[name], material=material, textures=of)
     return found
 

@@ -74,7 +74,8 @@ def test_the_texture_of_a_material(panels, state, tmp_path):
     panels.frame()
     panels.mode.drop(str(tmp_path / "grass.png"))
     assert isinstance(state.materials.edits.room.textures["brass"], ImageTexture)
-    assert state.materials.edits.current("brass").kd == pytest.approx((0, 1, 0))
+    kd = state.materials.edits.current("brass").kd
+    assert kd[0] == kd[2] == 0 and kd[1] > 0.5, "the mean of the image, as far as the lobe leaves light"
     panels.frame()
     panels.drag("repeat", 0.5, 0.7)
     assert state.materials.edits.room.textures["brass"].repeat > 1

@@ -5,7 +5,8 @@ import pytest
 from PIL import Image
 
 from lambent.core.errors import UserError
-from lambent.materials.document import Material
+from lambent.materials.diffuse_albedos import lobe_albedo
+from lambent.materials.document import Lobe, Material
 from lambent.scenes.scene import ImageTexture, MaterialTextures, Texture
 from lambent.store.images import IMAGES, kept_image, readable, with_paths
 from lambent.store.session import FILE, RoomState, read_session
@@ -21,6 +22,7 @@ SCENE = {
     "plaster": Material(name="plaster", kd=0.6),
     "oak": Material(name="oak", kd=(0.4, 0.3, 0.1)),
     "steel": Material(name="steel", kd=0.1),
+    "copper": Material(name="copper", kd=0.0, lobes=(Lobe(mx=0.1, my=0.1, r0=(0.9, 0.6, 0.4)),)),
 }
 
 
@@ -104,6 +106,15 @@ def test_an_image_is_copied_into_the_store_and_outlives_its_file(window, folder,
     assert with_paths(again.edits.room.textures, folder)["plaster"].file == str(copy.resolve())
     again.keeper.close()
     assert copy.exists()
+
+
+def test_a_metal_has_less_room_for_an_image(window, picture):
+    """Else it would reflect more light than arrives."""
+    window.texturing.open("copper", str(picture))
+    kd = window.edits.current("copper").kd
+    assert (
+        kd[0] == pytest.approx(1 - lobe_albedo(SCENE["copper"], "reflection")[0]) and kd[0] < 0.5 and kd[1:] == (0, 0)
+    )
 
 
 def test_images_of_no_saved_state_are_deleted(window, folder, picture):

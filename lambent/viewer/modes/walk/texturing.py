@@ -8,6 +8,7 @@ from pathlib import Path
 
 from lambent.core.errors import UserError
 from lambent.core.plain import Triple
+from lambent.materials.diffuse_albedos import possible_kd
 from lambent.scenes.image_textures import MOST_REPEAT, mean_and_detail
 from lambent.scenes.scene import ImageTexture, MaterialTextures
 from lambent.store.images import kept_image, located
@@ -59,7 +60,8 @@ class Texturing:
     def choose(self, name: str, of: str | ImageTexture | None) -> None:
         """Show a texture, with its mean as the diffuse colour, as one stroke."""
         try:
-            self.edits.wear(name, of, self._mean(name, of))
+            mean = self._mean(name, of)
+            self.edits.wear(name, of, mean and possible_kd(self.edits.current(name), mean))
         except UserError as error:
             self.screen.say(f"not shown: {error}")
 
