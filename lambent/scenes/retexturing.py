@@ -68,7 +68,12 @@ def retextured(
         alike = [name for name in looks if fnmatchcase(name, pattern)]
         for name in alike or [known("material", pattern, looks, field=FIELD)]:
             if of and name in without_uv:
-                raise UserError("has no texture coordinates", field=FIELD, got=name, hint="add uv to its geometry")
+                raise UserError(
+                    "has no texture coordinates",
+                    field=FIELD,
+                    got=name,
+                    hint="bake the scene again, or add uv to its geometry",
+                )
             kd = mean_of(of, looks, textures)
             material = looks[name].material
             if kd is not None:

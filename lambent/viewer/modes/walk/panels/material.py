@@ -61,7 +61,7 @@ def _texture(texturing: Texturing, name: str) -> None:
     """Draw the choice of the material's texture, and the field of an image."""
     imgui.separator()
     if name in texturing.without_uv:
-        imgui.text_wrapped("no texture coordinates: it can show no texture")
+        imgui.text_wrapped("no texture coordinates: bake the scene again, or add uv to show a texture")
         return
     choices, shown = texturing.choices(name), texturing.shown(name)
     meaning = "shows its own texture, none, another material's, or an image; the mean becomes the diffuse colour"
