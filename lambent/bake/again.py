@@ -15,7 +15,7 @@ from lambent.bake.watch import Watch
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
-from lambent.scenes.scene import Look, Scene
+from lambent.scenes.scene import ImageTexture, Look, Scene
 from lambent.scenes.variants import textures_worn
 from lambent.store.contract import LAST_RUN, SIDES, TIMINGS, needs_probe, probe_name, scene_record, shared_probes
 from lambent.store.source import SOURCE, scene_of
@@ -38,7 +38,7 @@ def bake_again(
     materials: Mapping[str, Material],
     progress: Progress = silent,
     *,
-    textures: Mapping[str, str] | None = None,
+    textures: Mapping[str, str | ImageTexture] | None = None,
     quality: Quality | None = None,
     watch: Watch | None = None,
 ) -> Store:
@@ -49,7 +49,7 @@ def bake_again(
     Parameters
     ----------
     textures : mapping, optional
-        By material, the name of the material whose textures it uses; "" for none.
+        By material, the name of the material whose textures it uses, "" for none, or an image.
     quality : Quality, optional
         By default the store's preset.
     watch : Watch, optional
@@ -80,8 +80,8 @@ def bake_again(
     effort, seed = quality or str(made_with.get("quality")), int(made_with.get("seed", 0))
     with bake(scene, copy, only={"geometry"}, quality=effort, seed=seed, progress=progress) as copied:
         if not _same_geometry(store, copied):
-            hint = "bake the scene with these materials"
-            raise UserError("these materials need probes or parts that the store lacks", file=folder, hint=hint)
+            what = "these materials need probes or parts that the store lacks, or its geometry is of an older version"
+            raise UserError(what, file=folder, hint="bake the scene again, with these materials")
     return bake(scene, copy, only=set(KINDS), quality=effort, seed=seed, progress=progress, watch=watch)
 
 

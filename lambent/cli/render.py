@@ -141,6 +141,13 @@ def command(
             help="MATERIAL=#rrggbb: another diffuse colour; indirect light follows. * and ? match names. Repeatable."
         ),
     ] = None,
+    texture: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="MATERIAL=FILE[,REPEAT], MATERIAL=MATERIAL or MATERIAL=none: show an image, another material's "
+            "textures, or none; their mean becomes its colour, and indirect light follows. Repeatable."
+        ),
+    ] = None,
     variant: Annotated[
         str,
         typer.Option(help="Variant of the scene, or a state stored in the window (saved: the last session)."),
@@ -171,6 +178,8 @@ def command(
 
     Example: lambent render room.store --recolour wall_paint=#31457c -o blue.png
 
+    Example: lambent render room.store --texture wall_paint=bricks.jpg,3 -o bricks.png
+
     Example: lambent render house.store --variant walnut -o walnut.png
 
     Example: lambent render house.store --variants --camera entrance -o sheet.png
@@ -189,6 +198,7 @@ def command(
     from lambent.core.projections import Projection
     from lambent.materials.recolour import parse_recolours
     from lambent.scenes.replacement import parse_replacements
+    from lambent.scenes.retexturing import parse_textures
 
     exposure_ev, exposures = parse_exposure(exposure, variants=variants)
     if ev100 is not None:
@@ -204,7 +214,8 @@ def command(
         *parse_size(size), integrator, samples, exposure_ev, view, scale, log=not linear, show=part, planar=planar,
         lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb, seed=seed,
         light=parse_light(light) if light else None, sky_turn_deg=sky_turn, light_field_cache=light_field_cache,
-        recolour=parse_recolours(recolour or ()), replacements=parse_replacements(replace or ()), variant=variant,
+        recolour=parse_recolours(recolour or ()), textures=parse_textures(texture or ()),
+        replacements=parse_replacements(replace or ()), variant=variant,
     )  # fmt: skip
     settings.check()
     for option in ("false_range", "linear"):

@@ -8,6 +8,7 @@ import numpy as np
 
 from lambent.core.answer import MOST_ALBEDO, Albedos
 from lambent.core.arrays import Floats
+from lambent.core.plain import Triple, triple
 from lambent.materials.bsdf import specular_only
 from lambent.materials.document import Material
 from lambent.materials.factored.albedo import albedo
@@ -23,6 +24,15 @@ def albedos_of(materials: Sequence[Material]) -> Albedos:
     )
 
 
+def possible_kd(material: Material, kd: Triple) -> Triple:
+    """A diffuse colour, reduced so that with the material's lobes and transmission no more than all light is scattered.
+
+    A metal has less room for one than a wall.
+    """
+    lobes = lobe_albedo(material, "reflection") + lobe_albedo(material, "transmission")
+    return triple(np.minimum(kd, np.maximum(1 - lobes - np.array(material.kt_d), 0)))
+
+
 def edited_albedos(baked: Sequence[Material], edited: Sequence[Material]) -> Albedos:
     """Albedos of edited materials for rays that follow the lobes of the baked ones.
 
@@ -36,14 +46,15 @@ def edited_albedos(baked: Sequence[Material], edited: Sequence[Material]) -> Alb
         if before == after:
             continue
         if before.lobes != after.lobes:
-            reflected[number] += _of_lobes(after, "reflection") - _of_lobes(before, "reflection")
-            transmitted[number] += _of_lobes(after, "transmission") - _of_lobes(before, "transmission")
+            reflected[number] += lobe_albedo(after, "reflection") - lobe_albedo(before, "reflection")
+            transmitted[number] += lobe_albedo(after, "transmission") - lobe_albedo(before, "transmission")
         total = np.maximum(reflected[number] + transmitted[number], MOST_ALBEDO)
         reflected[number] *= MOST_ALBEDO / total
         transmitted[number] *= MOST_ALBEDO / total
     return Albedos(reflected, transmitted)
 
 
-def _of_lobes(material: Material, side: str) -> Floats:
+def lobe_albedo(material: Material, side: str) -> Floats:
+    """Equivalent diffuse albedo (3,) of a material's lobes on a side, "reflection" or "transmission"."""
     lobes = specular_only(material)
     return albedo(of_material(lobes), side) if lobes.lobes else np.zeros(3)

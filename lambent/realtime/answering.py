@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.answer import Albedos, side_by_side, upsampled
+from lambent.core.answer import Albedos, Answer, side_by_side, upsampled
 from lambent.core.arrays import Floats
 from lambent.core.irradiance import irradiance_of
 from lambent.materials.diffuse_albedos import albedos_of, edited_albedos
@@ -27,10 +27,12 @@ from lambent.realtime.cube_mips import finite
 from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.lit_texels import LitTexels, mix_into
 from lambent.realtime.resources import SceneResources, light_layers
+from lambent.realtime.texture_detail import Detail, TextureDetails, Textures, own_rows, placed_alike, with_own_albedos
 from lambent.store.answer import SeenSpots, StoredAnswer
 
 MARGIN = 1.4  # factor on the estimated error; error over estimate was at most 1.33 in 19 edits of three rooms
 ERROR_TEXELS = 1 << 15  # texels in the estimate of the error, about; more would make an edit wait
+NO_TEXTURES: Textures = {}
 FAINT = 0.01  # of the mean indirect light: darker texels do not count in the estimate of the error
 
 
@@ -38,7 +40,8 @@ FAINT = 0.01  # of the mean indirect light: darker texels do not count in the es
 class Lit:
     """Light of the answering texels for materials with these albedos.
 
-    `is_baked`: this is the baked light. `on_gpu`: the light in GPU memory, if a GPU computed it.
+    `is_baked`: this is the baked light. `on_gpu`: the light in GPU memory, if a GPU computed it. `detail`: that of
+    exchanged textures.
     """
 
     in_memory: NDArray[np.float32] | None
@@ -46,6 +49,7 @@ class Lit:
     transmitted: Floats
     is_baked: bool
     on_gpu: TexelsOnGpu | None = None
+    detail: Detail | None = None
 
     @cached_property
     def irradiance(self) -> NDArray[np.float32]:
@@ -54,6 +58,25 @@ class Lit:
             return self.in_memory
         assert self.on_gpu is not None, "light is in memory or on a GPU"
         return self.on_gpu.irradiance()
+
+
+class _Computed:
+    """Light of an answer, by a GPU with enough memory, otherwise by the CPU."""
+
+    def __init__(self, answer: Answer, reference: Floats, texels: NDArray[np.uint32], device: Any) -> None:
+        self._answer, self._reference = answer, reference
+        self._gpu = None if device is None else gpu_answer(device, answer, reference, texels)
+
+    def light(self, albedos: Albedos) -> tuple[NDArray[np.float32] | None, TexelsOnGpu | None]:
+        """The light (G, T, 3) of the texels, in memory or in the GPU's."""
+        if self._gpu is not None:
+            try:
+                return None, self._gpu.begin(albedos)
+            except NoRoom:  # something else took the memory in the meantime
+                self._gpu = None
+            except Unsolved:
+                pass  # the CPU computes this edit
+        return self._answer.irradiance(albedos, self._reference), None
 
 
 class AnsweredLight:
@@ -65,30 +88,44 @@ class AnsweredLight:
     def __init__(self, baked: BakedScene, stored: StoredAnswer, device: Any = None) -> None:
         self._baked, self._stored = baked, stored
         self._materials = [baked.record.materials[name] for name in stored.materials]
+        self._details = TextureDetails(baked, stored)
+        self._last: tuple[Textures, Detail | None] | None = None  # the last exchanged textures and their detail
         self._reference = stored.answer.reference()
         self._as_baked = Lit(stored.answer.baked, *_shown(self._materials), is_baked=True)
-        self._gpu = None if device is None else gpu_answer(device, stored.answer, self._reference, stored.texels)
+        self._device = device
+        self._by_material = _Computed(stored.answer, self._reference, stored.texels, device)
 
     @property
     def as_baked(self) -> Lit:
         """The light before any edit."""
         return self._as_baked
 
-    def lit(self, edited: Mapping[str, Material]) -> Lit:
-        """The light with these materials, by name, in place of the baked ones."""
+    def lit(self, edited: Mapping[str, Material], textures: Textures = NO_TEXTURES) -> Lit:
+        """The light with these materials and textures, by name, in place of the baked ones."""
         now = [edited.get(name, given) for name, given in zip(self._stored.materials, self._materials, strict=True)]
-        albedos = edited_albedos(self._materials, now)
-        if albedos.same_as(self._stored.answer.albedos):
+        detail, of_materials = self._detail(textures), edited_albedos(self._materials, now)
+        if detail is None and of_materials.same_as(self._stored.answer.albedos):
             return self._as_baked
-        if self._gpu is not None:
-            try:
-                return Lit(None, *_shown(now), is_baked=False, on_gpu=self._gpu.begin(albedos))
-            except NoRoom:  # something else took the memory in the meantime
-                self._gpu = None
-            except Unsolved:
-                pass  # the CPU computes this edit
-        light = self._stored.answer.irradiance(albedos, self._reference)
-        return Lit(light, *_shown(now), is_baked=False)
+        by, albedos = self._by_material, of_materials
+        if detail is not None:
+            by, rows = self._by_point, own_rows(self._stored.answer)
+            albedos = detail.albedos(Albedos(of_materials.reflected[rows], of_materials.transmitted[rows]))
+        in_memory, on_gpu = by.light(albedos)
+        return Lit(in_memory, *_shown(now), is_baked=False, on_gpu=on_gpu, detail=detail)
+
+    @cached_property
+    def _by_point(self) -> _Computed:
+        """Light with an albedo for each point: made for the first exchanged texture, as it costs a quarter more."""
+        own = with_own_albedos(self._stored.answer)
+        return _Computed(own, self._reference, self._stored.texels, self._device)
+
+    def _detail(self, textures: Textures) -> Detail | None:
+        """The detail of exchanged textures; that of the last ones is kept, for drags of colours."""
+        last = self._last
+        same = last is not None and last[0].keys() == textures.keys()
+        if last is None or not same or not all(placed_alike(last[0][name], one) for name, one in textures.items()):
+            self._last = last = dict(textures), self._details.of(textures)
+        return last[1]
 
     def show(self, light: Lit, resources: SceneResources) -> None:
         """Show light of one group in a renderer's light map; light in GPU memory is not read back."""
@@ -158,11 +195,13 @@ class AnsweredLight:
         seen, before = self._stored.seen[name], self._as_baked
         at = np.flatnonzero(seen.texel.reshape(-1) >= 0)
         texel = seen.texel.reshape(-1)[at]
-        shown = seen.tint.reshape(-1, 3)[at].astype(np.float32) / np.float32(np.pi * self._baked.unit)
+        tint = seen.tint.reshape(-1, 3).astype(np.float32)
+        both = (tint, tint) if light.detail is None else self._details.tints(name, seen, light.detail)
+        was, now = (one[at] / np.float32(np.pi * self._baked.unit) for one in both)
         found = np.zeros((len(light.irradiance), seen.texel.size, 3), np.float32)
         for group, of_group in enumerate(found):
-            more = self._sent(seen, at, texel, light, group) - self._sent(seen, at, texel, before, group)
-            of_group[at] = more * shown
+            sent = (self._sent(seen, at, texel, one, group) for one in (before, light))
+            of_group[at] = -was * next(sent) + now * next(sent)
         return found.reshape(len(found), *seen.texel.shape, 3)
 
     def _sent(self, seen: SeenSpots, at: NDArray[np.intp], texel: NDArray[np.int64], light: Lit, group: int) -> Floats:
@@ -270,10 +309,12 @@ def _shown(materials: list[Material]) -> tuple[Floats, Floats]:
     return albedos.reflected.astype(np.float32), albedos.transmitted.astype(np.float32)
 
 
-def answered_scene(baked: BakedScene, stored: StoredAnswer, edited: Mapping[str, Material]) -> BakedScene:
-    """A baked scene with edited materials, by name, and with light maps and probes that answer the edit."""
+def answered_scene(
+    baked: BakedScene, stored: StoredAnswer, edited: Mapping[str, Material], textures: Textures = NO_TEXTURES
+) -> BakedScene:
+    """A baked scene with edited materials and textures, by name, and with light maps and probes that answer them."""
     answer = AnsweredLight(baked, stored)
-    light = answer.lit(edited)
+    light = answer.lit(edited, textures)
     front, back = answer.maps(light)
     probes = {**baked.probes, **{name: answer.probe(name, light) for name in answer.probes}}
     record = baked.record.model_copy(update={"materials": {**baked.record.materials, **edited}})
@@ -284,4 +325,5 @@ def answered_scene(baked: BakedScene, stored: StoredAnswer, edited: Mapping[str,
         irradiance_back=back,
         probes=probes,
         groups=answer.groups(light),
+        textures={name: one for name, one in {**baked.textures, **textures}.items() if one is not None},
     )

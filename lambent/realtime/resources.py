@@ -29,7 +29,8 @@ from lambent.realtime.sun import SunLight, sun_light
 from lambent.realtime.sun_disc import without_sun
 from lambent.realtime.textures import TextureCache
 from lambent.realtime.uploads import half, layers_of, upload, with_alpha
-from lambent.scenes.scene import Look
+from lambent.scenes.scene import ImageTexture, Look
+from lambent.scenes.variants import worn_by
 from lambent.store.contract import MOST_BORDERS, ObjectRecord
 
 LIGHT_MAP_USAGE = wgpu.TextureUsage.STORAGE_BINDING | wgpu.TextureUsage.COPY_SRC  # in addition to the usual ones
@@ -139,18 +140,29 @@ class SceneResources:
             name: MaterialBuffers(layouts, textures.sampler, textures.of_material(scene.textures.get(name)))
             for name in ("", *scene.record.materials)
         }
+        self._images: dict[str, TextureCache] = {}  # of shown images, by file
         self.show_textures({})
         self.mixes_parts = any(beyond.values())
         self.sun = sun_light(layouts, scene, self)
         self.reflector_lamps = LampsOverReflectors(layouts, self)
 
     def show_textures(self, looks: Mapping[str, Look]) -> None:
-        """Show materials with other materials' textures; materials left out show their own.
+        """Show materials with images or other materials' textures; materials left out show their own.
 
-        Documents come from a frame's state. The sun's shadows keep the holes of the baked materials.
+        Documents come from a frame's state. The sun's shadows keep the holes of the baked materials. Raises `UserError`
+        for an image that cannot be read, and then changes nothing.
         """
         own = {name: self._textured[name] for name in self.scene.record.materials}
-        self.materials = {**own, **{name: self._textured[look.textures] for name, look in looks.items()}}
+        images: dict[str, TextureCache] = {}  # images that are no longer shown leave the memory
+        for name, look in looks.items():
+            of = look.textures
+            if not isinstance(of, ImageTexture):
+                own[name] = self._textured[of]
+                continue
+            images[of.file] = cache = self._images.get(of.file) or TextureCache(self._layouts.device)
+            bound = cache.of_material(worn_by(name, look, self.scene.textures))
+            own[name] = MaterialBuffers(self._layouts, cache.sampler, bound)
+        self.materials, self._images = own, images
         records = self.scene.record.objects
         self.masked = {record.name for record in records if self.materials[record.material].textures.masked}
         self.whole_ranges = lru_cache(8)(self._whole_ranges)

@@ -13,8 +13,10 @@ from lambent.realtime.answered.stages import computes
 from lambent.realtime.answering import AnsweredLight
 from lambent.realtime.group_arrays import FIELDS_FOLLOW
 from lambent.realtime.renderer import Renderer
+from lambent.realtime.texture_detail import without_uv
+from lambent.scenes.retexturing import retextured
 from lambent.scenes.scene import Look
-from lambent.scenes.variants import looks_as_loaded
+from lambent.scenes.variants import looks_as_loaded, worn_by
 from lambent.store.answer import NO_ANSWER, has_answer, read_answer
 from lambent.store.contract import needs_probe
 from lambent.store.store import Store
@@ -38,10 +40,15 @@ class AppliedMaterials:
         self.materials: dict[str, Material] = {}
         self._looks: dict[str, Look] = {}
 
-    def apply(self, looks: Mapping[str, Look], colours: Mapping[str, Triple]) -> None:
-        """Apply looks, then diffuse colours, and the light that follows; materials left out stay as baked."""
+    def apply(self, looks: Mapping[str, Look], colours: Mapping[str, Triple], textures: Mapping[str, str]) -> None:
+        """Apply looks, then textures (`scenes.retexturing`), then diffuse colours, and the light that follows.
+
+        Materials left out stay as baked.
+        """
         scene = self._renderer.scene
         loaded = looks_as_loaded(scene.record.materials, scene.textures)
+        if textures:
+            looks = {**looks, **retextured({**loaded, **looks}, textures, scene.textures, without_uv(scene))}
         changed = {name: look for name, look in looks.items() if look != loaded[name]}
         documents = {name: look.material for name, look in changed.items()}
         materials = {**documents, **recoloured({**scene.record.materials, **documents}, colours)}
@@ -50,11 +57,12 @@ class AppliedMaterials:
         if changed != self._looks:
             self._renderer.resources.show_textures(changed)
         self._looks, self.materials = changed, materials
-        if materials:
+        if changed or materials:
             self._note_limits(materials)
         if self.answers:
             answer, shown = self._shown
-            shown.show(answer.lit(materials))
+            worn = {name: worn_by(name, look, scene.textures) for name, look in changed.items()}
+            shown.show(answer.lit(materials, worn))
 
     @cached_property
     def _shown(self) -> tuple[AnsweredLight, AnswerShown]:

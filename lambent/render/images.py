@@ -86,9 +86,12 @@ class Settings:
         For the path tracer, 0 or more: different seeds have independent noise.
     recolour : mapping
         Diffuse colour, linear RGB, by material; indirect light follows (`realtime.answering`).
+    textures : mapping
+        Texture that a material shows instead of its own: an image file, another material, or none, as
+        `scenes.retexturing` parses it. Its mean becomes the diffuse colour, unless `recolour` has one; light follows.
     variant : str
-        Name of a variant of the store (`store.states`): its materials, overridden by `recolour`, and its light mix,
-        unless `light` has one. Indirect light follows.
+        Name of a variant of the store (`store.states`): its materials, overridden by `recolour` and `textures`, and its
+        light mix, unless `light` has one. Indirect light follows.
     looks : LookTrack, optional
         Looks of materials over the time of a film, overriding the variant's; indirect light follows.
     replacements : tuple of Replacement
@@ -114,9 +117,15 @@ class Settings:
     sky_turn_deg: float = 0.0
     light_field_cache: str = LEAST_RECENT
     recolour: Mapping[str, Triple] = field(default_factory=dict)
+    textures: Mapping[str, str] = field(default_factory=dict)
     variant: str = ""
     looks: LookTrack | None = None
     replacements: tuple[Replacement, ...] = ()
+
+    @property
+    def changes_materials(self) -> bool:
+        """Whether materials differ from the baked ones."""
+        return bool(self.recolour or self.textures or self.variant or self.looks)
 
     @property
     def is_false_coloured(self) -> bool:

@@ -15,9 +15,10 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.recolour import recoloured
 from lambent.render.images import Images, Settings
 from lambent.scenes.replacement import with_replacements
+from lambent.scenes.retexturing import materials_without_uv, retextured
 from lambent.scenes.scene import Scene, Variant
 from lambent.scenes.turned_sky import under_turned_sky
-from lambent.scenes.variants import dressed, variant_named
+from lambent.scenes.variants import dressed, looks_as_loaded, variant_named
 from lambent.store.source import changed_inputs, scene_of
 from lambent.store.states import variants_of
 from lambent.store.store import Store
@@ -59,6 +60,10 @@ class PathTraced(Images):
         """The scene with the materials of the next image."""
         track = self.settings.looks
         looks = {**self._variant.looks, **(track.looks_at(self.time_s) if track else {})}
+        if self.settings.textures:
+            loaded = looks_as_loaded(self._baked.materials, self._baked.textures)
+            bare = materials_without_uv([(o.material, o.mesh.uv) for o in self._baked.objects])
+            looks |= retextured({**loaded, **looks}, self.settings.textures, self._baked.textures, bare)
         changed = dressed(self._baked, replace(self._variant, looks=looks))
         return replace(
             changed, materials={**changed.materials, **recoloured(changed.materials, self.settings.recolour)}

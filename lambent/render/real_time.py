@@ -65,8 +65,8 @@ class RealTime(Images):
         lookup = known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup")
         baked = read_baked(store, settings.light_field_mb, settings.light_field_cache)
         if settings.replacements:
-            if settings.recolour or settings.variant or settings.looks or settings.light:
-                hint = "leave out --recolour, --variant, --keyframes and --light"
+            if settings.changes_materials or settings.light:
+                hint = "leave out --recolour, --texture, --variant, --keyframes and --light"
                 raise UserError("cannot be combined with --replace", field="--replace", hint=hint)
             baked = with_replacements(baked, settings.replacements)
             note("shadows and reflections of the replaced object remain on other objects")
@@ -76,7 +76,7 @@ class RealTime(Images):
         for text in self._renderer.missing:
             note(text)
         self._applied, self._light = AppliedMaterials(store, self._renderer, note), settings.light or MixTrack()
-        if settings.recolour and not self._applied.answers:
+        if (settings.recolour or settings.textures) and not self._applied.answers:
             read_answer(store)  # raises the error that names what is missing
         self._check_light(self._light, note)
         self._looks: Mapping[str, Look] = {}
@@ -101,7 +101,7 @@ class RealTime(Images):
         """State of the next frame, once its materials and light are on the GPU."""
         track = self.settings.looks
         looks = {**self._looks, **(track.looks_at(self.time_s) if track else {})}
-        self._applied.apply(looks, self.settings.recolour)
+        self._applied.apply(looks, self.settings.recolour, self.settings.textures)
         light = self._light.factors_at(self.time_s)
         return self._frame(camera, light=light, materials=self._applied.materials, maps=self._renderer.light_version)
 

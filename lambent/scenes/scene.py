@@ -208,11 +208,27 @@ class LightGroup:
 
 
 @dataclass(frozen=True)
+class ImageTexture:
+    """An image file shown as the diffuse texture of a material, `repeat` times as often as the texture it replaces.
+
+    The material's other textures stay. Without a texture to replace, the image fills the unit square of uv.
+    """
+
+    file: str
+    repeat: float = 1.0
+
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 - read by pydantic: an unknown key in a file is an error
+
+
+@dataclass(frozen=True)
 class Look:
-    """A material as a variant shows it, with the textures of the scene's material of that name; "" for none."""
+    """A material as a variant shows it, with the textures of the scene's material of that name; "" for none.
+
+    Instead of a name, `textures` can be an image.
+    """
 
     material: Material
-    textures: str = ""
+    textures: str | ImageTexture = ""
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 - read by pydantic: an unknown key in a file is an error
 

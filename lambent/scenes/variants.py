@@ -15,7 +15,8 @@ from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.light_mix import LightMix
 from lambent.materials.document import Material
-from lambent.scenes.scene import Look, MaterialTextures, Scene, Variant
+from lambent.scenes.image_textures import with_image
+from lambent.scenes.scene import ImageTexture, Look, MaterialTextures, Scene, Variant
 
 FIELD = "--variant"
 Kept = TypeVar("Kept")
@@ -73,10 +74,10 @@ def _changed(scene: Scene, one: Dressed) -> dict[str, Look]:
     """The looks of a variant by material, where they differ from the scene's."""
     found, loaded = {}, looks_as_loaded(scene.materials, scene.textures)
     for o, look in zip(scene.objects, one.looks, strict=True):
-        now = loaded[o.material]
+        name, now = o.material, loaded[o.material]
         same_document = now.material.model_copy(update={"name": look.material.name}) == look.material
-        if not (same_document and scene.textures.get(now.textures) is scene.textures.get(look.textures)):
-            found[o.material] = look
+        if not (same_document and worn_by(name, now, scene.textures) is worn_by(name, look, scene.textures)):
+            found[name] = look
     return found
 
 
@@ -100,9 +101,15 @@ def variant_named(variants: Iterable[Variant], name: str, field: str = FIELD) ->
     return found[known("variant", name, found, field=field)]
 
 
+def worn_by(name: str, look: Look, textures: Mapping[str, MaterialTextures]) -> MaterialTextures | None:
+    """The textures of a material in a look; `UserError` for an image that cannot be read."""
+    of = look.textures
+    return with_image(textures.get(name), of) if isinstance(of, ImageTexture) else textures.get(of)
+
+
 def textures_worn(textures: Mapping[str, MaterialTextures], looks: Mapping[str, Look]) -> dict[str, MaterialTextures]:
     """The textures of each material after some get other looks."""
-    changed = {name: textures.get(look.textures) for name, look in looks.items()}
+    changed = {name: worn_by(name, look, textures) for name, look in looks.items()}
     return {name: found for name, found in {**textures, **changed}.items() if found is not None}
 
 

@@ -84,7 +84,8 @@ def _check_names(store: Store, record: SceneRecord) -> None:
     if len({variant.name for variant in record.variants}) != len(record.variants):
         raise _broken(store, "variants", "two variants have the same name")
     for variant in record.variants:
-        worn = {*variant.looks, *(look.textures for look in variant.looks.values() if look.textures)}
+        textures = {look.textures for look in variant.looks.values() if isinstance(look.textures, str)}
+        worn = {*variant.looks, *(textures - {""})}
         if strange := sorted(worn - set(record.materials)):
             raise _broken(store, f"variants.{variant.name}", "unknown material", strange[0])
     for number, reflector in enumerate(record.reflectors):

@@ -12,7 +12,7 @@ from lambent.store.store import MANIFEST, Store
 class LightGroupRecord(BaseModel):
     """Emitters that are dimmed together: see scenes.light_groups.
 
-    `share` is the group's fraction of luminous irradiance, the sun's direct light included, on the scene's surfaces.
+    `share` is the fraction of luminous irradiance on surfaces that viewers see, the direct light of the sun included.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)

@@ -20,6 +20,7 @@ from lambent.core.files import write_text
 from lambent.core.inputs import parse_json, read_bytes
 from lambent.core.light_mix import LightMix
 from lambent.materials.document import Material
+from lambent.scenes.scene import ImageTexture
 from lambent.store.lock import lock
 
 LOCK_FILE = ".session.lock"  # the file stays in the folder; its existence means nothing
@@ -61,22 +62,27 @@ class _Strict(BaseModel):
 class RoomState(_Strict):
     """The look of a room: replacement materials by name, and the mix of its light groups.
 
-    `textures` maps a material to the material whose textures it uses instead of its own; "" for none.
+    `textures` maps a material to what it shows instead of its own textures: those of another material, "" for none, or
+    an image, by its name in the store (`store.images`).
     """
 
     materials: dict[str, Material] = {}
-    textures: dict[str, str] = Field(default={}, exclude_if=lambda one: not one)
+    textures: dict[str, str | ImageTexture] = Field(default={}, exclude_if=lambda one: not one)
     light: LightMix = LightMix()
 
     def unknown(self, materials: Collection[str], groups: Collection[str]) -> list[str]:
         """Names of materials and light groups that are missing from a store."""
-        worn = [*self.materials, *self.textures, *(of for of in self.textures.values() if of)]
+        others = [of for of in self.textures.values() if isinstance(of, str) and of]
+        worn = [*self.materials, *self.textures, *others]
         return [n for n in worn if n not in materials] + [n for n in self.light.groups if n not in groups]
 
     def only(self, materials: Collection[str]) -> RoomState:
         """A copy limited to the materials that a store has."""
         known = {name: one for name, one in self.materials.items() if name in materials}
-        worn = {name: of for name, of in self.textures.items() if name in materials and of in (*materials, "")}
+        worn = {
+            name: of for name, of in self.textures.items()
+            if name in materials and (isinstance(of, ImageTexture) or of in (*materials, ""))
+        }  # fmt: skip
         return RoomState(materials=known, textures=worn, light=self.light)
 
 
@@ -89,10 +95,14 @@ class WalkSession(_Strict):
     beside: RoomState | None = None
     states: dict[str, RoomState] = {}
 
+    @property
+    def rooms(self) -> list[RoomState]:
+        """All states."""
+        return [self.now, *([] if self.beside is None else [self.beside]), *self.states.values()]
+
     def unknown(self, materials: Collection[str], groups: Collection[str]) -> list[str]:
         """Names of materials and light groups that are missing from a store, sorted."""
-        parts = [self.now, *([] if self.beside is None else [self.beside]), *self.states.values()]
-        return sorted({name for part in parts for name in part.unknown(materials, groups)})
+        return sorted({name for room in self.rooms for name in room.unknown(materials, groups)})
 
 
 def read_session(file: Path) -> WalkSession | None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from lambent.scenes.scene import Look, Variant
 from lambent.store.contract import SceneRecord, scene_record
+from lambent.store.images import with_paths
 from lambent.store.session import FILE, RoomState, read_session
 from lambent.store.store import Store
 
@@ -25,7 +28,7 @@ def variants_of(store: Store, *, saved: bool = True) -> tuple[Variant, ...]:
     found = {variant.name: variant for variant in record.variants}
     if session is not None:
         left = {SAVED: session.now} if saved and session.now != RoomState() else {}
-        found |= {name: _variant(name, room, record) for name, room in {**left, **session.states}.items()}
+        found |= {name: _variant(name, room, record, store.folder) for name, room in {**left, **session.states}.items()}
     return tuple(found.values())
 
 
@@ -36,11 +39,9 @@ def says_light(store: Store, name: str) -> bool:
     return name in found and (of_session or bool(found[name].light.groups))
 
 
-def _variant(name: str, room: RoomState, record: SceneRecord) -> Variant:
+def _variant(name: str, room: RoomState, record: SceneRecord, folder: Path) -> Variant:
     known = room.only(record.materials)
     own = {one: one if one in record.textures else "" for one in record.materials}
-    changed = dict.fromkeys([*known.materials, *known.textures])
-    looks = {
-        one: Look(known.materials.get(one, record.materials[one]), known.textures.get(one, own[one])) for one in changed
-    }
+    changed, worn = dict.fromkeys([*known.materials, *known.textures]), with_paths(known.textures, folder)
+    looks = {one: Look(known.materials.get(one, record.materials[one]), worn.get(one, own[one])) for one in changed}
     return Variant(name, looks, known.light)

@@ -9,9 +9,10 @@ from typing import Any
 
 from lambent.core.errors import UserError
 from lambent.core.light_mix import LightMix, MixTrack
-from lambent.core.plain import plain_name
+from lambent.core.plain import Triple, plain_name
 from lambent.editing.history import History
 from lambent.materials.document import Material
+from lambent.scenes.scene import ImageTexture
 from lambent.store.session import RoomState, WalkSession
 
 
@@ -90,6 +91,20 @@ class MaterialEdits:
     def take(self, room: RoomState) -> None:
         """Set the state of the whole room as one stroke; ignore materials that the scene does not have."""
         self._step(room=self._room(room))
+
+    def wear(self, name: str, of: str | ImageTexture | None, kd: Triple | None) -> None:
+        """Show a texture on a material, None for its own, and set its diffuse colour if given, as one stroke."""
+        material = self.current(name) if kd is None else self.current(name).model_copy(update={"kd": kd})
+        self.end_stroke()
+        self.show_texture(name, of)
+        self.change(name, material)
+        self.end_stroke()
+
+    def show_texture(self, name: str, of: str | ImageTexture | None) -> None:
+        """Show a texture on a material, None for its own, within the present stroke, or begin a stroke."""
+        others = {other: worn for other, worn in self.room.textures.items() if other != name}
+        textures = others if of is None else {**others, name: of}
+        self._go_on(room=self._room(self.room.model_copy(update={"textures": textures})))
 
     def set_materials(self, materials: Mapping[str, Material]) -> None:
         """Set several materials with their textures as one stroke."""

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
+from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.light_mix import GroupMix
-from lambent.scenes.geometry import patch, placed, sphere
-from lambent.scenes.scene import LightGroup, PointLight, Scene, SceneObject, SunSky
+from lambent.scenes.geometry import box, patch, placed, sphere
+from lambent.scenes.scene import ConstantEnvironment, LightGroup, PointLight, Scene, SceneObject, SunSky
 from lambent.store.light_groups import light_groups
 from lambent.store.store import Store
 from tests.bake.small_scenes import BLACK, GREY, MIRROR, TINY, plane, room_with_step
@@ -247,3 +248,28 @@ def test_samples_by_group_are_rounded_evenly(mi: Any) -> None:
     assert np.allclose(found, means, rtol=2**-13, atol=0)
     assert np.mean(found[3:] / means[3:]) == pytest.approx(1, abs=2e-6)
     assert len(zlib.compress(found.tobytes())) < 0.8 * len(zlib.compress(means.tobytes()))
+
+
+def test_light_that_no_viewer_sees_has_no_share(tmp_path: Path) -> None:
+    """A crate reaches through the floor of a closed room: its underside lies in the sky, which nobody inside sees."""
+    room = (
+        SceneObject("floor", patch((-2, 0, 2), (4, 0, 0), (0, 0, -4)), "grey"),
+        SceneObject("ceiling", patch((-2, 2, -2), (4, 0, 0), (0, 0, 4)), "grey"),
+        *(
+            SceneObject(f"wall {n}", patch(corner, along, (0, 2, 0)), "grey")
+            for n, (corner, along) in enumerate((
+                ((-2, 0, -2), (4, 0, 0)), ((2, 0, -2), (0, 0, 4)), ((2, 0, 2), (-4, 0, 0)), ((-2, 0, 2), (0, 0, -4)),
+            ))
+        ),
+        SceneObject("crate", placed(box((1.5, 1, 1.5)), (0, 0.499, 0)), "grey"),
+        SceneObject("lamp", patch((-0.5, 1.9, -0.5), (1, 0, 0), (0, 0, 1)), "black", emission=(5, 5, 5)),
+    )  # fmt: skip
+    materials, sky = {"grey": GREY, "black": BLACK}, ConstantEnvironment((20.0, 20.0, 20.0))
+    inside = Camera("inside", (1.4, 1.4, 1.4), (0.0, 0.5, 0.0))
+    scene = Scene("crate", room, materials, environment=sky, cameras=(inside,))
+    store = bake(scene, tmp_path / "s", quality=TINY, light_groups="scene", only=["light_map"])
+    share = {group.name: group.share for group in light_groups(store)}
+    light = store.read("light_map/groups").astype(float)
+    names = [group.name for group in light_groups(store)]
+    assert light[names.index("sky")].max() > 10, "the underside is lit"
+    assert share["sky"] < 0.02 and share["lamp"] > 0.98

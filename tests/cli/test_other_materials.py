@@ -9,11 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from lambent.bake.bake import bake
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.images import read_encoded, read_image
-from lambent.scenes.scene import Look, Scene, Variant
+from lambent.materials.document import Material
+from lambent.scenes.geometry import placed, sphere
+from lambent.scenes.scene import Look, Scene, SceneObject, Variant
 from tests.bake.small_scenes import TINY, room_with_step
 from tests.viewer.small_store import write_small_store
 
@@ -23,8 +26,10 @@ SMALL = ("--size", "48x32", "--integrator", "rings")
 
 
 def room() -> Scene:
-    """The room with a camera, a path, and a variant of other colour."""
-    whole = room_with_step()
+    """The room with a pebble without uv, a camera, a path, and a variant of other colour."""
+    whole, pebble = room_with_step(), placed(sphere(0.1, 8, 4), (-1.5, 0.1, -1.5))
+    bare = SceneObject("pebble", replace(pebble, uv=np.zeros_like(pebble.uv)), "bare")
+    whole = replace(whole, objects=(*whole.objects, bare), materials={**whole.materials, "bare": Material(kd=0.3)})
     blue = Look(whole.materials["grey"].model_copy(update={"kd": (0.05, 0.05, 0.5)}))
     path = CameraPath("rest", (WITHIN, WITHIN), 1.0)
     return replace(whole, cameras=(WITHIN,), paths=(path,), variants=(Variant("blue", {"grey": blue}),))
@@ -54,6 +59,25 @@ def test_colours_and_a_mix_go_together(lambent: Command, store: Path, tmp_path: 
 
 
 @pytest.mark.usefixtures("adapter", "mi")
+def test_an_image_is_a_texture_and_the_light_follows(lambent: Command, store: Path, tmp_path: Path) -> None:
+    """One red image on all walls lights the room as red paint does; halves are seen as such."""
+    Image.fromarray(np.full((8, 8, 3), (200, 50, 50), np.uint8)).save(tmp_path / "red.png")
+    Image.fromarray(np.repeat([[0], [255]], 4, axis=0).repeat(8, axis=1).astype(np.uint8)).save(tmp_path / "halves.png")
+    pictures = {}
+    for name, more in {
+        "painted": ("--recolour", "grey=#c83232"),
+        "even": ("--texture", f"grey={tmp_path / 'red.png'}"),
+        "halves": ("--texture", f"gr*={tmp_path / 'halves.png'},0.5"),
+    }.items():
+        done = lambent("render", store, "-o", tmp_path / f"{name}.exr", *SMALL, *more)
+        assert done.code == 0 and "are estimated for the changed materials" in done.err, done.err
+        pictures[name] = read_image(tmp_path / f"{name}.exr")
+    assert pictures["even"] == pytest.approx(pictures["painted"], rel=2e-3, abs=1e-3)
+    dark, bright = np.quantile(pictures["halves"].mean(axis=-1), (0.2, 0.8))
+    assert bright > 10 * dark
+
+
+@pytest.mark.usefixtures("adapter", "mi")
 def test_a_variant_a_sheet_and_a_film(lambent: Command, store: Path, tmp_path: Path) -> None:
     assert lambent("render", store, "--variant", "blue", "-o", tmp_path / "blue.png", *SMALL).code == 0
     blue = read_encoded(tmp_path / "blue.png").mean(axis=(0, 1))
@@ -80,6 +104,13 @@ WRONG = {
     ): "--recolour: cannot be read as a recoloured material; found grey=red; expected MATERIAL=#rrggbb",
     ("--recolour", "grey=#f00"): "--recolour: cannot be read as a recoloured material",
     ("--recolour", "grey=#ff0000", "--recolour", "grey=#00ff00"): "--recolour: names a material twice; found grey",
+    ("--texture", "gray=none"): "--texture: unknown material; found gray; .*did you mean 'grey'",
+    ("--texture", "grey"): "--texture: cannot be read as an exchanged texture; found grey; expected MATERIAL=FILE, ",
+    ("--texture", "grey=missing.png"): "--texture: is neither a material with textures nor a file; found missing.png",
+    ("--texture", "grey=pyproject.toml"): "pyproject.toml: picture cannot be read",
+    ("--texture", "grey=pyproject.toml,0"): "--texture: repetition is out of range; found 0.0",
+    ("--texture", "bare=pyproject.toml"): "--texture: has no texture coordinates; found bare",
+    ("--texture", "grey=none", "--texture", "grey=none"): "--texture: names a material twice; found grey",
     ("--variant", "blu"): "--variant: unknown variant; found blu; expected blue; did you mean 'blue'",
     ("--variant", "blue", "--variants"): "--variant: excludes --variants; leave out one",
     ("--light", "lomp=off"): "unknown light group; found lomp; expected lamp",

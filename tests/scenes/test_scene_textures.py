@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from lambent.core.errors import UserError
-from lambent.scenes import textures
+from lambent.scenes import load_scene, textures
 from lambent.scenes.scene import MaterialTextures, Texture
 
 
@@ -60,3 +62,15 @@ def test_a_picture_is_told_by_texels_and_place() -> None:
     assert textures.digest(one) == textures.digest(picture(np.ones((2, 2, 3))))
     assert textures.digest(one) != textures.digest(picture(np.full((2, 2, 3), 0.5)))
     assert textures.digest(one) != textures.digest(replace(one, uv_transform=((2.0, 0, 0), (0, 1.0, 0))))
+
+
+def test_an_object_whose_uv_is_one_point_can_show_an_image(tmp_path: Path) -> None:
+    """Unless its material has a texture, of which the point may be a swatch."""
+    corners = "v 0 0 0\nv 2 0 0\nv 2 3 0\nvt 0.5 0.5\nvn 0 0 1\n"
+    faces = "".join(f"o {name}\nusemtl {name}\nf 1/1/1 2/1/1 3/1/1\n" for name in ("plain", "swatch"))
+    (tmp_path / "t.obj").write_text(f"mtllib t.mtl\n{corners}{faces}")
+    (tmp_path / "t.mtl").write_text("newmtl plain\nKd .5 .5 .5\nnewmtl swatch\nmap_Kd palette.png\n")
+    Image.fromarray(np.arange(48, dtype=np.uint8).reshape(4, 4, 3)).save(tmp_path / "palette.png")
+    scene = load_scene(tmp_path / "t.obj")
+    assert np.array_equal(scene.object("plain").mesh.uv, [[0, 0], [2, 0], [2, 3]])
+    assert np.array_equal(scene.object("swatch").mesh.uv, np.full((3, 2), 0.5))

@@ -9,6 +9,7 @@ from lambent.viewer.modes.material.mode import MaterialMode, MaterialState
 from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.panels.plots import labels_apart
 from tests.viewer.measured_specimens import BRASS, FROSTED, write_measurement
 from tests.viewer.panel_driver import PanelDriver
 
@@ -100,6 +101,26 @@ def test_names_paths_and_saving(driver, state, tmp_path):
     assert editor.subject.material.name == "brassy"
     driver.click("save##file")
     assert state.screen.messages[-1].text.startswith("saved") and '"brassy"' in (tmp_path / "brass.json").read_text()
+
+
+def test_labels_of_the_p_axis_do_not_overlap():
+    ticks = [0.0, 0.001, 0.01, 0.1, 1.0]
+    assert labels_apart(ticks, 0.05) == ["0", "0.001", "0.01", "0.1", "1"]
+    assert labels_apart(ticks, 0.15) == ["0", "", "0.01", "0.1", "1"]
+    assert labels_apart(ticks, 0.3) == ["0", "", "", "0.1", "1"]
+
+
+def test_a_loaded_document_fits_the_axes(driver, state, tmp_path):
+    """Else the curves of a dull material fill the lowest tenth of the plot of a shiny one."""
+    state.editor.show_measurement(None)
+    tick(driver)
+    assert not state.editor.plots.fit_axes
+    BRASS.model_copy(update={"lobes": (), "kd": (0.1, 0.1, 0.1)}).save(tmp_path / "dull.json")
+    state.editor.files.open(str(tmp_path / "dull.json"))
+    state.editor.tick()
+    assert state.editor.plots.fit_axes
+    driver.frame(2)
+    assert not state.editor.plots.fit_axes
 
 
 def test_a_click_on_a_disk_chooses_it(driver, state):

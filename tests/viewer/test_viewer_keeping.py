@@ -132,7 +132,7 @@ def test_unknown_names_are_one_line_and_stay_in_the_file(window, tmp_path):
 
 def test_textures_of_variants_are_kept(window, tmp_path):
     window.edits.take(RoomState(materials={"plaster": RED}, textures={"plaster": "brass", "chrome": "brass"}))
-    assert window.edits.room.textures == {"plaster": "brass"} and "textures" in window.keeper.unsaved
+    assert window.edits.room.textures == {"plaster": "brass"} and "the texture of plaster" in window.keeper.unsaved
     assert window.keeper.save() and read_session(tmp_path / FILE).now.textures == {"plaster": "brass"}
 
 

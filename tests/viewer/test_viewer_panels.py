@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from imgui_bundle import imgui
+from PIL import Image
 
 from lambent.core.false_colour import Range
 from lambent.materials.document import Lobe, load_material
+from lambent.scenes.scene import ImageTexture
 from lambent.store.contract import ReflectorPart, ReflectorRecord
 from lambent.store.views import read_views
 from lambent.viewer import layout
@@ -60,6 +62,37 @@ def test_the_line_on_a_bake_moves_no_control(panels, state):
         state.rebaking.line, state.rebaking.said = line, done
         panels.frame()
         assert panels.rects == places
+
+
+def test_the_texture_of_a_material(panels, state, tmp_path):
+    Image.fromarray(np.full((4, 4, 3), (0, 255, 0), np.uint8)).save(tmp_path / "grass.png")
+    panels.mode.drop(str(tmp_path / "grass.png"))
+    assert "select an object first" in state.screen.messages[-1].text
+    panels.mode.drop(str(tmp_path / "brass.json"))
+    assert "select an object first" in state.screen.messages[-1].text and state.materials.editor is None
+    panels.click("table##1", 0.2)
+    panels.frame()
+    panels.mode.drop(str(tmp_path / "grass.png"))
+    assert isinstance(state.materials.edits.room.textures["brass"], ImageTexture)
+    kd = state.materials.edits.current("brass").kd
+    assert kd[0] == kd[2] == 0 and kd[1] > 0.5, "the mean of the image, as far as the lobe leaves light"
+    panels.frame()
+    panels.drag("repeat", 0.5, 0.7)
+    assert state.materials.edits.room.textures["brass"].repeat > 1
+    panels.click("undo")
+    panels.click("undo")
+    assert state.materials.edits.room.textures == {} and state.materials.edits.edited == {}
+    state.texturing.without_uv = {"brass"}
+    panels.frame()
+    assert "texture" not in panels.rects and "##image" not in panels.rects, "a line says that it has no uv"
+
+
+def test_a_dropped_document_opens_in_the_editor_of_the_selected_material(panels, state, tmp_path):
+    state.scene.materials["brass"].model_copy(update={"kd": (0.3, 0.3, 0.3)}).save(tmp_path / "other.json")
+    panels.click("table##1", 0.2)
+    panels.mode.drop(str(tmp_path / "other.json"))
+    assert state.materials.editor is not None and state.materials.edits.current("brass").kd == (0.3, 0.3, 0.3)
+    state.materials.close_editor()
 
 
 @pytest.mark.parametrize("exact", [True, False])

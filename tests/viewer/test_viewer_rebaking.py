@@ -451,6 +451,10 @@ def test_faults_are_one_line_and_the_estimate_stays(store, screen, monkeypatch, 
     assert room.state.rebaking.line == ""
     room.state.rebaking.on = True
     room.until(lambda: room.pictures._rebaked._process is not None)
+    room.until(lambda: "not baked again" in room.state.rebaking.line)
+    room.state.materials.edits.undo()
+    room.frame()
+    assert room.state.rebaking.line == "", "the light of the room as baked has no fault"
     room.pictures.close()
 
 

@@ -20,7 +20,7 @@ from lambent.bake.light.direct import direct_part
 from lambent.bake.light.level import with_level
 from lambent.bake.light.sampling import SMOOTH, closed, relative_noise, sampled_halves
 from lambent.bake.light.stitching import Cuts
-from lambent.bake.surfaces.texels import Texels
+from lambent.bake.surfaces.texels import BEYOND, Texels
 from lambent.bake.tracing.rays import array_of, vectors
 from lambent.bake.tracing.sun import SunRays
 from lambent.bake.tracing.traced_scene import TracedScene
@@ -125,10 +125,15 @@ def _filled(clean: Floats, known: Flags, labels: Indices) -> NDArray[np.float16]
 
 
 def group_notes(traced: TracedScene, light: Floats) -> list[dict[str, Any]]:
-    """LightGroupRecords of the groups as JSON, from their maps `light` (n, H, W, 3)."""
-    sides, lights = traced.lit_sides(1.0), traced.sorted_lights
+    """LightGroupRecords of the groups as JSON, from their maps `light` (n, H, W, 3).
+
+    Texels that no viewer sees do not count: the underside of furniture on a floor may lie in the full sun beneath it.
+    """
+    (sides, labels), lights = traced.in_view(1.0), traced.sorted_lights
     index, area = sides.texels.index, sides.texels.spacing**2
     lit = sides.valid.any(axis=1)
+    if (seen := lit & (labels.reshape(-1)[index] < BEYOND)).any():
+        lit = seen
     shining = [luminance(one.reshape(-1, 3)[index].astype(float)) for one in light]
     if traced.sun is not None and lights.sun is not None:
         shining[lights.sun] = shining[lights.sun] + luminance(_sun_on(traced, sides.texels).astype(float))

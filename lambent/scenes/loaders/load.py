@@ -15,6 +15,8 @@ from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
+
 from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
 from lambent.core.inputs import foreign_bytes
@@ -22,9 +24,10 @@ from lambent.materials.document import Material
 from lambent.scenes import builtin, loaders
 from lambent.scenes.loaders.contents import Contents
 from lambent.scenes.loaders.meshes.creases import leaning_warnings, with_creases
+from lambent.scenes.loaders.meshes.repair import box_mapped
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.document import load_toml
-from lambent.scenes.scene import MaterialTextures, Scene, SceneObject
+from lambent.scenes.scene import MaterialTextures, Mesh, Scene, SceneObject
 from lambent.scenes.validation import size_warnings
 
 BUILTIN_PREFIX = "builtin:"
@@ -51,11 +54,34 @@ def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> 
     """
     scene, text = _load(path_or_builtin), str(path_or_builtin)
     origin = text if text.startswith(BUILTIN_PREFIX) else os.path.abspath(text)
+    scene = with_uv(scene)
     angle = scene.crease_deg if crease_deg is None else crease_deg
     if angle is not None:
         scene = replace(scene, objects=with_creases(scene.objects, angle), crease_deg=angle)
     notes = leaning_warnings(scene.objects) if angle is None else []
     return replace(scene, warnings=(*counted(scene.warnings), *notes, *size_warnings(scene)), origin=origin)
+
+
+def with_uv(scene: Scene) -> Scene:
+    """The scene with box-mapped uv, in metres, for objects whose uv is one point, so that they can show an image.
+
+    Objects with textures stay: their one point may be a swatch of a palette.
+    """
+    looks = [(name, look) for variant in scene.variants for name, look in variant.looks.items()]
+    textured = {*scene.textures, *(name for name, look in looks if look.textures)}
+    found: dict[int, Mesh] = {}  # by mesh, because instances share theirs
+
+    def mapped(o: SceneObject) -> SceneObject:
+        mesh = o.mesh
+        if o.material in textured:
+            return o
+        if id(mesh) not in found:
+            is_point = len(mesh.uv) > 0 and not np.ptp(mesh.uv, axis=0).any()
+            uv = box_mapped(mesh.positions, mesh.normals).astype(np.float32) if is_point else mesh.uv
+            found[id(mesh)] = replace(mesh, uv=uv) if is_point else mesh
+        return o if found[id(mesh)] is mesh else replace(o, mesh=found[id(mesh)])
+
+    return replace(scene, objects=tuple(map(mapped, scene.objects)))
 
 
 def counted(warnings: Sequence[str]) -> list[str]:

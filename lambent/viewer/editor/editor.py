@@ -94,6 +94,10 @@ class Editor:
         self.leave: Callable[[], None] | None = None  # closes the editor within another mode
         self._queue: list[Callable[[], None]] = []
         self._closed = False
+        self.files.adopted = partial(self.queue, self._fit_axes)  # after the frame, when the curves are up to date
+
+    def _fit_axes(self) -> None:
+        self.plots.fit_axes = True
 
     def show_measurement(self, measurement: Measurement | None) -> None:
         """Compare with this measurement from now on."""

@@ -84,6 +84,7 @@ class Files:
         self.name = f"{plain_name(subject.material.name)}.json"
         self.typed: dict[str, str] = {}  # texts of the fields for paths, by label
         self.loading: Work | None = None
+        self.adopted: Callable[[], None] = lambda: None  # called after a document was loaded
         self.open_environment: Callable[[Path], None] | None = None  # None without a preview
         self._may_replace: set[Path] = set()
 
@@ -94,6 +95,7 @@ class Files:
             kind = kind_of(path)
             if kind == "material":
                 self._subject.adopt(load_material(path))
+                self.adopted()
                 self._may_replace.clear()
                 self.came_from(path)
                 self._screen.say(f"loaded the material of {path.name}; undo restores the previous one")

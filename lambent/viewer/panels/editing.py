@@ -79,7 +79,7 @@ def _error(editor: Editor) -> None:
     editor.metric = choice("##metric", editor.metric, tuple(METRICS), meaning, 104)
     imgui.same_line()
     if measurement is None or shown.error is None:
-        imgui.text_disabled("load a measurement to see the error")
+        wrapped(["load a measurement to see the error"], DIM)
         return
     flat = max(measurement.lambertian[editor.metric], 1e-300)
     mark = "" if shown.exact else "~ "

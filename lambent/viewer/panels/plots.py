@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -120,7 +121,7 @@ def _curves(editor: Editor, textures: Textures) -> None:
     wide = (room.x - space) * (1 - ALBEDO_SHARE)
     legend = implot.Flags_.none if plots.channel != "RGB" else implot.Flags_.no_legend  # nine curves would fill it
     if implot.begin_plot("##in plane", (wide, room.y), _PLOT | legend):
-        _in_plane(editor)
+        _in_plane(editor, room.y)
         implot.end_plot()
     imgui.same_line()
     size = (room.x - space - wide, room.y)
@@ -129,7 +130,7 @@ def _curves(editor: Editor, textures: Textures) -> None:
         implot.end_plot()
 
 
-def _in_plane(editor: Editor) -> None:
+def _in_plane(editor: Editor, height: float) -> None:
     shown, plots, curves = editor.shown, editor.plots, editor.shown.curves
     # The axis covers the measurement, if there is one.
     tops = [p for (kind, _), (_, p) in curves.items() if kind == "measured" and len(p)]
@@ -144,7 +145,8 @@ def _in_plane(editor: Editor) -> None:
         ticks = [0.0, *(t for t in TICKS if t < 3 * top)]
         between = [t * m for t in ticks[1:] for m in (2, 5)]
         places = [float(np.cbrt(t)) for t in (*ticks, *between)]
-        implot.setup_axis_ticks(Y, places, [f"{t:g}" for t in ticks] + [""] * len(between))
+        apart = imgui.get_text_line_height() / height * 1.08 * float(np.cbrt(top))  # height of a label on the axis
+        implot.setup_axis_ticks(Y, places, labels_apart(ticks, apart) + [""] * len(between))
         implot.setup_axis_limits(Y, 0, 1.08 * float(np.cbrt(top)), always)
     else:
         implot.setup_axis_limits(Y, 0, 1.08 * top, always)
@@ -154,6 +156,17 @@ def _in_plane(editor: Editor) -> None:
     theta_deg = shown.incidents[plots.chosen].theta_deg
     implot.plot_inf_lines("##source", np.array([-theta_deg]), spec=implot.Spec(line_color=SOURCE, line_weight=1.0))
     _series(editor, curves, plots.scale)
+
+
+def labels_apart(ticks: Sequence[float], apart: float) -> list[str]:
+    """Labels of ascending ticks, 0 first, of a cube root axis; empty where closer than `apart` to a larger one or 0."""
+    labels, last = list[str](), np.inf
+    for tick in reversed(ticks):
+        place = float(np.cbrt(tick))
+        fits = place == 0 or (last - place >= apart and place >= apart)
+        labels.append(f"{tick:g}" if fits else "")
+        last = place if fits else last
+    return labels[::-1]
 
 
 def _albedo(editor: Editor) -> None:

@@ -71,7 +71,7 @@ def mesh_of(arrays: MeshArrays, *, name: str, file: Path) -> tuple[Mesh | None, 
     else:
         normals = _unit_normals(positions, faces, normals, notes)
     if uv is None:
-        uv = _box_mapped(positions, normals)
+        uv = box_mapped(positions, normals)
         notes.append("no uv: box-mapped, one unit per metre")
     elif not np.isfinite(uv).all():
         uv = np.nan_to_num(uv, nan=0.0, posinf=0.0, neginf=0.0)
@@ -130,7 +130,7 @@ def _unit_normals(positions: Floats, faces: NDArray[np.integer], normals: Floats
     return unit
 
 
-def _box_mapped(positions: Floats, normals: Floats) -> Floats:
+def box_mapped(positions: Floats, normals: Floats) -> Floats:
     """uv (V, 2) in metres: the two axes other than that of the largest normal component."""
     kept = np.array([(2, 1), (0, 2), (0, 1)])[np.argmax(np.abs(normals), axis=-1)]
     return np.take_along_axis(np.nan_to_num(positions), kept, axis=-1)

@@ -65,54 +65,66 @@ class TextureImages:
         """
         path = self._files.look_for("picture", name, file, field, note, otherwise)
         if path is not None and path not in self._read:
-            data = read_bytes(path, TEXTURE_BYTES)
-            if data.startswith((exr.MAGIC, *rgbe.MAGICS)):
-                rgb = self._reduced(read_image(path), path.name)
-                self._read[path] = TextureImage(np.concatenate([rgb, np.ones_like(rgb[..., :1])], axis=-1), alpha=False)
-            else:
-                self._read[path] = self._decoded(data, path, None, path.name)
+            self._read[path] = read_texture_image(path, self.notes)
         return None if path is None else self._read[path]
 
     def within(self, key: object, data: bytes, file: Path, field: str) -> TextureImage:
         """Image from bytes within another file; `key` identifies it."""
         if key not in self._read:
-            self._read[key] = self._decoded(data, file, field, field)
+            self._read[key] = _decoded(data, file, field, field, self.notes)
         return self._read[key]
 
-    def _decoded(self, data: bytes, file: Path, field: str | None, name: str) -> TextureImage:
-        from PIL import Image
 
-        try:
-            with Image.open(io.BytesIO(data), formats=FORMATS) as opened:
-                picture: Image.Image = opened
-                width, height = picture.size
-                PIXELS.check(width * height, file=file, field=field, got=f"{width} x {height}")
-                alpha = picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info
-                if picture.mode.startswith("I"):  # 16-bit grey, which `convert` would clip
-                    grey = np.asarray(picture, np.float32) / np.float32(257)
-                    picture = Image.fromarray(np.clip(grey + 0.5, 0, 255).astype(np.uint8))
-                if max(width, height) > SIDE_MAX:
-                    self.notes.append(f"picture {name}: {width} x {height} reduced to {SIDE_MAX} texels")
-                    picture.draft("RGB", (SIDE_MAX, SIDE_MAX))
-                    picture = picture.convert("RGBA" if alpha else "RGB")
-                    picture.thumbnail((SIDE_MAX, SIDE_MAX))
-                return TextureImage(np.asarray(picture.convert("RGBA")), alpha)
-        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-            why = "unknown picture format" if "cannot identify" in str(error) else str(error)
-            raise UserError(f"picture cannot be read ({why})", file=file, field=field) from error
+def read_texture_image(path: Path, notes: list[str]) -> TextureImage:
+    """An image file as a texture; `notes` gets a line if it was reduced.
 
-    def _reduced(self, rgb: NDArray[np.float32], name: str) -> NDArray[np.float32]:
-        """Average blocks of texels until the image is small enough."""
-        height, width = rgb.shape[:2]
-        step = -(-max(height, width) // SIDE_MAX)
-        if step == 1:
-            return rgb
-        self.notes.append(f"picture {name}: {width} x {height} reduced by {step}")
-        rows, columns = max(1, height // step), max(1, width // step)
-        if min(height, width) < step:
-            return rgb[:rows, :columns]
-        blocks = rgb[: rows * step, : columns * step].reshape(rows, step, columns, step, 3)
-        return np.asarray(blocks.mean(axis=(1, 3)))
+    Raises
+    ------
+    UserError
+        If it is missing, of an unknown kind, damaged, or far too large.
+    """
+    data = read_bytes(path, TEXTURE_BYTES)
+    if not data.startswith((exr.MAGIC, *rgbe.MAGICS)):
+        return _decoded(data, path, None, path.name, notes)
+    rgb = _reduced(read_image(path), path.name, notes)
+    return TextureImage(np.concatenate([rgb, np.ones_like(rgb[..., :1])], axis=-1), alpha=False)
+
+
+def _decoded(data: bytes, file: Path, field: str | None, name: str, notes: list[str]) -> TextureImage:
+    from PIL import Image
+
+    try:
+        with Image.open(io.BytesIO(data), formats=FORMATS) as opened:
+            picture: Image.Image = opened
+            width, height = picture.size
+            PIXELS.check(width * height, file=file, field=field, got=f"{width} x {height}")
+            alpha = picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info
+            if picture.mode.startswith("I"):  # 16-bit grey, which `convert` would clip
+                grey = np.asarray(picture, np.float32) / np.float32(257)
+                picture = Image.fromarray(np.clip(grey + 0.5, 0, 255).astype(np.uint8))
+            if max(width, height) > SIDE_MAX:
+                notes.append(f"picture {name}: {width} x {height} reduced to {SIDE_MAX} texels")
+                picture.draft("RGB", (SIDE_MAX, SIDE_MAX))
+                picture = picture.convert("RGBA" if alpha else "RGB")
+                picture.thumbnail((SIDE_MAX, SIDE_MAX))
+            return TextureImage(np.asarray(picture.convert("RGBA")), alpha)
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        why = "unknown picture format" if "cannot identify" in str(error) else str(error)
+        raise UserError(f"picture cannot be read ({why})", file=file, field=field) from error
+
+
+def _reduced(rgb: NDArray[np.float32], name: str, notes: list[str]) -> NDArray[np.float32]:
+    """Average blocks of texels until the image is small enough."""
+    height, width = rgb.shape[:2]
+    step = -(-max(height, width) // SIDE_MAX)
+    if step == 1:
+        return rgb
+    notes.append(f"picture {name}: {width} x {height} reduced by {step}")
+    rows, columns = max(1, height // step), max(1, width // step)
+    if min(height, width) < step:
+        return rgb[:rows, :columns]
+    blocks = rgb[: rows * step, : columns * step].reshape(rows, step, columns, step, 3)
+    return np.asarray(blocks.mean(axis=(1, 3)))
 
 
 def _unit(texels: NDArray[np.uint8] | NDArray[np.float32]) -> Floats:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +24,8 @@ from lambent.realtime.answering import AnsweredLight, Lit
 from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.renderer import Renderer
+from lambent.scenes.scene import ImageTexture, Look
+from lambent.scenes.variants import worn_by
 from lambent.store.answer import has_answer, read_answer
 from lambent.store.store import Store
 from lambent.viewer.work import Work
@@ -46,6 +50,13 @@ class Answering:
         if self.likely_error is None or not self.on:
             return self.said
         return f"indirect light: estimated, error up to {100 * self.likely_error:.1f} %"
+
+
+class Wanted(NamedTuple):
+    """Edited materials, and exchanged textures with paths of images, by material."""
+
+    materials: Mapping[str, Material]
+    textures: Mapping[str, str | ImageTexture]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +87,7 @@ class AnsweringLight:
     def __init__(self, store: Store, renderer: Renderer, shown: Answering) -> None:
         self._store, self._renderer, self._shown = store, renderer, shown
         self._answer: AnsweredLight | None = None  # made in the thread at the first edit
-        self._of: Mapping[str, Material] | None = {}  # materials of the shown light; None: compute it again
+        self._of: Wanted | None = Wanted({}, {})  # materials and textures of the shown light; None: compute it again
         self._work: Work | None = None
         self._probes_of: Lit | None = None  # light whose probes are waiting
         self._probing: Lit | None = None  # light whose probes are being computed
@@ -100,11 +111,13 @@ class AnsweringLight:
         """Whether light is being computed."""
         return self._work is not None
 
-    def update(self, edited: Mapping[str, Material]) -> None:
-        """Take finished light, and start the light for these materials."""
+    def update(
+        self, edited: Mapping[str, Material], textures: Mapping[str, str | ImageTexture] = MappingProxyType({})
+    ) -> None:
+        """Take finished light, and start the light for these materials and exchanged textures."""
         if not self._shown.possible:
             return
-        wanted = edited if self._shown.on else {}
+        wanted = Wanted(dict(edited), dict(textures)) if self._shown.on else Wanted({}, {})
         if self._work is not None and self._work.poll():
             self._work = self._probing = None
         if wanted != self._of and self._work is not None and self._probing is not None:
@@ -113,8 +126,8 @@ class AnsweringLight:
         if self._work is not None:
             return
         if wanted != self._of:
-            self._of, self._probes_of = dict(wanted), None
-            self._work = Work(lambda progress: self._maps(dict(wanted)), self._show_maps, self._failed)
+            self._of, self._probes_of = wanted, None
+            self._work = Work(lambda progress: self._maps(wanted), self._show_maps, self._failed)
         elif self._probes_of is not None:
             light, self._probes_of = self._probes_of, None
             self._begin_probes(light)
@@ -130,13 +143,16 @@ class AnsweringLight:
             self._work.wait()
             self._work = None
 
-    def _maps(self, edited: Mapping[str, Material]) -> _Maps:
+    def _maps(self, wanted: Wanted) -> _Maps:
         """Compute the light maps of edited materials; runs in the thread."""
         if self._answer is None:
             device = self._renderer.device
             stored, shaders = read_answer(self._store), device if computes(device) else None
             self._answer = AnsweredLight(self._renderer.scene, stored, shaders)
-        light = self._answer.lit(edited)
+        scene = self._renderer.scene
+        looks = {name: Look(scene.record.materials[name], of) for name, of in wanted.textures.items()}
+        worn = {name: worn_by(name, look, scene.textures) for name, look in looks.items()}
+        light = self._answer.lit(wanted.materials, worn)
         groups = self._answer.groups(light)
         if groups is None and light.on_gpu is not None:
             return _Maps(light, None, None, None)

@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from lambent.core.errors import UserError
+from lambent.store.images import names_of_images, readable, remove_unused
 from lambent.store.session import FILE, UNSAVED_FILE, SessionLock, WalkSession, read_session, write_session
 from lambent.viewer.edits import MaterialEdits, unused
 from lambent.viewer.screen import Screen
@@ -64,6 +65,8 @@ class SessionKeeper:
             {*self._kept.unknown(self._edits.scene, groups), *session.unknown(self._edits.scene, groups)}
         ):
             lines.append(f"the session has {', '.join(unknown)}, which the store lacks: kept, not shown")
+        faults = (readable(room.textures, self._folder)[1] for room in session.rooms)
+        lines += dict.fromkeys(fault for of_room in faults for fault in of_room)
         self._seen = session
         return tuple(lines)
 
@@ -102,12 +105,23 @@ class SessionKeeper:
         edits, kept = self._edits, self._kept
         names = [name for name in edits.scene if not self._is_saved(name)]
         more = [
-            ("textures", edits.room.textures != kept.now.only(edits.scene).textures),
+            *((f"the texture of {name}", True) for name in self._unsaved_textures),
             ("the light mix", edits.light != kept.now.light),
             ("stored states", edits.stored != kept.states),
             ("the state to compare with", edits.other != kept.beside),
         ]
         return (*names, *(what for what, changed in more if changed))
+
+    @property
+    def _unsaved_textures(self) -> list[str]:
+        """Materials whose textures differ from those of the saved session."""
+        now, kept = self._edits.room.textures, self._kept.now.only(self._edits.scene).textures
+        return [name for name in self._edits.scene if now.get(name) != kept.get(name)]
+
+    @property
+    def has_lock(self) -> bool:
+        """Whether this window may write the session and keep images beside it."""
+        return self._lock is not None and self._lock.held
 
     def _is_saved(self, name: str) -> bool:
         """Whether a material equals that of the saved session, or its last saved document."""
@@ -178,9 +192,19 @@ class SessionKeeper:
         self._remove()
 
     def close(self) -> None:
-        """Release the session to another window."""
+        """Release the session to another window, and delete images that no saved state uses."""
         self._finish()
+        if self._folder is not None and self.has_lock and not self._set_aside:
+            self._remove_images(self._folder)
         self._release()
+
+    def _remove_images(self, folder: Path) -> None:
+        try:
+            sessions = [read_session(folder / file) for file in (FILE, UNSAVED_FILE)]
+            rooms = [room for one in sessions if one is not None for room in one.rooms]
+            remove_unused(folder, {name for room in rooms for name in names_of_images(room.textures)})
+        except (UserError, OSError) as error:
+            self._screen.say(f"unused images of the store stay: {error}")
 
     def _finish(self) -> None:
         if self._work is not None:

@@ -6,13 +6,15 @@ differ; geometry and textures are then on the GPU twice. Swapping the states swa
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from lambent.core.plain import Triple
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
-from lambent.scenes.scene import Look
+from lambent.scenes.scene import ImageTexture, Look
+from lambent.store.images import readable
 from lambent.store.session import RoomState
 from lambent.viewer.modes.walk.answering import Answering, AnsweringLight
 from lambent.viewer.picture import Picture
@@ -30,28 +32,37 @@ class Lane:
     picture: Picture
     answering: AnsweringLight | None
     shown: Answering
+    say: Callable[[str], None]
+    folder: Path | None = None  # of the store
     room: RoomState = field(default_factory=RoomState)
+    textures: Mapping[str, str | ImageTexture] = field(default_factory=dict)  # of `room`, images that can be read alone
 
     @classmethod
-    def of(cls, renderer: Renderer, screen: Screen, answering: AnsweringLight | None, shown: Answering) -> Lane:
+    def of(
+        cls, renderer: Renderer, screen: Screen, answering: AnsweringLight | None, shown: Answering,
+        folder: Path | None = None,
+    ) -> Lane:  # fmt: skip
         """Make a lane. Its frames do not wait for light field maps; it is drawn again when maps arrive."""
         renderer.waits = False
-        return cls(renderer, Picture(renderer, screen), answering, shown)
+        return cls(renderer, Picture(renderer, screen), answering, shown, screen.say, folder)
 
     def another(self, screen: Screen) -> Lane:
         """A second lane of the same scene, with light as baked."""
         renderer = Renderer(self.renderer.device, self.renderer.scene, kin=self.renderer)
         shown = Answering()
         answering = None if self.answering is None else self.answering.another(renderer, shown)
-        return Lane.of(renderer, screen, answering, shown)
+        return Lane.of(renderer, screen, answering, shown, self.folder)
 
     def answer(self, room: RoomState) -> None:
         """Set the textures of this state, and advance its light."""
         if room.textures != self.room.textures:
-            show_textures(self.renderer, room)
+            self.textures, faults = readable(room.textures, self.folder)
+            show_textures(self.renderer, self.textures)
+            for fault in faults:
+                self.say(fault)
         self.room = room
         if self.answering is not None:
-            self.answering.update(room.materials)
+            self.answering.update(room.materials, self.textures)
 
     def frame(self, wanted: FrameState, light: Mapping[str, Triple]) -> FrameState:
         """A frame of this lane's state with these factors of light groups."""
@@ -79,12 +90,12 @@ class Lane:
 
     def lend_light(self, other: Renderer) -> None:
         """Let another renderer of the scene show this lane's state in any light mix."""
-        show_textures(other, self.room)
+        show_textures(other, self.textures)
         if (groups := self.renderer.mixer.groups) is not None:
             other.mixer.answer(groups)
 
 
-def show_textures(renderer: Renderer, room: RoomState) -> None:
-    """Show the textures of a state."""
+def show_textures(renderer: Renderer, textures: Mapping[str, str | ImageTexture]) -> None:
+    """Show textures by material, images with their paths."""
     scene = renderer.scene.record.materials
-    renderer.resources.show_textures({name: Look(scene[name], of) for name, of in room.textures.items()})
+    renderer.resources.show_textures({name: Look(scene[name], of) for name, of in textures.items()})

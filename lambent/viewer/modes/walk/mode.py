@@ -14,6 +14,7 @@ from lambent.realtime.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.replaced import with_replacements
 from lambent.realtime.resources import device_needs
+from lambent.realtime.texture_detail import without_uv
 from lambent.realtime.turned_sky import under_turned_sky
 from lambent.scenes.replacement import parse_replacements
 from lambent.store.source import SOURCE
@@ -38,6 +39,7 @@ from lambent.viewer.modes.walk.panels import (
 )
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.modes.walk.texturing import ENDINGS
 from lambent.viewer.navigation import Movement
 from lambent.viewer.panels import overlay, statistics
 from lambent.viewer.panels.plots import beside
@@ -68,6 +70,8 @@ def open_store(
     state.rebaking.possible = from_scene and sky_turn_deg % 360 == 0  # the light map keeps the sky as baked
     of_session = state.session.open([group.name for group in state.lights.groups])
     state.missing = (*baked.missing, *state.missing, *of_session)
+    state.texturing.textures, state.texturing.without_uv = baked.textures, without_uv(baked)
+    state.texturing.keeps = state.session.has_lock
     state.notes, state.knows_noise = light_map_notes(store), baked.noise is not None
     geometry = Geometry(baked.positions, baked.faces, state.selection.objects)
     renderer = Renderer(open_device(device_needs(baked)), baked)
@@ -138,8 +142,16 @@ class WalkMode(Mode):
         return least(POLL_S if busy else None, self.state.session.wait_s())
 
     def drop(self, path: str) -> None:
-        if self.state.materials.editor is not None:
-            self.state.materials.editor.files.open(path)
+        """Show an image on the selected object's material, or open a document or measurement in its editor."""
+        name, materials = self.state.selection.material, self.state.materials
+        if path.lower().endswith(ENDINGS):
+            self.state.texturing.open(name, path)
+        elif materials.editor is not None:
+            materials.editor.files.open(path)
+        elif name is not None:
+            materials.open_editor(name, path)
+        else:
+            self.screen.say("select an object first: the file opens in the editor of its material")
 
     @property
     def unsaved(self) -> tuple[str, ...]:
@@ -179,7 +191,7 @@ def panels(state: WalkState) -> tuple[Panel, ...]:
     return (
         Panel(
             "Material",
-            partial(material.draw, state.selection, state.materials),
+            partial(material.draw, state.selection, state.materials, state.texturing),
             "the objects, and every parameter of the selected material",
             opened=True,
         ),

@@ -41,7 +41,7 @@ class Pictures(Pair):
     def __init__(self, renderer: Renderer, state: WalkState, answering: AnsweringLight | None = None) -> None:
         super().__init__(renderer.device)
         self._state = state
-        self._lane = Lane.of(renderer, state.screen, answering, state.answering)
+        self._lane = Lane.of(renderer, state.screen, answering, state.answering, state.store)
         self._beside: Lane | None = None  # lane of the state that the room is compared with
         self._rebaked = (
             None if state.store is None else RebakedLight(state.store, renderer.scene, state.screen, state.rebaking)
@@ -232,7 +232,7 @@ class Pictures(Pair):
             )
         b = self._traced
         self.shown = (a, b)
-        b.update(wanted, self._state.materials.edits.room.textures)
+        b.update(wanted, self._lane.textures)
         a.pacer.forget_refinement()
         a.update(wanted, refine=False)
         comparison.fault = b.fault

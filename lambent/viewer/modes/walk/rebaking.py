@@ -114,7 +114,8 @@ class RebakedLight:
     def _want(self, wanted: RoomState, now_s: float) -> None:
         """Want another state, and stop the bake of the previous one."""
         self._stop()
-        self._wanted, self._changed_s, self._failed = wanted, now_s, False
+        self._forgive()
+        self._wanted, self._changed_s = wanted, now_s
         self._arrivals = Arrivals()
         self._light = self._whole[1] if self._whole is not None and self._whole[0] == wanted else None
 
@@ -135,8 +136,7 @@ class RebakedLight:
         self._began_s, self._first_s = self._screen.clock(), first_bake_s(self._store)
         words = [str(self._store), str(self._copy)]
         self._process = WorkerProcess(WORKER, words, "the bake of edited materials", self._take, ends=True)
-        said = self._wanted.model_dump(mode="json")
-        self._process.ask({"materials": said["materials"], "textures": dict(self._wanted.textures)})
+        self._process.ask(self._wanted.model_dump(mode="json"))
 
     def _take(self, said: Mapping[str, Any], stream: IO[bytes]) -> None:
         """Handle a line of the process; runs in its thread."""

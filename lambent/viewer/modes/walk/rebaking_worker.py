@@ -2,7 +2,7 @@
 
 python -m lambent.viewer.modes.walk.rebaking_worker STORE COPY
 
-The first line of stdin is a JSON object with "materials", documents by name, and "textures", names by name. The end of
+The first line of stdin is a `RoomState` as a JSON object, in light as baked. The end of
 stdin ends the process at any moment; the next bake continues the copy. Every line of stdout is a JSON object: "what",
 "done" and "total" of a step; "error", a line for the user; "kind" and "there", names of arrays that are now in the
 copy; "region", the shape (n, H, W) of light that is finished before its light map (`bake.watch`), followed by its
@@ -26,7 +26,8 @@ from lambent.bake.again import KINDS, bake_again
 from lambent.bake.watch import Watch
 from lambent.core.arrays import Flags
 from lambent.core.errors import UserError
-from lambent.materials.document import Material
+from lambent.store.images import with_paths
+from lambent.store.session import RoomState
 
 NICENESS = 10  # the window has priority
 REGION_PAUSE = 10.0  # pause after sending a region, in multiples of the sending time
@@ -59,16 +60,15 @@ class StreamWatch(Watch):
 
 def main(store: Path, copy: Path, asked: bytes, out: BinaryIO) -> None:
     """Bake, and report progress."""
-    wanted = json.loads(asked)
-    materials = {name: Material.model_validate(said) for name, said in wanted["materials"].items()}
-
+    wanted = RoomState.model_validate_json(asked)
     watch = StreamWatch(out)
 
     def progress(done: float, total: float, what: str) -> None:
         watch.say(what=what, done=done, total=total)
 
     try:
-        bake_again(store, copy, materials, progress, textures=wanted["textures"], watch=watch)
+        textures = with_paths(wanted.textures, store)
+        bake_again(store, copy, wanted.materials, progress, textures=textures, watch=watch)
     except UserError as error:
         watch.say(error=str(error))
     else:

@@ -27,6 +27,7 @@ from lambent.viewer.modes.walk.metering import Meter
 from lambent.viewer.modes.walk.rebaked import Rebaking
 from lambent.viewer.modes.walk.recording import Recordings
 from lambent.viewer.modes.walk.states import States
+from lambent.viewer.modes.walk.texturing import Texturing
 from lambent.viewer.modes.walk.views import SavedViews
 from lambent.viewer.navigation import Movement, Navigation
 from lambent.viewer.screen import Screen
@@ -103,13 +104,13 @@ class Materials:
         """Write materials to new files."""
         return rescue(self.edits, names, self.screen.folder)
 
-    def open_editor(self, name: str) -> None:
-        """Open the editor on a material, with the measurement whose path was typed, if any."""
+    def open_editor(self, name: str, file: str = "") -> None:
+        """Open the editor on a material, and in it a file, or the measurement whose path was typed, if any."""
         self.close_editor()
         self.editor = Editor(self.edits, name, self.screen)
         self.editor.files.name, self.editor.leave = self.file_name(name), self.close_editor
-        if self.typed_measurement.strip():
-            self.editor.files.open(self.typed_measurement)
+        if wanted := file or self.typed_measurement.strip():
+            self.editor.files.open(wanted)
 
     def close_editor(self) -> None:
         """Close the editor; the material stays as it is."""
@@ -132,6 +133,7 @@ class WalkState:
     marks: Marks
     session: SessionKeeper
     states: States
+    texturing: Texturing
     comparison: Comparison = field(default_factory=Comparison)
     meter: Meter = field(default_factory=Meter)
     answering: Answering = field(default_factory=Answering)
@@ -176,6 +178,7 @@ class WalkState:
             scene, screen, look, navigation, Selection(whole_objects(scene.objects)),
             Materials(edits, screen), Recordings(views, navigation, screen, lights),
             Marks({}, scene.reflectors), SessionKeeper(edits, store, screen), States(edits, scene),
+            Texturing(edits, screen, store),
             meter=meter, lights=lights,
             store=store, store_name="STORE" if store is None else store.name,
             missing=() if fault is None else (fault,),  # a message would vanish before the window is open

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lambent.core.light_mix import LightMix
-from lambent.scenes.scene import Variant
+from lambent.scenes.scene import ImageTexture, Variant
 from lambent.store.contract import SceneRecord
 from lambent.store.session import RoomState
 from lambent.store.views import checked_name, free_name
@@ -90,7 +90,7 @@ class States:
             for one in self._variants
         }
 
-    def _textures_of(self, variant: Variant) -> dict[str, str]:
+    def _textures_of(self, variant: Variant) -> dict[str, str | ImageTexture]:
         """Textures of a variant that are not a material's own."""
         own = {name: name if name in self._textured else "" for name in variant.looks}
         return {name: look.textures for name, look in variant.looks.items() if look.textures != own[name]}

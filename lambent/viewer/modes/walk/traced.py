@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.given import Given
+from lambent.scenes.scene import ImageTexture
 from lambent.viewer.modes.walk.tracing import Traced, Tracing
 from lambent.viewer.pacing import REST_S
 from lambent.viewer.screen import Screen
@@ -29,7 +30,7 @@ class TracedPicture:
         self, given: Given, screen: Screen, store: Path, sky_turn_deg: float, replaced: tuple[str, ...]
     ) -> None:  # fmt: skip
         self._given, self._screen, self._tracing = given, screen, Tracing(store, sky_turn_deg, replaced)
-        self._of: tuple[FrameState, Mapping[str, str]] | None = (
+        self._of: tuple[FrameState, Mapping[str, str | ImageTexture]] | None = (
             None  # the requested frame, reduced to what paths depend on
         )
         self._is_mixed = False  # whether the picture A has another light mix than the scene
@@ -78,7 +79,7 @@ class TracedPicture:
         mix = ", light as baked" if self._is_mixed else ""
         return f"path traced, {f'{self.samples} samples' if self.samples else 'coarse'}{mix}"
 
-    def update(self, wanted: FrameState, textures: Mapping[str, str]) -> None:
+    def update(self, wanted: FrameState, textures: Mapping[str, str | ImageTexture]) -> None:
         """Request a view once it rests, and show its present picture.
 
         `textures` replace textures of materials. Light mixes are not traced.

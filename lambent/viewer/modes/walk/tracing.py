@@ -12,6 +12,8 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
 from lambent.materials.document import Material
+from lambent.scenes.scene import ImageTexture
+from lambent.store.session import RoomState
 from lambent.viewer.worker_process import WorkerProcess
 
 WORKER = "lambent.viewer.modes.walk.tracing_worker"
@@ -22,22 +24,22 @@ MOST_SAMPLES = 1024  # samples per pixel after which tracing stops
 class Wish:
     """A numbered request to trace a view; without a `camera`, a request to stop.
 
-    `materials` replace the scene's, by name. `textures` maps a material to the one whose textures it gets; "" removes
-    its textures.
+    `materials` replace the scene's, by name. `textures` maps a material to the one whose textures it gets, to "" for
+    none, or to an image with its path.
     """
 
     number: int
     camera: Camera | None = None
     size: tuple[int, int] = (1, 1)
     materials: Mapping[str, Material] = field(default_factory=dict)
-    textures: Mapping[str, str] = field(default_factory=dict)
+    textures: Mapping[str, str | ImageTexture] = field(default_factory=dict)
 
     def said(self) -> dict[str, Any]:
         """As a JSON object."""
-        materials = {name: material.model_dump(mode="json") for name, material in self.materials.items()}
+        room = RoomState(materials=dict(self.materials), textures=dict(self.textures))
         camera = None if self.camera is None else asdict(self.camera)
         view = {"number": self.number, "camera": camera, "size": list(self.size)}
-        return {**view, "materials": materials, "textures": dict(self.textures)}
+        return {**view, "room": room.model_dump(mode="json")}
 
     @classmethod
     def of(cls, said: Mapping[str, Any]) -> Wish:
@@ -46,9 +48,9 @@ class Wish:
         if camera is not None:
             places = {name: tuple(camera[name]) for name in ("position", "target", "up")}
             camera = Camera(**{**camera, **places})
-        materials = {name: Material.model_validate(one) for name, one in said["materials"].items()}
+        room = RoomState.model_validate(said["room"])
         size = int(said["size"][0]), int(said["size"][1])
-        return cls(int(said["number"]), camera, size, materials, dict(said["textures"]))
+        return cls(int(said["number"]), camera, size, room.materials, room.textures)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +107,7 @@ class Tracing:
         camera: Camera | None,
         size: tuple[int, int],
         materials: Mapping[str, Material],
-        textures: Mapping[str, str],
+        textures: Mapping[str, str | ImageTexture],
     ) -> None:
         """Trace this view from now on; without a camera, stop tracing."""
         if self.error or (self._process is None and camera is None):

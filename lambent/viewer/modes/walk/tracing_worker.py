@@ -26,7 +26,7 @@ from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.scenes.replacement import parse_replacements, with_replacements
-from lambent.scenes.scene import Look, Scene
+from lambent.scenes.scene import ImageTexture, Look, Scene
 from lambent.scenes.turned_sky import under_turned_sky
 from lambent.scenes.variants import textures_worn
 from lambent.store.source import SOURCE, scene_of
@@ -70,7 +70,7 @@ class Views:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._applied: tuple[Mapping[str, Material], Mapping[str, str]] | None = None
+        self._applied: tuple[Mapping[str, Material], Mapping[str, str | ImageTexture]] | None = None
         self._built: Any = None
 
     def traced(self, camera: Camera, size: tuple[int, int], samples: int, seed: int) -> Floats:
@@ -79,7 +79,7 @@ class Views:
 
         return traced(self._built, camera, *size, samples, seed)[0]
 
-    def apply_materials(self, materials: Mapping[str, Material], textures: Mapping[str, str]) -> bool:
+    def apply_materials(self, materials: Mapping[str, Material], textures: Mapping[str, str | ImageTexture]) -> bool:
         """Set materials and textures that replace the scene's; return whether the scene must be rebuilt."""
         if self._built is not None and (materials, textures) == self._applied:
             return False

@@ -6,14 +6,16 @@ from functools import partial
 
 from imgui_bundle import imgui
 
+from lambent.scenes.scene import ImageTexture
 from lambent.viewer.modes.walk.state import Materials, Selection
+from lambent.viewer.modes.walk.texturing import LEAST_REPEAT, MOST_SHOWN_REPEAT, Texturing
 from lambent.viewer.panels import editing, parameters
-from lambent.viewer.panels.widgets import buttons, explain, listed, path_field, press
+from lambent.viewer.panels.widgets import buttons, choice, explain, listed, path_field, press, slider
 
 LISTED = 5
 
 
-def draw(selection: Selection, materials: Materials) -> None:
+def draw(selection: Selection, materials: Materials, texturing: Texturing) -> None:
     _objects(selection)
     name, editor = selection.material, materials.editor
     if name is None:
@@ -31,6 +33,7 @@ def draw(selection: Selection, materials: Materials) -> None:
     edited, materials.linked_roughness = parameters.edited(material, materials.linked_roughness)
     if edited != material:
         edits.change(name, edited)
+    _texture(texturing, name)
     imgui.separator()
     buttons([
         ("reset", name in edits.edited, partial(edits.reset, name), "restores the store's material"),
@@ -52,6 +55,28 @@ def _objects(selection: Selection) -> None:
         imgui.same_line(0.5 * imgui.get_content_region_avail().x)
         imgui.text_disabled(item.material)
     imgui.end_child()
+
+
+def _texture(texturing: Texturing, name: str) -> None:
+    """Draw the choice of the material's texture, and the field of an image."""
+    imgui.separator()
+    if name in texturing.without_uv:
+        imgui.text_wrapped("no texture coordinates: bake the scene again, or add uv to show a texture")
+        return
+    choices, shown = texturing.choices(name), texturing.shown(name)
+    meaning = "shows its own texture, none, another material's, or an image; the mean becomes the diffuse colour"
+    chosen = choice("texture", shown, tuple(choices), meaning)
+    if chosen != shown:
+        texturing.choose(name, choices[chosen])
+    meaning = "shows an image as the texture of this material; or drop the file onto the window"
+    texturing.typed, wanted = path_field("image", texturing.typed, "show", "image file...", meaning)
+    if wanted:
+        texturing.open(name, texturing.typed)
+    worn = texturing.edits.room.textures.get(name)
+    if isinstance(worn, ImageTexture):
+        times = slider("repeat", worn.repeat, LEAST_REPEAT, MOST_SHOWN_REPEAT, "how often the image repeats", log=True)
+        if times != worn.repeat:
+            texturing.repeat(name, times)
 
 
 def _save(materials: Materials, name: str) -> None:
