@@ -39,7 +39,8 @@ class SunLight:
         self, layouts: Layouts, sun: SunRecord | None = None, parts: SunParts = (), depths: Any = None,
         panes: PaneLayers | None = None, sunlit: NDArray[np.uint8] | None = None,
     ) -> None:  # fmt: skip
-        self.exists, self.is_wide = len(parts) > 0, len(parts) > 1
+        self.parts = len(parts)
+        self.exists, self.is_wide = self.parts > 0, self.parts > 1
         panes = panes or no_panes(layouts.device)
         self.squares = len(parts[0].squares) if parts else 0
         self.pane_layers = panes.count

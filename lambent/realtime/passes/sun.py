@@ -32,10 +32,10 @@ class SunPass:
         module = layouts.device.create_shader_module(code=assemble("sun.wgsl"))
         groups = [layouts.frame, layouts.of(*SHADOW_MAP)]
         self._pipeline = cache(
-            lambda is_pane, transmits, squares, panes, wide: pipeline(
+            lambda is_pane, transmits, parts, squares, panes, wide: pipeline(
                 layouts.device, module, "sun_main", groups, [FORMAT], compare="greater" if is_pane else "equal",
                 front_face=front_face,
-                constants={"TRANSMITS": transmits, "SQUARES": squares, "PANES": panes, "WIDE": wide},
+                constants={"TRANSMITS": transmits, "PARTS": parts, "SQUARES": squares, "PANES": panes, "WIDE": wide},
             )
         )  # fmt: skip
         self._texture = lru_cache(2 * MOST_REFLECTORS)(
@@ -65,7 +65,7 @@ class SunPass:
             for draw in draws:
                 record = draw.item.record
                 render.set_pipeline(
-                    self._pipeline(draw.is_pane, draw.material.transmits, sun.squares, sun.pane_layers, wide)
+                    self._pipeline(draw.is_pane, draw.material.transmits, sun.parts, sun.squares, sun.pane_layers, wide)
                 )
                 context.counts["draw_calls"] += draw_seen(render, seen, record.first_face, record.face_count)
             render.end()
