@@ -91,4 +91,4 @@ def _clipped(polygons: Floats, height: Floats) -> Floats:
     entry = np.take_along_axis(on_side, entering.argmax(axis=1)[:, None, None], axis=1)
     pairs = [np.where(one, point, on_side) for one, point in ((starts, polygons), (ends, beyond))]
     kept = [np.where(starts | ends, point, entry) for point in pairs]
-    return np.stack(kept, axis=2).reshape(len(polygons), -1, 3)
+    return np.stack(kept, axis=2).reshape(len(polygons), 2 * height.shape[1], 3)
