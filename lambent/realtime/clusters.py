@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.arrays import Flags, Floats
 from lambent.store.contract import ObjectRecord
 
 CLUSTER_FACES = 64

@@ -52,9 +52,9 @@ def shares_on_screen(frame: Record, triangles: Floats) -> Floats:
     """(F,) share of a frame that each of the triangles (F, 3, 3), m, covers."""
     clip_from_world = frame["clip_from_world"].T.astype(float)[[0, 1, 3]]
     points = triangles @ clip_from_world[:, :3].T + clip_from_world[:, 3]
-    inside = _heights(points) > 0  # (F, 3, sides)
+    inside: Flags = np.asarray(_heights(points) > 0)  # (F, 3, sides)
     whole = inside.all(axis=(1, 2))
-    cut = inside.any(axis=1).all(axis=1) & ~whole
+    cut = inside.any(axis=1).all(axis=-1) & ~whole
     shares = np.zeros(len(triangles))
     shares[whole] = _areas(points[whole])
     shares[cut] = _areas(_within_frame(points[cut]))

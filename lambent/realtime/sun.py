@@ -33,8 +33,7 @@ BLOCK = 8  # texels along a block whose least and greatest depths are known: SUN
 class SunLight:
     """A sun on the GPU: its record, its shadow map and the blocks of that; none without `parts`.
 
-    `nowhere` stands for the pixels that see a sun where there is none. Other faces than `reached_faces` (F,) get no sun;
-    None: any face may.
+    `nowhere` stands for the pixels that see a sun where there is none. Only `reached_faces` (F,) get sun; None: any.
     """
 
     def __init__(

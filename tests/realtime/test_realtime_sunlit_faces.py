@@ -43,7 +43,7 @@ def test_places_that_are_no_numbers_count_as_lit() -> None:
 def test_a_picture_is_the_same_to_the_bit_without_the_faces_that_get_no_sun(
     tmp_path: Path, device: Any, radius_deg: float, monkeypatch: Any
 ) -> None:
-    """A floor with the shadow of a plate and, below ground, a closed room, while a camera passes over the shadow's edge."""
+    """A plate over a floor, and a closed room below ground; the camera passes over the shadow's edge."""
     room, ground = placed(turned_inwards(box((4, 3, 4))), (0, -8, 0)), placed(floor(200.0), (0, -0.5, 0))
     meshes = {"room": room, "ground": ground, "floor": floor(), "plate": plate()}
     found = baked(tmp_path, meshes, radius_deg, DOWN)
