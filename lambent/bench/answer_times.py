@@ -4,7 +4,9 @@ Times are medians over rounds through all edits, in milliseconds of wall clock. 
 gathering, upsampling and upload, after which the next frame shows the light; `edit_to_picture_cpu_ms` is the processor
 time of all threads meanwhile. `dimming_ms` covers mixing the light groups again, for the light map of an edit, and its
 upload; it is None if light is not separated by group. While a colour is dragged, the window's background thread
-computes the light, and frames of DRAG_WIDTH x DRAG_HEIGHT pixels are drawn with a moving camera.
+computes the light, and its picture of DRAG_WIDTH x DRAG_HEIGHT pixels is drawn with a moving camera, as small and with
+as few mirrored views as the window's pacing chooses: `drag_width_px` is the median width, `drag_cpu_ms` the processor
+time of all threads per frame.
 """
 
 from __future__ import annotations
@@ -30,8 +32,10 @@ from lambent.realtime.renderer import Renderer
 from lambent.store.answer import StoredAnswer
 from lambent.store.store import Store
 from lambent.viewer.modes.walk.answering import Answering, AnsweringLight
+from lambent.viewer.picture import Picture
+from lambent.viewer.screen import Pace, Screen
 
-DRAG_WIDTH, DRAG_HEIGHT = 320, 180
+DRAG_WIDTH, DRAG_HEIGHT = 1280, 720
 DRAG_STEP_M = 0.002  # of the camera along x, per frame
 DRAG_TURN = 40  # frames in which the colour fades to black and back
 DIMMED = 0.5
@@ -113,10 +117,11 @@ def dragged(store: Store, materials: Mapping[str, Material], edit: Edit, seconds
     """Frames and updates of the light per second while an edit's colours are dragged and the camera moves."""
     baked = read_baked(store)
     if not baked.record.cameras:
-        return {"drag_frames_per_s": None, "drag_edits_per_s": None}
+        return dict.fromkeys(("drag_frames_per_s", "drag_edits_per_s", "drag_width_px", "drag_cpu_ms"))
     renderer, camera = Renderer(open_device(), baked), first_camera(store, baked.record)
     renderer.waits = False  # as in the window: probes of a mix follow in a thread
-    answering = AnsweringLight(store, renderer, Answering())
+    answering, screen = AnsweringLight(store, renderer, Answering()), Screen(pace=Pace(dragging=True))
+    picture = Picture(renderer, screen)
 
     def draw(frame: int) -> None:
         share = abs(2 * (frame / DRAG_TURN % 1) - 1)
@@ -124,15 +129,20 @@ def dragged(store: Store, materials: Mapping[str, Material], edit: Edit, seconds
         answering.update(edited)
         x, y, z = camera.position
         moved = replace(camera, position=(x + frame * DRAG_STEP_M, y, z))
-        renderer.draw(FrameState(moved, DRAG_WIDTH, DRAG_HEIGHT, materials=edited))
-        renderer.finish()
+        maps, mixed = renderer.light_version, renderer.mixer.version
+        picture.update(FrameState(moved, DRAG_WIDTH, DRAG_HEIGHT, materials=edited, maps=maps, mixed=mixed))
 
     for frame in range(DRAG_TURN):  # the first edit loads the answer
         draw(frame)
-    frames, changes, begun = 0, renderer.resources.light_version, time.perf_counter()
+    widths, changes = [], renderer.resources.light_version
+    begun, busy = time.perf_counter(), time.process_time()
     while (passed := time.perf_counter() - begun) < seconds:
-        draw(frames)
-        frames += 1
+        draw(DRAG_TURN + len(widths))
+        widths.append(screen.statistics.resolution[0])
+    busy = time.process_time() - busy
     answering.close()
     shown = renderer.resources.light_version - changes
-    return {"drag_frames_per_s": round(frames / passed, 1), "drag_edits_per_s": round(shown / passed, 1)}
+    return {
+        "drag_frames_per_s": round(len(widths) / passed, 1), "drag_edits_per_s": round(shown / passed, 1),
+        "drag_width_px": statistics.median(widths), "drag_cpu_ms": round(1e3 * busy / len(widths), 1),
+    }  # fmt: skip

@@ -6,13 +6,14 @@ as much again in each pass.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.arrays import Flags, Floats
 from lambent.store.contract import ObjectRecord
 
 CLUSTER_FACES = 64
@@ -28,15 +29,14 @@ MERGED_GAP = 256  # faces; runs with a smaller gap are drawn in one call, which 
 class Seen:
     """Runs of faces, in order, none across the border of two objects: [begin, end)."""
 
-    begin: Indices
-    end: Indices
+    begin: list[int]
+    end: list[int]
 
     def of(self, first_face: int, face_count: int) -> Ranges:
         """(first, count) of each run within a range of faces."""
         last = first_face + face_count
-        mine = slice(np.searchsorted(self.end, first_face, "right"), np.searchsorted(self.begin, last))
-        begin, end = self.begin[mine].clip(first_face).tolist(), self.end[mine].clip(max=last).tolist()
-        return merged(zip(begin, end, strict=True), MERGED_GAP)
+        mine = range(bisect_right(self.end, first_face), bisect_left(self.begin, last))
+        return merged(((max(self.begin[k], first_face), min(self.end[k], last)) for k in mine), MERGED_GAP)
 
 
 class Clusters:
@@ -55,12 +55,20 @@ class Clusters:
         owned = np.concatenate([none, *(np.arange(first, end) for first, end in limits)])
         corners, at = np.asarray(positions, np.float64)[faces[owned]], np.searchsorted(owned, self._begin)
         self._sliver_m = np.minimum.reduceat(_slivers(corners), at) if len(at) else np.zeros(0)
-        self._low, self._high = (
+        low, high = (
             reduce.reduceat(extreme, at, axis=0) if len(at) else np.zeros((0, 3))
             for reduce, extreme in ((np.minimum, corners.min(axis=1)), (np.maximum, corners.max(axis=1)))
         )
+        with np.errstate(invalid="ignore"):
+            self._centre, self._half = (high + low) / 2, (high - low) / 2
+        self._largest = np.maximum(np.abs(low), np.abs(high))
 
-    def seen(self, clip_from_world: Floats, rows: tuple[float, float] = (0.0, 1.0)) -> Seen:
+    def with_any(self, faces: Flags) -> Flags:
+        """The clusters that hold any of the faces (F,)."""
+        before = np.concatenate([[0], np.cumsum(faces)])
+        return np.asarray(before[self._end] > before[self._begin])
+
+    def seen(self, clip_from_world: Floats, rows: tuple[float, float] = (0.0, 1.0), among: Flags | bool = True) -> Seen:
         """The clusters that a camera may see.
 
         Parameters
@@ -69,19 +77,20 @@ class Clusters:
             Column vectors, WebGPU's clip space: |x|, |y| <= w, 0 <= z <= w.
         rows : (top, bottom)
             The band of the image that is drawn, as shares of its height.
+        among
+            The clusters that count, by default all.
         """
-        return self._runs(self._visible(clip_from_world, rows))
+        return self._runs(self._visible(clip_from_world, rows) & among)
 
     def _visible(self, clip_from_world: Floats, rows: tuple[float, float]) -> Flags:
         x, y, z, w = np.asarray(clip_from_world, np.float64)
         top, bottom = (1 - 2 * share for share in rows)
-        visible = np.ones(len(self._begin), bool)
-        for plane in (w + x, w - x, top * w - y, y - bottom * w, z, w - z):
-            terms = np.where(plane[:3] > 0, self._high, self._low) * plane[:3]  # of the corner farthest inside
-            reach = np.abs(terms).sum(axis=1) + abs(plane[3])
-            # Clusters with NaN or infinite terms are drawn.
-            visible &= ~(terms.sum(axis=1) + plane[3] < -SLACK * reach)
-        return visible
+        planes = np.array([w + x, w - x, top * w - y, y - bottom * w, z, w - z]).T
+        normals = planes[:3]
+        farthest = self._centre @ normals + self._half @ np.abs(normals) + planes[3]  # of the corner farthest inside
+        reach = self._largest @ np.abs(normals) + np.abs(planes[3])
+        # Clusters with NaN or infinite terms are drawn.
+        return np.asarray(~(farthest < -SLACK * reach).any(axis=1))
 
     def thin(self, clip_from_world: Floats, rows: tuple[float, float], height_px: int) -> Seen:
         """The faces in view that may miss all pixel centres: slivers, and clusters of few pixels.
@@ -89,11 +98,10 @@ class Clusters:
         `height_px` is the height of the whole image; other parameters as in `seen`.
         """
         _, y, _, w = np.asarray(clip_from_world, np.float64)
-        centre, half = (self._high + self._low) / 2, (self._high - self._low) / 2
-        away_m = centre @ w[:3] + w[3] + half @ np.abs(w[:3])
+        away_m = self._centre @ w[:3] + w[3] + self._half @ np.abs(w[:3])
         with np.errstate(invalid="ignore"):
             narrow_m = np.maximum(away_m, 0) * 2 / (np.linalg.norm(y[:3]) * height_px)  # one pixel
-            thin = ~(self._sliver_m > SLIVER_PX * narrow_m) | ~(2 * half.max(axis=1) > FEW_PX * narrow_m)
+            thin = ~(self._sliver_m > SLIVER_PX * narrow_m) | ~(2 * self._half.max(axis=1) > FEW_PX * narrow_m)
         return self._runs(self._visible(clip_from_world, rows) & thin)
 
     def _runs(self, visible: Flags) -> Seen:
@@ -102,7 +110,7 @@ class Clusters:
         breaks = np.flatnonzero(~joined)
         first = at[np.concatenate([np.zeros(min(1, len(at)), np.int64), breaks + 1])]
         last = at[np.concatenate([breaks, np.full(min(1, len(at)), len(at) - 1)])]
-        return Seen(self._begin[first], self._end[last])
+        return Seen(self._begin[first].tolist(), self._end[last].tolist())
 
 
 def _slivers(corners: Floats) -> Floats:

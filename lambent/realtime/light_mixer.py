@@ -17,9 +17,11 @@ from typing import Any
 import numpy as np
 
 from lambent.core.arrays import Floats
+from lambent.core.background import beside_frames
 from lambent.core.light_mix import Factors
 from lambent.realtime.baked import BakedScene
 from lambent.realtime.cube_mips import finite
+from lambent.realtime.device import adapter_info
 from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.group_light import GroupLight
 from lambent.realtime.layouts import Layouts
@@ -50,6 +52,7 @@ class LightMixer:
         self._sky_of: Floats | None = None  # mix that the sky was last computed for
         self._answer: GroupLight | None = None  # light for edited materials, which replaces the baked light
         self._answers = 0  # answers received
+        self._is_software = adapter_info(layouts.device).is_software
 
     @property
     def busy(self) -> bool:
@@ -83,7 +86,7 @@ class LightMixer:
                 self._show(*self._ready.popleft())
             if self._work is not None or not self._stale():
                 return
-            self._work = self._thread.submit(self._make)
+            self._work = self._thread.submit(self._make, beside=self._is_software and not waits)
 
     def answer(self, groups: GroupArrays) -> None:
         """Mix these arrays from the next frame on: light that answers edited materials, or the scene's own again."""
@@ -134,8 +137,15 @@ class LightMixer:
         age = {part: place for place, part in enumerate(self._made)}
         return [p for p in sorted(parts, key=lambda p: (p != MAP, age.get(p, -1))) if self._made.get(p) != now]
 
-    def _make(self) -> None:
-        """Compute stale parts until none is left; while the mix changes, the light map and a probe alternate."""
+    def _make(self, *, beside: bool) -> None:
+        """Compute stale parts until none is left; while the mix changes, the light map and a probe alternate.
+
+        `beside`: frames are drawn meanwhile, by the processor.
+        """
+        with beside_frames(beside):
+            self._make_stale()
+
+    def _make_stale(self) -> None:
         turn = False
         while stale := self._stale():
             assert self._wanted is not None

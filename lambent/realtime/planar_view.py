@@ -24,7 +24,8 @@ from lambent.store.contract import ObjectRecord, PlanRecord, ReflectorRecord
 
 MARGIN_PX = 16  # least margin at each edge
 MOST_MARGIN = 0.1  # of the frame's longer side: what a wide lobe sees beyond the frame is left to the probe
-STEP_PX = 64  # windows are multiples of this in place and size: six MIP levels without remainder
+STEP_PX = 64  # windows of large frames are multiples of this in place and size: six MIP levels without remainder
+STEP_ROWS = 512  # of a large frame; the step of smaller ones halves with each halving, twice at most
 CLEARANCE = 1e-5  # over the reflector's highest vertex, of the largest coordinate: what lies below is not mirrored
 LEAST_SHARE = 2e-4  # of the frame: a reflector that covers less is left to its probes
 MOST_LEVELS = 7
@@ -49,27 +50,30 @@ class PlanarView:
 def planar_views(
     frame: Record, reflectors: Sequence[ReflectorRecord], width: int, height: int, most: int,
     widest: Mapping[str, float] | None = None, whole: bool = False,
-    bevel_of: Callable[[ReflectorRecord], Bevel] = lambda reflector: FLAT,
+    bevel_of: Callable[[ReflectorRecord], Bevel] = lambda reflector: FLAT, shares: Floats | None = None,
 ) -> list[PlanarView]:  # fmt: skip
     """Views of the reflectors that a frame (of FRAME_DTYPE) sees, the largest first, at most `most`.
 
     `widest` is the largest m of an object's lobes, by its name: wide lobes need a larger buffer. `whole`: buffers hold
     the whole frame, for lobes that are sampled to their very ends. `bevel_of` a reflector is that of its front.
+    `shares` (R,) of the frame are covered by the reflectors, by default as much as by their outlines.
     """
+    if shares is None:
+        shares = np.array([covered_share(on_screen(frame, np.asarray(r.outline, float))) for r in reflectors])
     seen = []
-    for reflector in reflectors:
+    for reflector, share in zip(reflectors, shares, strict=True):
+        if share < LEAST_SHARE:
+            continue
         plane = np.asarray(reflector.plane, float)
         above = float(plane[:3] @ frame["eye"][:3] + plane[3])
         if above < 0 and reflector.two_sided:
             plane, above = -plane, -above
-        in_front = above > 2 * clearance_m(reflector, frame["eye"][:3])
-        shown = on_screen(frame, np.asarray(reflector.outline, float)) if in_front else np.zeros((0, 2))
-        share = covered_share(shown)
-        if share >= LEAST_SHARE:
-            seen.append((share, reflector, plane, shown))
+        if above > 2 * clearance_m(reflector, frame["eye"][:3]):
+            seen.append((share, reflector, plane))
     seen.sort(key=lambda one: -one[0])
     views = []
-    for number, (_, reflector, plane, shown) in enumerate(seen[:most]):
+    for number, (_, reflector, plane) in enumerate(seen[:most]):
+        shown = on_screen(frame, np.asarray(reflector.outline, float))
         m = max((widest or {}).get(part.object, 0.0) for part in reflector.parts)
         place = _window(frame, (width, height), m, None if whole else shown)
         view = _view(frame, plane, reflector, (width, height), place, number)
@@ -186,16 +190,23 @@ def _window(frame: Record, size: tuple[int, int], m: float, shown: Floats | None
     focal_px = size[1] / 2 / float(np.linalg.norm(frame["up"][:3]))
     reach = max(MARGIN_PX, int(2 * m * focal_px))
     margin = min(reach, max(MARGIN_PX, int(MOST_MARGIN * max(size))))
-    wide = np.array([-(-(length + 2 * margin) // STEP_PX) * STEP_PX for length in size])
+    step = step_px(size[1])
+    wide = np.array([-(-(length + 2 * margin) // step) * step for length in size])
     offset = (wide - np.array(size)) // 2
     if shown is None:
         return wide, offset
     places = (shown * [1, -1] + 1) / 2 * size + offset
-    low = np.clip((places.min(axis=0) - reach) // STEP_PX * STEP_PX, 0, wide).astype(int)
-    high = np.clip(-(-(places.max(axis=0) + reach) // STEP_PX) * STEP_PX, 0, wide).astype(int)
+    low = np.clip((places.min(axis=0) - reach) // step * step, 0, wide).astype(int)
+    high = np.clip(-(-(places.max(axis=0) + reach) // step) * step, 0, wide).astype(int)
     return high - low, offset - low
 
 
+def step_px(rows: int) -> int:
+    """Pixels by which windows move and grow, for frames of so many rows. Lobes cover fewer pixels of a small frame."""
+    return STEP_PX >> sum(rows < least for least in (STEP_ROWS, STEP_ROWS // 2))
+
+
 def levels_of(size: tuple[int, int]) -> int:
-    """MIP levels of a planar reflection buffer."""
-    return min(MOST_LEVELS, int(np.log2(min(size))) - 1)
+    """MIP levels of a planar reflection buffer, all without remainder."""
+    halvings = ((size[0] | size[1]) & -(size[0] | size[1])).bit_length() - 1
+    return min(MOST_LEVELS, int(np.log2(min(size))) - 1, halvings + 1)

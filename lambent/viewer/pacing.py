@@ -21,6 +21,7 @@ BUDGET_S = 1 / 15  # target time of a frame in motion
 SCALES = (1.0, 0.75, 0.5, 0.35, 0.25, 0.18)
 PROBE_FRAMES = 8
 FIXED_SHARE = 1.5  # a frame in motion may take this multiple of its cost without pixels
+LEAP = 2.0  # a larger frame may take this multiple of the target if all of its cost were that of pixels
 LEAST_MIRRORED = 0.5  # least scale in motion with mirrored views; below, they are left out
 MIRROR_COST = 4.0  # cost of a frame with mirrored views, relative to one without; measured in software: 3 to 4
 PRIOR_SAMPLES = 16  # weight of the last picture in motion, in `qmc` samples, while few are accumulated
@@ -77,7 +78,9 @@ class Resolution:
         # Fewer pixels do not reduce the fixed cost.
         budget_s = max(budget_s, FIXED_SHARE * self._fixed_s)
         fits = next((s for s in SCALES if self.seconds(s) <= budget_s), SCALES[-1])
-        fits_well = next((s for s in SCALES if self.seconds(s) <= 0.7 * budget_s), SCALES[-1])
+        # Noise can hide the cost of pixels, and one frame of full size then takes seconds.
+        leap = scale * math.sqrt(LEAP * budget_s / max(seconds, 1e-9))
+        fits_well = next((s for s in SCALES if s <= leap and self.seconds(s) <= 0.7 * budget_s), SCALES[-1])
         if fits < self.scale:
             self.scale = fits
         elif fits_well > self.scale:

@@ -9,7 +9,7 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.quality import quality_named
-from lambent.bench import answer
+from lambent.bench import answer, answer_times
 from lambent.core.errors import UserError
 from lambent.scenes import builtin, load_scene
 from tests.viewer.small_store import write_small_store
@@ -42,6 +42,7 @@ def test_rows_of_a_store(tmp_path: Path, groups: str) -> None:
         assert min(parts) > 0 and row["edit_to_picture_ms"] > row["upload_ms"] and row["sweeps"] >= 1
         assert row["edit_to_picture_cpu_ms"] > 0 and (row["dimming_ms"] is None) == (groups == "none")
         assert row["drag_frames_per_s"] > 0 and row["drag_edits_per_s"] > 0
+        assert 0 < row["drag_width_px"] <= answer_times.DRAG_WIDTH and row["drag_cpu_ms"] > 0
         assert row["rms"] < row["likely_error"] < row["naive_rms"]
         assert row["bytes"] > 1000 and row["precompute_s"] > 0
         assert row["precompute_cpu_s"] > 0 and row["light_map_cpu_s"] > 0

@@ -165,6 +165,19 @@ def test_a_stall_at_the_start_is_forgotten():
     assert set(seen[-20:]) == {seen[-1]} and seen[-1] >= 0.35
 
 
+def test_noise_does_not_lead_to_a_frame_of_seconds():
+    """A busy machine: 100 ms and 2 s per full picture, once slower in a smaller frame than in a larger one."""
+    p = pacer(slow_adapter=True)
+    p.cost(Plan(0.25, None, mirrors=False), 0.22)
+    p.cost(Plan(0.18, None, mirrors=False), 0.25)
+    taken = []
+    for _ in range(60):
+        taken.append(0.1 + 2.0 * p.moving.scale**2)
+        p.cost(p.moving, taken[-1])
+    assert max(taken) < 0.5
+    assert p.moving.scale < 0.5
+
+
 def test_an_adapter_that_is_too_slow_is_left_alone():
     """A frame takes 60 ms whatever its size, and 800 ms per full picture: larger ones are tried ever less often."""
     p = pacer(slow_adapter=True)

@@ -71,14 +71,19 @@ class Shading:
         draws = list(draws)
         if self._stage.mixes_parts:
             draws += [replace(draw, is_beyond=True) for draw in draws if draw.item.beyond]
+        bound: list[Any] = [None] * 4  # encoding what is bound already would cost as much as the draw
         for draw in draws:
             runs = [run for faces in draw.faces for run in seen.of(*faces)]
             if not runs:
                 continue
-            render.set_pipeline(self._pipeline(draw, formats))
-            render.set_bind_group(1, draw.material_group)
-            render.set_bind_group(2, draw.object_group)
-            render.set_bind_group(3, context.reflections if self._is_reflecting(draw) else light)
+            reflecting = context.reflections if self._is_reflecting(draw) else light
+            wanted = [self._pipeline(draw, formats), draw.material_group, draw.object_group, reflecting]
+            if wanted[0] is not bound[0]:
+                render.set_pipeline(wanted[0])
+            for number in (1, 2, 3):
+                if wanted[number] is not bound[number]:
+                    render.set_bind_group(number, wanted[number])
+            bound = wanted
             context.counts["draw_calls"] += draw_runs(render, runs)
 
     def _is_reflecting(self, draw: Draw) -> bool:

@@ -12,6 +12,7 @@ from itertools import pairwise
 from typing import Any
 
 from lambent.realtime.context import FrameContext
+from lambent.realtime.draws import Draw
 from lambent.realtime.integrators import INTEGRATORS, Integrator
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.depth import DepthPass, draw_seen, set_geometry
@@ -172,12 +173,17 @@ class PlanarBufferPass:
         `lamps` are taken out of each view.
         """
         write, layouts = self._layouts.device.queue.write_buffer, self._layouts
-        for index, (view, gone) in enumerate(zip(context.views, lamps, strict=True)):
-            how, n = mirrored_by(context, view)
+
+        @cache
+        def drawn_by(how: Integrator, n: int) -> tuple[list[Draw], list[Draw]]:
             draws, panes = (
                 [d.by(how if d.material.lobes else INTEGRATORS["diffuse"], context.resources, n) for d in of]
                 for of in (context.draws, context.panes)
             )
+            return draws, panes
+
+        for index, (view, gone) in enumerate(zip(context.views, lamps, strict=True)):
+            draws, panes = drawn_by(*mirrored_by(context, view))
             write(self._frame(index), 0, view.frame.tobytes())
             write(self.uniform(index), 0, view.uniform.tobytes())
             group = layouts.group(layouts.frame, self._frame(index), context.resources.sampler)

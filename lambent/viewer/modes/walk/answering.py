@@ -15,12 +15,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.background import beside_frames
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress
 from lambent.materials.document import Material
 from lambent.realtime.answer_shown import answered, users_of
 from lambent.realtime.answered.stages import computes
 from lambent.realtime.answering import AnsweredLight, Lit
+from lambent.realtime.device import adapter_info
 from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.renderer import Renderer
@@ -94,6 +96,7 @@ class AnsweringLight:
         self._as_baked: dict[str, ProbeLight] | None = None  # baked light by owner of a probe
         self._first = [item.light for item in renderer.resources.objects]  # as baked
         self._users: dict[str, list[int]] = {}  # indices of the objects that show each probe
+        self._is_software = adapter_info(renderer.device).is_software
         shown.possible = has_answer(store) and not renderer.scene.replaced
         if shown.possible:
             shown.said = AS_BAKED
@@ -145,6 +148,10 @@ class AnsweringLight:
 
     def _maps(self, wanted: Wanted) -> _Maps:
         """Compute the light maps of edited materials; runs in the thread."""
+        with beside_frames(self._is_software):
+            return self._computed_maps(edited)
+
+    def _computed_maps(self, edited: Mapping[str, Material]) -> _Maps:
         if self._answer is None:
             device = self._renderer.device
             stored, shaders = read_answer(self._store), device if computes(device) else None
@@ -192,7 +199,8 @@ class AnsweringLight:
             found = {}
             for number, name in enumerate(answer.probes):
                 progress(number, len(answer.probes), "probes")
-                found[name] = baked[name] if light.is_baked else answered(baked[name], answer, name, light)
+                with beside_frames(self._is_software):
+                    found[name] = baked[name] if light.is_baked else answered(baked[name], answer, name, light)
             return _Probes(found, off)
 
         def show(found: _Probes) -> None:
