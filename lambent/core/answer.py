@@ -33,7 +33,7 @@ from lambent.core import answer_loops as loops
 from lambent.core.answer_rays import Rays, gathered
 from lambent.core.arrays import Floats
 
-PASSES = 6
+PASSES = 8
 FEW_RAYS = 32  # per point, in all passes but the last
 TOLERANCE = 1e-3  # relative change of a patch in one sweep, below which the solution has converged
 SWEEPS = 400  # at most: with albedos up to MOST_ALBEDO even a closed box converges sooner

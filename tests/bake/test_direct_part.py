@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.light.direct import direct_part
+from lambent.bake.light.direct import direct_part, variance_of
 from lambent.store.answer import read_answer
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, furnace, room_with_step
@@ -28,7 +28,8 @@ def test_the_share_of_noisy_light_is_found_without_bias() -> None:
     direct = noisy((64, 64, 3), 3.0, 0.3, 1) * edge
     whole = direct + noisy((64, 64, 3), 1.0, 0.3, 2)
     light = np.broadcast_to(np.where(edge, 4.0, 1.0), (64, 64, 3)).astype(np.float16)
-    found = direct_part(direct, whole, light, known, labels, 0).astype(float)
+    variance = np.where(edge, 0.9, 0.09)[..., 0] * np.ones((64, 64))
+    found = direct_part(direct, whole, variance, light, known, labels, 0).astype(float)
     assert found[:31].mean() == pytest.approx(3.0, rel=0.01) and np.std(found[:28]) < 0.15
     assert found[34:].max() < 0.1 and (found <= light).all()
 
@@ -36,7 +37,23 @@ def test_the_share_of_noisy_light_is_found_without_bias() -> None:
 def test_no_direct_light_is_none() -> None:
     known, labels = np.ones((8, 8), bool), np.zeros((8, 8), int)
     whole = noisy((8, 8, 3), 1.0, 0.2, 3)
-    assert not direct_part(0 * whole, whole, whole.astype(np.float16), known, labels, 0).any()
+    assert not direct_part(0 * whole, whole, 0 * whole[..., 0], whole.astype(np.float16), known, labels, 0).any()
+
+
+def test_shares_that_noise_does_not_explain_are_kept() -> None:
+    """A spot of one texel that a lamp lights: its samples agree, so that a filter must not spread it."""
+    known, labels = np.ones((64, 64), bool), np.zeros((64, 64), int)
+    direct = np.full((64, 64, 3), 0.3, np.float32)
+    direct[32, 32] = 9.0
+    whole = direct + 1
+    sampled = [1.001 * whole, 0.999 * whole]
+    found = direct_part(direct, whole, variance_of(np.array(sampled)), whole.astype(np.float16), known, labels, 0)
+    assert found[32, 32] == pytest.approx(9.0, rel=0.02)
+
+
+def test_half_the_difference_of_halves_is_their_error() -> None:
+    light = np.stack([np.full((4, 4, 3), 3.0), np.full((4, 4, 3), 1.0)])
+    assert variance_of(light) == pytest.approx(1.0)
 
 
 @pytest.fixture(scope="module")

@@ -31,6 +31,7 @@ NOWHERE = 0xFFFFFFFF  # of rays that leave the scene
 DEPTH = 6  # surfaces whose lobes a ray follows
 LEAST_DIFFUSE = 0.1  # of the albedo that rays choose by: surfaces without a diffuse colour may get one
 RAYS_AT_ONCE = 1 << 21
+TURN = 0.6180339887  # of the points of a texel, from ray to ray: the golden ratio keeps clear of the rays' directions
 
 
 class RayEnds:
@@ -48,9 +49,10 @@ class RayEnds:
         self._textured = any(t.diffuse for t in builder.scene.textures.values())
 
     def from_texels(self, sides: Sides, mine: Indices, count: int, seed: int) -> tuple[NDArray[np.uint32], Floats]:
-        """Ends (n, count) of rays from texels `mine` (n,) of a side, and their weights.
+        """Ends (n, count) of rays from texels `mine` (n,) or groups of texels (n, m) of a side, and their weights.
 
-        An end is twice the texel of the light map (row * width + column), plus 1 on the other side of the surface.
+        Rays of a group start at all of its texels, so that they stand for its mean. An end is twice the texel of the
+        light map (row * width + column), plus 1 on the other side of the surface.
         A weight is that of the exitance there, with the texture but without its material's albedo.
         """
         spots, weights = np.empty((len(mine), count), np.uint32), np.empty((len(mine), count), np.float32)
@@ -83,13 +85,14 @@ class RayEnds:
         return np.array(spot).reshape(n, count), np.array(weight).reshape(n, count)
 
     def _leaving(self, sides: Sides, mine: Indices, count: int, rng: np.random.Generator) -> Any:
-        """Cosine distributed rays (n * count,) from texels `mine` (n,), stratified by texel."""
-        points, n = points_of(sides, mine), len(mine)
+        """Cosine distributed rays (n * count,) from texels `mine` (n,) or groups (n, m), stratified by each."""
+        points, n = points_of(sides, mine.reshape(-1)), len(mine)
         thread = dr.arange(mi.UInt32, n * count)
         per_texel = dr.opaque(mi.UInt32, count)  # a constant count would compile another kernel
         texel, k = thread // per_texel, thread % per_texel
-        first = dr.gather(mi.UInt32, mi.UInt32(rng.integers(POINTS, size=n, dtype=np.uint32)), texel)
-        point = texel * POINTS + (k + first) % POINTS
+        origins = dr.opaque(mi.UInt32, POINTS * (mine.size // max(n, 1)))
+        turn = dr.gather(mi.Float, mi.Float(rng.random(n, dtype=np.float32)), texel) + mi.Float(k) * TURN
+        point = texel * origins + dr.minimum(mi.UInt32((turn - dr.floor(turn)) * mi.Float(origins)), origins - 1)
         p, normal, flat = (dr.gather(mi.Vector3f, v, point) for v in (points.position, points.normal, points.flat))
         shifts = rng.random((2, n), dtype=np.float32)
         pairs = zip(hammersley(count).T.astype(np.float32), shifts, strict=True)

@@ -15,6 +15,7 @@ from lambent.bake.tiles import seed_of
 from lambent.core.answer_rays import Rays, packed_rays, weights_of_bytes
 from lambent.core.arrays import Floats, Indices
 
+AROUND = 16  # texels that the rays of a point start from
 STRIDE = 8  # of the texels that viewers see, whose rays count for how important others are
 
 
@@ -31,14 +32,16 @@ class Between:
             self._sender[spots.index * 2 + side] = senders[side]
         self._sent = sender_means(spots, senders, exitance.sum(axis=0)[..., None], count)[:, 0]
 
-    def gathered_rays(self, points: GatherPoints, part: slice, count: int, kept: int, seed: int) -> NDArray[np.uint8]:
-        """`packed_rays` (n, kept, 3), chosen of `count` from some of the points, which send light or do not."""
-        side, texel = points.side[part], points.texel[part]
-        found = np.zeros((len(texel), kept, 3), np.uint8)
+    def gathered_rays(
+        self, points: GatherPoints, starts: Indices, count: int, kept: int, seed: int
+    ) -> NDArray[np.uint8]:
+        """`packed_rays` (n, kept, 3) of points, which send light or do not, chosen of `count` from texels (n, m)."""
+        side = points.side
+        found = np.zeros((len(side), kept, 3), np.uint8)
         for one in range(2):
             mine = np.flatnonzero(side == one)
             if len(mine):
-                ends = self._ends.from_texels(self._sides[one], texel[mine], count, seed_of(seed, "gather", one))
+                ends = self._ends.from_texels(self._sides[one], starts[mine], count, seed_of(seed, "gather", one))
                 there = ends[0] != NOWHERE
                 at = np.where(there, ends[0], 0)
                 met = np.where(there, self._sender[at], -1)
@@ -123,6 +126,21 @@ def sender_means(spots: Spots, senders: Indices, values: Floats, count: int) -> 
         for channel in range(values.shape[-1]):
             total[:, channel] += np.bincount(of, weight * values[side, mine, channel], count)
     return np.asarray(total / np.maximum(area, 1e-30)[:, None])
+
+
+def texels_around(spots: Spots, senders: Indices, points: GatherPoints, most: int = AROUND) -> Indices:
+    """(n, most) texels for which each point sends, among `senders` (2, K): some, or all in turn; itself without any."""
+    found = np.broadcast_to(points.texel[:, None], (len(points.texel), most)).copy()
+    for side in range(2):
+        mine = np.flatnonzero(spots.lit[side] & (senders[side] >= 0))
+        mine = np.random.default_rng(side).permutation(mine)
+        mine = mine[np.argsort(senders[side][mine], kind="stable")]
+        of = senders[side][mine]
+        first, last = np.searchsorted(of, np.arange(len(found))), np.searchsorted(of, np.arange(len(found)), "right")
+        some = np.flatnonzero((last > first) & (points.side == side))
+        turn = np.arange(most) % (last - first)[some][:, None]
+        found[some] = mine[first[some][:, None] + turn]
+    return found
 
 
 def light_seen(

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 KIND = "answer"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 9
+REVISION = 10
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
@@ -59,8 +59,8 @@ class Settings:
     """Patches, and samples for direct and gathered light.
 
     If the light map keeps no direct light, texels get `direct_samples` of it; if light is separated by group, light
-    through lobes takes `lobe_samples`. One texel of each block of `block` x `block` texels gathers with `gather_rays`;
-    points near contacts, which do not send, trace half as many and keep `receiver_rays` of these.
+    through lobes takes `lobe_samples`. Each block of `block` x `block` texels gathers with `gather_rays`, which start
+    all over it; points near contacts, which do not send, trace half as many and keep `receiver_rays` of these.
     """
 
     patches: int = 1000
@@ -252,7 +252,7 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
         refined_points,
         seeing,
     )
-    from lambent.bake.answering.transfer import Between, light_seen, sender_means, transfer_of
+    from lambent.bake.answering.transfer import Between, light_seen, sender_means, texels_around, transfer_of
 
     how: Settings = context.settings(KIND)
     width = context.traced.texels.width
@@ -276,20 +276,24 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     other = np.where(across >= 0, across, np.arange(len(across)))
     between = Between(ends, spots, sides, closest, exitance, len(points.texel))
 
-    def rays(of: GatherPoints, traced: int, kept: int) -> Callable[[tuple[slice, ...], int], NDArray[np.uint8]]:
+    def rays(
+        of: GatherPoints, starts: Indices, traced: int, kept: int
+    ) -> Callable[[tuple[slice, ...], int], NDArray[np.uint8]]:
         def tile(region: tuple[slice, ...], seed: int) -> NDArray[np.uint8]:
-            return np.moveaxis(between.gathered_rays(of, region[1], traced, kept, seed), -1, 0)
+            return np.moveaxis(between.gathered_rays(of[region[1]], starts[region[1]], traced, kept, seed), -1, 0)
 
         return tile
 
     of_contacts = max(how.gather_rays // 2, how.receiver_rays)
-    arrays = (("rays", points, how.gather_rays, how.gather_rays, "gathering"),
-              ("receiver_rays", receivers, of_contacts, how.receiver_rays, "gathering beside contacts"))  # fmt: skip
-    for part, of, count, kept, what in arrays:
+    around = texels_around(spots, closest, points)
+    arrays = (("rays", points, around, how.gather_rays, how.gather_rays, "gathering"),
+              ("receiver_rays", receivers, receivers.texel[:, None], of_contacts, how.receiver_rays,
+               "gathering beside contacts"))  # fmt: skip
+    for part, of, starts, count, kept, what in arrays:
         shape, chunk = (3, len(of.texel), kept), (3, max(1, -(-len(of.texel) // TILES)), kept)
         key = context.keys(KIND)[answer_name(part)]
         writer = context.store.begin(answer_name(part), KIND, shape, chunk, "uint8", key=key, meta=context.provenance())
-        run_tiles(writer, rays(of, count, kept), seed=context.seed, progress=context.progress, what=what)
+        run_tiles(writer, rays(of, starts, count, kept), seed=context.seed, progress=context.progress, what=what)
         writer.finish()
     sending = Rays.of(np.moveaxis(context.store.read(answer_name("rays")), 0, -1))
     sends = closest >= 0

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 KIND = "light_map"
 NEEDS = ("geometry",)
 REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 5, 5, 3, 1, 1
-REVISION_OF_DIRECT = 3
+REVISION_OF_DIRECT = 4
 IRRADIANCE = tuple(f"light_map/{side}" for side in SIDES)
 NOISE = tuple(noise_name(side) for side in SIDES)
 TRACED, GATHERED = (f"light_map/{stage}" for stage in ("traced", "gathered"))
@@ -181,7 +181,7 @@ def _bumpy_faces(context: BakeContext) -> Flags:
 
 
 def _sampled_maps(context: BakeContext) -> Maps:
-    from lambent.bake.light.direct import direct_part
+    from lambent.bake.light.direct import direct_part, variance_of
     from lambent.bake.light.sampling import SMOOTH, finished, gathered, path_traced, sampled_halves
     from lambent.bake.tracing.path_tracer import AllLight
 
@@ -193,7 +193,8 @@ def _sampled_maps(context: BakeContext) -> Maps:
             found.append(finished(raw, context.traced.texels, labels, context.traced.cuts))
             if sampling.parts:
                 parts, (halves, known) = context.store.read(_parts(_of_side(stage, side)))[0], sampled_halves(raw)
-                direct = direct_part(parts, halves.mean(axis=0), found[-1][0], known, labels, SMOOTH)
+                of_samples = parts, halves.mean(axis=0), variance_of(halves)
+                direct = direct_part(*of_samples, found[-1][0], known, labels, SMOOTH)
                 context.put(KIND, group_name(SIDES[side], direct=True), direct[None], context.provenance())
         return found
 

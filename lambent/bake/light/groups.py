@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.light.denoise import denoise_charts, fill
-from lambent.bake.light.direct import direct_part
+from lambent.bake.light.direct import direct_part, variance_of
 from lambent.bake.light.level import with_level
 from lambent.bake.light.sampling import SMOOTH, closed, relative_noise, sampled_halves
 from lambent.bake.light.stitching import Cuts
@@ -107,11 +107,11 @@ def finished_groups(
         light[lit] = _filled(clean[lit], known, labels)
     else:
         light[lit] = closed(clean[lit], known, texels, labels, cuts) if len(lit) else 0
-        direct = np.zeros_like(light)
+        direct, variance = np.zeros_like(light), variance_of(halves)  # of all groups: of each, it is no more
         for number in lit.tolist():
             progress(count + number, len(by_group), "denoising by group")
-            both = by_group[count + number], by_group[number]
-            direct[number] = direct_part(*both, light[number], known, labels, SMOOTH)
+            of_samples = by_group[count + number], by_group[number], variance
+            direct[number] = direct_part(*of_samples, light[number], known, labels, SMOOTH)
     whole = np.minimum(light.astype(np.float32).sum(axis=0), HALF_MAX).astype(np.float16)
     return GroupMaps(whole, light, direct, {"noise": relative_noise(halves[:, known]), "samples": samples})
 
