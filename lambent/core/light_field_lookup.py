@@ -206,10 +206,12 @@ def _answered(
     weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-30)
     seen = np.einsum("kj,kjc->kc", weight, radiance_along(field, place.named(count), q))
     in_sky = np.asarray(~met & (open_sky & known).any(axis=1))
-    radiance = np.where(met[:, None], seen, blended(field, place, w, sky=edges))
+    by_sky = in_sky & (sky is not None)
+    if (rest := ~met & ~by_sky).any():
+        seen[rest] = blended(field, Place(place.x[rest], place.n[rest], place.points[rest]), w[rest], sky=edges)
     if sky is not None and in_sky.any():
-        radiance[in_sky] = sky(w[in_sky])
-    return Marched(radiance, met, in_sky, first)
+        seen[in_sky] = sky(w[in_sky])
+    return Marched(seen, met, in_sky, first)
 
 
 def surface(field: LightField, place: Place) -> tuple[Floats, Flags]:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 from collections import defaultdict
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from contextlib import suppress
 
 import numpy as np
 
 from lambent.bake.light_fields.acquisition import Around
-from lambent.bake.light_fields.choice import worth_trying
+from lambent.bake.light_fields.choice import MOST_TRIED, worth_trying
 from lambent.bake.light_fields.facing import turned_to_viewers
 from lambent.bake.light_fields.placing import Placing
-from lambent.bake.light_fields.trial import ProbeLight, Trial, tried
+from lambent.bake.light_fields.trial import Option, ProbeLight, Trial, options_of, tried
 from lambent.bake.light_fields.watched import Watched, watched
 from lambent.bake.probes.selection import Scaling
 from lambent.bake.tiles import seed_of
@@ -32,7 +33,11 @@ from lambent.store.contract import (
 from lambent.store.occlusion import has_even_niches, occlusion_gain
 from lambent.store.store import Store
 
+MOST_WATCHED = 256  # objects whose probes are looked at
 REFLECTED = 0.9  # of an object's area: then planar reflectors show it
+
+
+log = logging.getLogger(__name__)
 
 
 class Chooser:
@@ -48,12 +53,19 @@ class Chooser:
     def trials(self, names: Collection[str], progress: Progress) -> dict[str, Trial]:
         """Trials of those of the objects that are worth one."""
         flat, looks = shown_by_reflectors(self._scene, self._store), dict[str, Watched]()
-        for i, name in enumerate(curved := [name for name in names if name not in flat]):
-            part_of(progress, 0.0, 0.5, "error of probes")(i, len(curved), "")
+        curved = [name for name in names if name not in flat]
+        largest = look_largest(self._scene, curved, self._places, MOST_WATCHED)
+        for i, name in enumerate(largest):
+            part_of(progress, 0.0, 0.5, "error of probes")(i, len(largest), "")
             if (seen := self.watched(name)) is not None:
                 looks[name] = seen
         level = usual_level(looks.values())
         wrong = {name: seen.size_sr * self._probe_error(name, seen, level) for name, seen in looks.items()}
+        if len(wrong) > MOST_TRIED or len(largest) < len(curved):
+            tried_of_all = min(len(wrong), MOST_TRIED), len(curved)
+            log.warning(
+                "light fields: tried on %d of %d shiny objects, the largest and worst; name others", *tried_of_all
+            )
         found = dict[str, Trial]()
         for i, name in enumerate(some := worth_trying(wrong)):
             part_of(progress, 0.5, 1.0, "trial light fields")(i, len(some), "")
@@ -67,15 +79,16 @@ class Chooser:
         mesh = self._turned(name)
         return watched(mesh, self._scene.materials[o.material], self._places, self._around, self._seed_of(name))
 
-    def trial(self, name: str, seen: Watched, level: float | None = None, most: int | None = None) -> Trial:
-        """Errors of the object's probe and of its light fields, up to `most` points.
+    def trial(
+        self, name: str, seen: Watched, level: float | None = None, options: Sequence[Option] | None = None
+    ) -> Trial:
+        """Errors of the object's probe and of its light fields, by default of all sizes.
 
         They are relative to a `level` of luminance, by default the object's own.
         """
         probe = probe_light(self._store, name)
-        more = {} if most is None else {"most": most}
-        mesh, seed = self._turned(name), self._seed_of(name)
-        return tried(self._placing, mesh, seen, probe, self._around, seed, self._texels, level or seen.level, **more)
+        mesh, seed, some = self._turned(name), self._seed_of(name), options or options_of(self._texels)
+        return tried(self._placing, mesh, seen, probe, self._around, seed, some, level or seen.level)
 
     def _turned(self, name: str) -> Mesh:
         mesh = self._scene.object(name).mesh
@@ -86,6 +99,21 @@ class Chooser:
 
     def _seed_of(self, name: str) -> int:
         return seed_of(self._seed, "light field", name)
+
+
+def look_largest(scene: Scene, names: Collection[str], places: Floats, most: int) -> list[str]:
+    """The objects that look largest to viewers at `places` (m, 3), as if nothing hid them; at most `most`, in order."""
+    if len(names) <= most or not len(places):
+        return list(names)[:most]
+    meshes = {name: scene.object(name).mesh for name in names}
+    area_m2 = np.array([triangle_areas(mesh.corners).sum() for mesh in meshes.values()])
+    centres = np.array([(mesh.positions.min(axis=0) + mesh.positions.max(axis=0)) / 2 for mesh in meshes.values()])
+    looks = np.zeros(len(area_m2))
+    for place in places:
+        away = ((centres - place) ** 2).sum(axis=1)
+        looks += area_m2 / np.maximum(away + area_m2, 1e-12)
+    kept = set(np.argsort(-looks, kind="stable")[:most].tolist())
+    return [name for i, name in enumerate(meshes) if i in kept]
 
 
 def usual_level(looks: Iterable[Watched]) -> float:
