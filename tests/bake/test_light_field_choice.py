@@ -154,7 +154,11 @@ def beside() -> Scene:
     )
 
 
-def test_a_bake_chooses_and_keeps_its_choice(beside: Scene, tmp_path: Path) -> None:
+def test_a_bake_chooses_and_keeps_its_choice(
+    beside: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    from lambent.bake.light_fields import choosing
+
     quality = TINY.changed("tiny", light_field={"points": 12, "texels": 46, "strata": 1, "blocks": False})
     store = bake(beside, tmp_path / "s", quality=quality, light_fields="auto")
     fields = {one["object"]: one for one in light_fields_of(store)}
@@ -166,6 +170,11 @@ def test_a_bake_chooses_and_keeps_its_choice(beside: Scene, tmp_path: Path) -> N
     keys, steps = {a.name: a.key for a in store.artefacts()}, list[str]()
     store = bake(beside, tmp_path / "s", quality=quality, progress=lambda done, total, what: steps.append(what))
     assert {a.name: a.key for a in store.artefacts()} == keys and not steps, "chosen once, as the store says"
+    assert "shiny objects" not in caplog.text
+    monkeypatch.setattr(choosing, "MOST_WATCHED", 1)
+    store = bake(beside, tmp_path / "s", quality=quality, light_field_mb=100)
+    assert {one["object"] for one in light_fields_of(store)} == {"ball"}, "the larger one"
+    assert "tried on 1 of 2 shiny objects" in caplog.text
     store = bake(beside, tmp_path / "s", quality=quality, light_fields="none")
     assert not light_fields_of(store) and not store.artefacts("light_field")
 

@@ -103,6 +103,8 @@ def keys(context: BakeContext) -> dict[str, str]:
         inputs += [context.seed, context.methods["probes"]]
         if not _cached(context):
             inputs.append(context.settings("light_map").max_depth)
+        if wish.error is not None:
+            inputs.append("texels traced where they are read")  # decides the number of points
         if wish.without_object:  # keys of other light fields stay as they were
             inputs.append("volume" if wish.volume else "refracts")
         found |= dict.fromkeys(

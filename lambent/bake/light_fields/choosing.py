@@ -37,6 +37,7 @@ MOST_WATCHED = 256  # objects whose probes are looked at
 REFLECTED = 0.9  # of an object's area: then planar reflectors show it
 
 
+LEFT_OUT = "light fields: tried on %d of %d shiny objects, the largest and worst; `--light-fields NAME` adds others"
 log = logging.getLogger(__name__)
 
 
@@ -61,13 +62,10 @@ class Chooser:
                 looks[name] = seen
         level = usual_level(looks.values())
         wrong = {name: seen.size_sr * self._probe_error(name, seen, level) for name, seen in looks.items()}
-        if len(wrong) > MOST_TRIED or len(largest) < len(curved):
-            tried_of_all = min(len(wrong), MOST_TRIED), len(curved)
-            log.warning(
-                "light fields: tried on %d of %d shiny objects, the largest and worst; name others", *tried_of_all
-            )
-        found = dict[str, Trial]()
-        for i, name in enumerate(some := worth_trying(wrong)):
+        found, some = dict[str, Trial](), worth_trying(wrong)
+        if len(largest) < len(curved) or len(some) == MOST_TRIED < len(wrong):
+            log.warning(LEFT_OUT, len(some), len(curved))
+        for i, name in enumerate(some):
             part_of(progress, 0.5, 1.0, "trial light fields")(i, len(some), "")
             with suppress(UserError):  # nothing of it is in the open
                 found[name] = self.trial(name, looks[name], level)
