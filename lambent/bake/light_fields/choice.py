@@ -1,8 +1,9 @@
 """Which objects get a light field where nobody says it: those whose probe shows viewers most that is wrong.
 
 What is wrong with an object is the error of its look-ups times the solid angle that it takes for viewers. Memory goes
-where it takes most of that away, until a budget is spent. A light field is only taken where it lowers the error of the
-smaller one before, or of the probe, to WORTH, and certainly lowers that at places held out from the choice, too.
+where it takes most of that away, until a budget is spent or a megabyte takes away too little of it. A light field is
+only taken where it lowers the error by a share WORTH of the probe's, and certainly lowers that at places held out from
+the choice, too.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from typing import Any
 
 from lambent.bake.light_fields.trial import PROBE, Option, Trial
 
-WORTH = 0.95
+WORTH = 0.05
+PER_MB = 0.0001  # of what is wrong with all objects that are tried: what a megabyte takes away at least
 CERTAINTY = 2.0  # standard errors by which the error falls at places held out, where noise does not favour the choice
 SHARE = 0.0002  # of what is wrong with all objects: those with less are not tried
 MOST_TRIED = 48
@@ -50,6 +52,7 @@ def chosen(
     `beside_mb` tells the memory that a light field takes beside its maps, by object and number of points.
     """
     taken, left = dict[str, Option](), budget_mb
+    least = PER_MB * sum(trial.probe * trial.size_sr for trial in trials.values())  # of a megabyte
 
     def megabytes(name: str, option: Option) -> float:
         if option == PROBE:
@@ -61,11 +64,11 @@ def chosen(
         for name, trial in trials.items():
             before = taken.get(name, PROBE)
             for option, error in trial.fields.items():
-                more = megabytes(name, option) - megabytes(name, before)
-                if not 0 < more <= left or error >= WORTH * trial.error(before):
+                more, falls = megabytes(name, option) - megabytes(name, before), trial.error(before) - error
+                if not 0 < more <= left or falls <= WORTH * trial.probe:
                     continue
-                worth = (trial.error(before) - error) * trial.size_sr / more
-                if worth > gain and trial.falls(before, option, CERTAINTY):
+                worth = falls * trial.size_sr / more
+                if worth > max(gain, least) and trial.falls(before, option, CERTAINTY):
                     best, gain, cost = (name, option), worth, more
         if best is None:
             break
