@@ -173,6 +173,8 @@ def test_a_bake_chooses_and_keeps_its_choice(
     store = bake(beside, tmp_path / "s", quality=quality, light_fields="auto")
     fields = {one["object"]: one for one in light_fields_of(store)}
     assert "ball" in fields
+    shown = choosing.shown_by_reflectors(beside, store)
+    assert set(shown) == {"corner"} and 0.4 < shown["corner"] < 0.9, "the large faces of a thin box"
     for name, one in fields.items():
         assert one["error"] < (1 - WORTH) * one["probe_error"] and one["seconds"] > 0
         side = store.read(light_field_name(name, "radiance")).shape[1]

@@ -6,6 +6,7 @@ import logging
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -34,7 +35,7 @@ from lambent.store.occlusion import has_even_niches, occlusion_gain
 from lambent.store.store import Store
 
 MOST_WATCHED = 256  # objects whose probes are looked at
-REFLECTED = 0.9  # of an object's area: then planar reflectors show it
+REFLECTED = 0.9  # of an object's area, above which no light field is tried: planar reflectors show it
 
 
 LEFT_OUT = "light fields: tried on %d of %d shiny objects, the largest and worst; `--light-fields NAME` adds others"
@@ -54,12 +55,12 @@ class Chooser:
     def trials(self, names: Collection[str], progress: Progress) -> dict[str, Trial]:
         """Trials of those of the objects that are worth one."""
         flat, looks = shown_by_reflectors(self._scene, self._store), dict[str, Watched]()
-        curved = [name for name in names if name not in flat]
+        curved = [name for name in names if flat.get(name, 0.0) <= REFLECTED]
         largest = look_largest(self._scene, curved, self._places, MOST_WATCHED)
         for i, name in enumerate(largest):
             part_of(progress, 0.0, 0.5, "error of probes")(i, len(largest), "")
             if (seen := self.watched(name)) is not None:
-                looks[name] = seen
+                looks[name] = replace(seen, size_sr=seen.size_sr * (1 - flat.get(name, 0.0)))
         level = usual_level(looks.values())
         wrong = {name: seen.size_sr * self._probe_error(name, seen, level) for name, seen in looks.items()}
         found, some = dict[str, Trial](), worth_trying(wrong)
@@ -126,13 +127,13 @@ def usual_level(looks: Iterable[Watched]) -> float:
     return max(float(light[order][np.searchsorted(total, total[-1] / 2)]), 1e-6)
 
 
-def shown_by_reflectors(scene: Scene, store: Store) -> set[str]:
-    """Names of the objects that planar reflectors show."""
+def shown_by_reflectors(scene: Scene, store: Store) -> dict[str, float]:
+    """Shares of the areas of objects that planar reflectors show."""
     shown: dict[str, float] = defaultdict(float)
     for part in (part for reflector in scene_record(store).reflectors for part in reflector.parts):
         shown[part.object] += part.area_m2
     areas = {o.name: float(triangle_areas(o.mesh.corners).sum()) for o in scene.objects}
-    return {name for name, area_m2 in shown.items() if area_m2 > REFLECTED * areas.get(name, np.inf)}
+    return {name: min(area_m2 / max(areas[name], 1e-12), 1.0) for name, area_m2 in shown.items() if name in areas}
 
 
 def probe_light(store: Store, name: str) -> ProbeLight:
