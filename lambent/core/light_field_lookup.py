@@ -214,14 +214,22 @@ def _answered(
     weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-30)
     seen = np.einsum("kj,kjc->kc", weight, radiance_along(field, place.named(count), q))
     in_sky = np.asarray(~met & (open_sky & known).any(axis=1))
-    other = blended(field, place, w, sky=edges)
-    if sky is not None and (either := in_sky | met).any():
-        other[either] = sky(w[either])
-    radiance = np.where(met[:, None], seen, other)
+    at = np.zeros(0, np.int64)
     if edges is not None and field.cover is not None:
         point = place.named(count)
         at_edge = known & (open_sky | (np.isfinite(t) & (cover_along(field, point, q) != WHOLE)))
         at = np.flatnonzero(met & at_edge.any(axis=1))
+    beyond = in_sky.copy()  # where light from behind the hit, or without one, is the sky's
+    beyond[at] = True
+    other, blends = np.zeros_like(seen), ~met & ~in_sky if sky is not None else ~met | beyond
+    if sky is not None and beyond.any():
+        other[beyond] = sky(w[beyond])
+    if blends.any():
+        other[blends] = blended(
+            field, Place(place.x[blends], place.n[blends], place.points[blends]), w[blends], sky=edges
+        )
+    radiance = np.where(met[:, None], seen, other)
+    if len(at):
         hit = place.x[at] + first[at, None] * w[at]
         shown, share = _edge(field, hit, point[at], weight[at], known[at])
         radiance[at] = share[:, None] * shown + (1 - share[:, None]) * other[at]

@@ -4,52 +4,106 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.light_fields.choice import SHARE, chosen, worth_trying
+from lambent.bake.light_fields.choice import SHARE, WORTH, chosen, worth_trying
 from lambent.bake.light_fields.request import as_asked, light_fields_of, noted
-from lambent.bake.light_fields.trial import ProbeLight, Trial
+from lambent.bake.light_fields.trial import COUNTS, PROBE, Option, ProbeLight, Trial, helps, options_of
 from lambent.core.camera import Camera
 from lambent.core.cubemap import face_directions
 from lambent.core.directions import normalize
 from lambent.core.errors import UserError
 from lambent.scenes.geometry import box, placed
-from lambent.scenes.scene import LightFieldWish, Scene, SceneObject
+from lambent.scenes.scene import LightFieldWish, Scene, SceneObject, SunSky
 from lambent.store.contract import light_field_name
 from tests.bake.small_scenes import MIRROR, TINY, room_with_step
 
 MB = 64**2 * 8 / 1e6  # of a point with maps of 64 texels a side
 
 
-def trial(probe: float, fields: dict[int, float], size_sr: float, held_out: dict[int, float] | None = None) -> Trial:
-    return Trial(probe, fields, size_sr, {0: probe, **fields} if held_out is None else held_out)
+def of_points(errors: dict[int, float]) -> dict[Option, float]:
+    return {Option(count, 64): error for count, error in errors.items()}
+
+
+def trial(probe: float, fields: dict[Option, float], size_sr: float, noise: float = 0.0) -> Trial:
+    """Held-out errors are those given; those of light fields are `noise` more and less in turn."""
+    up_and_down = noise * (-1.0) ** np.arange(100)
+    held_out = {option: error + up_and_down for option, error in fields.items()}
+    return Trial(probe, fields, size_sr, {PROBE: np.full(100, probe)} | held_out)
+
+
+def no_sample_map(name: str, points: int) -> float:
+    return 0.0
 
 
 def test_points_go_where_they_take_most_away() -> None:
     trials = {
-        "large": trial(0.4, {16: 0.2, 64: 0.1}, 0.02),
-        "small": trial(0.4, {16: 0.2, 64: 0.1}, 0.01),
-        "hopeless": trial(0.4, {16: 0.39, 64: 0.38}, 1.0),
-        "right already": trial(0.0, {16: 0.1, 64: 0.05}, 1.0),
-        "right by chance": trial(0.4, {16: 0.2, 64: 0.1}, 1.0, {0: 0.4, 16: 0.41, 64: 0.39}),
+        "large": trial(0.4, of_points({16: 0.2, 64: 0.1}), 0.02),
+        "small": trial(0.4, of_points({16: 0.2, 64: 0.1}), 0.01),
+        "hopeless": trial(0.4, of_points({16: 0.39, 64: 0.385}), 1.0),
+        "right already": trial(0.0, of_points({16: 0.1, 64: 0.05}), 1.0),
+        "by chance": trial(0.4, of_points({16: 0.37, 64: 0.36}), 1.0, noise=0.5),
     }
 
     def counts(points: float) -> dict[str, int]:
-        return {one.object: one.points for one in chosen(trials, 64, points * MB, 8)}
+        return {one.object: one.points for one in chosen(trials, points * MB, 8, no_sample_map)}
 
     assert counts(15) == {} and counts(16) == {"large": 16}
     assert counts(33) == {"large": 16, "small": 16}
     assert counts(85) == {"large": 64, "small": 16} and counts(1000) == {"large": 64, "small": 64}
-    one = chosen(trials, 64, 16 * MB, 8)[0]
+    one = chosen(trials, 16 * MB, 8, no_sample_map)[0]
     assert one.megabytes == pytest.approx(16 * MB) and (one.probe_error, one.error) == (0.4, 0.2)
-    assert chosen({}, 64, 100.0, 8) == []
+    assert chosen({}, 100.0, 8, no_sample_map) == []
+
+
+def test_small_gains_are_taken_where_they_are_certain() -> None:
+    for noise, expected in ((0.01, ["one"]), (0.5, [])):
+        trials = {"one": trial(0.4, of_points({16: 0.37}), 1.0, noise)}
+        assert [one.object for one in chosen(trials, 100.0, 8, no_sample_map)] == expected
+
+
+def test_memory_buys_points_or_texels_by_what_they_gain() -> None:
+    rough = {Option(64, 30): 0.2, Option(16, 94): 0.3, Option(1024, 30): 0.1, Option(64, 94): 0.2}
+    narrow = {Option(64, 30): 0.39, Option(16, 94): 0.2, Option(1024, 30): 0.39, Option(64, 94): 0.1}
+    trials = {"rough": trial(0.4, rough, 1.0), "narrow": trial(0.4, narrow, 1.0)}
+    found = {one.object: (one.points, one.texels) for one in chosen(trials, 100.0, 8, no_sample_map)}
+    assert found == {"rough": (1024, 30), "narrow": (64, 94)}
+    whole = sum(one.megabytes for one in chosen(trials, 100.0, 8, no_sample_map))
+    assert whole == pytest.approx((1024 * 30**2 + 64 * 94**2) * 8e-6)
+    spare = chosen(trials, whole + 3.9, 8, lambda name, points: 2.0)
+    assert {one.object: one.points for one in spare} != {"rough": 1024, "narrow": 64}, "sample maps count as well"
+
+
+def test_memory_is_kept_where_it_takes_next_to_nothing_away() -> None:
+    """A gain by a tenth of the error of the probe, for 17 MB: of an object that viewers see, and of one hardly seen."""
+    fields = {Option(16, 94): 0.2, Option(256, 94): 0.16}
+    trials = {name: trial(0.4, fields, size_sr) for name, size_sr in (("seen", 0.1), ("hardly", 0.0005))}
+    found = {one.object: one.points for one in chosen(trials, 1000.0, 8, no_sample_map)}
+    assert found == {"seen": 256, "hardly": 16}
+    nearly = {"nearly right": trial(0.4, {Option(16, 94): 0.01, Option(256, 94): 0.001}, 1.0)}
+    assert [one.points for one in chosen(nearly, 1000.0, 8, no_sample_map)] == [16]
+
+
+def test_sizes_are_those_that_trials_tell_apart() -> None:
+    assert {one.texels for one in options_of(94)} == {30, 94, 190}
+    assert all(count in COUNTS for count, _ in options_of(94)) and Option(1024, 190) not in options_of(94)
+    assert {one.texels for one in options_of(310)} == {102, 310}, "620 would be tried with as many texels as 310"
+    assert all(one.texels >= 8 for one in options_of(8))
+
+
+def test_more_points_or_texels_help_where_errors_fall() -> None:
+    errors = {Option(16, 30): 0.4, Option(64, 30): 0.3, Option(64, 94): 0.2, Option(256, 30): 0.3}
+    assert [helps(errors, one) for one in errors] == [True, True, True, False]
+    assert not helps(errors | {Option(64, 190): 0.2}, Option(64, 190))
 
 
 def test_a_count_comes_down_to_an_error_or_is_the_best() -> None:
-    found = trial(0.4, {16: 0.2, 64: 0.1, 256: 0.11}, 1.0)
+    found = trial(0.4, of_points({16: 0.2, 64: 0.1, 256: 0.11}), 1.0)
     assert [found.count_for(error) for error in (0.3, 0.15, 0.01)] == [16, 64, 64]
 
 
@@ -57,6 +111,16 @@ def test_only_the_worst_are_tried() -> None:
     wrong = {"a": 1.0, "b": 10.0, "c": 11 * SHARE / 2, "d": 0.0}
     assert worth_trying(wrong) == ["b", "a"]
     assert worth_trying({}) == [] and worth_trying({"a": 0.0}) == []
+
+
+def test_of_very_many_the_largest_are_looked_at(mi: Any) -> None:
+    from lambent.bake.light_fields.choosing import look_largest
+
+    meshes = {f"{k}": placed(box((0.1 * k, 0.1, 0.1)), (float(k % 2), 0, 0)) for k in range(1, 9)}
+    scene = Scene("many", tuple(SceneObject(name, mesh, "mirror") for name, mesh in meshes.items()), {"mirror": MIRROR})
+    places = np.array([[0.5, 0, 4.0], [0.5, 3.0, 2.0]])
+    assert look_largest(scene, list(meshes), places, 3) == ["6", "7", "8"]
+    assert look_largest(scene, list(meshes), places, 8) == list(meshes)
 
 
 def test_a_probe_is_looked_up_as_the_renderer_does() -> None:
@@ -101,17 +165,37 @@ def beside() -> Scene:
     )
 
 
-def test_a_bake_chooses_and_keeps_its_choice(beside: Scene, tmp_path: Path) -> None:
+def test_reflectors_show_shares_of_areas(beside: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    from lambent.bake.light_fields import choosing
+
+    parts = [SimpleNamespace(object=name, area_m2=0.25) for name in ("corner", "corner", "gone")]
+    record = SimpleNamespace(reflectors=[SimpleNamespace(parts=parts)])
+    monkeypatch.setattr(choosing, "scene_record", lambda store: record)
+    shown = choosing.shown_by_reflectors(beside, cast(Any, None))
+    assert shown == {"corner": pytest.approx(0.5 / 0.58)}, "both large faces of a thin box"
+
+
+def test_a_bake_chooses_and_keeps_its_choice(
+    beside: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    from lambent.bake.light_fields import choosing
+
     quality = TINY.changed("tiny", light_field={"points": 12, "texels": 46, "strata": 1, "blocks": False})
     store = bake(beside, tmp_path / "s", quality=quality, light_fields="auto")
     fields = {one["object"]: one for one in light_fields_of(store)}
     assert "ball" in fields
     for name, one in fields.items():
-        assert one["error"] < 0.85 * one["probe_error"] and one["seconds"] > 0
-        assert store.read(light_field_name(name, "radiance")).shape == (one["points"], 46, 46, 3)
+        assert one["error"] < (1 - WORTH) * one["probe_error"] and one["seconds"] > 0
+        side = store.read(light_field_name(name, "radiance")).shape[1]
+        assert side in {option.texels for option in options_of(46)}
     keys, steps = {a.name: a.key for a in store.artefacts()}, list[str]()
     store = bake(beside, tmp_path / "s", quality=quality, progress=lambda done, total, what: steps.append(what))
     assert {a.name: a.key for a in store.artefacts()} == keys and not steps, "chosen once, as the store says"
+    assert "shiny objects" not in caplog.text
+    monkeypatch.setattr(choosing, "MOST_WATCHED", 1)
+    store = bake(beside, tmp_path / "s", quality=quality, light_field_mb=100)
+    assert {one["object"] for one in light_fields_of(store)} == {"ball"}, "the larger one"
+    assert "tried on 1 of 2 shiny objects" in caplog.text
     store = bake(beside, tmp_path / "s", quality=quality, light_fields="none")
     assert not light_fields_of(store) and not store.artefacts("light_field")
 
@@ -123,3 +207,12 @@ def test_an_error_that_is_asked_for_decides_how_many_points(beside: Scene, tmp_p
         asked = replace(beside, light_fields={"ball": LightFieldWish(error=error)})
         counts.append(light_fields_of(bake(asked, tmp_path / "s", quality=quality))[0]["points"])
     assert counts[0] == 16 and counts[0] <= counts[1] <= 40
+
+
+def test_what_stands_alone_under_the_sky_keeps_its_probe(tmp_path: Path) -> None:
+    """A convex box far from everything: the probe is right."""
+    objects = (SceneObject("box", box((0.4, 0.3, 0.2)), "mirror"),)
+    eyes = (Camera("a", (1.0, 0.8, 1.2), (0, 0, 0)), Camera("b", (-1.2, -0.6, 0.7), (0, 0, 0)))
+    scene = Scene("alone", objects, {"mirror": MIRROR}, environment=SunSky((0.39, 0.86, -0.32)), cameras=eyes)
+    quality = TINY.changed("tiny", light_field={"points": 12, "texels": 46, "strata": 1, "blocks": False})
+    assert light_fields_of(bake(scene, tmp_path / "s", quality=quality, light_fields="auto")) == []

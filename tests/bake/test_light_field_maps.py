@@ -283,3 +283,18 @@ def test_the_disc_of_the_sun_is_left_out(mi: Any) -> None:
     assert not difference[~near].any()
     np.testing.assert_allclose(difference.sum(axis=(0, 1)), found.record.irradiance, rtol=0.1)
     assert rest[near].max() < 0.01 * whole[near].max()
+
+
+def test_maps_that_are_traced_where_they_are_read_are_those_of_a_bake(mi: Any) -> None:
+    from lambent.bake.light_fields.acquisition import Around, TracedMaps, radiance_maps
+    from lambent.bake.tracing.scene_builder import SceneBuilder
+
+    room = coloured_room()
+    around = Around(SceneBuilder(replace(room, objects=room.objects[:-1])).build(), None, 1)
+    points = np.array([[0.0, 0, 0], [1.5, -0.7, 0.3]])
+    whole, read = radiance_maps(around, points, 16, 1, 0), TracedMaps(around, points, 16, 0)
+    some = np.array([[1, 0], [1, 1]]), np.array([[3, 3], [15, 0]]), np.array([[4, 4], [0, 7]])
+    for _ in range(2):
+        np.testing.assert_array_equal(read[some], whole[some])
+    assert read.shape == whole.shape and read.nbytes == whole.nbytes
+    np.testing.assert_array_equal(np.array(read), whole)

@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from lambent.bake.light_fields import request
 from lambent.bake.methods import ProbeMethod
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles, seed_of
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Floats, Indices
 from lambent.core.colour import halves
 from lambent.core.errors import UserError
 from lambent.core.geometry import triangle_areas
@@ -98,16 +99,12 @@ def keys(context: BakeContext) -> dict[str, str]:
     found = dict[str, str]()
     for name, wish in wished(context).items():
         how = settings_of(context, wish)
-        inputs: list[Any] = [
-            context.keys("light_map")["light_map/irradiance"],
-            name,
-            asdict(how),
-            wish.offset_m,
-            wish.error,
-        ]
-        inputs += [context.seed, context.methods["probes"]]
+        inputs: list[Any] = [context.keys("light_map")["light_map/irradiance"], name, asdict(how)]
+        inputs += [wish.offset_m, wish.error, context.seed, context.methods["probes"]]
         if not _cached(context):
             inputs.append(context.settings("light_map").max_depth)
+        if wish.error is not None:
+            inputs.append("texels traced where they are read")  # decides the number of points
         if wish.without_object:  # keys of other light fields stay as they were
             inputs.append("volume" if wish.volume else "refracts")
         if not wish.volume:
@@ -148,7 +145,9 @@ def wished(context: BakeContext) -> dict[str, LightFieldWish]:
     asked = {name: scene.light_fields[name] for name in _shiny(context) if name in scene.light_fields}
     if context.methods.get(request.FIELDS) != request.AUTO:
         return asked
-    return {one["object"]: LightFieldWish(points=one["points"]) for one in _choice(context)} | asked
+    return {
+        one["object"]: LightFieldWish(points=one["points"], texels=one["texels"]) for one in _choice(context)
+    } | asked
 
 
 def parts_of(how: Settings, wish: LightFieldWish) -> tuple[str, ...]:
@@ -188,7 +187,7 @@ def _choice(context: BakeContext) -> list[dict[str, Any]]:
     named = sorted(context.scene.light_fields)
     curved = [part for name in _shiny(context) for part in _patches(context, name)]
     inputs = [context.keys("light_map"), context.keys("probe"), asdict(how), named, budget_mb, context.seed, *curved]
-    key = key_of(LIGHT_FIELD_CHOICE, 2, *inputs)
+    key = key_of(LIGHT_FIELD_CHOICE, 3, *inputs)
     said = context.store.documents.get(LIGHT_FIELD_CHOICE)
     if not isinstance(said, dict) or said.get("key") != key:
         from lambent.bake.light_fields.choice import chosen
@@ -196,10 +195,26 @@ def _choice(context: BakeContext) -> list[dict[str, Any]]:
         with context.timed(LIGHT_FIELD_CHOICE):
             others = [name for name in _shiny(context) if name not in named]
             trials = _chooser(context, _traced(context)).trials(others, context.progress)
-            found = chosen(trials, how.texels, budget_mb, BYTES_PER_TEXEL[how.blocks])
+            beside_mb = partial(_sample_map_mb, context)
+            found = chosen(trials, budget_mb, BYTES_PER_TEXEL[how.blocks], beside_mb)
         said = {"key": key, "chosen": [one.said() for one in found]}
         context.store.set_document(LIGHT_FIELD_CHOICE, said)
     return list(said["chosen"])
+
+
+def _sample_map_mb(context: BakeContext, name: str, points: int) -> float:
+    from lambent.bake.light_fields.sample_map import megabytes
+
+    spacing_m = float(np.sqrt(triangle_areas(context.scene.object(name).mesh.corners).sum() / points))
+    return megabytes(context.geometry, _faces_of(context, name), (context.atlas.width, context.atlas.height), spacing_m)
+
+
+def _faces_of(context: BakeContext, name: str) -> Indices:
+    """Numbers of an object's triangles."""
+    objects = context.scene.objects
+    first = np.cumsum([0, *(len(o.mesh.faces) for o in objects)])
+    number = next(i for i, o in enumerate(objects) if o.name == name)
+    return np.arange(first[number], first[number + 1])
 
 
 def _traced(context: BakeContext) -> Traced:
@@ -317,19 +332,22 @@ def _placed(context: BakeContext, name: str, wish: LightFieldWish, traced: Trace
     """Where the points of an object stand."""
     from lambent.bake.light_fields.facing import turned_to_viewers
     from lambent.bake.light_fields.glass import clearest
+    from lambent.bake.light_fields.trial import COUNTS, Option
     from lambent.bake.light_fields.volume import volume_points
 
     o, seed = context.scene.object(name), seed_of(context.seed, KIND, name)
     mesh = o.mesh
     if wish.refracts:
         clearest(context.scene.materials[o.material])  # an error before anything is traced
-    count = most = settings_of(context, wish).points
+    how = settings_of(context, wish)
+    count = most = how.points
     if wish.volume:
         return volume_points(context.traced.builder(diffuse=not _cached(context)), mesh, name, most)
     if wish.error is not None:
         chooser = _chooser(context, traced)
         if (seen := chooser.watched(name)) is not None:
-            count = chooser.trial(name, seen, most=most).count_for(wish.error)
+            options = [Option(points, how.texels) for points in (*(some for some in COUNTS if some < most), most)]
+            count = chooser.trial(name, seen, options=options).count_for(wish.error)
     mesh = turned_to_viewers(mesh, context.traced.places, traced.around.scene, seed)
     return traced.placing.points(mesh, count, seed, wish.offset_m, patch_density=wish.patch_density)
 
@@ -340,16 +358,13 @@ def _sample_map(context: BakeContext, name: str, wish: LightFieldWish, traced: T
     from lambent.bake.light_fields.sample_map import sample_map
     from lambent.bake.light_fields.volume import spacing_m
 
-    objects, how = context.scene.objects, settings_of(context, wish)
+    how, mesh = settings_of(context, wish), context.scene.object(name).mesh
     points = context.store.read(light_field_name(name, "points"))
-    first = np.cumsum([0, *(len(o.mesh.faces) for o in objects)])
-    number = next(i for i, o in enumerate(objects) if o.name == name)
-    mesh = objects[number].mesh
     spacing = np.sqrt(triangle_areas(mesh.corners).sum() / len(points))
     if wish.volume:
         spacing = spacing_m(mesh, len(points))
     size = context.atlas.width, context.atlas.height
-    faces = np.arange(first[number], first[number + 1])
+    faces = _faces_of(context, name)
     behind = _exits(context, name) if wish.refracts else None
     sees = views_in(traced.seen(name, how, wish).scene)
     side = side_seen(mesh, context.traced.places, traced.around.scene, seed_of(context.seed, KIND, name))

@@ -6,6 +6,7 @@ most end where they begin, at the first surface. The object itself is in the sce
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -113,6 +114,45 @@ def _maps(
             light[index] = _parted(around, some, texels, index, solid[index], parts, onward, seed + mine.start)
         found[mine] = light.reshape(shape)
     return found, shows
+
+
+class TracedMaps:
+    """Maps (P, E, E, 3) of the radiance at points (P, 3), traced where they are read: through the middles of texels.
+
+    They serve trials, which read few texels of many maps; each is traced once.
+    """
+
+    dtype: np.dtype[Any] = np.dtype(np.float32)
+
+    def __init__(self, around: Around, points: Floats, texels: int, seed: int) -> None:
+        self._around, self._points, self._seed = around, points, seed
+        self.shape = len(points), texels, texels, 3
+        self._light = np.zeros((self.size // 3, 3), np.float32)  # of all texels, flat
+        self._traced = np.zeros(len(self._light), bool)
+
+    @property
+    def size(self) -> int:
+        """How many numbers the maps have."""
+        return math.prod(self.shape)
+
+    @property
+    def nbytes(self) -> int:
+        """How large the maps are."""
+        return self.size * self.dtype.itemsize
+
+    def __getitem__(self, key: tuple[Indices, Indices, Indices]) -> NDArray[np.float32]:
+        """(..., 3) light of texels by point, row and column, (...) integers each."""
+        read = np.ravel_multi_index(key, self.shape[:3])
+        new = np.unique(read[~self._traced[read]])
+        for mine in slices(len(new), PATHS_AT_ONCE):
+            ray = _rays(self._points, mi.UInt32(new[mine].astype(np.uint32)), self.shape[1], mi.Point2f(0.5))
+            self._light[new[mine]] = array_of(_radiance(self._around, ray, 1, self._seed + mine.start)[0])
+        self._traced[new] = True
+        return np.asarray(self._light[read])
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        """All maps."""
+        return self[tuple(np.indices(self.shape[:3]))].astype(dtype or self.dtype)
 
 
 def unlike(light: Floats, solid: Flags) -> Flags:

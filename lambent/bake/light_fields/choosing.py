@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import logging
 from collections import defaultdict
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from contextlib import suppress
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from lambent.bake.light_fields.acquisition import Around
-from lambent.bake.light_fields.choice import worth_trying
+from lambent.bake.light_fields.choice import MOST_TRIED, worth_trying
 from lambent.bake.light_fields.facing import turned_to_viewers
 from lambent.bake.light_fields.placing import Placing
-from lambent.bake.light_fields.trial import ProbeLight, Trial, tried
+from lambent.bake.light_fields.trial import Option, ProbeLight, Trial, options_of, tried
 from lambent.bake.light_fields.watched import Watched, watched
 from lambent.bake.probes.selection import Scaling
 from lambent.bake.tiles import seed_of
@@ -33,7 +34,12 @@ from lambent.store.contract import (
 from lambent.store.occlusion import has_even_niches, occlusion_gain
 from lambent.store.store import Store
 
-REFLECTED = 0.9  # of an object's area: then planar reflectors show it
+MOST_WATCHED = 256  # objects whose probes are looked at
+REFLECTED = 0.9  # of an object's area, above which no light field is tried: planar reflectors show it
+
+
+LEFT_OUT = "light fields: tried on %d of %d shiny objects, the largest and worst; `--light-fields NAME` adds others"
+log = logging.getLogger(__name__)
 
 
 class Chooser:
@@ -49,14 +55,18 @@ class Chooser:
     def trials(self, names: Collection[str], progress: Progress) -> dict[str, Trial]:
         """Trials of those of the objects that are worth one."""
         flat, looks = shown_by_reflectors(self._scene, self._store), dict[str, Watched]()
-        for i, name in enumerate(curved := [name for name in names if name not in flat]):
-            part_of(progress, 0.0, 0.5, "error of probes")(i, len(curved), "")
+        curved = [name for name in names if flat.get(name, 0.0) <= REFLECTED]
+        largest = look_largest(self._scene, curved, self._places, MOST_WATCHED)
+        for i, name in enumerate(largest):
+            part_of(progress, 0.0, 0.5, "error of probes")(i, len(largest), "")
             if (seen := self.watched(name)) is not None:
-                looks[name] = seen
+                looks[name] = replace(seen, size_sr=seen.size_sr * (1 - flat.get(name, 0.0)))
         level = usual_level(looks.values())
         wrong = {name: seen.size_sr * self._probe_error(name, seen, level) for name, seen in looks.items()}
-        found = dict[str, Trial]()
-        for i, name in enumerate(some := worth_trying(wrong)):
+        found, some = dict[str, Trial](), worth_trying(wrong)
+        if len(largest) < len(curved) or len(some) == MOST_TRIED < len(wrong):
+            log.warning(LEFT_OUT, len(some), len(curved))
+        for i, name in enumerate(some):
             part_of(progress, 0.5, 1.0, "trial light fields")(i, len(some), "")
             with suppress(UserError):  # nothing of it is in the open
                 found[name] = self.trial(name, looks[name], level)
@@ -68,17 +78,18 @@ class Chooser:
         mesh = self._turned(name)
         return watched(mesh, self._scene.materials[o.material], self._places, self._around, self._seed_of(name))
 
-    def trial(self, name: str, seen: Watched, level: float | None = None, most: int | None = None) -> Trial:
-        """Errors of the object's probe and of its light fields, up to `most` points.
+    def trial(
+        self, name: str, seen: Watched, level: float | None = None, options: Sequence[Option] | None = None
+    ) -> Trial:
+        """Errors of the object's probe and of its light fields, by default of all sizes.
 
         They are relative to a `level` of luminance, by default the object's own.
         """
         probe = probe_light(self._store, name)
+        mesh, seed, some = self._turned(name), self._seed_of(name), options or options_of(self._texels)
         wish = self._scene.light_fields.get(name)
-        more: dict[str, Any] = {} if most is None else {"most": most}
-        more |= {"patch_density": wish.patch_density} if wish is not None else {}
-        mesh, seed = self._turned(name), self._seed_of(name)
-        return tried(self._placing, mesh, seen, probe, self._around, seed, self._texels, level or seen.level, **more)
+        density = None if wish is None else wish.patch_density
+        return tried(self._placing, mesh, seen, probe, self._around, seed, some, level or seen.level, density)
 
     def _turned(self, name: str) -> Mesh:
         mesh = self._scene.object(name).mesh
@@ -89,6 +100,21 @@ class Chooser:
 
     def _seed_of(self, name: str) -> int:
         return seed_of(self._seed, "light field", name)
+
+
+def look_largest(scene: Scene, names: Collection[str], places: Floats, most: int) -> list[str]:
+    """The objects that look largest to viewers at `places` (m, 3), as if nothing hid them; at most `most`, in order."""
+    if len(names) <= most or not len(places):
+        return list(names)[:most]
+    meshes = {name: scene.object(name).mesh for name in names}
+    area_m2 = np.array([triangle_areas(mesh.corners).sum() for mesh in meshes.values()])
+    centres = np.array([(mesh.positions.min(axis=0) + mesh.positions.max(axis=0)) / 2 for mesh in meshes.values()])
+    looks = np.zeros(len(area_m2))
+    for place in places:
+        away = ((centres - place) ** 2).sum(axis=1)
+        looks += area_m2 / np.maximum(away + area_m2, 1e-12)
+    kept = set(np.argsort(-looks, kind="stable")[:most].tolist())
+    return [name for i, name in enumerate(meshes) if i in kept]
 
 
 def usual_level(looks: Iterable[Watched]) -> float:
@@ -103,13 +129,13 @@ def usual_level(looks: Iterable[Watched]) -> float:
     return max(float(light[order][np.searchsorted(total, total[-1] / 2)]), 1e-6)
 
 
-def shown_by_reflectors(scene: Scene, store: Store) -> set[str]:
-    """Names of the objects that planar reflectors show."""
+def shown_by_reflectors(scene: Scene, store: Store) -> dict[str, float]:
+    """Shares of the areas of objects that planar reflectors show."""
     shown: dict[str, float] = defaultdict(float)
     for part in (part for reflector in scene_record(store).reflectors for part in reflector.parts):
         shown[part.object] += part.area_m2
     areas = {o.name: float(triangle_areas(o.mesh.corners).sum()) for o in scene.objects}
-    return {name for name, area_m2 in shown.items() if area_m2 > REFLECTED * areas.get(name, np.inf)}
+    return {name: min(area_m2 / max(areas[name], 1e-12), 1.0) for name, area_m2 in shown.items() if name in areas}
 
 
 def probe_light(store: Store, name: str) -> ProbeLight:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,11 +51,7 @@ def sample_map(
     sees : whether places see points (`core.nearest_points`).
     side : -1 where viewers see the object from the other side of its normals.
     """
-    corners = geometry["uv2"][geometry["faces"][faces]].astype(float) * size
-    scale = finer_by(geometry["positions"][geometry["faces"][faces]].astype(float), corners, spacing_m)
-    grid = np.array(size) * scale
-    low = np.maximum(np.floor(corners.min(axis=(0, 1)) * scale).astype(int) - GUTTER, 0)
-    high = np.minimum(np.ceil(corners.max(axis=(0, 1)) * scale).astype(int) + GUTTER, grid)
+    grid, low, high = rectangle(geometry, faces, size, spacing_m)
     width, height = (int(side) for side in high - low)
     cropped = (geometry["uv2"].astype(float) * grid - low) / (width, height)
     texels = texels_of({**geometry, "faces": geometry["faces"][faces], "uv2": cropped}, width, height)
@@ -76,6 +72,23 @@ def sample_map(
     exits[texels.index] = behind(middle, normal)
     whole = with_gutters(exits.reshape(height, width, 4), covered.reshape(height, width), NO_EXIT)
     return SampleMap(filled, (top, left), (rows, columns), whole)
+
+
+def rectangle(
+    geometry: Mapping[str, Floats], faces: Indices, size: tuple[int, int], spacing_m: float
+) -> tuple[Indices, Indices, Indices]:
+    """The grid of a sample map over the whole light map, and its first texel and the one after its last: x and y."""
+    corners = geometry["uv2"][geometry["faces"][faces]].astype(float) * size
+    scale = finer_by(geometry["positions"][geometry["faces"][faces]].astype(float), corners, spacing_m)
+    grid = np.array(size) * scale
+    low = np.maximum(np.floor(corners.min(axis=(0, 1)) * scale).astype(int) - GUTTER, 0)
+    return grid, low, np.minimum(np.ceil(corners.max(axis=(0, 1)) * scale).astype(int) + GUTTER, grid)
+
+
+def megabytes(geometry: Mapping[str, Floats], faces: Indices, size: tuple[int, int], spacing_m: float) -> float:
+    """Memory of a sample map, as `sample_map` makes it."""
+    _, low, high = rectangle(geometry, faces, size, spacing_m)
+    return float((high - low).prod() * CANDIDATES * np.dtype(np.uint16).itemsize / 1e6)
 
 
 def finer_by(positions: Floats, corners: Floats, spacing_m: float) -> int:

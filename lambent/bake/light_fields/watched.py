@@ -25,6 +25,7 @@ from lambent.materials.lobes import fresnel
 from lambent.scenes.scene import Mesh
 
 POINTS, SPREAD, LEAST = 768, 8, 32  # points, directions of each side, points in view below which nothing is known
+PATHS = 4  # along each direction, whose mean is its light
 TRIES = 4  # viewers for each point, of whom those who see it tell how large the object is
 
 
@@ -54,8 +55,12 @@ class Watched:
 
     def error(self, along: Floats, level: float) -> float:
         """Mean difference of what is shown, RGB, in log(1 + L/level), for light (n, S, 3) that look-ups find."""
+        return float(self.errors(along, level).mean())
+
+    def errors(self, along: Floats, level: float) -> Floats:
+        """Likewise at each point, (n,)."""
         shown = self.own + (self.share * along).sum(axis=1)
-        return float(np.abs(np.log1p(shown / level) - np.log1p(self.light / level)).mean())
+        return np.asarray(np.abs(np.log1p(shown / level) - np.log1p(self.light / level)).mean(axis=1))
 
     def halves(self) -> tuple[Flags, Flags]:
         """Every other point (n,): those that decide, and those that are held out."""
@@ -86,8 +91,10 @@ def watched(mesh: Mesh, material: Material, places: Floats, around: Around, seed
         return None
     count = w.shape[1]
     ray = leaving(around.scene, np.repeat(x, count, axis=0), np.repeat(n, count, axis=0), w.reshape(-1, 3))
-    light = light_along(around.scene, ray, around.depth, around.cache, seed).reshape(w.shape)
     origins = array_of(ray.o).astype(float).reshape(w.shape)
+    paths = rays_from(np.repeat(origins.reshape(-1, 3), PATHS, axis=0), np.repeat(w.reshape(-1, 3), PATHS, axis=0))
+    traced = light_along(around.scene, paths, around.depth, around.cache, seed)
+    light = traced.reshape(*w.shape[:2], PATHS, 3).mean(axis=2)
     own, irradiance = _diffuse(around, x, n)
     return Watched(x, n, origins, w, share, own, own + (share * light).sum(axis=1), irradiance, size_sr)
 

@@ -147,11 +147,11 @@ class AnsweringLight:
             self._work = None
 
     def _maps(self, wanted: Wanted) -> _Maps:
-        """Compute the light maps of edited materials; runs in the thread."""
+        """Compute the light maps of edited materials and textures; runs in the thread."""
         with beside_frames(self._is_software):
-            return self._computed_maps(edited)
+            return self._computed_maps(wanted)
 
-    def _computed_maps(self, edited: Mapping[str, Material]) -> _Maps:
+    def _computed_maps(self, wanted: Wanted) -> _Maps:
         if self._answer is None:
             device = self._renderer.device
             stored, shaders = read_answer(self._store), device if computes(device) else None
