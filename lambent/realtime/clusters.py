@@ -6,6 +6,7 @@ as much again in each pass.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -28,15 +29,14 @@ MERGED_GAP = 256  # faces; runs with a smaller gap are drawn in one call, which 
 class Seen:
     """Runs of faces, in order, none across the border of two objects: [begin, end)."""
 
-    begin: Indices
-    end: Indices
+    begin: list[int]
+    end: list[int]
 
     def of(self, first_face: int, face_count: int) -> Ranges:
         """(first, count) of each run within a range of faces."""
         last = first_face + face_count
-        mine = slice(np.searchsorted(self.end, first_face, "right"), np.searchsorted(self.begin, last))
-        begin, end = self.begin[mine].clip(first_face).tolist(), self.end[mine].clip(max=last).tolist()
-        return merged(zip(begin, end, strict=True), MERGED_GAP)
+        mine = range(bisect_right(self.end, first_face), bisect_left(self.begin, last))
+        return merged(((max(self.begin[k], first_face), min(self.end[k], last)) for k in mine), MERGED_GAP)
 
 
 class Clusters:
@@ -60,7 +60,14 @@ class Clusters:
             for reduce, extreme in ((np.minimum, corners.min(axis=1)), (np.maximum, corners.max(axis=1)))
         )
 
-    def seen(self, clip_from_world: Floats, rows: tuple[float, float] = (0.0, 1.0)) -> Seen:
+    def with_any(self, faces: Flags) -> Flags:
+        """The clusters that hold any of the faces (F,)."""
+        before = np.concatenate([[0], np.cumsum(faces)])
+        return np.asarray(before[self._end] > before[self._begin])
+
+    def seen(
+        self, clip_from_world: Floats, rows: tuple[float, float] = (0.0, 1.0), among: Flags | bool = True
+    ) -> Seen:
         """The clusters that a camera may see.
 
         Parameters
@@ -69,8 +76,10 @@ class Clusters:
             Column vectors, WebGPU's clip space: |x|, |y| <= w, 0 <= z <= w.
         rows : (top, bottom)
             The band of the image that is drawn, as shares of its height.
+        among
+            The clusters that count, by default all.
         """
-        return self._runs(self._visible(clip_from_world, rows))
+        return self._runs(self._visible(clip_from_world, rows) & among)
 
     def _visible(self, clip_from_world: Floats, rows: tuple[float, float]) -> Flags:
         x, y, z, w = np.asarray(clip_from_world, np.float64)
@@ -102,7 +111,7 @@ class Clusters:
         breaks = np.flatnonzero(~joined)
         first = at[np.concatenate([np.zeros(min(1, len(at)), np.int64), breaks + 1])]
         last = at[np.concatenate([breaks, np.full(min(1, len(at)), len(at) - 1)])]
-        return Seen(self._begin[first], self._end[last])
+        return Seen(self._begin[first].tolist(), self._end[last].tolist())
 
 
 def _slivers(corners: Floats) -> Floats:

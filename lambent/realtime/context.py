@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from lambent.core.arrays import Flags
 from lambent.realtime.clusters import Clusters, Seen
 from lambent.realtime.draws import Draw
 from lambent.realtime.frame_state import FrameState
@@ -69,9 +70,9 @@ class FrameContext:
         smoothed = self.shown is not None and of_one and self.state.is_smoothed
         return self.targets.display("unsmoothed", self.state.size) if smoothed else None
 
-    def seen(self, rows: tuple[float, float] = (0.0, 1.0)) -> Seen:
-        """The clusters that the frame's camera may see in a band of rows."""
-        return self.clusters.seen(self.data["clip_from_world"].T, rows)
+    def seen(self, rows: tuple[float, float] = (0.0, 1.0), among: Flags | bool = True) -> Seen:
+        """The clusters, of those `among` which it looks, that the frame's camera may see in a band of rows."""
+        return self.clusters.seen(self.data["clip_from_world"].T, rows, among)
 
     def thin(self, rows: tuple[float, float]) -> Seen:
         """The faces in view that may miss all pixel centres."""

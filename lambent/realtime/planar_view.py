@@ -49,27 +49,30 @@ class PlanarView:
 def planar_views(
     frame: Record, reflectors: Sequence[ReflectorRecord], width: int, height: int, most: int,
     widest: Mapping[str, float] | None = None, whole: bool = False,
-    bevel_of: Callable[[ReflectorRecord], Bevel] = lambda reflector: FLAT,
+    bevel_of: Callable[[ReflectorRecord], Bevel] = lambda reflector: FLAT, shares: Floats | None = None,
 ) -> list[PlanarView]:  # fmt: skip
     """Views of the reflectors that a frame (of FRAME_DTYPE) sees, the largest first, at most `most`.
 
     `widest` is the largest m of an object's lobes, by its name: wide lobes need a larger buffer. `whole`: buffers hold
     the whole frame, for lobes that are sampled to their very ends. `bevel_of` a reflector is that of its front.
+    `shares` (R,) of the frame are covered by the reflectors, by default as much as by their outlines.
     """
+    if shares is None:
+        shares = np.array([covered_share(on_screen(frame, np.asarray(r.outline, float))) for r in reflectors])
     seen = []
-    for reflector in reflectors:
+    for reflector, share in zip(reflectors, shares, strict=True):
+        if share < LEAST_SHARE:
+            continue
         plane = np.asarray(reflector.plane, float)
         above = float(plane[:3] @ frame["eye"][:3] + plane[3])
         if above < 0 and reflector.two_sided:
             plane, above = -plane, -above
-        in_front = above > 2 * clearance_m(reflector, frame["eye"][:3])
-        shown = on_screen(frame, np.asarray(reflector.outline, float)) if in_front else np.zeros((0, 2))
-        share = covered_share(shown)
-        if share >= LEAST_SHARE:
-            seen.append((share, reflector, plane, shown))
+        if above > 2 * clearance_m(reflector, frame["eye"][:3]):
+            seen.append((share, reflector, plane))
     seen.sort(key=lambda one: -one[0])
     views = []
-    for number, (_, reflector, plane, shown) in enumerate(seen[:most]):
+    for number, (_, reflector, plane) in enumerate(seen[:most]):
+        shown = on_screen(frame, np.asarray(reflector.outline, float))
         m = max((widest or {}).get(part.object, 0.0) for part in reflector.parts)
         place = _window(frame, (width, height), m, None if whole else shown)
         view = _view(frame, plane, reflector, (width, height), place, number)

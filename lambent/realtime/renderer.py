@@ -44,6 +44,7 @@ from lambent.realtime.passes.planar import PlanarPass
 from lambent.realtime.passes.sun import SunPass
 from lambent.realtime.planar_integrators import planar_integrator
 from lambent.realtime.planar_view import MOST_REFLECTORS, PlanarView, planar_views
+from lambent.realtime.reflector_faces import ReflectorFaces
 from lambent.realtime.resources import SceneResources
 from lambent.realtime.slices import Cut, Steps, Whole
 from lambent.realtime.streaming import Streaming
@@ -89,7 +90,7 @@ class Renderer:
         )
         self.streaming: Streaming = beside.streaming if beside else Streaming(scene, self.resources.objects)
         self.mixer: LightMixer = beside.mixer if beside else LightMixer(layouts, scene, self.resources)
-        self.waits, self._bevels = True, Bevels(scene)
+        self.waits, self._bevels, self._reflector_faces = True, Bevels(scene), ReflectorFaces(scene)
         depth, base = DepthPass(layouts), BasePass(layouts)
         planar = PlanarPass(layouts, depth)
         light = LightPass(layouts, planar.reflections)
@@ -298,9 +299,10 @@ class Renderer:
             for o in record.objects
         }
         whole = integrator(state.integrator).progressive
-        reflectors = [r for r in record.reflectors if any(part.object not in panes for part in r.parts)]
+        wanted = [k for k, r in enumerate(record.reflectors) if any(part.object not in panes for part in r.parts)]
+        reflectors, shares = [record.reflectors[k] for k in wanted], self._reflector_faces.shares(data)[np.array(wanted, int)]
         return planar_views(
-            data, reflectors, state.width, state.height, MOST_REFLECTORS, widest, whole, self._bevels.of
+            data, reflectors, state.width, state.height, MOST_REFLECTORS, widest, whole, self._bevels.of, shares
         )
 
 

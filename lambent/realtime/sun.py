@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Flags, Floats
 from lambent.core.plain import Triple
 from lambent.realtime.baked import BakedScene
 from lambent.realtime.layouts import SHADOW_MAP, Layouts
@@ -22,6 +22,7 @@ from lambent.realtime.panes import PaneLayers, no_panes, pane_layers
 from lambent.realtime.solid_depths import SolidDepths, depth_texture, read_depths
 from lambent.realtime.structs import SUN_DTYPE, Record
 from lambent.realtime.sun_squares import MOST_SQUARES, SIDE, SunSquares, parts_of
+from lambent.realtime.sunlit_faces import sunlit_faces
 from lambent.realtime.uploads import upload
 from lambent.store.contract import SunRecord
 
@@ -32,14 +33,17 @@ BLOCK = 8  # texels along a block whose least and greatest depths are known: SUN
 class SunLight:
     """A sun on the GPU: its record, its shadow map and the blocks of that; none without `parts`.
 
-    `nowhere` stands for the pixels that see a sun where there is none.
+    `nowhere` stands for the pixels that see a sun where there is none. Other faces than `reached_faces` (F,) get no sun;
+    None: any face may.
     """
 
     def __init__(
         self, layouts: Layouts, sun: SunRecord | None = None, parts: SunParts = (), depths: Any = None,
-        panes: PaneLayers | None = None, sunlit: NDArray[np.uint8] | None = None,
+        panes: PaneLayers | None = None, sunlit: NDArray[np.uint8] | None = None, reached_faces: Flags | None = None,
     ) -> None:  # fmt: skip
-        self.exists, self.is_wide = len(parts) > 0, len(parts) > 1
+        self.reached_faces = reached_faces
+        self.parts = len(parts)
+        self.exists, self.is_wide = self.parts > 0, self.parts > 1
         panes = panes or no_panes(layouts.device)
         self.squares = len(parts[0].squares) if parts else 0
         self.pane_layers = panes.count
@@ -126,6 +130,6 @@ def sun_light(layouts: Layouts, scene: BakedScene, resources: Any) -> SunLight:
     sun, corners = scene.sun, scene.positions[scene.faces].astype(float)
     parts = parts_of(sun.direction, sun.radius_rad, corners, eyes)
     depths = draw_depths(layouts, parts, resources, sun.panes)
-    return SunLight(
-        layouts, sun, parts, depths, pane_layers(layouts, parts, resources, depths, sun.panes), scene.sunlit
-    )
+    reached = None if scene.sunlit is None else sunlit_faces(scene.sunlit, scene.uv2, scene.faces)
+    panes = pane_layers(layouts, parts, resources, depths, sun.panes)
+    return SunLight(layouts, sun, parts, depths, panes, scene.sunlit, reached)

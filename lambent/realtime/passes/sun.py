@@ -8,14 +8,17 @@ from __future__ import annotations
 from functools import cache, lru_cache
 from typing import Any
 
+from lambent.core.arrays import Flags
+from lambent.realtime.clusters import Clusters
 from lambent.realtime.context import FrameContext
 from lambent.realtime.draws import Draw
 from lambent.realtime.layouts import SHADOW_MAP, Layouts
-from lambent.realtime.passes.depth import draw_seen, set_geometry
+from lambent.realtime.passes.depth import draw_runs, set_geometry
 from lambent.realtime.pipelines import pipeline
 from lambent.realtime.planar_view import MOST_REFLECTORS
 from lambent.realtime.shader_source import assemble
 from lambent.realtime.slices import Steps
+from lambent.realtime.sun import SunLight
 from lambent.realtime.targets import target_texture
 
 FORMAT = "rgb10a2unorm"
@@ -32,12 +35,13 @@ class SunPass:
         module = layouts.device.create_shader_module(code=assemble("sun.wgsl"))
         groups = [layouts.frame, layouts.of(*SHADOW_MAP)]
         self._pipeline = cache(
-            lambda is_pane, transmits, squares, panes, wide: pipeline(
+            lambda is_pane, transmits, parts, squares, panes, wide: pipeline(
                 layouts.device, module, "sun_main", groups, [FORMAT], compare="greater" if is_pane else "equal",
                 front_face=front_face,
-                constants={"TRANSMITS": transmits, "SQUARES": squares, "PANES": panes, "WIDE": wide},
+                constants={"TRANSMITS": transmits, "PARTS": parts, "SQUARES": squares, "PANES": panes, "WIDE": wide},
             )
         )  # fmt: skip
+        self._reached = lru_cache(1)(_reached)
         self._texture = lru_cache(2 * MOST_REFLECTORS)(
             lambda size, is_pane: target_texture(layouts.device, size, FORMAT)
         )
@@ -61,12 +65,19 @@ class SunPass:
             render = context.begin("sun", [view], band.load_op, band=band)
             render.set_bind_group(1, sun.group)
             set_geometry(render, context.resources)
-            seen = context.seen(band.shares)
+            seen = context.seen(band.shares, self._reached(context.clusters, sun))
             for draw in draws:
-                record = draw.item.record
-                render.set_pipeline(
-                    self._pipeline(draw.is_pane, draw.material.transmits, sun.squares, sun.pane_layers, wide)
-                )
-                context.counts["draw_calls"] += draw_seen(render, seen, record.first_face, record.face_count)
+                if runs := seen.of(draw.item.record.first_face, draw.item.record.face_count):
+                    render.set_pipeline(
+                        self._pipeline(
+                            draw.is_pane, draw.material.transmits, sun.parts, sun.squares, sun.pane_layers, wide
+                        )
+                    )
+                    context.counts["draw_calls"] += draw_runs(render, runs)
             render.end()
             yield
+
+
+def _reached(clusters: Clusters, sun: SunLight) -> Flags | bool:
+    """The clusters that the sun may reach."""
+    return True if sun.reached_faces is None else clusters.with_any(sun.reached_faces)

@@ -22,6 +22,7 @@
 
 // Conditions of uniforms alone, of loops or in `&&`, make Mesa's software adapter copy the shader for every render pass, and
 // keep the copies: use constants and `&`.
+override PARTS: u32 = 4u;        // of the disc, each with a map of its own
 override SQUARES: u32 = 4u;      // of each part of the disc
 override PANES: u32 = 0u;        // layers of clear glass
 override WIDE: bool = false;      // taps are places of the disc
@@ -53,7 +54,7 @@ fn turn_sun_pattern(pixel: vec2u) {
     let place = ((mixed & 1u) << 3u) | ((pixel.y & 1u) << 2u) | (mixed & 2u) | ((pixel.y & 2u) >> 1u);
     let frames = f32(frame.first_sample & 0xffffu);
     let order = f32(place) + 0.5;
-    sun_part = ((pixel.x & 1u) + 2u * (pixel.y & 1u) + (u32(frame.eye.w) >> 4u)) % sun.parts;
+    sun_part = ((pixel.x & 1u) + 2u * (pixel.y & 1u) + (u32(frame.eye.w) >> 4u)) % PARTS;
     let turn = f32(u32(frame.eye.w) >> 2u); // sixteen in a still: for each part they show all of a ring
     sun_turn = fract(vec2f((order + 5.0 * turn) / 16.0 + 0.7548776662 * frames, 0.6180339887 * (order + turn) + 0.5698402910 * frames));
 }
@@ -66,19 +67,20 @@ struct SunPlace {
     depth_m: f32,
     slope: vec2f,
     texel_m: f32,
+    layer: u32,   // of the map
+    last: vec2f,  // texel of a square
+    low_m: f32,   // depth where the map has 0
+    span_m: f32,  // metres that its depths of 0 to 1 span
+    tangent: f32, // of the part's angular radius
 }
 
 // Layers of the map: all squares of one part after those of another.
-fn sun_layer(at: SunPlace) -> u32 {
-    return sun_part * u32(sun.irradiance.w) + at.square;
-}
-
 fn sun_layers() -> u32 {
-    return sun.parts * u32(sun.irradiance.w);
+    return PARTS * u32(sun.irradiance.w);
 }
 
-fn sun_depth_m(stored: f32) -> f32 {
-    return sun.across[sun_part].w + sun.down[sun_part].w * stored;
+fn sun_depth_m(at: SunPlace, stored: f32) -> f32 {
+    return at.low_m + at.span_m * stored;
 }
 
 // Least and greatest depth (m) within `radius` texels, and somewhat beyond: a block's range is that of its neighbours, too.
@@ -87,16 +89,15 @@ fn sun_range(at: SunPlace, radius: f32) -> vec2f {
     let level = u32(clamp(ceil(log2((radius + 1.0) / SUN_BLOCK)), 0.0, log2(f32(across))));
     let corner = select(vec2i(across, across - (across >> (level - 1u))), vec2i(0), level == 0u);
     let block = vec2i(at.texel / (SUN_BLOCK * exp2(f32(level))));
-    let range = textureLoad(sun_blocks, corner + block, sun_layer(at), 0).xy;
-    return vec2f(sun_depth_m(range.x), sun_depth_m(range.y));
+    let range = textureLoad(sun_blocks, corner + block, at.layer, 0).xy;
+    return vec2f(sun_depth_m(at, range.x), sun_depth_m(at, range.y));
 }
 
 // How far (m) the map is nearer to the sun than the surface, in the texel at `offset` from its own.
 fn sun_rise(at: SunPlace, offset: vec2f) -> f32 {
-    let most = vec2f(textureDimensions(sun_depths)) - 1.0;
-    let texel = clamp(floor(at.texel + offset), vec2f(0.0), most);
+    let texel = clamp(floor(at.texel + offset), vec2f(0.0), at.last);
     let here = at.depth_m + dot(at.slope, (texel + 0.5 - at.texel) * at.texel_m);
-    return sun_depth_m(textureLoad(sun_depths, vec2i(texel), sun_layer(at), 0)) - here;
+    return sun_depth_m(at, textureLoad(sun_depths, vec2i(texel), at.layer, 0)) - here;
 }
 
 // A point of a disc of radius 1, and the next: n of them are spread evenly over it (Vogel 1979).
@@ -117,9 +118,17 @@ fn next_sun_tap(tap: SunTap) -> SunTap {
 }
 
 fn sun_place(p_world: vec3f, n_world: vec3f) -> SunPlace {
-    let axes = vec2f(dot(sun.across[sun_part].xyz, p_world), dot(sun.down[sun_part].xyz, p_world));
+    // read once, not at each tap: adapters in software read what depends on the pixel lane by lane
+    let across = sun.across[sun_part];
+    let down = sun.down[sun_part];
+    let towards = sun.part_towards[sun_part];
+    let axes = vec2f(dot(across.xyz, p_world), dot(down.xyz, p_world));
     let side = f32(textureDimensions(sun_depths).x);
     var at = SunPlace();
+    at.last = vec2f(side - 1.0);
+    at.low_m = across.w;
+    at.span_m = down.w;
+    at.tangent = towards.w;
     at.square = u32(sun.irradiance.w);
     for (var k = 0u; k < SQUARES; k++) {
         at.texel = (axes - sun.squares[4u * sun_part + k].xy) * sun.squares[4u * sun_part + k].z;
@@ -129,9 +138,10 @@ fn sun_place(p_world: vec3f, n_world: vec3f) -> SunPlace {
             break;
         }
     }
-    at.depth_m = dot(sun.part_towards[sun_part].xyz, p_world);
-    let facing = dot(sun.part_towards[sun_part].xyz, n_world);
-    let falls = -vec2f(dot(sun.across[sun_part].xyz, n_world), dot(sun.down[sun_part].xyz, n_world)) * select(-1.0, 1.0, facing > 0.0);
+    at.layer = sun_part * u32(sun.irradiance.w) + at.square;
+    at.depth_m = dot(towards.xyz, p_world);
+    let facing = dot(towards.xyz, n_world);
+    let falls = -vec2f(dot(across.xyz, n_world), dot(down.xyz, n_world)) * select(-1.0, 1.0, facing > 0.0);
     at.slope = falls / max(abs(facing), length(falls) / SUN_STEEPEST);
     return at;
 }
@@ -184,9 +194,9 @@ fn hides_place(at: SunPlace, tap: SunTap, px_per_m: f32, found: SunBlockers, bia
 // costs them more than it saves: one loop looks for blockers and then compares.
 fn sun_visibility(p_world: vec3f, n_world: vec3f) -> f32 {
     let at = sun_place(p_world, n_world);
-    let bias_m = SUN_BIAS_PX * at.texel_m + SUN_ROUNDING * sun.down[sun_part].w;
-    let px_per_m = sun.part_towards[sun_part].w / at.texel_m;
-    var highest_m = sun.across[sun_part].w + sun.down[sun_part].w - at.depth_m;
+    let bias_m = SUN_BIAS_PX * at.texel_m + SUN_ROUNDING * at.span_m;
+    let px_per_m = at.tangent / at.texel_m;
+    var highest_m = at.low_m + at.span_m - at.depth_m;
     var radius = 0.0;
     var range = vec2f(0.0);
     let inside = at.square < u32(sun.irradiance.w);
@@ -258,7 +268,7 @@ fn pane_texel(at: SunPlace, offset: vec2f) -> vec2i {
 fn pane_rise(at: SunPlace, texel: vec2i, layer: u32) -> f32 {
     let to_sun = vec2f(textureDimensions(sun_depths)) / vec2f(textureDimensions(pane_depths));
     let here = at.depth_m + dot(at.slope, ((vec2f(texel) + 0.5) * to_sun - at.texel) * at.texel_m);
-    return sun_depth_m(textureLoad(pane_depths, texel, layer * sun_layers() + sun_layer(at), 0)) - here;
+    return sun_depth_m(at, textureLoad(pane_depths, texel, layer * sun_layers() + at.layer, 0)) - here;
 }
 
 // What the clear glass between a point and the part of the sun that it sees lets through; edges are as wide as the sun's
@@ -267,7 +277,7 @@ fn sun_through_panes(p_world: vec3f, n_world: vec3f) -> vec3f {
     let at = sun_place(p_world, n_world);
     let to_sun = f32(textureDimensions(sun_depths).x) / f32(textureDimensions(pane_depths).x);
     let texel_m = at.texel_m * to_sun;
-    let bias_m = SUN_BIAS_PX * texel_m + SUN_ROUNDING * sun.down[sun_part].w;
+    let bias_m = SUN_BIAS_PX * texel_m + SUN_ROUNDING * at.span_m;
     let inside = at.square < u32(sun.irradiance.w);
     var tap = first_sun_tap();
     var rise_m = 0.0;
@@ -276,7 +286,7 @@ fn sun_through_panes(p_world: vec3f, n_world: vec3f) -> vec3f {
         rise_m = max(rise_m, pane_rise(at, pane_texel(at, reach * tap.across), 0u));
         tap = next_sun_tap(tap);
     }
-    let radius = max(sun.part_towards[sun_part].w * rise_m / texel_m, PANE_LEAST_PX);
+    let radius = max(at.tangent * rise_m / texel_m, PANE_LEAST_PX);
     var sum = vec4f(0.0);
     tap = first_sun_tap();
     let taps = select(0u, PANE_TAPS, rise_m > bias_m);
@@ -285,7 +295,7 @@ fn sun_through_panes(p_world: vec3f, n_world: vec3f) -> vec3f {
         let texel = pane_texel(at, offset);
         var passed = vec3f(1.0);
         for (var layer = 0u; layer < PANES; layer++) {
-            let colour = textureLoad(pane_colours, texel, layer * sun_layers() + sun_layer(at), 0).rgb;
+            let colour = textureLoad(pane_colours, texel, layer * sun_layers() + at.layer, 0).rgb;
             passed *= select(vec3f(1.0), colour, pane_rise(at, texel, layer) > bias_m);
         }
         sum += select(HARDLY, 1.0, sun_rise(at, offset * to_sun) <= bias_m) * vec4f(passed, 1.0);
@@ -300,7 +310,7 @@ fn mean_of_parts(seen: vec3f, pixel: vec2u) -> vec3f {
     let is_odd = vec2f(pixel & vec2u(1u));
     let row = seen + (0.5 - is_odd.x) * dpdxFine(seen);
     let all = row + (0.5 - is_odd.y) * dpdyFine(row);
-    return select(seen, clamp(all, vec3f(0.0), vec3f(1.0)), (sun.parts > 1u) & (frame.alone == 1u));
+    return select(seen, clamp(all, vec3f(0.0), vec3f(1.0)), (PARTS > 1u) & (frame.alone == 1u));
 }
 
 // Whether the sun gets to the light map's texel at a place. Along joints of thin sheets, depths alone let light through.
@@ -309,15 +319,26 @@ fn is_sunlit(uv2: vec2f) -> bool {
     return textureLoad(sun_reaches, vec2i(clamp(uv2 * size, vec2f(0.0), size - 1.0)), 0).r > 0.0;
 }
 
+// 1 where a pixel or another of its 2 x 2, which take their mean, has `value` 1, else 0.
+fn in_any_of_four(value: f32) -> f32 {
+    let row = max(value, abs(dpdxFine(value)));
+    return max(row, abs(dpdyFine(row)));
+}
+
 @fragment fn sun_main(v: Varyings, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     let flat_normal = cross(dpdx(v.p_world), dpdy(v.p_world));
-    let n = select(v.n_world, normalize(flat_normal), dot(flat_normal, flat_normal) > 0.0);
+    let is_reached = is_sunlit(v.uv2);
+    let of_four = in_any_of_four(select(0.0, 1.0, is_reached)); // texels of the others may be of other charts
     let facing = dot(v.n_world, sun.towards.xyz) * select(-1.0, 1.0, front);
-    turn_sun_pattern(vec2u(v.position.xy));
-    var seen = 0.0;
-    for (var i = 0u; i < select(0u, 1u, TRANSMITS | (facing > 0.0)); i++) { seen = sun_visibility(v.p_world, n); }
-    var passed = vec3f(1.0);
-    for (var i = 0u; i < select(0u, 1u, PANES > 0u && seen > 0.0); i++) { passed = sun_through_panes(v.p_world, n); }
-    let mean = mean_of_parts(seen * passed, vec2u(v.position.xy)); // over pixels whose texels may be of other charts
-    return vec4f(select(vec3f(0.0), mean, is_sunlit(v.uv2)), 1.0);
+    var seen = vec3f(0.0);
+    // most of an interior gets no sun: what is outside this loop costs adapters in software as much there as in the sun
+    for (var i = 0u; i < select(0u, 1u, (of_four > 0.0) & (TRANSMITS | (facing > 0.0))); i++) {
+        let n = select(v.n_world, normalize(flat_normal), dot(flat_normal, flat_normal) > 0.0);
+        turn_sun_pattern(vec2u(v.position.xy));
+        let share = sun_visibility(v.p_world, n);
+        var passed = vec3f(1.0);
+        for (var j = 0u; j < select(0u, 1u, PANES > 0u && share > 0.0); j++) { passed = sun_through_panes(v.p_world, n); }
+        seen = share * passed;
+    }
+    return vec4f(select(vec3f(0.0), mean_of_parts(seen, vec2u(v.position.xy)), is_reached), 1.0);
 }
