@@ -65,9 +65,7 @@ class Clusters:
         before = np.concatenate([[0], np.cumsum(faces)])
         return np.asarray(before[self._end] > before[self._begin])
 
-    def seen(
-        self, clip_from_world: Floats, rows: tuple[float, float] = (0.0, 1.0), among: Flags | bool = True
-    ) -> Seen:
+    def seen(self, clip_from_world: Floats, rows: tuple[float, float] = (0.0, 1.0), among: Flags | bool = True) -> Seen:
         """The clusters that a camera may see.
 
         Parameters

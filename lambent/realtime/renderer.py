@@ -300,7 +300,10 @@ class Renderer:
         }
         whole = integrator(state.integrator).progressive
         wanted = [k for k, r in enumerate(record.reflectors) if any(part.object not in panes for part in r.parts)]
-        reflectors, shares = [record.reflectors[k] for k in wanted], self._reflector_faces.shares(data)[np.array(wanted, int)]
+        reflectors, shares = (
+            [record.reflectors[k] for k in wanted],
+            self._reflector_faces.shares(data)[np.array(wanted, int)],
+        )
         return planar_views(
             data, reflectors, state.width, state.height, MOST_REFLECTORS, widest, whole, self._bevels.of, shares
         )
