@@ -23,7 +23,7 @@ from lambent.realtime.renderer import Renderer
 from lambent.realtime.sun import BLOCK, block_ranges
 from lambent.realtime.sun_squares import MIDDLE, squares_of
 from lambent.realtime.unbaked import unbaked_scene
-from lambent.scenes.geometry import box, merge, patch, placed
+from lambent.scenes.geometry import box, merge, patch, placed, sphere
 from lambent.scenes.scene import Mesh
 from lambent.store.contract import SunRecord
 from tests.bake.small_scenes import turned_inwards
@@ -195,6 +195,24 @@ def in_block(p: Floats, aside: float) -> bool:
     half = np.array([0.4, 0.3, 0.4]) + aside
     near, far = np.sort([(s * half + [0, 0.3, 0] - p) / TOWARDS for s in (-1, 1)], axis=0)
     return bool(near.max() < far.min() and far.min() > 1e-3)
+
+
+@pytest.mark.parametrize(("around", "radius_deg"), [(24, 0.27), (48, 0.27), (24, 3.0)])
+def test_facets_of_a_ball_are_lit_as_far_as_the_ball_is(device: Any, around: int, radius_deg: float) -> None:
+    """Facets that turn away from the sun hide themselves; where a plate hides the sun, they stay dark."""
+    radius, middle = 0.5, np.array([0.0, 0.55, 0.0])
+    meshes = {"floor": floor(), "ball": placed(sphere(radius, around, around // 2), tuple(middle))}
+    camera = Camera(name="aside", position=(1.2, 1.5, 2.2), target=tuple(middle), fov_y_deg=32.0)
+    eye, w = np.array(camera.position) - middle, pixel_rays(camera, SIZE, SIZE)
+    along = w @ eye
+    square = along**2 - eye @ eye + (0.96 * radius) ** 2  # within the facets' outline
+    cosine = normalize(eye + (-along - np.sqrt(square.clip(0)))[..., None] * w) @ TOWARDS
+    found = drawn(device, scene(meshes, radius_deg, cameras=(camera,)), camera, 1)
+    assert ((cosine > 0) & (cosine < 0.1) & (square > 0)).sum() > 100
+    assert (found - cosine)[square > 0].min() > -0.03, "up to .09 is missing where facets hide themselves"
+    meshes["lid"] = placed(floor(), (0, 1.9, 0))
+    covered = drawn(device, scene(meshes, radius_deg, cameras=(camera,)), camera, 1)
+    assert not covered[square > 0].any()
 
 
 def test_sheet_that_transmits_shows_the_sun_from_behind(device: Any) -> None:

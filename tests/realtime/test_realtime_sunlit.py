@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
+from lambent.bake.quality import Quality
 from lambent.core.camera import Camera
 from lambent.core.images import write_image
 from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, read_baked
 from lambent.realtime.turned_sky import under_turned_sky
-from lambent.scenes.geometry import box, placed
+from lambent.scenes.geometry import box, placed, sphere
 from lambent.scenes.scene import ImageEnvironment, Mesh, Scene, SceneObject
 from lambent.store.store import Store
 from lambent.store.sunlit import GEOMETRY
@@ -23,17 +24,20 @@ from tests.bake.small_scenes import TINY, turned_inwards
 from tests.bake.test_sun import disc
 from tests.realtime.test_realtime_sun import DOWN, TOWARDS, drawn, floor, places, plate, traced
 
+FINE = TINY.changed("fine", geometry={"texels": 320}, light_map={"samples": (4, 4)})
 INSIDE = Camera(name="inside", position=(-1.5, 1.2, 1.2), target=(1.0, 1.6, -1.0), fov_y_deg=80.0)
 
 
-def baked(folder: Path, meshes: dict[str, Mesh], radius_deg: float, camera: Camera) -> BakedScene:
+def baked(
+    folder: Path, meshes: dict[str, Mesh], radius_deg: float, camera: Camera, quality: Quality = TINY
+) -> BakedScene:
     """Under a sun alone, whose light on a surface that faces it is that of `test_realtime_sun`."""
     folder.mkdir(exist_ok=True)
     write_image(folder / "sky.exr", disc(TOWARDS, radius_deg, 1000.0))
     objects = tuple(SceneObject(name, mesh, "grey") for name, mesh in meshes.items())
     environment = ImageEnvironment(folder / "sky.exr", rotation_deg=180.0, layout="lat-long")
     scene = Scene("sunny", objects, {"grey": Material(kd=0.5)}, environment=environment, cameras=(camera,))
-    bake(scene, folder / "store", quality=TINY, only=("sunlit",))
+    bake(scene, folder / "store", quality=quality, only=("sunlit",))
     found = read_baked(Store.open(folder / "store"))
     assert found.sun is not None and found.irradiance is not None
     assert np.linalg.norm(np.array(found.sun.direction) - TOWARDS) < 2e-3
@@ -61,6 +65,16 @@ def test_penumbras_are_not_cut(tmp_path: Path, device: Any, radius_deg: float) -
     with_map, without = (drawn(device, one) for one in (found, replace(found, sunlit=None)))
     expected = traced(places(DOWN), np.degrees(found.sun.radius_rad))
     assert np.array_equal(with_map[expected > 0], without[expected > 0])
+
+
+def test_facets_of_a_ball_are_not_cut(tmp_path: Path, device: Any) -> None:
+    """Texels are smaller than facets; some of these turn away from the sun where the ball does not."""
+    middle = (0.0, 0.55, 0.0)
+    camera = Camera(name="aside", position=(1.2, 1.5, 2.2), target=middle, fov_y_deg=32.0)
+    found = baked(tmp_path, {"ball": placed(sphere(0.5, 24, 12), middle)}, 0.5, camera, FINE)
+    assert found.sunlit is not None and found.sunlit.mean() < 0.9
+    with_map, without = (drawn(device, one, camera, 1) for one in (found, replace(found, sunlit=None)))
+    assert np.abs(with_map - without).max() < 0.02, ".09 where rays leave the facets"
 
 
 def test_texels_hold_for_their_sun_and_geometry_alone(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from lambent.store.sunlit import GEOMETRY, SUNLIT
 
 KIND = "sunlit"
 NEEDS = ("geometry", "light_map")
-REVISION = 1
+REVISION = 2
 
 
 def keys(context: BakeContext) -> dict[str, str]:
@@ -31,6 +31,6 @@ def bake(context: BakeContext) -> None:
     notes: dict[str, object] = {"geometry": context.keys("geometry")[GEOMETRY]}
     if sun is not None:
         rays = SunRays(sun, traced.whole(diffuse=False))
-        found = sunlit(texels, traced.labels, rays, context.seed, context.progress)
+        found = sunlit(texels, traced.merged, traced.labels, rays, context.seed, context.progress)
         notes["sun"] = list(sun.record.direction)
     context.put(KIND, SUNLIT, found, context.provenance(**notes))

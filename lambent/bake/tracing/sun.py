@@ -94,6 +94,11 @@ class SunRays:
         self._tangent = float(np.tan(sun.record.radius_rad))
         self._irradiance = mi.Color3f(*sun.record.irradiance)
 
+    @property
+    def direction(self) -> Floats:
+        """Towards the middle of the sun, (3,) float64."""
+        return np.array(self._sun.record.direction, float)
+
     def __call__(self, si: Any, active: Any) -> Any:
         """Irradiance (mi.Color3f), including the cosine of the shading normal: negative on the back.
 

@@ -9,7 +9,7 @@
 // does not shadow itself. Under the edge of a sheet that touches the surface, texels beyond that edge do not count: what
 // they show is farther from the sun.
 
-#include "vertex.wgsl"
+#include "frame.wgsl"
 #include "sun_record.wgsl"
 
 @group(1) @binding(0) var<uniform> sun: Sun;
@@ -37,6 +37,7 @@ const SUN_STEEPEST = 20.0;   // slope, depth over width, beyond which a surface 
 const SUN_APART_PX = 0.75;   // texels, by which a blocker may miss the place that it hides
 const SUN_BIAS_PX = 0.3;     // texels, by which what is nearer to the sun casts no shadow
 const SUN_BEYOND_PX = 2.0;   // texels, by which what is farther from the sun is no part of the surface
+const SUN_LEAST_BEND = 0.85; // cosine between a facet and the smooth surface that it stands for
 const SUN_ROUNDING = 4e-7;   // of the depths' span
 const PANE_LOOKS = 8u;       // taps that look for panes
 const PANE_TAPS = 6u;        // that are averaged
@@ -325,20 +326,55 @@ fn in_any_of_four(value: f32) -> f32 {
     return max(row, abs(dpdyFine(row)));
 }
 
-@fragment fn sun_main(v: Varyings, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+struct SunVaryings {
+    @invariant @builtin(position) position: vec4f, // to the bit that of depth.wgsl
+    @location(0) p_world: vec3f,
+    @location(1) n_world: vec3f,
+    @location(2) uv2: vec2f,
+    @location(3) tangent_m: f32, // of the vertex's tangent plane: distance from the eye
+}
+
+@vertex fn vertex_main(@location(0) position: vec3f, @location(1) normal: vec3f, @location(3) uv2: vec2f) -> SunVaryings {
+    let tangent_m = dot(position - frame.eye.xyz, normal);
+    return SunVaryings(frame.clip_from_world * vec4f(position, 1.0), position, normal, uv2, tangent_m);
+}
+
+// A place whose sunlight is looked up, and the normal of the surface there.
+struct SunPoint {
+    p_world: vec3f,
+    n_world: vec3f,
+}
+
+// The place on the smooth surface that a facet stands for: half as far above the facet as the tangent planes of its
+// vertices, which is exact for equal curvature (after Hanika 2021, "Hacking the shadow terminator"). Only outwards.
+fn on_smooth_surface(v: SunVaryings, side: f32) -> SunPoint {
+    let bulge_m = 0.5 * side * (v.tangent_m - dot(v.p_world - frame.eye.xyz, v.n_world));
+    let n = normalize(side * v.n_world);
+    return SunPoint(v.p_world + max(bulge_m, 0.0) * n, n);
+}
+
+@fragment fn sun_main(v: SunVaryings, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     let flat_normal = cross(dpdx(v.p_world), dpdy(v.p_world));
     let is_reached = is_sunlit(v.uv2);
     let of_four = in_any_of_four(select(0.0, 1.0, is_reached)); // texels of the others may be of other charts
-    let facing = dot(v.n_world, sun.towards.xyz) * select(-1.0, 1.0, front);
+    let side = select(-1.0, 1.0, front);
+    let facing = dot(v.n_world, sun.towards.xyz) * side;
+    let n = select(v.n_world, normalize(flat_normal), dot(flat_normal, flat_normal) > 0.0);
+    let outwards = n * select(-1.0, 1.0, dot(n, v.n_world) * side > 0.0);
+    // facets that turn away from the sun hide themselves, although the smooth surface is lit
+    let bends = (dot(outwards, sun.towards.xyz) < 1.0 / SUN_STEEPEST) & (dot(outwards, v.n_world) * side > SUN_LEAST_BEND);
+    var at = SunPoint(v.p_world, n);
     var seen = vec3f(0.0);
     // most of an interior gets no sun: what is outside this loop costs adapters in software as much there as in the sun
-    for (var i = 0u; i < select(0u, 1u, (of_four > 0.0) & (TRANSMITS | (facing > 0.0))); i++) {
-        let n = select(v.n_world, normalize(flat_normal), dot(flat_normal, flat_normal) > 0.0);
+    var turns = select(0u, 1u, (of_four > 0.0) & (TRANSMITS | (facing > 0.0)));
+    for (var i = 0u; i < turns; i++) {
         turn_sun_pattern(vec2u(v.position.xy));
-        let share = sun_visibility(v.p_world, n);
+        let share = sun_visibility(at.p_world, at.n_world);
         var passed = vec3f(1.0);
-        for (var j = 0u; j < select(0u, 1u, PANES > 0u && share > 0.0); j++) { passed = sun_through_panes(v.p_world, n); }
-        seen = share * passed;
+        for (var j = 0u; j < select(0u, 1u, PANES > 0u && share > 0.0); j++) { passed = sun_through_panes(at.p_world, at.n_world); }
+        seen = max(seen, share * passed);
+        turns = select(1u, 2u, bends & (share < 1.0) & (facing > 0.0));
+        at = on_smooth_surface(v, side);
     }
     return vec4f(select(vec3f(0.0), mean_of_parts(seen, vec2u(v.position.xy)), is_reached), 1.0);
 }
