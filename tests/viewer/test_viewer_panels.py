@@ -129,6 +129,13 @@ def test_the_line_on_a_bake_is_shown_whole(monkeypatch, state, geometry, size):
     panels.close()
 
 
+def test_a_click_at_the_shown_time_goes_to_the_path(panels, state):
+    """Its keys of light are set where the camera stands on it."""
+    assert state.navigation.path is None
+    panels.click("##time", 0.01)
+    assert state.navigation.path is not None and state.navigation.path.time_s == 0.0
+
+
 def test_a_camera_path_plays_pauses_and_is_scrubbed(panels, state):
     panels.click("play")
     assert state.navigation.path.playing

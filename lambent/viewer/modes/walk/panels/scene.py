@@ -114,8 +114,9 @@ def _follow(recordings: Recordings) -> None:
     imgui.set_next_item_width(-1)
     time_s = min(navigation.path.time_s, chosen.seconds) if navigation.path else 0.0
     moved, time_s = imgui.slider_float("##time", time_s, 0.0, chosen.seconds, "%.1f s", imgui.SliderFlags_.always_clamp)
+    held = imgui.is_item_activated()  # a click at the shown time goes there too: the camera may be elsewhere
     explain("time along the camera path; drag to go there")
-    if moved:
+    if moved or held:
         navigation.scrub(chosen, time_s)
     if chosen.name in [path.name for path in recordings.views.saved.paths]:
         _rename_or_delete(recordings, "path", chosen.name)
