@@ -134,6 +134,16 @@ def exitance(direct, indirect, grows, now, inverse, most_ratio, material, other,
     return found
 
 
+@numba.njit(cache=True, nogil=True)
+def nearest_code(weight, steps, one):  # type: ignore[no-untyped-def]
+    """Byte (as a float, 0 for none) of the step nearest to a weight, in `steps` per octave from 1, coded `one`."""
+    if weight <= 0:
+        return 0.0
+    below = np.floor(np.log2(weight) * steps)
+    middle = (2.0 ** (below / steps) + 2.0 ** ((below + 1) / steps)) / 2
+    return min(max(below + (weight > middle) + one, 0.0), 255.0)
+
+
 @numba.njit(parallel=True, cache=True, nogil=True)
 def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
     """`answer_rays.packed_rays` into `rays` (K, R, 3), zeroed before, for rays to `numbers` with `weights` (K, R)."""
@@ -149,15 +159,16 @@ def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
                     ends[count] = last
                     count += 1
                 sums[count - 1] += weights[k, r]
-        place, last = 0, np.int64(0)
+        place, last, rest = 0, np.int64(0), 0.0
         for n in range(count):
-            # Steps are wide; dithered rounding to the byte above or below keeps sums of many weights right.
-            dither = np.float32((n * 0.6180339887 + ends[n] * 0.7548776662) % 1)
-            code = np.floor(np.log2(sums[n]) * steps + dither) + one
+            # Steps are wide; passing on what rounding leaves keeps sums of weights right.
+            code = nearest_code(sums[n] + rest, steps, one)
+            rest += sums[n]
             if code >= 1:
+                rest -= 2.0 ** ((code - one) / steps)
                 step = ends[n] - last
                 rays[k, place, 0], rays[k, place, 1] = np.uint8(step & 255), np.uint8(step >> 8)
-                rays[k, place, 2] = np.uint8(min(code, np.float32(255)))
+                rays[k, place, 2] = np.uint8(code)
                 last = ends[n]
                 place += 1
 
@@ -176,7 +187,7 @@ def thin(starts, points, weights, table, light, steps, one, chosen, codes):  # t
             weighed += table[weights[r]]
             lit += table[weights[r]] * light[points[r]]
         shift = (k * 0.6180339887) % 1
-        total, taken, place = 0.0, 0, 0
+        total, taken, place, rest = 0.0, 0, 0, 0.0
         for r in range(starts[k], starts[k + 1]):
             weight = table[weights[r]]
             chance = weight / weighed
@@ -188,9 +199,10 @@ def thin(starts, points, weights, table, light, steps, one, chosen, codes):  # t
                 taken += 1
             if taken > before:
                 value = weight * (taken - before) / (count * chance)
-                code = np.floor(np.log2(value) * steps + (r * 0.7548776662) % 1) + one
+                code = max(nearest_code(value + rest, steps, one), 1.0)
+                rest += value - 2.0 ** ((code - one) / steps)
                 chosen[k, place] = r
-                codes[k, place] = np.uint8(min(max(code, 1.0), 255.0))
+                codes[k, place] = np.uint8(code)
                 place += 1
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from lambent.bake.answering.points import (
     MORE,
     MORE_RECEIVERS,
+    GatherPoints,
     gather_points,
     neighbours,
     receiving_points,
@@ -94,6 +95,27 @@ def test_blind_points_are_left_out_unless_all_are() -> None:
     seen[:5] = 0
     assert np.array_equal(seeing(spots, points, seen).texel, points.texel[5:])
     assert np.array_equal(seeing(spots, points, 0 * seen).texel, points.texel)
+
+
+def test_texels_show_points_of_their_own_sheet() -> None:
+    """A second sheet, close behind the first, has a point at each texel: none is shown on the first."""
+    one = plane()
+    count = len(one.area)
+    behind = one.position + np.array([0.0, 1.0, 0.0])
+    both = {
+        name: np.concatenate([getattr(one, name)] * 2, axis=-2 if name in ("irradiance", "direct", "sun") else -1)
+        for name in ("lit", "there", "irradiance", "direct", "sun", "area", "object", "material")
+    }
+    chart, index = np.repeat([0, 1], count), np.arange(2 * count)
+    spots = replace(
+        one, **both, chart=chart, position=np.concatenate([one.position, behind]),
+        normal=np.tile(one.normal, (2, 1)), index=index,
+    )  # fmt: skip
+    first = gather_points(one, SIZE, 4)
+    second = GatherPoints(np.zeros(count, np.int64), np.arange(count, 2 * count), np.ones(count, np.int64))
+    _, shown = neighbours(spots, first.followed_by(second))
+    own = shown.shares * (shown.points < len(first.texel))
+    assert (own[:count].sum(axis=1) == shown.shares[:count].sum(axis=1)).all()
 
 
 def test_rays_of_a_point_start_from_all_texels_that_it_stands_for() -> None:

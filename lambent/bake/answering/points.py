@@ -17,6 +17,7 @@ from lambent.core.colour import luminance
 NEAR = 8
 SPREAD = 0.7  # of a block's size: distance at which a point counts by 1/e
 NORMAL_M = 0.5  # metres that a unit of the normal counts for in the search
+OFF_PLANE = 8.0  # a metre along the texel's normal counts for so many: sheets lie close behind one another
 BENT = 4  # power of the cosine between normals
 LEAST = 1e-6
 BLIND = 0.05  # of the baked indirect light, that a few rays see
@@ -168,11 +169,14 @@ def _in_blocks(spots: Spots, width: int, side: Indices, texel: Indices, size: In
 def neighbours(spots: Spots, points: GatherPoints) -> tuple[NDArray[np.uint32], Neighbours]:
     """Texels (T,) that answer, as twice the light map's texel plus the side, and the points near each.
 
-    Points are of the same object and side; texels of objects without any have no answer.
+    Points are of the same object and side, and candidates are the nearest ones of all and of the texel's chart: where
+    sheets lie close behind one another, the other sheet may have more points. Texels of objects without any have no
+    answer.
     """
     from scipy.spatial import KDTree
 
     place = np.concatenate([spots.position, NORMAL_M * spots.normal], axis=1)
+    by_chart = np.column_stack([place, 10 * (1 + np.ptp(spots.position)) * spots.chart])
     owner = spots.object * 2
     codes, near, shares = [], [], []
     point_owner = owner[points.texel] + points.side
@@ -181,9 +185,18 @@ def neighbours(spots: Spots, points: GatherPoints) -> tuple[NDArray[np.uint32], 
             mine = np.flatnonzero(spots.there[side] & (owner + side == one))
             known = np.flatnonzero(point_owner == one)
             count = min(NEAR, len(known))
-            found = KDTree(place[points.texel[known]]).query(place[mine], k=np.arange(1, count + 1))[1]
-            share, order = _shares(spots, mine, points, known[found]), np.argsort(found, axis=1)  # files pack it well
-            at, share = known[np.take_along_axis(found, order, axis=1)], np.take_along_axis(share, order, axis=1)
+            found = np.concatenate(
+                [
+                    KDTree(of[points.texel[known]]).query(of[mine], k=np.arange(1, count + 1))[1]
+                    for of in (place, by_chart)
+                ],
+                axis=1,
+            )
+            found.sort(axis=1)  # files pack it well
+            share = _shares(spots, mine, points, known[found])
+            share[:, 1:][np.diff(found, axis=1) == 0] = 0  # named twice
+            most = np.sort(np.argsort(-share, axis=1, kind="stable")[:, :count], axis=1)
+            at, share = known[np.take_along_axis(found, most, axis=1)], np.take_along_axis(share, most, axis=1)
             codes.append(spots.index[mine] * 2 + side)
             near.append(np.pad(at, ((0, 0), (0, NEAR - count))))
             shares.append(np.pad(share, ((0, 0), (0, NEAR - count))))
@@ -204,12 +217,12 @@ def points_near(spots: Spots, codes: NDArray[np.uint32], near: Neighbours) -> In
 
 
 def _shares(spots: Spots, mine: Indices, points: GatherPoints, at: Indices) -> Floats:
-    """(n, count) bytes of the points `at` (n, count), nearest first; the largest of each row is BYTE."""
+    """(n, count) bytes of the points `at` (n, count); the largest of each row is BYTE."""
     texel = points.texel[at]
-    size = np.sqrt(spots.area[mine]) * points.block[at[:, 0]] * SPREAD
-    squared = ((spots.position[mine][:, None] - spots.position[texel]) ** 2).sum(axis=-1)
-    squared /= np.maximum(size[:, None] ** 2, 1e-12)
+    away = spots.position[texel] - spots.position[mine][:, None]
+    squared = (away**2).sum(axis=-1) + (OFF_PLANE * (away * spots.normal[mine][:, None]).sum(axis=-1)) ** 2
+    nearest = np.take_along_axis(points.block[at], squared.argmin(axis=1)[:, None], axis=1)
+    squared /= np.maximum((np.sqrt(spots.area[mine])[:, None] * nearest * SPREAD) ** 2, 1e-12)
     cosine = np.maximum((spots.normal[mine][:, None] * spots.normal[texel]).sum(axis=-1), 0)
-    nearest = squared.min(axis=1, keepdims=True)
-    weight = np.exp(nearest - squared) * (cosine**BENT + LEAST)
+    weight = np.exp(squared.min(axis=1, keepdims=True) - squared) * (cosine**BENT + LEAST)
     return np.asarray(np.rint(weight / weight.max(axis=1, keepdims=True) * BYTE))

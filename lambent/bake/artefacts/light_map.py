@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 KIND = "light_map"
 NEEDS = ("geometry",)
 REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 5, 5, 3, 1, 1
-REVISION_OF_DIRECT = 4
+REVISION_OF_DIRECT, REVISION_OF_PARTS = 4, 3
 IRRADIANCE = tuple(f"light_map/{side}" for side in SIDES)
 NOISE = tuple(noise_name(side) for side in SIDES)
 TRACED, GATHERED = (f"light_map/{stage}" for stage in ("traced", "gathered"))
@@ -93,17 +93,19 @@ def keys(context: BakeContext) -> dict[str, str]:
     names = [*IRRADIANCE[:count], *NOISE[:count]]
     raw = [PHOTONS] if _by_photons(context) else [_of_side(stage, i) for stage in _stages(how) for i in range(count)]
     direct: list[str] = []  # direct light of the last stage
+    parts: list[str] = []  # its samples
     if grouped:
         names += map(group_name, SIDES[:count])
         raw += [_parts(_of_side(stage, side)) for stage in _stages(how)[:-1] for side in range(count)]
     if grouped or keeps_direct(context):
         direct += [group_name(side, direct=True) for side in SIDES[:count]]
-        direct += [_parts(_of_side(_stages(how)[-1], side)) for side in range(count)]
+        parts += [_parts(_of_side(_stages(how)[-1], side)) for side in range(count)]
     if _bumpy_faces(context).any():
         names.append(DOMINANT_DIRECTION)
         raw.append(MOMENTS)
-    of_direct = key_of("direct", REVISION_OF_DIRECT, filtered)
-    return dict.fromkeys(raw, samples) | dict.fromkeys(names, filtered) | dict.fromkeys(direct, of_direct)
+    of_direct, of_parts = (key_of("direct", one, filtered) for one in (REVISION_OF_DIRECT, REVISION_OF_PARTS))
+    found = dict.fromkeys(raw, samples) | dict.fromkeys(names, filtered)
+    return found | dict.fromkeys(direct, of_direct) | dict.fromkeys(parts, of_parts)
 
 
 def bake(context: BakeContext) -> None:
