@@ -26,7 +26,7 @@ from lambent.scenes.scene import Mesh
 MOST_TEXELS = 190  # along a side of a trial's maps
 MOST_OF_FIELD = 1 << 24  # texels of all maps of a trial
 COUNTS = (16, 64, 256, 1024)
-FINENESS = (1 / 3, 1, 2)  # of maps, relative to those that a bake's quality asks for
+FINENESS = (1, 2 / 3, 2)  # of maps, relative to those that a bake's quality asks for
 ENOUGH = 64  # points from where on maps of a size are tried with more only if the error falls to FALLS
 FALLS = 0.97
 
@@ -110,8 +110,8 @@ class Trial:
 def options_of(texels: int) -> list[Option]:
     """The light fields that objects may get where a bake's quality asks for maps of `texels` a side.
 
-    Rough lobes need many points rather than fine maps, narrow ones the reverse. Those that a trial cannot tell apart
-    are left out.
+    Rough lobes need many points rather than fine maps, narrow ones the reverse. Of those that a trial
+    cannot tell apart, the quality's own stay.
     """
     found = dict[tuple[int, int], Option]()
     for fineness in FINENESS:
