@@ -134,7 +134,8 @@ def dragged(store: Store, materials: Mapping[str, Material], edit: Edit, seconds
 
     for frame in range(DRAG_TURN):  # the first edit loads the answer
         draw(frame)
-    widths, changes = list[int](), renderer.resources.light_version
+    widths: list[int] = []
+    changes = renderer.resources.light_version
     begun, busy = time.perf_counter(), time.process_time()
     while (passed := time.perf_counter() - begun) < seconds:
         draw(DRAG_TURN + len(widths))
