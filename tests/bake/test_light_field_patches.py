@@ -145,8 +145,8 @@ def test_trials_ask_for_the_same_density(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(choosing, "turned_to_viewers", lambda mesh, *_: mesh)
     nothing: Any = None
     around: Any = SimpleNamespace(scene=None)
-    choosing.Chooser(scene, nothing, nothing, around, np.zeros((0, 3)), 16, 0).trial("ball", nothing, 1.0, 64)
-    assert asked == {"most": 64, "patch_density": (4.0, 1.0)}
+    choosing.Chooser(scene, nothing, nothing, around, np.zeros((0, 3)), 16, 0).trial("ball", nothing, 1.0)
+    assert asked == {"patch_density": (4.0, 1.0)}
 
 
 def test_points_of_the_teapot_are_on_it_and_nothing_is_lost(mi: Any) -> None:

@@ -89,7 +89,8 @@ class Chooser:
         mesh, seed, some = self._turned(name), self._seed_of(name), options or options_of(self._texels)
         wish = self._scene.light_fields.get(name)
         density = None if wish is None else wish.patch_density
-        return tried(self._placing, mesh, seen, probe, self._around, seed, some, level or seen.level, density)
+        level = level or seen.level
+        return tried(self._placing, mesh, seen, probe, self._around, seed, some, level, patch_density=density)
 
     def _turned(self, name: str) -> Mesh:
         mesh = self._scene.object(name).mesh
