@@ -75,10 +75,13 @@ def planar_views(
     for number, (_, reflector, plane) in enumerate(seen[:most]):
         shown = on_screen(frame, np.asarray(reflector.outline, float))
         m = max((widest or {}).get(part.object, 0.0) for part in reflector.parts)
-        place = _window(frame, (width, height), m, None if whole else shown)
+        bevel = bevel_of(reflector) if plane @ reflector.plane > 0 else FLAT
+        step = (
+            step_px(height) if bevel == FLAT else STEP_PX
+        )  # bevels mirror what lies beside the outline's mirror image
+        place = _window(frame, (width, height), m, None if whole else shown, step)
         view = _view(frame, plane, reflector, (width, height), place, number)
         if view is not None:
-            bevel = bevel_of(reflector) if plane @ reflector.plane > 0 else FLAT
             view.uniform["bevel_depth"], view.uniform["bevel_cos"] = bevel.depth_m, bevel.least_cos
             views.append(view)
     return views
@@ -181,16 +184,15 @@ def _plan(record: PlanRecord | None, plane: Floats, eye: Floats) -> Record | Non
     return uniform
 
 
-def _window(frame: Record, size: tuple[int, int], m: float, shown: Floats | None) -> tuple[Floats, Floats]:
+def _window(frame: Record, size: tuple[int, int], m: float, shown: Floats | None, step: int) -> tuple[Floats, Floats]:
     """Size of the buffer of a frame of `size`, and where the frame's first pixel lies in it.
 
     It holds the polygon `shown` (Q, 2), in clip coordinates, or the whole frame, and around either the half-width 2 m
-    of the widest lobe. A camera that moves moves it in steps, so that MIP levels do not swim.
+    of the widest lobe. A camera that moves moves it in steps of so many pixels, so that MIP levels do not swim.
     """
     focal_px = size[1] / 2 / float(np.linalg.norm(frame["up"][:3]))
     reach = max(MARGIN_PX, int(2 * m * focal_px))
     margin = min(reach, max(MARGIN_PX, int(MOST_MARGIN * max(size))))
-    step = step_px(size[1])
     wide = np.array([-(-(length + 2 * margin) // step) * step for length in size])
     offset = (wide - np.array(size)) // 2
     if shown is None:

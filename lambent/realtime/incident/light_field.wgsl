@@ -160,13 +160,13 @@ struct Behind {
     at_edge: bool, // the texel also shows the sky
 }
 
-struct Hit {
+struct MarchEnd {
     u: f32,        // inverse distance, 1/m, along the ray; SKY or MISSED
     at_edge: bool, // the point sees the sky there, or nearby
 }
 
 struct Found {
-    u: vec4f, // of each point's Hit
+    u: vec4f, // of each point's MarchEnd
     at_edge: bool,
 }
 
@@ -179,7 +179,7 @@ fn behind(map: Map, o: vec3f, r: vec3f, u: f32) -> Behind {
 }
 
 // The ray's hit on the map's surface. Steps grow from FIRST times the distance of the point to the distance where the parallax is LAST texels of about 4/side rad, and end at infinity.
-fn marched(point: u32, o: vec3f, r: vec3f) -> Hit {
+fn marched(point: u32, o: vec3f, r: vec3f) -> MarchEnd {
     let map = map_of(point);
     let texel = 4.0 / f32(field.side);
     let growth = pow(FIRST * texel / LAST, 1.0 / f32(STEPS - 1u));
@@ -195,7 +195,7 @@ fn marched(point: u32, o: vec3f, r: vec3f) -> Hit {
         g_far = behind(map, o, r, far).g;
         crossed = g_near < 0.0 && (g_far > 0.0 || (g_far == 0.0 && i < STEPS));
     }
-    if (!crossed) { return Hit(select(MISSED, SKY, g_far <= 0.0), g_far <= 0.0); }
+    if (!crossed) { return MarchEnd(select(MISSED, SKY, g_far <= 0.0), g_far <= 0.0); }
     var u = far;
     var last: Behind;
     for (var i = 0u; i < SECANTS; i++) {
@@ -206,7 +206,7 @@ fn marched(point: u32, o: vec3f, r: vec3f) -> Hit {
     // |q|/d - 1 is g |r + u o|/u, and |q|/t is |r + u o|
     let stretch = length(r + u * o);
     let hit = u > 0.0 && abs(last.g) * stretch * max(stretch, 1.0) < TOLERANCE * u;
-    return Hit(select(MISSED, u, hit), hit && last.at_edge);
+    return MarchEnd(select(MISSED, u, hit), hit && last.at_edge);
 }
 
 fn found_by_points(s: Surface, r: vec3f) -> Found {
