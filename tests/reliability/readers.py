@@ -68,6 +68,7 @@ def sound() -> tuple[Sound, ...]:
         "glTF 2.0, GLB": [("scene.glb", scene_seeds.gltf("glb"))],
         "Wavefront OBJ": [("scene.obj", scene_seeds.obj())],
         "PLY": [("scene.ply", scene_seeds.ply(f)) for f in ("ascii", "binary_little_endian", "binary_big_endian")],
+        "Bezier patches": [("scene.bpt", scene_seeds.bpt(numbered)) for numbered in (False, True)],
         "Mitsuba XML": [("scene.xml", scene_seeds.mitsuba())],
         "scene.toml": [("scene.toml", scene_seeds.toml(_material(), measured_fuzz.seeds()["gonio text"][0]))],
     }

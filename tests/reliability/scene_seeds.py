@@ -102,6 +102,13 @@ def obj() -> Files:
     return {"scene.obj": OBJ, "a.mtl": MTL, "p.png": encoded("PNG")}
 
 
+def bpt(numbered: bool) -> Files:
+    """A curved patch, in the layout of degrees or in the older one of `numbered` points."""
+    points = "\n".join(f"{x} {y} {(x * (3 - x) + y * y) / 4}" for y in range(4) for x in range(4))
+    text = f"1\n{','.join(map(str, range(1, 17)))}\n16\n{points}\n" if numbered else f"1\n3 3\n{points}\n"
+    return {"scene.bpt": text.encode()}
+
+
 def ply(form: str) -> Files:
     """A square of a triangle pair with normals and uv."""
     names = ("x", "y", "z", "nx", "ny", "nz", "u", "v")
