@@ -72,7 +72,9 @@ class Resolution:
         """Learn the time of a frame, and choose the size of the next."""
         before = self._times.get(scale, seconds)
         # A running mean that forgets a stall (shader compilation) at the next frame of this size.
-        self._times[scale] = min((before + seconds) / 2, 1.2 * seconds)
+        learnt = min((before + seconds) / 2, 1.2 * seconds)
+        # Fewer pixels take no longer: a stall at a size that is not drawn again is no cost without pixels.
+        self._times = {s: min(t, learnt) if s < scale else t for s, t in self._times.items()} | {scale: learnt}
         self._fixed_s = min(self._without_pixels_s(), seconds)
         self._pixels_s = (seconds - self._fixed_s) / scale**2
         # Fewer pixels do not reduce the fixed cost.

@@ -209,3 +209,15 @@ def test_a_frame_that_an_event_brings_early_delays_none():
     beat = Beat(0.016)
     beat.wait_s(5.0)
     assert beat.wait_s(5.001) == pytest.approx(0.016)
+
+
+def test_a_stall_at_the_least_size_does_not_make_pixels_look_free():
+    """The only frame of the least size waits for its shaders; a full picture takes .6 s more than no pixels."""
+    p = pacer(slow_adapter=True)
+    p.cost(Plan(0.5, None, mirrors=False), 0.46)
+    p.cost(Plan(SCALES[-1], None, mirrors=False), 1.7)
+    seen = []
+    for _ in range(40):
+        p.cost(p.moving, 0.15 + 0.6 * p.moving.scale**2)
+        seen.append(p.moving.scale)
+    assert max(seen[10:]) <= 0.5
