@@ -15,6 +15,7 @@ from lambent.core.latlong import lat_long_uv
 from lambent.core.surroundings import Axis, Layout
 from lambent.scenes.computed import lat_long_image
 from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, Environment, ImageEnvironment
+from lambent.scenes.textures import halved
 
 _UPRIGHT = np.eye(3)
 # Minimal rotations from +y to an axis: columns are the images of +x, +y, +z. Upside down, front stays front.
@@ -52,14 +53,7 @@ def read_surroundings(file: Path) -> Image:
         If the file is not a picture, or has more than `SURROUNDINGS_PIXELS`.
     """
     picture = read_image(file, SURROUNDINGS_PIXELS)
-    height, width = (side // 2 * 2 for side in picture.shape[:2])
-    if height * width <= PIXELS.most:
-        return picture
-    reduced = picture[:height:2, :width:2].copy()
-    for row, column in ((0, 1), (1, 0), (1, 1)):
-        reduced += picture[row:height:2, column:width:2]
-    reduced /= 4
-    return reduced
+    return halved(picture) if picture.shape[0] * picture.shape[1] > PIXELS.most else picture
 
 
 def up_turn(up: Axis) -> Floats:

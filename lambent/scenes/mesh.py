@@ -88,6 +88,12 @@ class Mesh:
         numbers = self.patches.number[self.faces]
         return np.where((numbers == numbers[:, :1]).all(axis=1), numbers[:, 0], NO_PATCH)
 
+    def at_vertices(self, source: NDArray[np.integer], faces: NDArray[np.uint32]) -> Mesh:
+        """The mesh of `faces` (T, 3) over copies of the vertices `source` (W,)."""
+        patches = None if self.patches is None else self.patches.at_vertices(source)
+        positions, normals, tangents, uv = (a[source] for a in (self.positions, self.normals, self.tangents, self.uv))
+        return Mesh(positions, normals, tangents, uv, faces, patches)
+
     @property
     def bounds(self) -> tuple[Array, Array]:
         return self.positions.min(axis=0), self.positions.max(axis=0)

@@ -214,6 +214,4 @@ def family(parts: Mapping[str, str], name: str) -> set[str]:
 def sub_mesh(mesh: Mesh, faces: Indices) -> Mesh:
     """The mesh restricted to some faces."""
     vertices, renumbered = np.unique(mesh.faces[faces], return_inverse=True)
-    positions, normals, tangents, uv = (a[vertices] for a in (mesh.positions, mesh.normals, mesh.tangents, mesh.uv))
-    patches = None if mesh.patches is None else mesh.patches.at_vertices(vertices)
-    return Mesh(positions, normals, tangents, uv, renumbered.reshape(-1, 3).astype(np.uint32), patches)
+    return mesh.at_vertices(vertices, renumbered.reshape(-1, 3).astype(np.uint32))

@@ -109,9 +109,7 @@ def _seams(charts: list[Chart], corners: list[Floats]) -> tuple[Indices, NDArray
 
 def _split(mesh: Mesh, corner: Indices, faces: NDArray[np.uint32]) -> Mesh:
     """The mesh with a vertex for each of these corners (V,) of its faces, numbered consecutively."""
-    source = mesh.faces.reshape(-1)[corner]
-    patches = None if mesh.patches is None else mesh.patches.at_vertices(source)
-    return Mesh(mesh.positions[source], mesh.normals[source], mesh.tangents[source], mesh.uv[source], faces, patches)
+    return mesh.at_vertices(mesh.faces.reshape(-1)[corner], faces)
 
 
 def merged(atlas: Atlas) -> dict[str, Floats]:

@@ -80,13 +80,10 @@ def creased(mesh: Mesh, angle_deg: float) -> Mesh:
     _, kept, index = np.unique(
         np.column_stack([vertex, normals.round(5)]), axis=0, return_index=True, return_inverse=True
     )
-    source = mesh.faces.reshape(-1)[kept]
+    copied = mesh.at_vertices(mesh.faces.reshape(-1)[kept], index.reshape(-1, 3).astype(np.uint32))
     new: Floats = normals[kept]
-    return Mesh(
-        mesh.positions[source], new.astype(np.float32),
-        tangents_along(new, mesh.tangents[source].astype(float)).astype(np.float32), mesh.uv[source],
-        index.reshape(-1, 3).astype(np.uint32), None if mesh.patches is None else mesh.patches.at_vertices(source),
-    )  # fmt: skip
+    tangents = tangents_along(new, copied.tangents.astype(float))
+    return replace(copied, normals=new.astype(np.float32), tangents=tangents.astype(np.float32))
 
 
 def with_creases(objects: Sequence[SceneObject], angle_deg: float) -> tuple[SceneObject, ...]:
