@@ -68,8 +68,8 @@ def test_a_tray_is_as_with_the_whole_buffer(device: Any, m: float, monkeypatch: 
     assert np.abs(part - whole)[middle].mean() < 0.03 * whole[middle].mean()
 
 
-def _whole(window: Any, frame: Any, size: Any, m: float, shown: Any) -> Any:
-    return window(frame, size, m, None)
+def _whole(window: Any, frame: Any, size: Any, m: float, shown: Any, step: int) -> Any:
+    return window(frame, size, m, None, step)
 
 
 def test_nothing_pops_where_windows_move(device: Any) -> None:
