@@ -14,6 +14,7 @@ import typer
 
 import lambent
 from lambent.core.errors import UserError
+from lambent.core.interruption import was_interrupted
 from lambent.core.plain import plain, printable
 from lambent.core.progress import Progress
 
@@ -80,11 +81,14 @@ def metric_errors(errors: Mapping[str, float], share: Mapping[str, float]) -> st
 
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """A bar with the time left on stderr; if stderr is no terminal, a line for each step with its time."""
+    """A bar with the time left on stderr; if stderr is no terminal, a line for each step with its time.
+
+    Raises `KeyboardInterrupt` at the next step if a library has dropped the one of Ctrl-C.
+    """
     if not sys.stderr.isatty():
         lines = _StepLines()
         try:
-            yield lines
+            yield _interruptible(lines)
         except BaseException:
             lines.end("stopped after ")
             raise
@@ -106,7 +110,16 @@ def progress_bar() -> Iterator[Progress]:
                 tasks[what] = bars.add_task(printable(what), total=total)
             bars.update(tasks[what], completed=done, total=total, visible=True)
 
-        yield update
+        yield _interruptible(update)
+
+
+def _interruptible(progress: Progress) -> Progress:
+    def report(done: float, total: float, what: str) -> None:
+        if was_interrupted():
+            raise KeyboardInterrupt
+        progress(done, total, what)
+
+    return report
 
 
 class _StepLines:

@@ -15,6 +15,8 @@ import signal
 import sys
 from typing import TYPE_CHECKING
 
+from lambent.core.interruption import interrupt, is_interruption
+
 if TYPE_CHECKING:
     import typer
     from typer.exceptions import TyperException
@@ -35,7 +37,7 @@ def main() -> None:
     signal.signal(signal.SIGINT, _leave)
     build_app()  # imports the commands; no work can be lost yet
     sys.unraisablehook = _unraisable
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGINT, interrupt)
     try:
         code = run(sys.argv[1:])
     except KeyboardInterrupt:  # during the report at the end of the command
@@ -82,7 +84,9 @@ def run(arguments: list[str]) -> int:
         code = build_app()(arguments or ["--help"], prog_name="lambent", standalone_mode=False) or 0
         sys.stdout.flush()
     except UserError as error:
-        return _fail(str(error))
+        if not is_interruption(error.__cause__):  # a reader that was interrupted reports a faulty file
+            return _fail(str(error))
+        code = INTERRUPTED
     except TyperException as error:  # unknown commands and options, missing arguments
         return _fail(_usage_fault(error))
     except (Cancelled, KeyboardInterrupt):
@@ -92,12 +96,12 @@ def run(arguments: list[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except Exception as error:
-        if _is_interruption(error):
+        if isinstance(error, OSError) and error.errno in FAULTS_OF_THE_DISK:
+            return _fail(f"{error.filename or 'output'}: cannot be written ({error.strerror})")
+        if is_interruption(error):
             code = INTERRUPTED
         elif isinstance(error, MemoryError) or (isinstance(error, ImportError) and NO_ROOM in str(error)):
             return _fail(MEMORY)
-        elif isinstance(error, OSError) and error.errno in FAULTS_OF_THE_DISK:
-            return _fail(f"{error.filename or 'output'}: cannot be written ({error.strerror})")
         else:
             raise
     if code == INTERRUPTED:
@@ -110,13 +114,6 @@ def _usage_fault(error: TyperException) -> str:
     message = error.format_message().replace("Value error, ", "").replace("Input should be", "it has to be")
     context = getattr(error, "ctx", None)
     return message if context is None else f"{message.removesuffix('.')} (see `{context.command_path} --help`)"
-
-
-def _is_interruption(error: BaseException | None) -> bool:
-    """Whether Ctrl-C caused an error: an interrupted import fails in many ways."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__cause__ or error.__context__
-    return error is not None
 
 
 def _leave(*_: object) -> None:

@@ -123,7 +123,7 @@ def command(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="For path: seed of the noise.")] = 0,
     scene: Annotated[
-        str | None, typer.Option(help="For path: the scene file, where it has moved since the bake.")
+        str | None, typer.Option(help="For path: trace this scene file, with its own materials and lights.")
     ] = None,
     edit: Annotated[
         Path | None,
@@ -218,6 +218,8 @@ def command(
         replacements=parse_replacements(replace or ()), variant=variant,
     )  # fmt: skip
     settings.check()
+    if scene is not None and integrator != "path":
+        raise UserError("applies to the path tracer only", field="--scene", hint="add --integrator path")
     for option in ("false_range", "linear"):
         if _is_said(context, option) and not settings.is_false_coloured:
             name = "--range" if option == "false_range" else "--linear"

@@ -85,7 +85,7 @@ def still(
     settings : Settings
         Size, integrator, exposure, view transform.
     scene : str, optional
-        For the path tracer: the scene file, if it has moved since the bake.
+        For the path tracer: a scene file to trace in place of the bake's, with its own materials and lights.
     note : callable
         Called with a sentence for each thing that the store lacks or that has changed since the bake.
 

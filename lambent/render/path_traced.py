@@ -24,10 +24,14 @@ from lambent.store.states import variants_of
 from lambent.store.store import Store
 
 SPP = 64
+AS_THE_FILE_IS = (
+    "traced with the present geometry, lights and surroundings, and the materials of the bake; --scene FILE traces a "
+    "file with its own"
+)
 
 
 class PathTraced(Images):
-    """Path traced images of the scene that a store was baked from; `scene` is its present file."""
+    """Path traced images of the scene that a store was baked from, or of the file `scene` in its place."""
 
     def __init__(self, store: Store, settings: Settings, scene: str | None, note: Callable[[str], None]) -> None:
         super().__init__(settings)
@@ -47,8 +51,9 @@ class PathTraced(Images):
         self.apply_variant(
             variant_named(variants_of(store), settings.variant) if settings.variant else Variant("as baked")
         )
-        for name in changed_inputs(store, baked):
-            note(f"{name} has changed since the bake")
+        if changed := changed_inputs(store, baked):
+            traced = f"{scene} is traced as it is now" if scene else AS_THE_FILE_IS
+            note(f"changed since the bake: {', '.join(changed)}; {traced}")
         engine()
 
     def apply_variant(self, variant: Variant) -> None:

@@ -53,10 +53,10 @@ def write_source(store: Store, scene: Scene) -> None:
 
 
 def scene_of(store: Store, given: str | None = None) -> Scene:
-    """The scene of a store, with the materials and textures of the bake.
+    """The scene of a store, with the materials, textures and emission of the bake; or `given`, entirely as it is.
 
-    It is loaded from `given`, else from its location at the bake. Logs a warning if its geometry no longer fits the
-    store.
+    Without `given`, the scene is loaded from its location at the bake. Logs a warning if its geometry does not fit
+    the store.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def scene_of(store: Store, given: str | None = None) -> Scene:
         raise UserError("store has no path of its scene file", file=store.folder, hint="name it with --scene")
     crease_deg = store.documents.get(CREASE_ANGLE)
     scene = load_scene(place if given or place.startswith("builtin:") else store.folder / place, crease_deg)
-    if SCENE not in store.documents:  # baked for edited views alone
+    if given or SCENE not in store.documents:  # without the document: baked for edited views alone
         return scene
     record = scene_record(store)
     if not record.objects:  # a store of edited views alone

@@ -60,6 +60,40 @@ def test_the_command_traces_them_too(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_image(file)[..., :3], expected, rtol=2e-3, atol=1e-5)  # half floats
 
 
+LAMP = """format = "lambent-scene"
+version = 1
+geometry = "floor.obj"
+materials.grey.kd = {kd}
+assign."*" = "grey"
+environment = {{ kind = "constant", radiance = [{light}, {light}, {light}] }}
+cameras = [{{ name = "front", position = [0, 3, 0.1], target = [0, 0, 0] }}]
+"""
+
+
+def test_a_scene_named_for_the_path_tracer_is_traced_with_its_own_materials(tmp_path: Path, capsys) -> None:
+    (tmp_path / "floor.obj").write_text(OBJ)
+    recorded, other = tmp_path / "scene.toml", tmp_path / "other.toml"
+    recorded.write_text(LAMP.format(kd=0.2, light=1))
+    bake(load_scene(str(recorded)), tmp_path / "s", quality=TINY, only=["geometry"])
+
+    def mean(*options: str) -> tuple[float, str]:
+        file = tmp_path / "a.exr"
+        traced = ["--integrator", "path", "--size", "16x16", "--samples", "16", "--force", *options]
+        assert run(["render", str(tmp_path / "s"), "-o", str(file), *traced]) == 0
+        return float(read_image(file)[6:10, 6:10, :3].mean()), capsys.readouterr().err
+
+    assert mean() == (pytest.approx(0.2, rel=0.02), "")
+    other.write_text(LAMP.format(kd=0.6, light=2))
+    assert mean("--scene", str(other))[0] == pytest.approx(1.2, rel=0.02)
+    recorded.write_text(LAMP.format(kd=0.6, light=2))  # an edited file brings its light, not its materials
+    found, said = mean()
+    assert found == pytest.approx(0.4, rel=0.02)
+    assert said.count("\n") == 1 and "scene.toml" in said and "materials of the bake" in said
+    assert mean("--scene", str(recorded))[0] == pytest.approx(1.2, rel=0.02)
+    assert run(["render", str(tmp_path / "s"), "-o", str(tmp_path / "b.exr"), "--scene", str(other)]) == 2
+    assert "--integrator path" in capsys.readouterr().err
+
+
 def test_textures_and_materials_of_objects_are_those_of_the_bake(tmp_path: Path) -> None:
     scene = load_scene("builtin:box")
     first, *others = scene.objects

@@ -168,3 +168,45 @@ def test_ctrl_c_is_clean_while_libraries_are_imported(name):
     # A slow machine has been at the step long enough for its line.
     said = r"(\w+: stopped after [\d.]+ s\n)?lambent: interrupted; finished work is kept\n"
     assert (done.returncode, done.stdout) == (130, "") and re.fullmatch(said, done.stderr), done.stderr
+
+
+AFTER_CTRL_C = """
+import signal, sys
+from lambent.cli.console import progress_bar
+from lambent.core.errors import UserError
+from lambent.core.inputs import foreign_bytes
+import lambent.materials.check as module
+def dropped():
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        pass
+def check(*_, **__):
+    {body}
+module.check = check
+from lambent.cli.main import main
+sys.argv = ["lambent", "check", "lambert"]
+main()
+"""
+READER = "with foreign_bytes('reader', 'a.txt'): raise RuntimeError('no compiled object yet')"
+STEPS = "with progress_bar() as progress: progress(0, 1, 'step')\n    raise SystemExit('went on')"
+BEFORE = "raise RuntimeError('a bug')"
+SAVING = "dropped()\n    raise UserError('cannot be written') from OSError(28, 'no space')"
+FULL = "dropped()\n    raise OSError(28, 'no space', 'a.png')"
+
+
+@posix
+@pytest.mark.parametrize(
+    ("body", "code", "said"),
+    [("dropped()\n    raise RuntimeError('no compiled object yet')", 130, "lambent: interrupted"),
+     (f"dropped()\n    {READER}", 130, "lambent: interrupted"),
+     (f"dropped()\n    {STEPS}", 130, "lambent: interrupted"),
+     (SAVING, 2, "lambent: error: cannot be written"), (FULL, 2, "lambent: error: a.png: cannot be written"),
+     (READER, 2, "lambent: error: a.txt: "), (BEFORE, 1, "Traceback")],
+)  # fmt: skip
+def test_errors_after_ctrl_c_are_the_interruption(body, code, said):
+    """Where a library drops the `KeyboardInterrupt`; errors before Ctrl-C, and of the disk after it, are told."""
+    program = AFTER_CTRL_C.format(body=body)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (code, "") and done.stderr.startswith(said), done.stderr
+    assert code == 1 or done.stderr.count("\n") == 1
