@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import cached_property
 
+from lambent.core.errors import UserError
 from lambent.core.plain import Triple
 from lambent.materials.document import Material
 from lambent.materials.recolour import recoloured
@@ -14,8 +15,8 @@ from lambent.realtime.answering import AnsweredLight
 from lambent.realtime.group_arrays import FIELDS_FOLLOW
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.texture_detail import without_uv
-from lambent.scenes.retexturing import retextured
-from lambent.scenes.scene import Look
+from lambent.scenes.retexturing import NO_UV, NO_UV_HINT, retextured
+from lambent.scenes.scene import ImageTexture, Look
 from lambent.scenes.variants import looks_as_loaded, worn_by
 from lambent.store.answer import NO_ANSWER, has_answer, read_answer
 from lambent.store.contract import needs_probe
@@ -48,12 +49,15 @@ class AppliedMaterials:
         scene = self._renderer.scene
         loaded = looks_as_loaded(scene.record.materials, scene.textures)
         if textures:
-            looks = {**looks, **retextured({**loaded, **looks}, textures, scene.textures, without_uv(scene))}
+            looks = {**looks, **retextured({**loaded, **looks}, textures, scene.textures, self._without_uv)}
         changed = {name: look for name, look in looks.items() if look != loaded[name]}
         documents = {name: look.material for name, look in changed.items()}
         materials = {**documents, **recoloured({**scene.record.materials, **documents}, colours)}
         if (changed, materials) == (self._looks, self.materials):
             return
+        for name, look in changed.items():
+            if isinstance(look.textures, ImageTexture) and name in self._without_uv:
+                raise UserError(NO_UV, field=name, hint=NO_UV_HINT)
         if changed != self._looks:
             self._renderer.resources.show_textures(changed)
         self._looks, self.materials = changed, materials
@@ -63,6 +67,10 @@ class AppliedMaterials:
             answer, shown = self._shown
             worn = {name: worn_by(name, look, scene.textures) for name, look in changed.items()}
             shown.show(answer.lit(materials, worn))
+
+    @cached_property
+    def _without_uv(self) -> frozenset[str]:
+        return without_uv(self._renderer.scene)
 
     @cached_property
     def _shown(self) -> tuple[AnsweredLight, AnswerShown]:

@@ -233,7 +233,8 @@ def images(
 def _with_keyframes(settings: Settings, store: Store, record: SceneRecord, file: Path) -> Settings:
     """Settings with the materials and light of a keyframe file."""
     looks = looks_as_loaded(record.materials, record.textures)
-    found = read_keyframes(file, Known(looks, variants_of(store), read_views(store.folder).lights))
+    coloured = {name: "diffuse" in one.parts for name, one in record.textures.items()}
+    found = read_keyframes(file, Known(looks, variants_of(store), read_views(store.folder).lights, coloured))
     if not found.light.groups:
         return replace(settings, looks=found.looks)
     if settings.light is not None:

@@ -6,7 +6,7 @@ exchanged, stay.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -23,6 +23,7 @@ from lambent.scenes.scene import ImageTexture, Look, MaterialTextures
 
 FIELD = "--texture"
 NONE = "none"
+NO_UV, NO_UV_HINT = "has no texture coordinates", "bake the scene again, or add uv to its geometry"
 
 
 def parse_textures(texts: Sequence[str]) -> dict[str, str]:
@@ -64,53 +65,59 @@ def retextured(
     """
     found: dict[str, Look] = {}
     for pattern, value in wanted.items():
-        of = _source(value, textures)
+        of = texture_named(value, textures, Path, FIELD)
         alike = [name for name in looks if fnmatchcase(name, pattern)]
         for name in alike or [known("material", pattern, looks, field=FIELD)]:
             if of and name in without_uv:
-                raise UserError(
-                    "has no texture coordinates",
-                    field=FIELD,
-                    got=name,
-                    hint="bake the scene again, or add uv to its geometry",
-                )
-            kd = mean_of(of, looks, textures)
-            material = looks[name].material
-            if kd is not None:
-                material = material.model_copy(update={"kd": possible_kd(material, kd)})
-            found[name] = replace(looks[name], material=material, textures=of)
+                raise UserError(NO_UV, field=FIELD, got=name, hint=NO_UV_HINT)
+            found[name] = with_texture(looks[name], of, looks, diffuse_textures(textures))
     return found
 
 
-def mean_of(
-    of: str | ImageTexture, looks: Mapping[str, Look], textures: Mapping[str, MaterialTextures]
-) -> Triple | None:
-    """The diffuse colour that a texture brings: its mean; None if it has none, and the colour stays."""
+def with_texture(look: Look, of: str | ImageTexture, looks: Mapping[str, Look], coloured: Collection[str]) -> Look:
+    """A look with another texture; the texture's mean becomes the diffuse colour, as far as lobes leave light for it.
+
+    `looks` has the material `of` as loaded, and `coloured` the names of those whose textures have a diffuse part: other
+    textures leave the colour as it is.
+    """
     if isinstance(of, ImageTexture):
-        return mean_and_detail(Path(of.file)).mean
-    return looks[of].material.kd if of and textures[of].diffuse is not None else None
+        kd: Triple | None = mean_and_detail(Path(of.file)).mean
+    else:
+        kd = looks[of].material.kd if of in coloured else None
+    material = look.material
+    if kd is not None:
+        material = material.model_copy(update={"kd": possible_kd(material, kd)})
+    return replace(look, material=material, textures=of)
 
 
-def _source(value: str, textures: Mapping[str, MaterialTextures]) -> str | ImageTexture:
+def diffuse_textures(textures: Mapping[str, MaterialTextures]) -> frozenset[str]:
+    """Names of the materials whose textures have a diffuse part."""
+    return frozenset(name for name, one in textures.items() if one.diffuse is not None)
+
+
+def texture_named(
+    value: str, textures: Collection[str], locate: Callable[[str], Path], field: str, file: Path | None = None
+) -> str | ImageTexture:
+    """The texture of a text FILE[,REPEAT], a material with textures, or "none", which is the empty name.
+
+    `locate` finds an image by its name as written; `field` and `file` are the text's place, for errors.
+    """
     if value == NONE:
         return ""
     if value in textures:
         return value
-    file, comma, number = value.rpartition(",")
+    name, comma, number = value.rpartition(",")
     repeated = bool(comma) and is_number(number.strip())
-    file, repeat = (file, float(number)) if repeated else (value, 1.0)
-    if not Path(file).exists():
+    name, repeat = (name, float(number)) if repeated else (value, 1.0)
+    image = locate(name)
+    if not image.exists():
         expected = ", ".join([*sorted(textures), NONE, "or an image file"])
-        raise UserError("is neither a material with textures nor a file", field=FIELD, got=value, expected=expected)
-    return ImageTexture(str(Path(file).resolve()), checked_repeat(repeat))
-
-
-def checked_repeat(repeat: float) -> float:
-    """The number of repetitions; `UserError` if it is out of range."""
+        fault = "is neither a material with textures nor a file"
+        raise UserError(fault, file=file, field=field, got=value, expected=expected)
     if not 1 / MOST_REPEAT <= repeat <= MOST_REPEAT:  # also refuses nan
         expected = f"{1 / MOST_REPEAT:g} to {MOST_REPEAT:g}"
-        raise UserError("repetition is out of range", field=FIELD, got=repeat, expected=expected)
-    return repeat
+        raise UserError("repetition is out of range", file=file, field=field, got=repeat, expected=expected)
+    return ImageTexture(str(image.resolve()), repeat)
 
 
 def materials_without_uv(worn: Sequence[tuple[str, Floats]]) -> frozenset[str]:

@@ -1,13 +1,13 @@
 """Images that replace textures in the states of a room: copies in the store's folder, so that a moved file stays shown.
 
-A state names a copy by its file name in IMAGES, or an image elsewhere by its absolute path, if the store was not
-writable. Bakes never touch the folder.
+A state, or a variant of the scene, names a copy by its file name in IMAGES; a state names an image elsewhere by its
+absolute path, if the store was not writable. Bakes add the images of variants.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from lambent.core.files import atomic_path, inside
 from lambent.core.inputs import read_bytes
 from lambent.core.plain import plain_name
 from lambent.scenes.image_textures import mean_and_detail
-from lambent.scenes.scene import ImageTexture
+from lambent.scenes.scene import ImageTexture, Variant
 
 IMAGES = "images"
 Worn = Mapping[str, str | ImageTexture]  # by material, as of `session.RoomState.textures`
@@ -39,6 +39,29 @@ def kept_image(folder: Path, file: Path) -> str:
         with atomic_path(copy) as beside:
             beside.write_bytes(content)
     return name
+
+
+def with_kept_images(folder: Path, variants: Sequence[Variant]) -> tuple[Variant, ...]:
+    """Variants of a scene as a store keeps them: with copies of their images; raises as `kept_image`."""
+
+    def kept(of: str | ImageTexture) -> str | ImageTexture:
+        return replace(of, file=kept_image(folder, Path(of.file))) if isinstance(of, ImageTexture) else of
+
+    return tuple(_with_textures(variant, kept) for variant in variants)
+
+
+def with_located_images(variants: Sequence[Variant], folder: Path) -> tuple[Variant, ...]:
+    """Variants of a store with absolute paths of their images; raises as `located`."""
+
+    def found(of: str | ImageTexture) -> str | ImageTexture:
+        return located(of, folder) if isinstance(of, ImageTexture) else of
+
+    return tuple(_with_textures(variant, found) for variant in variants)
+
+
+def _with_textures(variant: Variant, change: Callable[[str | ImageTexture], str | ImageTexture]) -> Variant:
+    looks = {name: replace(look, textures=change(look.textures)) for name, look in variant.looks.items()}
+    return replace(variant, looks=looks)
 
 
 def located(image: ImageTexture, folder: Path | None) -> ImageTexture:
@@ -74,7 +97,7 @@ def names_of_images(worn: Worn) -> Iterator[str]:
 
 
 def remove_unused(folder: Path, used: Collection[str]) -> None:
-    """Delete copies of images that no state uses."""
+    """Delete copies of images that neither a state nor a variant uses."""
     if (folder / IMAGES).is_dir():
         for copy in (folder / IMAGES).iterdir():
             if copy.is_file() and copy.name not in used:

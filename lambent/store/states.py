@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lambent.scenes.scene import Look, Variant
 from lambent.store.contract import SceneRecord, scene_record
-from lambent.store.images import with_paths
+from lambent.store.images import names_of_images, with_located_images, with_paths
 from lambent.store.session import FILE, RoomState, read_session
 from lambent.store.store import Store
 
@@ -25,11 +25,18 @@ def variants_of(store: Store, *, saved: bool = True) -> tuple[Variant, ...]:
         If the session is damaged.
     """
     record, session = scene_record(store), read_session(store.folder / FILE)
-    found = {variant.name: variant for variant in record.variants}
+    found = {variant.name: variant for variant in with_located_images(record.variants, store.folder)}
     if session is not None:
         left = {SAVED: session.now} if saved and session.now != RoomState() else {}
         found |= {name: _variant(name, room, record, store.folder) for name, room in {**left, **session.states}.items()}
     return tuple(found.values())
+
+
+def images_of_variants(folder: Path) -> set[str]:
+    """The images of a store's scene variants, as the store names them."""
+    variants = scene_record(Store.open(folder)).variants
+    textures = ({name: look.textures for name, look in variant.looks.items()} for variant in variants)
+    return {name for worn in textures for name in names_of_images(worn)}
 
 
 def says_light(store: Store, name: str) -> bool:

@@ -11,13 +11,15 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError
-from lambent.core.images import read_encoded, read_image
+from lambent.core.images import read_encoded, read_image, write_shown
 from lambent.core.light_mix import GroupMix, LightMix, parse_light
 from lambent.render import Settings, film, sheet, still
 from lambent.render.sheet import Exposures, laid_out, shape_of, with_the_baked_state
+from lambent.scenes.image_textures import mean_and_detail
 from lambent.scenes.look_track import LookTrack
-from lambent.scenes.scene import Look, MaterialTextures, Texture, Variant
+from lambent.scenes.scene import ImageTexture, Look, MaterialTextures, Texture, Variant
 from lambent.store.contract import scene_record, write_scene_record
+from lambent.store.images import kept_image
 from lambent.store.session import FILE, RoomState, WalkSession, write_session
 from lambent.store.states import variants_of
 from lambent.store.store import Store
@@ -246,3 +248,30 @@ def test_a_stored_state_brings_its_light_to_a_saved_view(adapter: None, store: P
         return float(found)
 
     assert mean("red") == pytest.approx(mean("plain") / 2, rel=6e-3)
+
+
+def test_a_baked_variant_keeps_a_copy_of_its_image(adapter: None, store: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "bricks.png"
+    write_shown(picture, np.array([[[255, 0, 0], [0, 0, 255]]] * 2, np.uint8))
+    scene = room_with_step()
+    name = scene.objects[0].material
+    look = Look(scene.materials[name], ImageTexture(str(picture)))
+    baked = bake(replace(scene, variants=(Variant("bricks", {name: look}),)), tmp_path / "b", quality=TINY,
+                 only=["geometry"])  # fmt: skip
+    content = picture.read_bytes()
+    picture.unlink()
+    (kept,) = (one.looks[name].textures for one in variants_of(baked))
+    assert Path(kept.file).read_bytes() == content and Path(kept.file).parent == baked.folder / "images"
+
+
+def test_a_variant_shows_the_image_of_the_store(adapter: None, store: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "bricks.png"
+    write_shown(picture, np.array([[[255, 0, 0], [0, 0, 255]]] * 2, np.uint8))
+    kd = mean_and_detail(picture).mean
+    look = Look(MATERIALS["plaster"].model_copy(update={"kd": kd}), ImageTexture(kept_image(store, picture)))
+    add_variants(
+        store, (Variant("bricks", {"plaster": look}), Variant("mean", {"plaster": replace(look, textures="")}))
+    )
+    picture.unlink()
+    bricks, mean = (image(store, replace(SMALL, variant=name), tmp_path) for name in ("bricks", "mean"))
+    assert np.abs(bricks - mean).max() > 0.05 * mean.max()

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
+from lambent.core.images import write_shown
 from lambent.core.light_mix import GroupMix, LightMix
 from lambent.materials.between import between
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.loaders.keyframes import Keyframes, Known, read_keyframes
 from lambent.scenes.look_track import LookTrack
-from lambent.scenes.scene import Look, Variant
+from lambent.scenes.scene import ImageTexture, Look, Variant
 
 WALL, OAK = Material(name="wall", kd=0.8), Material(name="oak", kd=(0.4, 0.3, 0.2))
 LOOKS = {"wall": Look(WALL), "oak": Look(OAK, "oak")}
@@ -115,3 +117,32 @@ def test_textures_are_those_of_the_earlier_key() -> None:
     assert track.looks_at(1.9)["oak"].textures == "oak" and track.looks_at(2.0)["oak"].textures == ""
     with pytest.raises(UserError, match="times do not increase"):
         LookTrack({"oak": ((1.0, BLUE), (1.0, BLUE))})
+
+
+def test_a_key_shows_a_texture(tmp_path: Path) -> None:
+    """Colours change evenly towards the mean of the texture, which follows at the time of its key."""
+    write_shown(tmp_path / "a.png", np.full((2, 2, 3), 255, np.uint8))
+    given = Known(LOOKS, VARIANTS, coloured={"oak": True})
+    (tmp_path / "k.toml").write_text(HEAD + """
+[[keys]]
+at = 0
+as_baked = true
+[[keys]]
+at = 2
+materials.wall.texture = "oak"
+materials.oak.texture = "a.png,2"
+[[keys]]
+at = 4
+materials.oak.texture = "none"
+""")  # fmt: skip
+    looks = read_keyframes(tmp_path / "k.toml", given).looks
+    assert looks.looks_at(1.0)["wall"].material.kd == pytest.approx((0.6, 0.55, 0.5))
+    assert looks.looks_at(1.0)["wall"].textures == "" and looks.looks_at(1.0)["oak"].textures == "oak"
+    assert looks.looks_at(2.0)["wall"].textures == "oak" and looks.looks_at(2.0)["wall"].material.kd == OAK.kd
+    assert looks.looks_at(3.0)["oak"].textures == ImageTexture(str((tmp_path / "a.png").resolve()), 2.0)
+    assert looks.looks_at(4.0)["oak"] == Look(OAK)
+
+
+def test_a_wrong_texture_of_a_key_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"k.toml: keys.0.materials.wall.texture: is neither a material.*b.png"):
+        read(tmp_path, '[[keys]]\nat = 0\nmaterials.wall.texture = "b.png"')

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
+from lambent.core.images import write_shown
 from lambent.core.light_mix import GroupMix
 from lambent.materials.document import Material
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch
-from lambent.scenes.scene import Look, MaterialTextures, Scene, SceneObject, Texture
+from lambent.scenes.scene import ImageTexture, Look, MaterialTextures, Scene, SceneObject, Texture
 from lambent.scenes.variants import Dressed, dressed, textures_worn, variant_named, with_variants
 
 HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
@@ -98,7 +99,7 @@ def test_variants_that_change_nothing_part_no_materials() -> None:
 
 WRONG = {
     '[[variants]]\nname = "a"\nmaterials.wite.kd = 0.1': r"a.materials.wite: unknown material.*did you mean 'white'",
-    '[[variants]]\nname = "a"\nmaterials.white = {}': r"a.materials.white: is empty; expected use, file, colour",
+    '[[variants]]\nname = "a"\nmaterials.white = {}': r"white: is empty; expected use, file, texture, colour",
     '[[variants]]\nname = "a"\nmaterials.white.colour = "blue"': r"white.colour: not a colour; found blue; .*#rrggbb",
     '[[variants]]\nname = "a"\nmaterials.white = {colour = "#000000", kd = 1}': r"has two colours",
     '[[variants]]\nname = "a"\nmaterials.white = {use = "gold", kd = 1}': r"has other keys beside use; found kd",
@@ -129,3 +130,47 @@ def test_an_unknown_variant_is_said_with_those_there_are() -> None:
         variant_named(scene.variants, "oke")
     with pytest.raises(UserError, match=r"the store has no variants"):
         variant_named((), "oak")
+
+
+STRIPES = np.repeat(np.array([[[255, 0, 0], [0, 0, 0]]], np.uint8), 2, axis=0)
+BRICKS = """
+[[variants]]
+name = "bricks"
+materials.white.texture = "images/bricks.png,3"
+[[variants]]
+name = "tinted"
+materials.white = {{ texture = "images/bricks.png", colour = "#0000ff" }}
+[[variants]]
+name = "wrong"
+materials.white.texture = {wrong}
+"""
+
+
+def test_a_variant_shows_an_image(tmp_path: Path) -> None:
+    """The mean becomes the diffuse colour, unless the variant has one; the image is a source of the scene."""
+    image = tmp_path / "images" / "bricks.png"
+    image.parent.mkdir()
+    write_shown(image, STRIPES)
+    scene = load_scene(written(tmp_path, PAINTED + BRICKS.format(wrong='"none"')))
+    bricks, tinted, none = scene.variants
+    assert bricks.looks["white"].textures == ImageTexture(str(image.resolve()), 3.0)
+    assert bricks.materials["white"].kd == pytest.approx((0.5, 0, 0), abs=1e-3)
+    assert tinted.materials["white"].kd == pytest.approx((0, 0, 1)) and tinted.looks["white"].textures
+    assert not none.looks and image.resolve() in [path.resolve() for path in scene.sources]
+    shown = dressed(scene, bricks)
+    np.testing.assert_allclose(shown.textures["white"].diffuse.texels[0, :, 0], (2, 0), atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [('"missing.png"', "neither a material with textures nor a file"), ('"../a.png"', "path leaves its folder"),
+     ("3", "is not a name"), ('"images/bricks.png,0"', "repetition is out of range"),
+     ('"gold"', "neither a material with textures nor a file"), ('"scene.toml"', "scene.toml"), ('""', "file name"),
+     ('"none"\nmaterials.white.use = "gold"', "has other keys beside use")],
+)  # fmt: skip
+def test_wrong_textures_of_variants_are_one_line(tmp_path: Path, wrong: str, said: str) -> None:
+    (tmp_path / "images").mkdir()
+    write_shown(tmp_path / "images" / "bricks.png", STRIPES)
+    with pytest.raises(UserError, match=said) as raised:
+        load_scene(written(tmp_path, PAINTED + BRICKS.format(wrong=wrong)))
+    assert "\n" not in str(raised.value)

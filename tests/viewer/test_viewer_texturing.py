@@ -7,15 +7,19 @@ from PIL import Image
 from lambent.core.errors import UserError
 from lambent.materials.diffuse_albedos import lobe_albedo
 from lambent.materials.document import Lobe, Material
-from lambent.scenes.scene import ImageTexture, MaterialTextures, Texture
+from lambent.scenes.scene import ImageTexture, Look, MaterialTextures, Texture, Variant
+from lambent.store.contract import scene_record, write_scene_record
 from lambent.store.images import IMAGES, kept_image, readable, with_paths
 from lambent.store.session import FILE, RoomState, read_session
+from lambent.store.states import variants_of
+from lambent.store.store import Store
 from lambent.viewer.edits import MaterialEdits
 from lambent.viewer.modes.walk.keeping import SessionKeeper
 from lambent.viewer.modes.walk.texturing import NONE, OWN, Texturing
 from lambent.viewer.modes.walk.tracing import Wish
 from lambent.viewer.screen import Rect, Screen
 from tests.viewer.conftest import Clock
+from tests.viewer.small_store import write_small_store
 
 OAK = MaterialTextures(diffuse=Texture(np.ones((2, 2, 3), np.float16)))
 SCENE = {
@@ -36,8 +40,7 @@ def picture(tmp_path):
 
 @pytest.fixture
 def folder(tmp_path):
-    (tmp_path / "room.store").mkdir()
-    return tmp_path / "room.store"
+    return write_small_store(tmp_path / "room.store")
 
 
 class Window:
@@ -172,3 +175,14 @@ def test_a_wish_for_path_tracing_carries_the_image(picture):
     textures = {"plaster": ImageTexture(str(picture), 2.0), "oak": ""}
     wish = Wish(1, materials={"plaster": SCENE["plaster"]}, textures=textures)
     assert Wish.of(wish.said()) == wish
+
+
+def test_images_of_the_scenes_variants_stay(window, folder, picture):
+    name = kept_image(folder, picture)
+    store = Store.open(folder)
+    variant = Variant("red", {"plaster": Look(SCENE["plaster"], ImageTexture(name))})
+    write_scene_record(store, scene_record(store).model_copy(update={"variants": (variant,)}))
+    store.close()
+    window.keeper.close()
+    assert [path.name for path in (folder / IMAGES).iterdir()] == [name]
+    assert variants_of(Store.open(folder))[0].looks["plaster"].textures.file == str(folder / IMAGES / name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 
 from lambent.bake.context import GEOMETRY, BakeContext
@@ -16,6 +16,7 @@ from lambent.core.plain import triple
 from lambent.scenes.reflectors import Reflector, find_reflectors
 from lambent.scenes.scene import Scene
 from lambent.store.contract import SCENE, ReflectorPart, ReflectorRecord, SceneRecord, write_scene_record
+from lambent.store.images import with_kept_images
 from lambent.store.plans import plan_record
 from lambent.store.textures import texture_records, write_textures
 
@@ -59,7 +60,8 @@ def describe(context: BakeContext) -> None:
     Reflectors are searched again only if their inputs have changed.
     """
     write_textures(context.store, context.scene.textures)
-    scene, store = context.scene, context.store
+    store = context.store
+    scene = replace(context.scene, variants=with_kept_images(store.folder, context.scene.variants))
     worn = [(o.name, scene.materials[o.material].model_dump(mode="json")) for o in scene.objects]
     key = key_of(REFLECTORS, 1, *geometry_inputs(scene), worn, list(map(asdict, scene.reflector_rules)))
     if store.documents.get(REFLECTORS) == key and SCENE in store.documents:

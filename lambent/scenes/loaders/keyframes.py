@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -14,10 +14,9 @@ from lambent.core.discovery import known
 from lambent.core.errors import UserError, invalid
 from lambent.core.inputs import foreign_bytes
 from lambent.core.light_mix import AS_BAKED, GroupMix, LightMix, MixTrack
-from lambent.materials.document import Material
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.looks import looks_told, mixes_told
-from lambent.scenes.loaders.scene_toml.material_files import material_of_file
+from lambent.scenes.loaders.scene_toml.material_files import LookFiles
 from lambent.scenes.loaders.scene_toml.sections import NotNegative, Section
 from lambent.scenes.loaders.scene_toml.text import toml_of
 from lambent.scenes.look_track import LookTrack
@@ -46,11 +45,15 @@ class _Document(Section):
 
 @dataclass(frozen=True)
 class Known:
-    """Names that keyframes may use: looks of the store's materials, its variants, and mixes saved with views."""
+    """Names that keyframes may use: looks of the store's materials, its variants, and mixes saved with views.
+
+    `coloured` tells whether textures have a diffuse part, by the material they belong to.
+    """
 
     looks: Mapping[str, Look]
     variants: tuple[Variant, ...] = ()
     mixes: Mapping[str, LightMix] | None = None
+    coloured: Mapping[str, bool] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -91,17 +94,13 @@ def read_keyframes(path: Path, given: Known) -> Keyframes:
     for first, second in pairwise(document.keys):
         if second.at <= first.at:
             raise UserError("times do not increase", file=path, field="keys.at", got=f"{first.at:g}, {second.at:g}")
-    files = SceneFiles(path)
-
-    def read(name: str, field: str) -> Material:
-        return material_of_file(name, field, path, files)
-
-    moments = [_moment(key, number, given, read, path) for number, key in enumerate(document.keys)]
+    files = LookFiles(path, SceneFiles(path))
+    moments = [_moment(key, number, given, files) for number, key in enumerate(document.keys)]
     return Keyframes(MixTrack(_light_keys(moments)), LookTrack(_look_keys(moments, given.looks)))
 
 
-def _moment(key: _Key, number: int, given: Known, read: Callable[[str, str], Material], path: Path) -> _Moment:
-    where = f"keys.{number}"
+def _moment(key: _Key, number: int, given: Known, files: LookFiles) -> _Moment:
+    path, where = files.path, f"keys.{number}"
     if sum((key.as_baked, key.variant is not None)) > 1:
         raise UserError("sets both as_baked and a variant", file=path, field=where, got=key.variant)
     looks, light = dict[str, Look](), dict[str, GroupMix]()
@@ -111,7 +110,7 @@ def _moment(key: _Key, number: int, given: Known, read: Callable[[str, str], Mat
     if key.view is not None:
         light = dict((given.mixes or {})[_known_view(key.view, given, path, where)].groups)
     present = {**given.looks, **looks}
-    looks |= looks_told(key.materials, present, read, path, f"{where}.materials")
+    looks |= looks_told(key.materials, present, given.coloured, files, f"{where}.materials")
     light |= mixes_told(key.light, path, f"{where}.light")
     whole = key.as_baked or key.variant is not None
     return _Moment(key.at, looks, light, whole, whole or key.view is not None)

@@ -68,7 +68,7 @@ def with_uv(scene: Scene) -> Scene:
     Objects with textures stay: their one point may be a swatch of a palette.
     """
     looks = [(name, look) for variant in scene.variants for name, look in variant.looks.items()]
-    textured = {*scene.textures, *(name for name, look in looks if look.textures)}
+    textured = {*scene.textures, *(name for name, look in looks if isinstance(look.textures, str) and look.textures)}
     found: dict[int, Mesh] = {}  # by mesh, because instances share theirs
 
     def mapped(o: SceneObject) -> SceneObject:

@@ -25,7 +25,7 @@ from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.assembly import assembled, assigned, check_material, fitting
 from lambent.scenes.loaders.scene_toml.lamps import IesSection, coloured
-from lambent.scenes.loaders.scene_toml.material_files import material_of_file
+from lambent.scenes.loaders.scene_toml.material_files import LookFiles, material_of_file
 from lambent.scenes.loaders.scene_toml.schema import (
     GeometrySection,
     ImageSection,
@@ -119,11 +119,8 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         light_groups=_light_groups(document, objects, lights, path),
     )
 
-    def read_material(name: str, field: str) -> Material:
-        return material_of_file(name, field, path, files)
-
     worn = {name: [o.material for o in worn] for name, worn in dressings.items()}
-    told = variants_told(document.variants, worn, scene, read_material, path)
+    told = variants_told(document.variants, worn, scene, LookFiles(path, files))
     return replace(with_variants(scene, told), sources=tuple(files.sources))
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +13,19 @@ from lambent.core.light_mix import GroupMix, mix_of
 from lambent.materials.document import Material, material_from
 from lambent.materials.recolour import hex_colour
 from lambent.scenes.loaders.scene_toml.assembly import check_material
-from lambent.scenes.scene import Look
+from lambent.scenes.loaders.scene_toml.material_files import LookFiles
+from lambent.scenes.retexturing import texture_named, with_texture
+from lambent.scenes.scene import ImageTexture, Look
 
-USE, FILE, COLOUR = "use", "file", "colour"
-ReadMaterial = Callable[[str, str], Material]  # name of a file as written, and the field that contains it
+USE, FILE, COLOUR, TEXTURE = "use", "file", "colour", "texture"
 
 
 def looks_told(
-    tables: Mapping[str, Mapping[str, Any]], looks: Mapping[str, Look], read: ReadMaterial, path: Path, where: str
+    tables: Mapping[str, Mapping[str, Any]],
+    looks: Mapping[str, Look],
+    coloured: Mapping[str, bool],
+    given: LookFiles,
+    where: str,
 ) -> dict[str, Look]:
     """Looks given by tables, by the names of the materials they replace.
 
@@ -27,14 +33,18 @@ def looks_told(
     ----------
     looks : mapping
         Of all existing materials.
+    coloured : mapping
+        Whether textures have a diffuse part, by the material they belong to.
+    given : LookFiles
+        The file of the tables, and those that it refers to.
     where : str
-        The field of `path` that contains the tables, for errors.
+        The field that contains the tables, for errors.
     """
     found = {}
     for name, table in tables.items():
         field = f"{where}.{name}"
-        check_material(name, {name: look.material for name, look in looks.items()}, path, field)
-        found[name] = _look(table, looks, name, read, path, field)
+        check_material(name, {name: look.material for name, look in looks.items()}, given.path, field)
+        found[name] = _look(table, looks, name, coloured, given, field)
     return found
 
 
@@ -51,11 +61,17 @@ def mixes_told(light: Mapping[str, str | float], path: Path, where: str) -> dict
 
 
 def _look(
-    table: Mapping[str, Any], looks: Mapping[str, Look], name: str, read: ReadMaterial, path: Path, field: str
+    table: Mapping[str, Any],
+    looks: Mapping[str, Look],
+    name: str,
+    coloured: Mapping[str, bool],
+    given: LookFiles,
+    field: str,
 ) -> Look:
-    """Another material of the scene, another document, or the same material with other numbers."""
-    for key in (USE, FILE):
-        if key in table and len(table) > 1:
+    """Another material of the scene, another document, or the same material with another texture or other numbers."""
+    path = given.path
+    for key in (USE, FILE, TEXTURE):
+        if key in table and len(table) > 1 and key != TEXTURE:
             raise UserError(f"has other keys beside {key}", file=path, field=field, got=sorted({*table} - {key})[0])
         if not isinstance(table.get(key, ""), str):
             raise UserError("is not a name", file=path, field=f"{field}.{key}", got=table[key])
@@ -63,12 +79,19 @@ def _look(
         check_material(table[USE], {name: look.material for name, look in looks.items()}, path, f"{field}.{USE}")
         return looks[table[USE]]
     if FILE in table:
-        return Look(read(table[FILE], f"{field}.{FILE}"))
+        return Look(given.material(table[FILE], f"{field}.{FILE}"))
     if not table:
-        expected = "use, file, colour, or keys of a material document"
+        expected = "use, file, texture, colour, or keys of a material document"
         raise UserError("is empty", file=path, field=field, expected=expected)
-    now = looks[name]
-    numbers = dict(table)
+    now, numbers = looks[name], dict(table)
+    if TEXTURE in numbers:
+        place = f"{field}.{TEXTURE}"
+        of = texture_named(numbers.pop(TEXTURE), coloured, partial(given.image, field=place), place, path)
+        if isinstance(of, ImageTexture):
+            given.files.use(Path(of.file))
+        now = with_texture(now, of, looks, {one for one, has_colour in coloured.items() if has_colour})
+        if not numbers:
+            return now
     if COLOUR in numbers:
         if "kd" in numbers:
             raise UserError("has two colours, colour and kd", file=path, field=field)

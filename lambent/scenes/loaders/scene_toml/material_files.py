@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from lambent.core.errors import UserError
@@ -20,6 +21,22 @@ def material_of_file(name: str, field: str, path: Path, files: SceneFiles) -> Ma
         hint = f"fit it first: lambent fit {source.name} -o {fitted}, then file = {fitted!r}"
         raise UserError("is a measurement, not a material", file=path, field=field, got=source.name, hint=hint)
     return load_material(files.use(source))
+
+
+@dataclass(frozen=True)
+class LookFiles:
+    """The files that looks in `path`, a scene.toml or a file of keyframes, refer to."""
+
+    path: Path
+    files: SceneFiles
+
+    def material(self, name: str, field: str) -> Material:
+        """The material of a document: see `material_of_file`."""
+        return material_of_file(name, field, self.path, self.files)
+
+    def image(self, name: str, field: str) -> Path:
+        """The path of an image, which need not exist."""
+        return self.files.path(name, self.path, field)
 
 
 def _begins_as_json(path: Path) -> bool:

@@ -10,7 +10,8 @@ from pathlib import Path
 from lambent.core.errors import UserError
 from lambent.core.light_mix import LightMix
 from lambent.scenes.loaders.scene_toml.assembly import check_material, fitting
-from lambent.scenes.loaders.scene_toml.looks import ReadMaterial, looks_told, mixes_told
+from lambent.scenes.loaders.scene_toml.looks import looks_told, mixes_told
+from lambent.scenes.loaders.scene_toml.material_files import LookFiles
 from lambent.scenes.loaders.scene_toml.schema import VariantSection
 from lambent.scenes.scene import Scene
 from lambent.scenes.variants import Dressed, looks_as_loaded
@@ -20,8 +21,7 @@ def variants_told(
     sections: Sequence[VariantSection],
     of_geometry: Mapping[str, Sequence[str]],
     scene: Scene,
-    read: ReadMaterial,
-    path: Path,
+    given: LookFiles,
 ) -> list[Dressed]:
     """The variants of a scene.toml.
 
@@ -29,25 +29,27 @@ def variants_told(
     ----------
     of_geometry : mapping
         Variants of the geometry files: the material of each of the scene's objects.
-    read : callable
-        Reads a material's document.
+    given : LookFiles
+        The scene.toml, and the files that it refers to.
 
     Raises
     ------
     UserError
         If a section uses unknown names or invalid values.
     """
+    path = given.path
     for name, times in Counter(section.name for section in sections).items():
         if times > 1:
             raise UserError("name is used twice", file=path, field="variants", got=name)
     described = {section.name: section for section in sections}
     as_loaded, loaded = [o.material for o in scene.objects], looks_as_loaded(scene.materials, scene.textures)
+    coloured = {name: one.diffuse is not None for name, one in scene.textures.items()}
     told = []
     for name in dict.fromkeys([*of_geometry, *described]):
         worn = list(of_geometry.get(name, as_loaded))
         section = described.get(name) or VariantSection(name=name)
         worn = _exchanged(section, worn, scene, path)
-        told_looks = looks_told(section.materials, loaded, read, path, f"variants.{section.name}.materials")
+        told_looks = looks_told(section.materials, loaded, coloured, given, f"variants.{section.name}.materials")
         looks = {**loaded, **told_looks}
         told.append(Dressed(name, [looks[material] for material in worn], _mix(section, path)))
     return told

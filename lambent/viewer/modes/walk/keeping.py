@@ -11,6 +11,7 @@ from pathlib import Path
 from lambent.core.errors import UserError
 from lambent.store.images import names_of_images, readable, remove_unused
 from lambent.store.session import FILE, UNSAVED_FILE, SessionLock, WalkSession, read_session, write_session
+from lambent.store.states import images_of_variants
 from lambent.viewer.edits import MaterialEdits, unused
 from lambent.viewer.screen import Screen
 from lambent.viewer.work import Work, pending
@@ -202,7 +203,8 @@ class SessionKeeper:
         try:
             sessions = [read_session(folder / file) for file in (FILE, UNSAVED_FILE)]
             rooms = [room for one in sessions if one is not None for room in one.rooms]
-            remove_unused(folder, {name for room in rooms for name in names_of_images(room.textures)})
+            used = {name for room in rooms for name in names_of_images(room.textures)}
+            remove_unused(folder, used | images_of_variants(folder))
         except (UserError, OSError) as error:
             self._screen.say(f"unused images of the store stay: {error}")
 
