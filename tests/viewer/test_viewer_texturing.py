@@ -1,9 +1,12 @@
 """The texture of a material exchanged in the window: choice, image, undo, session, and what is refused."""
 
+import time
+
 import numpy as np
 import pytest
 from PIL import Image
 
+from lambent.core.colour import srgb_encode
 from lambent.core.errors import UserError
 from lambent.materials.diffuse_albedos import lobe_albedo
 from lambent.materials.document import Lobe, Material
@@ -16,6 +19,7 @@ from lambent.store.store import Store
 from lambent.viewer.edits import MaterialEdits
 from lambent.viewer.modes.walk.keeping import SessionKeeper
 from lambent.viewer.modes.walk.texturing import NONE, OWN, Texturing
+from lambent.viewer.modes.walk.thumbnails import SIDE, thumbnail
 from lambent.viewer.modes.walk.tracing import Wish
 from lambent.viewer.screen import Rect, Screen
 from tests.viewer.conftest import Clock
@@ -186,3 +190,29 @@ def test_images_of_the_scenes_variants_stay(window, folder, picture):
     window.keeper.close()
     assert [path.name for path in (folder / IMAGES).iterdir()] == [name]
     assert variants_of(Store.open(folder))[0].looks["plaster"].textures.file == str(folder / IMAGES / name)
+
+
+def test_thumbnails_are_made_in_the_background(window, picture, folder):
+    texturing = window.texturing
+    texturing.open("plaster", str(picture))
+    choices = texturing.choices("plaster")
+    assert texturing.thumbnail("plaster", choices[NONE]) is None and not texturing.thumbnails.busy
+    red, oak = choices["bricks.png"], choices["of oak"]
+    assert texturing.thumbnail("plaster", red) is None and texturing.thumbnails.busy, "the frame does not wait"
+
+    def made(of):
+        while (found := texturing.thumbnail("plaster", of)) is None:
+            time.sleep(0.01)
+        return found
+
+    assert (made(red) == (255, 0, 0)).all() and made(red).shape == (SIDE, SIDE, 3)
+    expected = np.round(255 * srgb_encode(np.array(SCENE["oak"].kd)))
+    assert np.abs(made(oak).astype(int) - expected).max() <= 1
+    assert len(made(ImageTexture(str(folder / "gone.png")))) == 0, "no picture, and no error"
+
+
+def test_thumbnails_of_large_textures_show_all_of_them():
+    texels = np.zeros((700, 900, 3), np.float16)
+    texels[:350, :, 0], texels[350:, :, 2] = 1, 1
+    found = thumbnail(texels)
+    assert (found[: SIDE // 2 - 1] == (255, 0, 0)).all() and (found[SIDE // 2 + 1 :] == (0, 0, 255)).all()

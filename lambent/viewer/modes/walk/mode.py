@@ -139,6 +139,7 @@ class WalkMode(Mode):
     def wait_s(self) -> float | None:
         editor = self.state.materials.editor
         busy = self.state.recordings.recorder.on or (editor is not None and editor.busy)
+        busy = busy or self.state.texturing.thumbnails.busy
         return least(POLL_S if busy else None, self.state.session.wait_s())
 
     def drop(self, path: str) -> None:

@@ -6,14 +6,18 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
+from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.plain import Triple
 from lambent.materials.diffuse_albedos import possible_kd
 from lambent.scenes.image_textures import MOST_REPEAT, mean_and_detail
-from lambent.scenes.scene import ImageTexture, MaterialTextures
+from lambent.scenes.scene import ImageTexture, MaterialTextures, Texture
 from lambent.store.images import kept_image, located
 from lambent.viewer.editor.files import typed_path
 from lambent.viewer.edits import MaterialEdits
+from lambent.viewer.modes.walk.thumbnails import Thumbnail, Thumbnails
 from lambent.viewer.screen import Screen
 
 OWN, NONE = "its own", "none"
@@ -42,6 +46,7 @@ class Texturing:
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)
     without_uv: Collection[str] = ()
     typed: str = ""  # path of an image, as typed
+    thumbnails: Thumbnails = field(default_factory=Thumbnails)
 
     def choices(self, name: str) -> dict[str, str | ImageTexture | None]:
         """What a material can show, by label; None for its own texture, or for none if it has no own."""
@@ -56,6 +61,17 @@ class Texturing:
         """The label of the present choice."""
         worn = self.edits.room.textures.get(name)
         return next((label for label, of in self.choices(name).items() if of == worn), NONE)
+
+    def thumbnail(self, name: str, of: str | ImageTexture | None) -> Thumbnail | None:
+        """The thumbnail of a choice of `choices`; None for none, and until it is made."""
+        if isinstance(of, ImageTexture):
+            image = located(of, self.store)
+            return self.thumbnails.get(image.file, lambda: _reflectance(*mean_and_detail(Path(image.file))))
+        source = name if of is None else of
+        if source not in self.textures:
+            return None
+        kd, diffuse = self.edits.scene[source].kd, self.textures[source].diffuse
+        return self.thumbnails.get((source,), lambda: _reflectance(kd, diffuse))
 
     def choose(self, name: str, of: str | ImageTexture | None) -> None:
         """Show a texture, with its mean as the diffuse colour, as one stroke."""
@@ -104,6 +120,11 @@ class Texturing:
         if isinstance(worn, ImageTexture):
             times = min(max(times, 1 / MOST_REPEAT), MOST_REPEAT)
             self.edits.show_texture(name, replace(worn, repeat=times))
+
+
+def _reflectance(mean: Triple, detail: Texture | None) -> Floats:
+    """Linear reflectance (H, W, 3) of a texture with this mean; an even one without detail."""
+    return np.asarray(mean, np.float32) * (np.ones((1, 1, 3), np.float32) if detail is None else detail.texels)
 
 
 def label_of(image: ImageTexture) -> str:

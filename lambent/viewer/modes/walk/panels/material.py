@@ -9,10 +9,12 @@ from imgui_bundle import imgui
 from lambent.scenes.scene import ImageTexture
 from lambent.viewer.modes.walk.state import Materials, Selection
 from lambent.viewer.modes.walk.texturing import LEAST_REPEAT, MOST_SHOWN_REPEAT, Texturing
+from lambent.viewer.modes.walk.thumbnails import SIDE, Thumbnail
 from lambent.viewer.panels import editing, parameters
-from lambent.viewer.panels.widgets import buttons, choice, explain, listed, path_field, press, slider
+from lambent.viewer.panels.widgets import buttons, explain, listed, path_field, press, slider
 
 LISTED = 5
+THUMBNAIL_PX = float(SIDE)
 
 
 def draw(selection: Selection, materials: Materials, texturing: Texturing) -> None:
@@ -65,7 +67,7 @@ def _texture(texturing: Texturing, name: str) -> None:
         return
     choices, shown = texturing.choices(name), texturing.shown(name)
     meaning = "shows its own texture, none, another material's, or an image; the mean becomes the diffuse colour"
-    chosen = choice("texture", shown, tuple(choices), meaning)
+    chosen = _chosen_texture(texturing, name, meaning)
     if chosen != shown:
         texturing.choose(name, choices[chosen])
     meaning = "shows an image as the texture of this material; or drop the file onto the window"
@@ -77,6 +79,34 @@ def _texture(texturing: Texturing, name: str) -> None:
         times = slider("repeat", worn.repeat, LEAST_REPEAT, MOST_SHOWN_REPEAT, "how often the image repeats", log=True)
         if times != worn.repeat:
             texturing.repeat(name, times)
+
+
+def _chosen_texture(texturing: Texturing, name: str, meaning: str) -> str:
+    """Draw the list of textures, each with its thumbnail; return the label of the present choice."""
+    chosen = texturing.shown(name)
+    is_open = imgui.begin_combo("texture", chosen)
+    if not is_open:
+        explain(meaning)
+        return chosen
+    for label, of in texturing.choices(name).items():
+        left = imgui.get_cursor_pos_x()
+        if imgui.is_rect_visible((THUMBNAIL_PX, THUMBNAIL_PX)):
+            _thumbnail(texturing.thumbnail(name, of))
+        imgui.set_cursor_pos_x(left + THUMBNAIL_PX + imgui.get_style().item_spacing.x)
+        if imgui.selectable(label, label == chosen, size=(0, THUMBNAIL_PX))[0]:
+            chosen = label
+    imgui.end_combo()
+    return chosen
+
+
+def _thumbnail(picture: Thumbnail | None) -> None:
+    """Draw a thumbnail at the cursor; a frame alone until it is made, or if its image cannot be read."""
+    lines, (x, y) = imgui.get_window_draw_list(), imgui.get_cursor_screen_pos()
+    for row, colours in enumerate(() if picture is None else picture.tolist()):
+        for column, (red, green, blue) in enumerate(colours):
+            corner = (x + column, y + row)
+            lines.add_rect_filled(corner, (corner[0] + 1, corner[1] + 1), imgui.IM_COL32(red, green, blue, 255))
+    lines.add_rect((x, y), (x + THUMBNAIL_PX, y + THUMBNAIL_PX), imgui.get_color_u32(imgui.Col_.border))
 
 
 def _save(materials: Materials, name: str) -> None:
