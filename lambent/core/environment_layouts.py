@@ -40,19 +40,19 @@ def layout_of(picture: Image, file: Path | None = None) -> Layout:
     """Detect the layout of a picture (H, W, 3) from its proportions and its black regions.
 
     1:6 and 6:1 are strips; 3:4 and 4:3 are crosses if the empty cells are black; squares are angular maps if the
-    corners are black; everything else is lat-long.
+    corners are black; everything else is lat-long, squares of one colour as well.
 
     Raises
     ------
     UserError
-        If a square picture is not an angular map.
+        If a square picture of several colours is not an angular map.
     """
     height, width = picture.shape[:2]
     if height == 6 * width or width == 6 * height:
         return "strip"
     if (shape := _cross(height, width)) and _is_black(picture, _empty(height, width, shape)):
         return "cross"
-    if height != width:
+    if height != width or (picture == picture[0, 0]).all():
         return "lat-long"
     x, y = np.meshgrid(*[(np.arange(width) + 0.5) / width * 2 - 1] * 2)
     if not _is_black(picture, np.hypot(x, y) > 1 + 2 / width):

@@ -30,28 +30,31 @@ def decode(file: Path, ceiling: Ceiling = PIXELS) -> Image:
     """Linear Rec.709 RGB (H, W, 3) of the data window, from RGB of other primaries or from X, Y, Z as well.
 
     Luminance alone becomes grey. A picture in layers is that of its only layer with colour, or of the one that Blender
-    calls `Combined`.
+    calls `Combined`; a picture in parts that of the first part with colour.
 
     Raises
     ------
     UserError
-        If the file is damaged, truncated, deep or multi-part, larger than a `ceiling` of four channels, or has no
-        colour, or several layers with colour.
+        If the file is damaged, truncated or deep, larger than a `ceiling` of four channels, or has no colour, or
+        several layers with colour.
     """
     with _opened(file, header_only=True) as exr:
-        header = exr.header()
-        (x0, y0), (x1, y1) = (corner.tolist() for corner in header["dataWindow"])
-        height, width, channels = y1 - y0 + 1, x1 - x0 + 1, len(header["channels"])
-        flat = len(exr.parts) == 1 and "deep" not in str(header["type"])
-        chromaticities = header.get("chromaticities")  # the library empties the header when it closes
+        headers = [exr.header(number) for number in range(len(exr.parts))]
+        channels = [[channel.name for channel in header["channels"]] for header in headers]
+        number = next((n for n, names in enumerate(channels) if _layers(names)[1]), 0)
+        sizes = [np.ptp(header["dataWindow"], axis=0) + 1 for header in headers]
+        (width, height), chosen = sizes[number].tolist(), headers[number]
+        flat = not any("deep" in str(header["type"]) for header in headers)
+        chromaticities = chosen.get("chromaticities")  # the library empties the header when it closes
     if not flat:
-        raise UserError("deep and multi-part EXR files are not supported", file=file, hint="save it as one flat part")
-    said = f"{width} x {height}, {channels} channels"
+        raise UserError("deep EXR files are not supported", file=file, hint="save it as a flat picture")
+    said = f"{width} x {height}, {len(channels[number])} channels"
     if not (height > 0 and width > 0):
         raise UserError("picture has no pixels", file=file, got=said)
-    ceiling.check(height * width * max(4, channels) // 4, file=file, got=said)
+    values = [int(w) * int(h) * len(names) for (w, h), names in zip(sizes, channels, strict=True)]
+    ceiling.check(max(height * width, sum(values) // 4), file=file, got=said)  # the library decodes all parts
     with _opened(file, separate_channels=True) as exr:
-        planes = {name: np.asarray(channel.pixels) for name, channel in exr.channels().items()}
+        planes = {name: np.asarray(channel.pixels) for name, channel in exr.channels(number).items()}
     names = _colour_channels(planes, file)
     if {planes[c].shape for c in names} != {(height, width)}:
         raise UserError("channels differ in size", file=file)
@@ -61,23 +64,30 @@ def decode(file: Path, ceiling: Ceiling = PIXELS) -> Image:
     return _as_rec_709(image, names, chromaticities, file)
 
 
+def _layers(names: Collection[str]) -> tuple[str, list[str]]:
+    """Last letters of the channels with colour, R, G, B, or X, Y, Z, or luminance alone; the layers that have them."""
+    for wanted in ("RGB", "XYZ", "YYY"):
+        layers = [c.removesuffix(wanted[0]) for c in names if c == wanted[0] or c.endswith(f".{wanted[0]}")]
+        if layers := [layer for layer in layers if all(layer + c in names for c in wanted)]:
+            return wanted, layers
+    return "", []
+
+
 def _colour_channels(planes: Collection[str], file: Path) -> tuple[str, ...]:
     """Three names of channels that hold R, G, B, or X, Y, Z, or luminance three times."""
-    for wanted in ("RGB", "XYZ", "YYY"):
-        layers = [c.removesuffix(wanted[0]) for c in planes if c == wanted[0] or c.endswith(f".{wanted[0]}")]
-        layers = [layer for layer in layers if all(layer + c in planes for c in wanted)]
-        chosen = layers if len(layers) < 2 else [x for x in layers if x == ""] or [
-            x for x in layers if x.endswith("Combined.")
-        ]  # fmt: skip
-        if len(chosen) == 1:
-            return tuple(chosen[0] + c for c in wanted)
-        if layers:
-            raise UserError(
-                "EXR has several layers with colour", file=file, got=", ".join(x.rstrip(".") for x in sorted(layers)),
-                hint="save one of them as a flat picture",
-            )  # fmt: skip
-    expected = "R, G, B; X, Y, Z; or Y"
-    raise UserError("EXR has no picture channels", file=file, got=", ".join(sorted(planes)), expected=expected)
+    wanted, layers = _layers(planes)
+    if not layers:
+        expected = "R, G, B; X, Y, Z; or Y"
+        raise UserError("EXR has no picture channels", file=file, got=", ".join(sorted(planes)), expected=expected)
+    chosen = layers if len(layers) < 2 else [x for x in layers if x == ""] or [
+        x for x in layers if x.endswith("Combined.")
+    ]  # fmt: skip
+    if len(chosen) != 1:
+        raise UserError(
+            "EXR has several layers with colour", file=file, got=", ".join(x.rstrip(".") for x in sorted(layers)),
+            hint="save one of them as a flat picture",
+        )  # fmt: skip
+    return tuple(chosen[0] + c for c in wanted)
 
 
 def _as_rec_709(image: Image, names: Sequence[str], chromaticities: Sequence[float] | None, file: Path) -> Image:

@@ -24,14 +24,17 @@ from lambent.core.inputs import read_bytes
 from lambent.core.outputs import MARK, check_output
 
 ROWS_AT_ONCE = 64
+HALF_MAX = 65504.0
+MENDED = 0.01  # largest share of values that are not finite which can be replaced
 HDR_SUFFIXES = (".exr", ".hdr")
 WRITABLE = (".exr", ".hdr", ".png")
 
 
-def read_image(path: Path, ceiling: Ceiling = PIXELS) -> Image:
+def read_image(path: Path, ceiling: Ceiling = PIXELS, *, mend: bool = False) -> Image:
     """Linear RGB (H, W, 3) float32 of an EXR, HDR, PNG or JPEG file; an alpha channel is dropped.
 
-    `ceiling` limits the pixels of EXR and HDR files; PNG and JPEG have at most `PIXELS`.
+    `ceiling` limits the pixels of EXR and HDR files; PNG and JPEG have at most `PIXELS`. If `mend`, values that are not
+    finite, in at most `MENDED` of the pixels, are replaced: see `_mended`.
 
     Raises
     ------
@@ -49,6 +52,8 @@ def read_image(path: Path, ceiling: Ceiling = PIXELS) -> Image:
     else:
         raise UserError("unknown picture format", file=path, got=repr(data[:4]), expected="EXR, HDR, PNG or JPEG")
     bad = image.size - np.count_nonzero(np.isfinite(image))
+    if mend and 0 < bad <= MENDED * image.size:
+        return _mended(image)
     if bad:
         raise UserError("picture has values that are not finite", file=path, got=f"{bad} of {image.size} values")
     return image
@@ -73,6 +78,15 @@ def _stored(path: Path) -> NDArray[Any]:
             return np.asarray(picture.convert("RGBA" if alpha else "RGB"))
     except (OSError, SyntaxError, ValueError, Pillow.DecompressionBombError) as error:
         raise UserError("picture is damaged or cut off", file=path, hint="copy or export it again") from error
+
+
+def _mended(image: Image) -> Image:
+    """A picture whose infinite values become the largest of half floats, or its own; others that are not finite, black.
+
+    A sun that is brighter than half floats can say is written as infinity.
+    """
+    largest = max(HALF_MAX, float(image[np.isfinite(image)].max()))
+    return np.nan_to_num(image, nan=0.0, posinf=largest, neginf=0.0)
 
 
 def write_image(path: Path, image: NDArray[Any], view: str | None = None) -> None:

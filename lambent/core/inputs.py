@@ -95,6 +95,14 @@ def read_bytes(path: Path, limit_bytes: int) -> bytes:
     return parts[0] if len(parts) == 1 else b"".join(parts)
 
 
+def decoded(text: bytes) -> str:
+    """Text of a format that does not name its encoding: UTF-8, else Latin-1, as older programs write names."""
+    try:
+        return text.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return text.decode("latin-1")
+
+
 _HALF_CHARACTER = re.compile(rb"\\u[dD][89a-fA-F]")
 
 

@@ -21,22 +21,24 @@ from lambent.core.plain import is_number
 
 MAGICS = (b"#?RADIANCE", b"#?RGBE")
 PRIMARIES = ".64 .33 .30 .60 .15 .06 .3127 .3290"  # x and y of red, green, blue and white of Rec.709
-_RESOLUTION = re.compile(rb"([-+])([XY]) (\d{1,9}) ([-+])([XY]) (\d{1,9})\n")
+_RESOLUTION = re.compile(rb"([-+])([XY]) (\d{1,9}) ([-+])([XY]) (\d{1,9})\r?\n")
+_HEADER_END = re.compile(rb"\n\r?\n")
+_HEADER_MAX = 1 << 16
 FORWARD = {b"Y": b"-", b"X": b"+"}  # signs for rows from the top and columns from the left
 _MIN_RUN_WIDTH, _MAX_RUN_WIDTH = 8, 0x7FFF  # other widths are never run-length encoded per channel
 
 
 def decode(data: bytes, file: Path, ceiling: Ceiling = PIXELS) -> Image:
     """Linear RGB (H, W, 3) of a whole file's bytes, within a `ceiling` of pixels; errors name `file`."""
-    header_end = data.find(b"\n\n", 0, 1 << 16)
-    match = _RESOLUTION.match(data, header_end + 2) if header_end >= 0 else None
-    if match is None or match[2] == match[5]:
+    header_end = _HEADER_END.search(data, 0, _HEADER_MAX)
+    match = None if header_end is None else _RESOLUTION.match(data, header_end.end())
+    if header_end is None or match is None or match[2] == match[5]:
         raise UserError("Radiance header has no '-Y height +X width' line", file=file)
     height, width = int(match[3]), int(match[6])  # of scanlines, which are columns if X comes first
     ceiling.check(width * height, file=file, got=f"{width} x {height}")
     if width * height == 0:
         raise UserError("picture has no pixels", file=file, got=f"{width} x {height}")
-    header = data[:header_end]
+    header = data[: header_end.start()]
     pixels = _pixels(data, match.end(), height, width, file)
     image = np.empty((height, width, 3), np.float32)
     for row, into in zip(pixels, image, strict=True):  # row by row: float64 of a whole picture takes twice its memory
@@ -55,8 +57,8 @@ def decode(data: bytes, file: Path, ceiling: Ceiling = PIXELS) -> Image:
 
 def header_lines(data: bytes) -> list[str]:
     """Header lines of a picture's bytes; empty if the header does not end."""
-    end = data.find(b"\n\n", 0, 1 << 16)
-    return data[:end].decode("latin-1").splitlines() if end >= 0 else []
+    end = _HEADER_END.search(data, 0, _HEADER_MAX)
+    return [] if end is None else data[: end.start()].decode("latin-1").splitlines()
 
 
 def encode(image: Image, view: str | None = None) -> bytes:

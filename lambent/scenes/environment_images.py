@@ -32,7 +32,8 @@ _TURNS: dict[Axis, Floats] = {
 def read_lat_long(file: Path, layout: Layout | None = None) -> Image:
     """(H, W, 3) float32 lat-long picture of a file in any layout, detected if `layout` is None.
 
-    Negative values, which filters leave next to bright lamps, become black.
+    Negative values, which filters leave next to bright lamps, become black; so do single ones that are not numbers.
+    Single infinite values become 65504, or the picture's largest value.
 
     Raises
     ------
@@ -52,7 +53,7 @@ def read_surroundings(file: Path) -> Image:
     UserError
         If the file is not a picture, or has more than `SURROUNDINGS_PIXELS`.
     """
-    picture = read_image(file, SURROUNDINGS_PIXELS)
+    picture = read_image(file, SURROUNDINGS_PIXELS, mend=True)
     return halved(picture) if picture.shape[0] * picture.shape[1] > PIXELS.most else picture
 
 

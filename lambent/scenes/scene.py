@@ -7,6 +7,7 @@ Rec.709. All dataclasses are frozen; arrays must not be modified.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -178,6 +179,11 @@ class IesLight:
             return np.array([across * (1, 1, -1), beside * (1, 1, -1), aim])
         turned = [v + np.cross(turn, v) + np.cross(turn, np.cross(turn, v)) / (1 + cosine) for v in (across, beside)]
         return np.array([*turned, aim])
+
+    def turned_to(self, across: Array) -> IesLight:
+        """The luminaire rotated about its axis so that horizontal angle 0 is towards `across` (3,), a unit vector."""
+        unturned = replace(self, rotation_deg=0.0).axes
+        return replace(self, rotation_deg=math.degrees(math.atan2(across @ unturned[1], across @ unturned[0])))
 
 
 Light = PointLight | DirectionalLight | IesLight

@@ -190,10 +190,11 @@ def test_exr_of_every_compression_and_of_luminance_alone(tmp_path: Path) -> None
 def test_exr_files_that_are_refused(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Several parts, no colour, a limit: told from the header, and the library prints nothing of its own."""
-    parts = [OpenEXR.Part({"type": OpenEXR.scanlineimage}, {"RGB": PICTURE.copy()}, name=n) for n in "ab"]
+    """No colour, a limit on all parts: told from the header, and the library prints nothing of its own."""
+    parts = [OpenEXR.Part({"type": OpenEXR.scanlineimage}, {"RGB": PICTURE.copy()}, name=n) for n in "abcd"]
     OpenEXR.File(parts).write(str(tmp_path / "parts.exr"))
-    assert "multi-part" in _refused(tmp_path / "parts.exr")
+    with pytest.raises(UserError, match="at most 1480 pixels"):
+        exr.decode(tmp_path / "parts.exr", replace(exr.PIXELS, most=20 * 37 * 2))
     assert "found Z" in _refused(_exr_of(tmp_path / "z.exr", OpenEXR.ZIP_COMPRESSION, Z=PICTURE[..., 0].copy()))
     monkeypatch.setattr(exr, "PIXELS", replace(exr.PIXELS, most=20 * 37 - 1))
     with pytest.raises(UserError, match="found 37 x 20, 1 channels; expected at most 739 pixels"):

@@ -223,7 +223,7 @@ WRONG = {
     "": r"holds no triangles",
     "f 1 2\n": r"holds no triangles",
     "f \n": r"line 10: face cannot be read",
-    "f 1/ 2/ 3/\n": r"line 10: ",
+    "f 1/1 2/ 3/3\n": r"line 10: ",
     "mtllib thing.mtl\nusemtl a\nf 1 2 3\n": r"thing.mtl: line 2 Kd: not a finite number; found nan",
 }
 

@@ -18,6 +18,7 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.colour import luminance
 
 MOST_BIAS = 1.5  # largest correction factor of a share
+MOST_RELATIVE = 1e6  # squared standard error by squared light
 
 
 def direct_part(
@@ -64,5 +65,6 @@ def _trust(share: Floats, clean: Floats, whole: Floats, variance: Floats, known:
     difference = ((share - clean) ** 2).mean(axis=-1)
     noise = np.stack([difference, variance, luminance(np.asarray(whole, np.float32)) ** 2], axis=-1)
     found, squared, of_light = np.moveaxis(chart_means(noise.astype(np.float32), known, labels)[0], -1, 0)
-    expected = squared / np.maximum(of_light, 1e-30) * 2 * (1 - clean.mean(axis=-1)) ** 2
+    relative = np.minimum(squared / np.maximum(of_light, 1e-20), MOST_RELATIVE)  # unlit charts must not overflow
+    expected = relative * 2 * (1 - clean.mean(axis=-1)) ** 2
     return np.asarray(np.clip(1 - expected / np.maximum(found, 1e-12), 0, 1)[..., None])

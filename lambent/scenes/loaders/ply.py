@@ -50,7 +50,8 @@ class _Element:
 
 def load(path: Path, root: Path | None = None) -> Contents:
     """A file as one grey object; v points up, missing normals are smooth."""
-    mesh, notes = mesh_of(read(path).smooth(), name=path.stem, file=path)
+    mesh, notes = mesh_of(read(path, ignored := []).smooth(), name=path.stem, file=path)
+    notes += ignored
     if mesh is None:
         raise UserError("holds no triangles", file=path, hint="; ".join(notes) or None)
     grey = Material(name="default", kd=(0.5, 0.5, 0.5))
@@ -58,8 +59,8 @@ def load(path: Path, root: Path | None = None) -> Contents:
     return Contents((thing,), {grey.name: grey}, sources=(path,), warnings=tuple(notes))
 
 
-def read(path: Path) -> MeshArrays:
-    """Read the arrays of a file.
+def read(path: Path, notes: list[str] | None = None) -> MeshArrays:
+    """Read the arrays of a file; `notes` gets a line about everything in it that is ignored.
 
     Raises
     ------
@@ -81,6 +82,9 @@ def read(path: Path) -> MeshArrays:
             raise UserError("has unsupported lists", file=path, field=f"element {element.name}")
         else:
             break  # elements after the faces are invisible
+    if notes is not None:
+        notes += ["vertex colours are ignored"] if "red" in vertex or "diffuse_red" in vertex else []
+        notes += ["triangle strips are ignored"] if any(e.name == "tristrips" for e in elements) else []
     positions = _columns(vertex, ("x", "y", "z"))
     if positions is None:
         raise UserError("has no vertices", file=path, expected="properties x, y, z")

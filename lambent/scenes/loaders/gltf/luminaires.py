@@ -35,12 +35,10 @@ class Luminaires:
         if photometry is None:
             return None
         aim, across = -normalize(world[:3, 2]), normalize(world[:3, 0])
-        unturned = IesLight(triple(world[:3, 3]), photometry, (1.0, 1.0, 1.0), triple(aim)).axes
-        rotation_deg = math.degrees(math.atan2(across @ unturned[1], across @ unturned[0]))
         tilt_deg = math.degrees(math.acos(min(max(-float(aim[1]), -1.0), 1.0)))
         tint = np.minimum(node.luminaire_color, 1.0) * node.luminaire_multiplier
         scale = triple(radiometric(tint * photometry.tilted(tilt_deg)))
-        return IesLight(triple(world[:3, 3]), photometry, scale, triple(aim), rotation_deg)
+        return IesLight(triple(world[:3, 3]), photometry, scale, triple(aim)).turned_to(across)
 
     def _profile(self, index: int) -> Photometry | None:
         if index not in self._read:

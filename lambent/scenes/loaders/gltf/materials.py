@@ -42,7 +42,10 @@ class _Reading:
         document, notes = self._document, self._notes
         pbr, specular, transmission = document.pbrMetallicRoughness, document.specular, document.transmission
         image = self._image(pbr.baseColorTexture)
-        base = _times(pbr.baseColorFactor[:3], _srgb(image))
+        factor = np.array(pbr.baseColorFactor[:3])
+        if factor.max() > 1:
+            notes.append(f"its base colour reflects more light than arrives ({factor.max():.3g}): clipped to 1")
+        base = _times(np.minimum(factor, 1), _srgb(image))
         packed = self._values(pbr.metallicRoughnessTexture)
         metallic = _times([pbr.metallicFactor], packed and packed.channel(2))
         roughness = _times([pbr.roughnessFactor], packed and packed.channel(1))

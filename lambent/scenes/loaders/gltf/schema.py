@@ -151,7 +151,7 @@ class NormalReference(TextureReference):
 
 
 class MetallicRoughness(_Part):
-    baseColorFactor: tuple[Share, Share, Share, Share] = (1, 1, 1, 1)
+    baseColorFactor: tuple[NotNegative, NotNegative, NotNegative, Share] = (1, 1, 1, 1)  # some exporters exceed 1
     metallicFactor: Share = 1
     roughnessFactor: Share = 1
     baseColorTexture: TextureReference | None = None

@@ -17,7 +17,7 @@ import numpy as np
 from lambent.core.ceilings import MATERIALS, MTL_BYTES
 from lambent.core.directions import Floats
 from lambent.core.errors import UserError
-from lambent.core.inputs import read_bytes
+from lambent.core.inputs import decoded, read_bytes
 from lambent.core.plain import Triple, is_number
 from lambent.materials.fresnel import r0_of
 from lambent.scenes.loaders.scene_files import SceneFiles
@@ -104,7 +104,7 @@ class Library:
 
 def _entries(path: Path, notes: list[str]) -> dict[str, Entry]:
     """Materials of one library file by name."""
-    text = read_bytes(path, MTL_BYTES).decode("utf-8-sig", "replace")
+    text = decoded(read_bytes(path, MTL_BYTES))
     entries: dict[str, Entry] = {}
     entry: Entry | None = None
     for number, line in enumerate(text.splitlines(), 1):

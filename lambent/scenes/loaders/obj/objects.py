@@ -48,6 +48,7 @@ def load(path: Path, root: Path | None = None) -> Contents:
     files = SceneFiles(path, root)
     text = read(path)
     warnings = [f"{what} are ignored" for word, what in UNREAD.items() if any(w == word for _, w, _ in text.words)]
+    warnings += ["vertex colours are ignored"] if text.coloured else []
     triangles = triangles_of(text, path)
     names, material_names, owner = _owners(text, triangles.lines, warnings, path)
     library = Library(files)

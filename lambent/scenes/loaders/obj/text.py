@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.ceilings import CORNERS, OBJ_BYTES
 from lambent.core.errors import UserError
-from lambent.core.inputs import read_bytes
+from lambent.core.inputs import decoded, read_bytes
 
 BLOCK_BYTES = 8 << 20
 Bytes = NDArray[np.uint8]
@@ -39,6 +39,8 @@ class ObjText:
         Number of corners of each face, and its line in the file.
     words : list of (line, keyword, rest)
         Every other line.
+    coloured : bool
+        Vertices have colours, which are not read.
     """
 
     v: Floats
@@ -48,6 +50,7 @@ class ObjText:
     sizes: Indices
     lines: Indices
     words: list[tuple[int, str, str]]
+    coloured: bool = False
 
 
 def read(file: Path) -> ObjText:
@@ -67,7 +70,7 @@ def parse(data: bytes, file: Path) -> ObjText:
     counts = dict.fromkeys(WIDTHS, 0)
     faces = [(np.zeros((0, 3), np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64))]
     words: list[tuple[int, str, str]] = []
-    total = 0
+    total, coloured = 0, False
     for first_line, block in _blocks(data):
         text = _Block(block, first_line, file)
         before = {}
@@ -76,6 +79,7 @@ def parse(data: bytes, file: Path) -> ObjText:
             values[kind].append(text.numbers(at, kind, width))
             before[kind] = counts[kind] + np.searchsorted(at, np.arange(len(text.starts)))
             counts[kind] += len(at)
+        coloured = coloured or text.has_coloured_vertex()
         faces += text.faces(before)
         total += len(faces[-1][0])
         CORNERS.check(total, file=file)
@@ -88,7 +92,7 @@ def parse(data: bytes, file: Path) -> ObjText:
             got, most = int(corners[over[0], column]) + 1, f"at most {counts[kind]}"
             raise UserError(f"corner has an unknown {kind}", file=file, field=field, got=got, expected=most)
     v, vt, vn = (np.concatenate(values[kind]) for kind in WIDTHS)
-    return ObjText(v, vt, vn, corners, sizes, lines, words)
+    return ObjText(v, vt, vn, corners, sizes, lines, words, coloured)
 
 
 def _blocks(data: bytes) -> Iterator[tuple[int, bytes]]:
@@ -159,12 +163,19 @@ class _Block:
         given = np.arange(width) < per_line[:, None]
         return np.where(given, values[np.minimum(index, len(values) - 1)], 0.0)
 
+    def has_coloured_vertex(self) -> bool:
+        """Whether the block's first vertex has six numbers or more."""
+        first = self.lines_of("v")[:1]
+        return len(first) > 0 and int(_tokens(self._text(first, "v"))[0]) >= 6
+
     def faces(self, before: dict[str, Indices]) -> Iterator[tuple[Indices, Indices, Indices]]:
         """Corners, sizes and lines of the faces; `before` counts v, vt and vn before each line."""
         lines = self.lines_of("f")
         if not len(lines):
             return
         text = self._text(lines, "f")
+        if b"/ " in text or b"/\n" in text:  # 1// and 1/2/, as some exporters write corners without normals
+            text = re.sub(rb"/+(?=\s)", b"", text)
         sizes, form = _tokens(text), _forms(text)
         face = np.repeat(np.arange(len(lines)), sizes)
         first = np.minimum(np.cumsum(sizes) - sizes, max(len(form) - 1, 0))
@@ -197,7 +208,7 @@ class _Block:
         other &= (self._head[0] != ord("#")) & (self._head[0] != 10)
         found = []
         for i in np.flatnonzero(other):
-            line = self.bytes[self.starts[i] : self.ends[i]].tobytes().decode("utf-8", "replace")
+            line = decoded(self.bytes[self.starts[i] : self.ends[i]].tobytes())
             word, _, rest = line.partition(" ")
             found.append((int(i) + self.first_line, word, rest.strip()))
         return found

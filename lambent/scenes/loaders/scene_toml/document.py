@@ -17,15 +17,14 @@ from lambent.core.geometry import triangle_areas
 from lambent.core.plain import Triple
 from lambent.materials.document import Material, material_from
 from lambent.scenes.first_view import first_views
-from lambent.scenes.geometry import transformed
 from lambent.scenes.ies import read_ies
 from lambent.scenes.light_groups import SKY, SUN, names_of_lights
 from lambent.scenes.loaders.contents import DAYLIGHT, Contents, lights_that_stay
-from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.assembly import assembled, assigned, check_material, fitting
 from lambent.scenes.loaders.scene_toml.lamps import IesSection, coloured
 from lambent.scenes.loaders.scene_toml.material_files import LookFiles, material_of_file
+from lambent.scenes.loaders.scene_toml.placing import placed
 from lambent.scenes.loaders.scene_toml.schema import (
     GeometrySection,
     ImageSection,
@@ -44,7 +43,6 @@ from lambent.scenes.scene import (
     LightFieldWish,
     LightGroup,
     Mesh,
-    PointLight,
     ReflectorRule,
     Scene,
     SceneObject,
@@ -66,7 +64,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
     """
     document, files = _parse(path), SceneFiles(path)
     there, missing = _there(document, path, files)
-    contents = [_geometry(entry, path, files, read_geometry) for entry in there]
+    contents = [placed(read_geometry(entry.file, path, files), entry.scale, entry.up, path) for entry in there]
     for source in (s for c in contents for s in c.sources):
         files.use(source)
     environment = _environment(document, path, files) or next((c.environment for c in contents if c.environment), None)
@@ -145,29 +143,6 @@ def _parse(path: Path) -> SceneDocument:
         return SceneDocument.model_validate(written)
     except ValidationError as error:
         raise invalid(error, path, known_keys()) from error
-
-
-def _geometry(entry: GeometrySection, path: Path, files: SceneFiles, read_geometry: ReadGeometry) -> Contents:
-    contents, size = read_geometry(entry.file, path, files), entry.scale
-    if size == 1:
-        return contents
-    if not 1e-9 <= size <= 1e9 or max(np.abs(o.mesh.positions).max() for o in contents.objects) * size > ABSURD:
-        raise UserError("scale is too large", file=path, field="geometry.scale", got=size)
-    matrix = np.diag([size] * 3 + [1.0])
-
-    def scaled(position: Triple) -> Triple:
-        x, y, z = position
-        return x * size, y * size, z * size
-
-    return replace(
-        contents,
-        objects=tuple(replace(o, mesh=transformed(o.mesh, matrix)) for o in contents.objects),
-        cameras=tuple(replace(c, position=scaled(c.position), target=scaled(c.target)) for c in contents.cameras),
-        lights=tuple(
-            replace(light, position=scaled(light.position)) if isinstance(light, PointLight) else light
-            for light in contents.lights
-        ),
-    )
 
 
 def _idle_patterns(described: Iterable[str], objects: Iterable[SceneObject]) -> list[str]:

@@ -43,10 +43,11 @@ FORMAT = "lambent-scene"
 
 
 class GeometrySection(Section):
-    """A file, or a built-in scene's geometry; `scale` turns its unit into metres."""
+    """A file, or a built-in scene's geometry; `scale` turns its unit into metres, `up` is the file's own axis."""
 
     file: str
     scale: Positive = 1.0
+    up: Axis = "+y"
 
 
 class SunSkySection(Section):
