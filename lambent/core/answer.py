@@ -7,11 +7,12 @@
 
 B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, a and t are their diffuse albedos of reflection
 and transmission, and F (P, P) is the share of a patch's irradiance that comes from each other patch. Patches carry most
-bounces. The last PASSES bounces are gathered among some thirty times as many points, each with its own direct light,
-along few rays until the last pass: in gaps, which patches do not resolve, light is reflected many times. Near contacts,
-where light changes from texel to texel, more points gather in the last pass and send nothing. Light is linear, so D, E
-and I have a leading axis of light groups. The baked light is multiplied by a ratio, not corrected by a difference: it
-keeps its detail, the error is relative, and baked albedos give the ratio 1 exactly.
+bounces. The last bounces are gathered among some thirty times as many points, each with its own direct light, along few
+rays until the last pass: in gaps, which patches do not resolve, light is reflected many times. Near contacts, where
+light changes from texel to texel, more points gather in the last pass and send nothing. What the last pass gathers is
+averaged over points around that see the same (`answer_smoothing`): noise of few rays would show as mottle. Light is
+linear, so D, E and I have a leading axis of light groups. The baked light is multiplied by a ratio, not corrected by a
+difference: it keeps its detail, the error is relative, and baked albedos give the ratio 1 exactly.
 
 Weights of rays include textures and chains of specular lobes. Points send the mean light around them: when the weights
 held the pattern of the baked light, indirect light from a sunlit spot grew as if it were the sun's.
@@ -33,7 +34,7 @@ from lambent.core import answer_loops as loops
 from lambent.core.answer_rays import Rays, gathered
 from lambent.core.arrays import Floats
 
-PASSES = 8
+STEPS = (1.0, 3.0, 1.0, 1.0)  # of passes by few rays, over the change of exitance: one long step replaces four passes
 FEW_RAYS = 32  # per point, in all passes but the last
 TOLERANCE = 1e-3  # relative change of a patch in one sweep, below which the solution has converged
 SWEEPS = 400  # at most: with albedos up to MOST_ALBEDO even a closed box converges sooner
@@ -154,16 +155,24 @@ class Points:
     light: NDArray[np.float32]
 
     def exitance(
-        self, albedos: Albedos, now: NDArray[np.float32], inverse: NDArray[np.float32], grows: NDArray[np.float32]
+        self,
+        albedos: Albedos,
+        now: NDArray[np.float32],
+        inverse: NDArray[np.float32],
+        grows: NDArray[np.float32],
+        before: NDArray[np.float32] | None = None,
+        step: float = 1.0,
     ) -> NDArray[np.float32]:
         """Exitance (K, G, 4), W/m^2, for indirect light that is `now` times `inverse` (K, G, 4) times the baked.
 
-        `inverse` comes from `inverses`. Only the part `grows` (K, G, 4) of the baked light is brightened.
+        `inverse` comes from `inverses`. Only the part `grows` (K, G, 4) of the baked light is brightened. From exitance
+        `before`, it goes `step` times the way.
         """
         tables = (np.pad(one, ((0, 0), (0, 1))) for one in (albedos.reflected, albedos.transmitted))
         reflected, transmitted = (np.asarray(one, np.float32) for one in tables)
         given = self._direct, self.indirect, grows, now, inverse, np.float32(MOST_RATIO)
-        return np.asarray(loops.exitance(*given, self.material, self.other, reflected, transmitted))
+        along = (self._direct if before is None else before), np.float32(step)
+        return np.asarray(loops.exitance(*given, self.material, self.other, reflected, transmitted, *along))
 
     @cached_property
     def indirect(self) -> NDArray[np.float32]:
@@ -199,6 +208,11 @@ class Neighbours:
         return np.take_along_axis(self.points, most, axis=1)[:, 0].astype(np.int64)
 
 
+def smoothed(light: NDArray[np.float32], around: Neighbours) -> NDArray[np.float32]:
+    """Weighted means (K, G, 4), over the points around each point, of light (K, G, 4)."""
+    return np.asarray(loops.smoothed(light, around.points, around.shares))
+
+
 def upsampled(light: NDArray[np.float32], near: Neighbours) -> NDArray[np.float32]:
     """Weighted means (G, T, 3), over the points near each texel, of light (K, G, 4)."""
     return np.asarray(loops.upsampled(light, near.points, near.shares))
@@ -232,6 +246,8 @@ class Answer:
         K points that send and gather light.
     rays : Rays
         Of K + F points: those K, then F points that only gather.
+    around : Neighbours
+        Points that each of the K + F points is averaged with, by decreasing weight.
     near : Neighbours
         Of T texels, among all K + F points.
     direct, baked : (G, T, 3) float32
@@ -243,6 +259,7 @@ class Answer:
     patches: Patches
     points: Points
     rays: Rays
+    around: Neighbours
     near: Neighbours
     direct: NDArray[np.float32]
     baked: NDArray[np.float32]
@@ -253,15 +270,14 @@ class Answer:
 
         `solution` is the solution of the patches, if already known.
         """
-        seen = self._gathered_as_baked
         if albedos.same_as(self.albedos):
-            return seen
+            return self._shown_as_baked
         patch, grows = self.points.patch, self._grows
         now = side_by_side((solution or solved(self.patches, albedos)).irradiance - self.patches.direct)
         sent = self.points.exitance(albedos, now[patch], self._inverse_of_patches[patch], grows)
-        for _ in range(PASSES - 1):
-            sent = self.points.exitance(albedos, gathered(self.few_rays, sent), self._inverse_of_few, grows)
-        return gathered(self.rays, sent)
+        for step in STEPS:
+            sent = self.points.exitance(albedos, gathered(self.few_rays, sent), self._inverse_of_few, grows, sent, step)
+        return smoothed(gathered(self.rays, sent), self.around)
 
     @cached_property
     def few_rays(self) -> Rays:
@@ -284,7 +300,7 @@ class Answer:
     @cached_property
     def _grows(self) -> NDArray[np.float32]:
         return np.asarray(
-            np.minimum(self.points.indirect, MOST_EXCESS * self._gathered_as_baked[: len(self.points.other)])
+            np.minimum(self.points.indirect, MOST_EXCESS * self.gathered_as_baked[: len(self.points.other)])
         )
 
     @cached_property
@@ -293,12 +309,17 @@ class Answer:
         return self.points.exitance(self.albedos, same, same, self.points.indirect)
 
     @cached_property
-    def _gathered_as_baked(self) -> NDArray[np.float32]:
+    def gathered_as_baked(self) -> NDArray[np.float32]:
+        """Indirect irradiance (K + F, G, 4) gathered along `rays` for the baked materials."""
         return gathered(self.rays, self._sent_as_baked)
+
+    @cached_property
+    def _shown_as_baked(self) -> NDArray[np.float32]:
+        return smoothed(self.gathered_as_baked, self.around)
 
     def reference(self) -> NDArray[np.float32]:
         """Indirect irradiance (G, T, 3) at the texels, computed the same way for the baked materials."""
-        return upsampled(self._gathered_as_baked, self.near)
+        return upsampled(self._shown_as_baked, self.near)
 
     def irradiance(self, albedos: Albedos, reference: Floats) -> NDArray[np.float32]:
         """Irradiance (G, T, 3) of the texels with other albedos; `baked` itself if the albedos are unchanged."""

@@ -104,11 +104,12 @@ def solve(starts, ends, senders, shares, direct, reflected, transmitted, paired,
 
 
 @by_lanes
-def exitance(direct, indirect, grows, now, inverse, most_ratio, material, other, reflected, transmitted):  # type: ignore[no-untyped-def]
+def exitance(direct, indirect, grows, now, inverse, most_ratio, material, other, reflected, transmitted, before, step):  # type: ignore[no-untyped-def]
     """Exitance (K, G, 4) of points with albedos (M, 4), for indirect light `now` times `inverse` times the baked.
 
     All light is (K, G, 4). `indirect` is the baked light, and `grows` the part of it that is brightened. `inverse` is
-    one over the reference of `now`, 0 where a ratio is meaningless.
+    one over the reference of `now`, 0 where a ratio is meaningless. From exitance `before`, the result is `step` times
+    the way.
     """
     points, groups = direct.shape[:2]
     lanes = points * groups * 4
@@ -131,6 +132,9 @@ def exitance(direct, indirect, grows, now, inverse, most_ratio, material, other,
                 at = 4 * (there * groups + group)
                 for c in range(4):
                     found[k, group, c] += transmitted[one, c] * light[at + c]
+            if step != np.float32(1):
+                for c in range(4):
+                    found[k, group, c] = before[k, group, c] + step * (found[k, group, c] - before[k, group, c])
     return found
 
 
@@ -267,6 +271,30 @@ def gather_four(starts, points, weights, table, scale, sent):  # type: ignore[no
         found[k, 4], found[k, 5], found[k, 6], found[k, 7] = a4 * by, a5 * by, a6 * by, a7 * by
         found[k, 8], found[k, 9], found[k, 10], found[k, 11] = a8 * by, a9 * by, a10 * by, a11 * by
         found[k, 12], found[k, 13], found[k, 14], found[k, 15] = a12 * by, a13 * by, a14 * by, a15 * by
+    return found
+
+
+@by_lanes
+def smoothed(light, points, shares):  # type: ignore[no-untyped-def]
+    """Weighted means (K, G, 4), over the points (K, 8) around each point, of light (K, G, 4)."""
+    groups = light.shape[1]
+    found = np.empty(light.shape, np.float32)
+    for k in numba.prange(len(points)):
+        total, some = np.float32(0), 0
+        while some < points.shape[1] and shares[k, some] > 0:
+            total += np.float32(shares[k, some])
+            some += 1
+        by = np.float32(1) / total
+        for group in range(groups):
+            a0 = a1 = a2 = a3 = np.float32(0)
+            for n in range(some):
+                at, share = points[k, n], np.float32(shares[k, n])
+                a0 += share * light[at, group, 0]
+                a1 += share * light[at, group, 1]
+                a2 += share * light[at, group, 2]
+                a3 += share * light[at, group, 3]
+            found[k, group, 0], found[k, group, 1] = a0 * by, a1 * by
+            found[k, group, 2], found[k, group, 3] = a2 * by, a3 * by
     return found
 
 

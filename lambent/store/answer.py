@@ -39,6 +39,7 @@ from numpy.typing import NDArray
 
 from lambent.core.answer import Answer, Neighbours, Patches, Points
 from lambent.core.answer_rays import Rays, last_points
+from lambent.core.answer_smoothing import alike
 from lambent.core.arrays import Floats
 from lambent.core.delta_bytes import PLACES, from_delta_bytes
 from lambent.core.errors import UserError
@@ -204,7 +205,8 @@ def read_answer(store: Store) -> StoredAnswer:
         np.minimum(point_direct, point_light), point_light,
     )  # fmt: skip
     all_rays = Rays.of(rays).followed_by(Rays.of(more_rays))
-    answer = Answer(patches, sending, all_rays, nearest, directs, baked, albedos)
+    around = alike(sending, all_rays, albedos.reflected, nearest[number[points]])
+    answer = Answer(patches, sending, all_rays, around, nearest, directs, baked, albedos)
     return StoredAnswer(
         answer, texels, other, material[of_patch].astype(np.int64), names, _seen(store, record, number),
         np.zeros(3) if sun is None else np.array(sun.irradiance), of_sun, point_sun,

@@ -155,7 +155,7 @@ def test_two_points_in_a_furnace_have_the_light_of_its_series() -> None:
     points = Points(np.arange(2), np.zeros(2, int), np.arange(2), direct, 2 * direct)
     near = Neighbours(np.array([[0], [1]], np.uint32), np.full((2, 1), 255, np.uint8))
     answer = Answer(
-        room, points, Rays.of(rays), near, direct, 2 * direct, Albedos(np.full((1, 3), 0.5), np.zeros((1, 3)))
+        room, points, Rays.of(rays), near, near, direct, 2 * direct, Albedos(np.full((1, 3), 0.5), np.zeros((1, 3)))
     )
     for albedo in (0.0, 0.25, 0.8):
         found = answer.irradiance(Albedos(np.full((1, 3), albedo), np.zeros((1, 3))), answer.reference())
@@ -179,7 +179,7 @@ def test_light_in_a_gap_that_patches_do_not_resolve_is_reflected_many_times() ->
     points = Points(np.zeros(8, int), np.zeros(8, int), np.arange(8), direct, light)
     near = Neighbours(np.full((1, 8), 1, np.uint32), np.full((1, 8), 255, np.uint8))
     rays = Rays.of(packed_rays(np.tile(np.arange(64) % 8, (8, 1)), weight))
-    answer = Answer(patch, points, rays, near, direct[:, 1:2], light[:, 1:2], grey(0.2))
+    answer = Answer(patch, points, rays, alone(8), near, direct[:, 1:2], light[:, 1:2], grey(0.2))
     assert answer.reference() == pytest.approx(gap(0.2))
     assert answer.irradiance(grey(0.8), answer.reference()) == pytest.approx(gap(0.8), rel=0.12)
 
@@ -225,6 +225,11 @@ def test_texels_are_answered_as_arrays_are() -> None:
     assert np.allclose(answer.irradiance(other, reference), expected, rtol=1e-5)
 
 
+def alone(count: int) -> Neighbours:
+    """Points that are averaged with none but themselves."""
+    return Neighbours(np.arange(count, dtype=np.uint32)[:, None], np.full((count, 1), 255, np.uint8))
+
+
 def small_answer() -> Answer:
     rng, room = np.random.default_rng(1), patches(1)
     rays = packed_rays(rng.integers(0, 9, (9, 32)), np.ones((9, 32)))
@@ -232,7 +237,7 @@ def small_answer() -> Answer:
     points = Points(rng.integers(0, 30, 9), rng.integers(0, 4, 9), np.arange(9), 0.3 * light, light)
     near = Neighbours(rng.integers(0, 9, (50, 8)).astype(np.uint32), np.full((50, 8), 255, np.uint8))
     baked = (1 + rng.random((1, 50, 3))).astype(np.float32)
-    return Answer(room, points, Rays.of(rays), near, 0.3 * baked, baked, albedos())
+    return Answer(room, points, Rays.of(rays), alone(9), near, 0.3 * baked, baked, albedos())
 
 
 def test_before_the_first_edit_nothing_changes() -> None:

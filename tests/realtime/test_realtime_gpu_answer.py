@@ -51,7 +51,9 @@ def room(groups: int, seed: int = 3) -> Answer:
     shares = rng.integers(1, 256, (TEXELS, 8)).astype(np.uint8)
     near = Neighbours(rng.integers(0, POINTS + RECEIVERS, (TEXELS, 8)).astype(np.uint32), shares)
     baked = (0.2 + rng.random((groups, TEXELS, 3)) ** 4 * 5).astype(np.float32)
-    return Answer(patches, points, rays, near, np.float32(0.3) * baked, baked, colours(5))
+    alike = rng.integers(0, POINTS + RECEIVERS, (POINTS + RECEIVERS, 8)).astype(np.uint32)
+    around = Neighbours(alike, -np.sort(-rng.integers(0, 256, alike.shape)).astype(np.uint8))
+    return Answer(patches, points, rays, around, near, np.float32(0.3) * baked, baked, colours(5))
 
 
 def colours(seed: int, most: float = 0.8) -> Albedos:
@@ -99,7 +101,7 @@ def test_the_gpu_finds_the_series_of_a_furnace(device: Any) -> None:
     points = Points(np.arange(2), np.zeros(2, int), np.arange(2), direct, 2 * direct)
     near = Neighbours(np.array([[0], [1]], np.uint32), np.full((2, 1), 255, np.uint8))
     half = Albedos(np.full((1, 3), 0.5), np.zeros((1, 3)))
-    answer = Answer(box, points, Rays.of(rays), near, direct, 2 * direct, half)
+    answer = Answer(box, points, Rays.of(rays), near, near, direct, 2 * direct, half)
     on_gpu = GpuAnswer(device, answer, answer.reference(), texels_of(answer))
     for albedo in (0.0, 0.25, 0.5, 0.8):
         found = on_gpu.begin(Albedos(np.full((1, 3), albedo), np.zeros((1, 3)))).irradiance()
@@ -114,7 +116,9 @@ def test_dark_corners_are_solved_as_well_as_bright_ones(device: Any) -> None:
     direct = np.zeros((1, count, 3), np.float32)
     direct[0, 0] = 1
     lined = Patches(np.zeros(count, int), np.arange(count), direct, chain)
-    answer = Answer(lined, answer.points, answer.rays, answer.near, answer.direct, answer.baked, answer.albedos)
+    answer = Answer(
+        lined, answer.points, answer.rays, answer.around, answer.near, answer.direct, answer.baked, answer.albedos
+    )
     on_gpu = GpuAnswer(device, answer, answer.reference(), texels_of(answer))
     on_gpu.begin(Albedos(np.full((4, 3), 0.5), np.zeros((4, 3))))
     expected = np.where(np.arange(count) > 0, 0.25 ** np.arange(count, dtype=float), 0)[:, None]
@@ -158,7 +162,7 @@ def test_many_patches_with_long_rows_are_solved(device: Any) -> None:
     small = room(1)
     direct = (rng.random((1, count, 3)) ** 4).astype(np.float32)
     large = Patches(rng.integers(0, MATERIALS, count), np.arange(count), direct, transfer)
-    answer = Answer(large, small.points, small.rays, small.near, small.direct, small.baked, small.albedos)
+    answer = Answer(large, small.points, small.rays, small.around, small.near, small.direct, small.baked, small.albedos)
     on_gpu, white = GpuAnswer(device, answer, answer.reference(), texels_of(answer)), EDITS[2]
     on_gpu.begin(white)
     exact = solved(large, white, tolerance=1e-6).irradiance - direct

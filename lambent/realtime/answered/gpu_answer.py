@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.answer import PASSES, SWEEPS, Albedos, Answer, Neighbours, least_light
+from lambent.core.answer import STEPS, SWEEPS, Albedos, Answer, Neighbours, least_light
 from lambent.core.answer_rays import Rays
 from lambent.core.arrays import Floats
 from lambent.realtime.answered.stages import GROUP, Call, NoRoom, Stages
@@ -81,7 +81,7 @@ class GpuAnswer:
         self._solvers = [_Solver(self._stages, self._shared, answer, group) for group in numbers]
         self._shared.colour(answer.albedos)
         _solve(self._stages, self._solvers)
-        as_baked = answer.indirect(answer.albedos)
+        as_baked = answer.gathered_as_baked
         self._groups = [
             _Group(
                 self._stages,
@@ -139,7 +139,7 @@ class _Shared:
         about = [points.patch, points.material, points.other, np.zeros(len(points.patch))]
         self.points = stages.buffer(np.stack(about, axis=1).astype(np.uint32))
         self.rays, self.few_rays = (self._buffers(one) for one in (rays, answer.few_rays))
-        self.near = stages.buffer(packed_near(answer.near))
+        self.around, self.near = (stages.buffer(packed_near(one)) for one in (answer.around, answer.near))
 
     def _buffers(self, rays: Rays) -> tuple[Any, ...]:
         arrays = rays.starts.astype(np.uint32), rays.points, rays.weights, rays.scale
@@ -199,32 +199,38 @@ class _Group:
         points = answer.points
         self._points, self._gathering, self._texels = len(points.other), len(answer.rays.scale), len(reference)
         self._sent = stages.empty(self._points * LIGHT_BYTES)
-        self._found = stages.empty(self._gathering * LIGHT_BYTES)
+        self._found, self._smooth = (stages.empty(self._gathering * LIGHT_BYTES) for _ in range(2))
         lights = stages.buffer(np.concatenate([points.direct[group], points.light[group]], axis=1).astype(np.float32))
         both = lights, stages.buffer(np.asarray(gathered[: self._points], np.float32))
-        self._first = self._exitance(*both, True, solver.indirect, solver.light())
-        self._next = self._exitance(*both, False, self._found, answer.few_as_baked[:, group, :3])
+        self._first = self._exitance(*both, True, solver.indirect, solver.light(), 1.0)
+        few = answer.few_as_baked[:, group, :3]
+        self._next = [self._exitance(*both, False, self._found, few, step) for step in STEPS]
         self._gathers, self._gathers_last = (
             stages.call("gather", (count,), *rays, self._sent, self._found, threads=count)
             for count, rays in ((self._points, shared.few_rays), (self._gathering, shared.rays))
         )
+        given = shared.around, self._found, self._smooth
+        self._smooths = stages.call("smooth", (self._gathering,), *given, threads=self._gathering)
         arrays = reference, answer.direct[group], answer.baked[group]
         self._of_texels = [stages.buffer(np.asarray(one, np.float32)) for one in arrays]
         self._least = _least(reference)
 
     def calls(self, found: Any) -> Iterator[Call]:
         """Stages in order; the last writes the irradiance of texels to `found`."""
-        for step in range(PASSES):
-            yield self._first if step == 0 else self._next
-            yield self._gathers_last if step == PASSES - 1 else self._gathers
-        given = self._shared.near, self._found, *self._of_texels, found
+        yield self._first
+        for sends in self._next:
+            yield self._gathers
+            yield sends
+        yield self._gathers_last
+        yield self._smooths
+        given = self._shared.near, self._smooth, *self._of_texels, found
         yield self._stages.call("texels", (self._texels, self._least), *given, threads=self._texels)
 
-    def _exitance(self, lights: Any, seen: Any, by_patch: bool, now: Any, baked: Floats) -> Call:
+    def _exitance(self, lights: Any, seen: Any, by_patch: bool, now: Any, baked: Floats, step: float) -> Call:
         before = self._stages.buffer(np.asarray(baked, np.float32))
         given = self._shared.points, lights, self._shared.albedos, now, before, seen, self._sent
         return self._stages.call(
-            "exitance", (self._points, int(by_patch), _least(baked)), *given, threads=self._points
+            "exitance", (self._points, int(by_patch), _least(baked), step), *given, threads=self._points
         )  # fmt: skip
 
 

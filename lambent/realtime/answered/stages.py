@@ -25,6 +25,7 @@ BINDINGS = {
     "solve": ("uniform", READ, READ, READ, READ, READ, WRITTEN, WRITTEN, WRITTEN),
     "exitance": ("uniform", READ, READ, READ, READ, READ, READ, WRITTEN),
     "gather": ("uniform", READ, READ, READ, READ, READ, WRITTEN),
+    "smooth": ("uniform", READ, READ, WRITTEN),
     "texels": ("uniform", READ, READ, READ, READ, READ, WRITTEN),
     "show": ("uniform", READ, READ, "written half layers"),
 }

@@ -7,6 +7,7 @@ struct Exitance {
     points: u32,
     by_patch: u32,  // 1: the ratio is taken at patches; 0: at points
     least: f32,  // light below which a ratio is 1
+    step: f32,  // over the change of exitance
 }
 
 @group(0) @binding(0) var<uniform> exitance: Exitance;
@@ -36,6 +37,10 @@ fn light_of(point: u32) -> vec3f {
     let about = points[point];
     var light = albedos[about.y].rgb * light_of(point);
     if (about.z != point) { light += albedos[arrayLength(&albedos) / 2u + about.y].rgb * light_of(about.z); }
+    if (exitance.step != 1.0) {
+        let before = vec3f(sent[3u * point], sent[3u * point + 1u], sent[3u * point + 2u]);
+        light = before + exitance.step * (light - before);
+    }
     sent[3u * point] = light.r;
     sent[3u * point + 1u] = light.g;
     sent[3u * point + 2u] = light.b;

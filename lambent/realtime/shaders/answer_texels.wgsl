@@ -1,9 +1,7 @@
 // Irradiance of answering texels from the indirect light at points near each (`lambent.core.answer.Answer.at_texels`).
 
 #include "answer.wgsl"
-
-const NEAR = 8u;  // points per texel
-const WORDS = 10u;  // per texel: eight points, then eight shares
+#include "answer_near.wgsl"
 
 struct Texels {
     texels: u32,
@@ -21,18 +19,10 @@ struct Texels {
 @compute @workgroup_size(256) fn texels_main(@builtin(global_invocation_id) id: vec3u) {
     let texel = id.x;
     if (texel >= about.texels) { return; }
-    var sum = vec3f(0.0);
-    var shares = 0.0;
-    for (var n = 0u; n < NEAR; n++) {
-        let at = 3u * near[WORDS * texel + n];
-        let share = f32(extractBits(near[WORDS * texel + NEAR + n / 4u], 8u * (n % 4u), 8u));
-        sum += share * vec3f(indirect[at], indirect[at + 1u], indirect[at + 2u]);
-        shares += share;
-    }
     let at = 3u * texel;
     let before = vec3f(gathered[at], gathered[at + 1u], gathered[at + 2u]);
     let arrives = vec3f(direct[at], direct[at + 1u], direct[at + 2u]);
-    let ratio = ratio_of(sum / shares, before, about.least);
+    let ratio = ratio_of(mean_near(texel), before, about.least);
     let bounced = vec3f(baked[at], baked[at + 1u], baked[at + 2u]) - arrives;
     let excess = max(bounced - MOST_EXCESS * before, vec3f(0.0));
     let light = arrives + bounced * ratio - excess * max(ratio - vec3f(1.0), vec3f(0.0));
