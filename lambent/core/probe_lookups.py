@@ -14,11 +14,11 @@ from lambent.core.directions import normalize
 
 PLANE_ACTIVE_M = 1e-6  # planes closer to x than this, or behind it, are ignored
 NEARNESS_MIN = 1e-6  # 1/m: farther planes count as infinitely far
-# The march through a distance map: number of steps, their growth, the first step relative to the distance seen along w,
-# bounds of the secant's shares.
-STEPS, GROWTH, FIRST = 12, 1.6, 0.05
+TINY = 1e-9  # guards divisions
+# The march through a distance map: its steps, and bounds of the secant's shares.
+STEPS = 16
 SECANTS = ((0.05, 0.95), (0.05, 0.95), (0.05, 0.95), (0.0, 1.0))
-DEPTH_MIN_M, INVERSE_MIN = 1e-3, 1e-4
+DEPTH_MIN_M = 1e-3
 
 
 def planes_lookup(x: Floats, w: Floats, planes: Floats) -> Floats:
@@ -49,27 +49,36 @@ def inverse_depth(distance: Floats) -> Floats:
 
 
 def distance_lookup(x: Floats, w: Floats, inverse: Floats) -> Floats:
-    """Directions (n, 3) from the probe's centre to where rays pass behind its surfaces; `inverse` is `inverse_depth`.
+    """Directions (n, 3) from the probe's centre to where rays first pass behind its surfaces.
 
-    A distance impostor (Szirmay-Kalos et al. 2005): growing steps, then the secant method.
+    A distance impostor (Szirmay-Kalos et al. 2005): steps, then the secant method. Steps are equal in s of
+    (1 - s) x/|x| + s w, the ray's points as seen from the centre, from its start to infinity: fine where the ray is
+    near, whatever the scale of the scene. A ray that starts behind surfaces counts from where it comes out. `inverse`
+    is `inverse_depth`.
     """
+    reach = np.linalg.norm(x, axis=1)
+    start = x / np.maximum(reach, TINY)[:, None]
 
-    def behind(t: Floats) -> Floats:
-        p = x + t[:, None] * w
-        return np.asarray(np.abs(p).max(axis=1) * sample(inverse, normalize(p))[:, 0] - 1)
+    def along(s: Floats) -> Floats:
+        return np.asarray((1 - s)[:, None] * start + s[:, None] * w)
 
-    near, f_near = np.zeros(len(x)), np.full(len(x), -1.0)
-    far = np.maximum(np.linalg.norm(x, axis=1), FIRST / np.maximum(sample(inverse, w)[:, 0], INVERSE_MIN))
-    f_far = behind(far)
-    for _ in range(STEPS - 1):
-        on = f_far < 0
-        near, f_near = np.where(on, far, near), np.where(on, f_far, f_near)
-        far = np.where(on, far * GROWTH, far)
-        f_far = np.where(on, behind(far), f_far)
-    met = f_far >= 0
+    def behind(s: Floats) -> Floats:
+        q = along(s)
+        size = np.abs(q).max(axis=1)
+        seen = sample(inverse, np.where(size[:, None] > 0, q, w))[:, 0]
+        return np.asarray(reach * size * seen - (1 - s))
+
+    near = np.zeros(len(x))
+    f_near = behind(near)
+    far, f_far, met = near, f_near, np.zeros(len(x), bool)
+    for i in range(STEPS):
+        near, f_near = np.where(met, near, far), np.where(met, f_near, f_far)
+        far = np.where(met, far, (i + 1) / STEPS)
+        f_far = np.where(met, f_far, behind(far))
+        met |= (f_near < 0) & (f_far >= 0)
     for low, high in SECANTS:
-        t = near + (far - near) * (f_near / np.minimum(f_near - f_far, -1e-9)).clip(low, high)
-        f = behind(t)
-        near, f_near = np.where(f < 0, t, near), np.where(f < 0, f, f_near)
-        far, f_far = np.where(f < 0, far, t), np.where(f < 0, f_far, f)
-    return np.where(met[:, None], x + t[:, None] * w, w)
+        s = near + (far - near) * (f_near / np.minimum(f_near - f_far, -TINY)).clip(low, high)
+        f = behind(s)
+        near, f_near = np.where(f < 0, s, near), np.where(f < 0, f, f_near)
+        far, f_far = np.where(f < 0, far, s), np.where(f < 0, f_far, f)
+    return np.where(met[:, None], along(s), w)

@@ -170,12 +170,12 @@ NAMES = (
     "probe/floor/planes",
 )
 PINNED = {
-    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 62826275 b10c6153 961ea049 c473f316",
-    ("preview", "photons", "traced"): "1dec1a65 4cae5d96 493576a5 b18d77b3 8bbff745 f2524a03",
-    ("normal", "paths", "cached"): "6161cd22 5095e777 ca1bc7db c922d6f4 090fbd2f dd80d1a6",
-    ("normal", "photons", "traced"): "6161cd22 5095e777 c3dd8d8a 65c1843f 0b8a4a9a e4d0565d",
-    ("final", "paths", "cached"): "a38141f9 cef94a2c 6fbf5e5b 27f817ab 1d2942b5 68a263b9",
-    ("final", "photons", "traced"): "a38141f9 cef94a2c 95888972 2aa08bcd ce740dcb e83161eb",
+    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 62826275 b10c6153 c2468578 2be4816a",
+    ("preview", "photons", "traced"): "1dec1a65 4cae5d96 493576a5 b18d77b3 ec73ceba d2d23e28",
+    ("normal", "paths", "cached"): "6161cd22 5095e777 ca1bc7db c922d6f4 1a2e75bc 3d33a5e8",
+    ("normal", "photons", "traced"): "6161cd22 5095e777 c3dd8d8a 65c1843f 9165629e d9a49624",
+    ("final", "paths", "cached"): "a38141f9 cef94a2c 6fbf5e5b 27f817ab 7bc2473f 07add8a1",
+    ("final", "photons", "traced"): "a38141f9 cef94a2c 95888972 2aa08bcd e095242b 1e95b1a1",
 }
 
 

@@ -23,6 +23,7 @@ from lambent.bake.probes.selection import (
 from lambent.core.camera import Camera
 from lambent.core.cubemap import face_directions
 from lambent.core.directions import normalize
+from lambent.core.probe_lookups import distance_lookup, inverse_depth
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import merge, patch, sphere
 from lambent.scenes.scene import ImageEnvironment, Scene, SceneObject
@@ -101,6 +102,33 @@ def test_the_distance_map_is_stepped_through_to_the_wall() -> None:
     assert np.quantile(np.abs(found - 2 - normalize(hits)[:, 0]), 0.9) < 0.05  # few steps: a tenth ends beside the wall
     walls = np.array([[*-np.sign(s) * np.eye(3)[i], 1.0] for i in range(3) for s in (1, -1)])
     assert np.allclose(by_planes(many, cube, np.zeros(3), walls), 2 + normalize(hits)[:, 0], atol=5e-3)
+
+
+@pytest.mark.parametrize("scale", [0.1, 1.0, 1e3])
+def test_the_distance_map_finds_the_wall_of_a_cup_before_the_sky(scale: float) -> None:
+    """Rays from the tea in a cup of 4.6 cm, seen from 1 cm above its rim, under a sky that is 10 km away."""
+    radius, rim, tea = 0.023, -0.01, -0.035
+    w = normalize(face_directions(256))
+    with np.errstate(divide="ignore"):
+        across = radius / np.linalg.norm(w[..., [0, 2]], axis=-1)
+        depth = np.where(w[..., 1] < 0, tea / w[..., 1], np.inf)
+    to_wall = np.where((across * w[..., 1] < rim) & (across < depth), across, np.inf)
+    to_tea = np.where(depth * np.linalg.norm(w[..., [0, 2]], axis=-1) < radius, depth, np.inf)
+    distance = np.minimum(np.minimum(to_wall, to_tea), 1e4)
+    rng = np.random.default_rng(4)
+    phi, up = rng.uniform(0, 2 * np.pi, 500), np.radians(rng.uniform(10, 35, 500))
+    r, turn = 0.8 * radius * np.sqrt(rng.uniform(size=500)), rng.uniform(0, 2 * np.pi, 500)
+    x = np.stack([r * np.cos(phi), np.full(500, tea + 1e-5), r * np.sin(phi)], axis=-1)
+    along = np.stack([np.cos(up) * np.cos(turn), np.sin(up), np.cos(up) * np.sin(turn)], axis=-1)
+    level = along[:, [0, 2]]
+    a, b = (level**2).sum(axis=1), (x[:, [0, 2]] * level).sum(axis=1)
+    t = (np.sqrt(b * b + a * (radius**2 - r * r)) - b) / a
+    hits = x + t[:, None] * along
+    inside = hits[:, 1] < rim - 1e-3
+    assert inside.sum() > 100
+    found = distance_lookup(scale * x, along, inverse_depth(np.minimum(scale * distance, 1e4)))
+    cosine = (normalize(found) * normalize(hits)).sum(axis=1)[inside]
+    assert (np.degrees(np.arccos(cosine.clip(-1, 1))) < 2).mean() > 0.9
 
 
 def well(folder: Path) -> Scene:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 KIND = "probe"
 NEEDS = ("geometry", "light_map")
-REVISION = 6
+REVISION = 7
 HELD = "held"  # key in the document of shared probes: objects that no probe leaves out
 SHARING = "sharing"  # the step that assigns shared probes
 PARTS = ("radiance", "distance", "planes")

@@ -14,13 +14,11 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.colour import luminance
 from lambent.core.probe_lookups import (
-    FIRST,
-    GROWTH,
-    INVERSE_MIN,
     NEARNESS_MIN,
     PLANE_ACTIVE_M,
     SECANTS,
     STEPS,
+    TINY,
     inverse_depth,
 )
 
@@ -59,25 +57,28 @@ class DeviceProbe:
 
     @staticmethod
     def _by_distance(x: Any, w: Any, inverse: _Cube) -> Any:
-        def behind(t: Any) -> Any:
-            p = x + t * w
-            return dr.max(dr.abs(p)) * inverse(p) - 1
+        reach = dr.norm(x)
+        start = x / dr.maximum(reach, TINY)
 
-        near, f_near = mi.Float(0.0), mi.Float(-1.0)
-        far = dr.maximum(dr.norm(x), FIRST / dr.maximum(inverse(w), INVERSE_MIN))
-        f_far = behind(far)
-        for _ in range(STEPS - 1):
-            on = f_far < 0
-            near, f_near = dr.select(on, far, near), dr.select(on, f_far, f_near)
-            far = dr.select(on, far * GROWTH, far)
-            f_far = dr.select(on, behind(far), f_far)
-        met, t = f_far >= 0, mi.Float(0.0)
+        def behind(s: Any) -> Any:
+            q = (1 - s) * start + s * w
+            size = dr.max(dr.abs(q))
+            return reach * size * inverse(dr.select(size > 0, q, w)) - (1 - s)
+
+        near = far = mi.Float(0.0)
+        f_near = f_far = behind(far)
+        met, s = mi.Bool(False), mi.Float(0.0)
+        for i in range(STEPS):
+            near, f_near = dr.select(met, near, far), dr.select(met, f_near, f_far)
+            far = dr.select(met, far, (i + 1) / STEPS)
+            f_far = dr.select(met, f_far, behind(far))
+            met |= (f_near < 0) & (f_far >= 0)
         for low, high in SECANTS:
-            t = near + (far - near) * dr.clip(f_near / dr.minimum(f_near - f_far, -1e-9), low, high)
-            f = behind(t)
-            near, f_near = dr.select(f < 0, t, near), dr.select(f < 0, f, f_near)
-            far, f_far = dr.select(f < 0, far, t), dr.select(f < 0, f_far, f)
-        return dr.select(met, x + t * w, w)
+            s = near + (far - near) * dr.clip(f_near / dr.minimum(f_near - f_far, -TINY), low, high)
+            f = behind(s)
+            near, f_near = dr.select(f < 0, s, near), dr.select(f < 0, f, f_near)
+            far, f_far = dr.select(f < 0, far, s), dr.select(f < 0, f_far, f)
+        return dr.select(met, (1 - s) * start + s * w, w)
 
 
 class _Cube:

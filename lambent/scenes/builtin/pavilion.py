@@ -187,7 +187,7 @@ def _cup(name: str) -> list[SceneObject]:
            [(0.046, 0.062), (0.043, 0.045), (0.034, 0.023), (0.022, 0.0085), (0.0, 0.0075)]]  # fmt: skip
     ear = [(0.0455, 0.054, 0), (0.063, 0.056, 0), (0.072, 0.043, 0), (0.063, 0.028, 0), (0.04, 0.024, 0)]
     china = [placed(lathe(cup, 64, 3), (0, 0.006, 0)), placed(tube(ear, 0.0035, 12, 6), (0, 0.006, 0))]
-    tea = placed(cylinder(0.0441, 0.012, 48), (0, 0.0375, 0))
+    tea = placed(cylinder(0.0427, 0.002, 48), (0, 0.0475, 0))
     return [
         thing(f"saucer_{name}", f"china_{name}", lathe(saucer, 64, 3)),
         thing(f"cup_{name}", f"china_{name}", *china),
