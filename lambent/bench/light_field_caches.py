@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Iterator
 from typing import Any
 
@@ -14,7 +13,7 @@ from lambent.core.arrays import Floats
 from lambent.core.cubemap import face_places
 from lambent.core.light_field import NO_POINT, LightField
 from lambent.core.light_field_lookup import Place
-from lambent.core.map_cache import POLICIES, fewest_misses, misses
+from lambent.core.map_cache import POLICIES, KnownFuture, MapCache, fewest_misses, misses
 
 SCATTERED = 100  # samples of a BRDF
 TILE = 16  # pixels: a renderer's order of shading
@@ -69,18 +68,18 @@ def thesis_reads(
         rows = (row[known][:, None] + [0, 0, 1, 1]).ravel().tolist()
         reads = list(zip(item, rows, strict=True))
         for capacity in capacities:
-            missed = {"least-recent": round(100 * partial_misses(reads, capacity) / len(reads), 4)}
+            kept = {name: make(capacity) for name, make in POLICIES.items()}
+            kept["known future"] = KnownFuture(item, capacity)
+            missed = {name: round(100 * partial_misses(reads, of) / len(reads), 4) for name, of in kept.items()}
             said = {"reads": "reflection, texels of faces", "order": order, "maps": capacity}
             yield {**said, "count": len(reads), "first": len(set(item)), "miss_percent": missed}
 
 
-def partial_misses(reads: list[tuple[int, int]], capacity: int) -> int:
-    """Reads (item, row) that find their item missing or read only to an earlier row; evicts the least recent item."""
-    held, missed = OrderedDict[int, int](), 0
+def partial_misses(reads: list[tuple[int, int]], cache: MapCache) -> int:
+    """Reads (item, row) that find their item missing from `cache`, or read only to an earlier row."""
+    ends, missed = dict[int, int](), 0
     for item, row in reads:
-        end = held.pop(item, -1)
+        end = ends.get(item, -1) if cache.read(item) else -1
         missed += row > end
-        held[item] = max(end, row)
-        if len(held) > capacity:
-            held.popitem(last=False)
+        ends[item] = max(end, row)
     return missed

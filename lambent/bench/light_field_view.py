@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from lambent.bake.reference.mirrored import MirrorTracer, Shown
 
 SEED = 1
+TRUE_PATHS = 16  # for each place of the truth: glossy surfaces scatter light, and one path leaves 1.5 % of a* and b*
 
 
 @dataclass(frozen=True)
@@ -100,8 +101,15 @@ class LightFieldView:
         chosen: Camera = self._context.scene.cameras[camera]
         progress(0, 1, "truth")
         self.shown: Shown = self._tracer.shown(chosen, *size, paths, SEED)
-        self.truth, self.surface = self._tracer.mirrored(self.shown, SEED), self._tracer.surface(self.shown)
+        self.truth, self.surface = self._truth(), self._tracer.surface(self.shown)
         self.distance_m = self._tracer.distance_m(self.shown)
+
+    def _truth(self) -> Floats:
+        """Mean radiance (k, 3) of TRUE_PATHS paths from each place."""
+        total = np.zeros_like(self.shown.x)
+        for n in range(TRUE_PATHS):
+            total += self._tracer.mirrored(self.shown, SEED + n)
+        return total / TRUE_PATHS
 
     @cached_property
     def _tracer(self) -> MirrorTracer:

@@ -21,6 +21,7 @@ from lambent.core.light_field import NO_POINT, LightField, Sky
 from lambent.core.light_field_maps import (
     WHOLE,
     cover_along,
+    focus_along,
     nearest_points,
     nearness_along,
     radiance_along,
@@ -210,7 +211,8 @@ def _answered(
     first = t.min(axis=1)
     met = np.isfinite(first)
     agree = t <= first[:, None] * (1 + rule.alike)
-    weight = np.where(agree & met[:, None], np.maximum(basis_weights(field, place, w, "normal")[:, :count], 1e-6), 0.0)
+    basis = np.maximum(basis_weights(field, place, w, "normal")[:, :count], 1e-6)
+    weight = np.where(agree & met[:, None], basis * focus_along(field, q), 0.0)
     weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-30)
     seen = np.einsum("kj,kjc->kc", weight, radiance_along(field, place.named(count), q))
     in_sky = np.asarray(~met & (open_sky & known).any(axis=1))
@@ -244,7 +246,7 @@ def _edge(field: LightField, hit: Floats, point: Indices, weight: Floats, known:
     """
     light, shows, share = surface_along(field, point, hit[:, None] - field.points[point])
     mean = (share * known).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    total = np.maximum(np.einsum("kj,kj->k", weight, shows), 1e-9)[:, None]
+    total = np.maximum(np.einsum("kj,kj->k", weight, shows), 1e-20)[:, None]
     return np.einsum("kj,kjc->kc", weight, light) / total, np.clip((mean - 0.5) * EDGE_STEEPNESS + 0.5, 0, 1)
 
 

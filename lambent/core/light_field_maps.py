@@ -15,6 +15,7 @@ from lambent.core.arrays import Floats, Indices
 from lambent.core.light_field import SKY_SHARE, LightField, Sky
 from lambent.core.octahedral import texel_directions, to_square
 
+FOCUS = 8.0  # exponent of weights by the place between texels
 WHOLE = 15  # `LightField.cover` of a texel without sky
 
 
@@ -46,6 +47,17 @@ def radiance_along(field: LightField, point: Indices, w: Floats, sky: Sky | None
     if sky is not None and (edge := open_sky > 0).any():
         total[edge] += open_sky[edge][:, None] * sky(w[edge])
     return total
+
+
+def focus_along(field: LightField, w: Floats) -> Floats:
+    """(...) weights of light between the four nearest texels: 1 at a texel's centre, least in the middle of four.
+
+    The sum of the squared bilinear weights, to the power of FOCUS: of several points that see the same surface, the one
+    with a texel's centre near the wanted place blurs it least.
+    """
+    at = to_square(w) * field.radiance.shape[1] - 0.5
+    share = at - np.floor(at)
+    return np.asarray((share**2 + (1 - share) ** 2).prod(axis=-1) ** FOCUS)
 
 
 def surface_along(field: LightField, point: Indices, w: Floats) -> tuple[Floats, Floats, Floats]:

@@ -140,28 +140,41 @@ class Adaptive:
         return self._maps.keys()
 
 
+class KnownFuture:
+    """Evicts the map that is read again last: the optimal policy, which knows all `reads` in order (Belady 1966)."""
+
+    def __init__(self, reads: Sequence[int], capacity: int) -> None:
+        self.capacity = capacity
+        self._following, seen = [NEVER] * len(reads), dict[int, int]()
+        for at in range(len(reads) - 1, -1, -1):
+            self._following[at] = seen.get(reads[at], NEVER)
+            seen[reads[at]] = at
+        self._at, self._maps, self._queue = 0, dict[int, int](), list[tuple[int, int]]()
+
+    def read(self, name: int, keep: Collection[int] = ()) -> bool:
+        there = name in self._maps
+        while not there and len(self._maps) >= self.capacity:
+            when, last = heappop(self._queue)
+            if self._maps.get(last) == -when:
+                del self._maps[last]
+        self._maps[name] = self._following[self._at]
+        heappush(self._queue, (-self._maps[name], name))
+        self._at += 1
+        return there
+
+    @property
+    def held(self) -> Collection[int]:
+        return self._maps.keys()
+
+
 def misses(reads: Sequence[int], cache: MapCache) -> int:
     """Number of `reads` that miss when run through `cache` in order."""
     return sum(not cache.read(name) for name in reads)
 
 
 def fewest_misses(reads: Sequence[int], capacity: int) -> int:
-    """Misses of the optimal policy, which knows the future and evicts the map read again last (Belady 1966)."""
-    following, seen = [NEVER] * len(reads), dict[int, int]()
-    for at in range(len(reads) - 1, -1, -1):
-        following[at] = seen.get(reads[at], NEVER)
-        seen[reads[at]] = at
-    held, queue, missed = dict[int, int](), list[tuple[int, int]](), 0
-    for name, again in zip(reads, following, strict=True):
-        if name not in held:
-            missed += 1
-            while len(held) >= capacity:
-                when, last = heappop(queue)
-                if held.get(last) == -when:
-                    del held[last]
-        held[name] = again
-        heappush(queue, (-again, name))
-    return missed
+    """Misses of the optimal policy."""
+    return misses(reads, KnownFuture(reads, capacity))
 
 
 LEAST_RECENT = "least-recent"

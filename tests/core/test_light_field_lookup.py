@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lambent.core import light_field_maps
 from lambent.core.directions import normalize
 from lambent.core.light_field import NO_POINT, LightField
 from lambent.core.light_field_lookup import March, Place, basis_weights, blended, fixed_point, marched, surface
@@ -120,9 +121,19 @@ def test_the_march_errs_by_texels_and_a_blend_by_the_spacing_of_points(field: Li
 
     coarse, sparse = ball_field(144, 80), ball_field(36, 80)
     assert median(field, "march") < 0.5 * median(coarse, "march")
-    assert median(sparse, "march") == pytest.approx(median(coarse, "march"), rel=0.3)
+    # closer points add sharpness alone: more of them agree, so that one has a texel near each hit
+    assert median(sparse, "march") == pytest.approx(median(coarse, "march"), rel=0.4)
     assert median(field, "normal") > 0.9 * median(coarse, "normal")
     assert median(sparse, "normal") > 1.5 * median(coarse, "normal")
+
+
+def test_points_that_have_a_texel_near_the_hit_blur_it_least(
+    field: LightField, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place, w = places(field, 4000)
+    focused = float(np.median(errors(marched(field, place, w).radiance, place, w)))
+    monkeypatch.setattr(light_field_maps, "FOCUS", 0.0)
+    assert focused < 0.85 * float(np.median(errors(marched(field, place, w).radiance, place, w)))
 
 
 def test_the_sky_is_read_where_all_points_see_it(roofless: LightField) -> None:

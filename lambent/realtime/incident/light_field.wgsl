@@ -127,26 +127,27 @@ fn weights_of(method: u32, s: Surface, r: vec3f) -> vec4f {
 
 // Weighted light of the points along w[j] = r + u[j] (x - p_j); u is 0 without parallax. Rays with one weight leave the
 // loop after one iteration: software adapters run both sides of a branch, but skip iterations that all pixels have
-// left.
-fn weighted(s: Surface, r: vec3f, u: vec4f, weights: vec4f, half_log2_omega: f32) -> vec3f {
+// left. `focused` look-ups also weigh points by focus_along.
+fn weighted(s: Surface, r: vec3f, u: vec4f, weights: vec4f, half_log2_omega: f32, focused: bool) -> vec3f {
     let x = s.x + object.centre.xyz;
     var left = weights;
-    var light = vec3f(0.0);
+    var light = vec4f(0.0);
     loop {
         let one = first_largest(left);
         let point = u32(dot(select(vec4f(0.0), vec4f(s.points), one > vec4f(0.0)), vec4f(1.0)));
         let q = r + dot(one, u) * (x - place_of_point(point));
         // omega t^2/|q t|^2, as the point sees it
-        light += dot(one, weights) * light_of(point, q, half_log2_omega - 0.5 * log2(dot(q, q)));
+        let weight = dot(one, weights) * select(1.0, focus_along(q), focused);
+        light += weight * vec4f(light_of(point, q, half_log2_omega - 0.5 * log2(dot(q, q))), 1.0);
         left *= 1.0 - one;
         if (largest_of(left) <= 0.0) { break; }
     }
-    return light / dot(weights, vec4f(1.0));
+    return light.rgb / light.a;
 }
 
 // Without parallax: the light of the points in the ray's own direction.
 fn blended(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
-    let light = weighted(s, r, vec4f(0.0), weights_of(METHOD, s, r), half_log2_omega);
+    let light = weighted(s, r, vec4f(0.0), weights_of(METHOD, s, r), half_log2_omega, false);
     return light * change_along(s, r, 0.0, half_log2_omega);
 }
 
@@ -178,7 +179,8 @@ fn behind(map: Map, o: vec3f, r: vec3f, u: f32) -> Behind {
     return Behind(texel.inverse - u * inverseSqrt(dot(q, q)), texel.cover != 15u);
 }
 
-// The ray's hit on the map's surface. Steps grow from FIRST times the distance of the point to the distance where the parallax is LAST texels of about 4/side rad, and end at infinity.
+// The ray's hit on the map's surface. Steps grow from FIRST times the distance of the point to the distance where the
+// parallax is LAST texels of about 4/side rad, and end at infinity.
 fn marched(point: u32, o: vec3f, r: vec3f) -> MarchEnd {
     let map = map_of(point);
     let texel = 4.0 / f32(field.side);
@@ -237,13 +239,15 @@ fn is_narrow(half_log2_omega: f32) -> bool {
 // between quarters of texels, made steeper.
 fn edge_at(s: Surface, x: vec3f, weights: vec4f) -> vec4f {
     var light = vec3f(0.0);
-    var shows = 1e-9;
+    var shows = 1e-20;
     var sum = vec2f(0.0, 1e-9); // of shares, and number of points
     for (var j = 0u; j < MARCHES; j++) {
         if (s.points[j] == NO_POINT) { continue; }
-        let edge = edge_along(map_of(s.points[j]), x - place_of_point(s.points[j]));
-        light += weights[j] * edge.light;
-        shows += weights[j] * edge.shows;
+        let q = x - place_of_point(s.points[j]);
+        let edge = edge_along(map_of(s.points[j]), q);
+        let weight = weights[j] * focus_along(q);
+        light += weight * edge.light;
+        shows += weight * edge.shows;
         sum += vec2f(edge.share, 1.0);
     }
     return vec4f(light / shows, saturate((sum.x / sum.y - 0.5) * STEEPNESS + 0.5));
@@ -257,10 +261,12 @@ fn marched_light(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
     if (HAS_SKY) { sky = light_of_sky(r, half_log2_omega) * object.sky_change.rgb; }
     if (HAS_SKY && is_sky(s, found.u, half_log2_omega)) { return sky; }
     let nearest = max(largest_of(found.u), 0.0);
+    let is_sharp = nearest > 0.0 && is_narrow(half_log2_omega);
     let weights = weights_of_found(s, found.u);
-    var light = vec4f(weighted(s, r, max(found.u, vec4f(0.0)), weights, half_log2_omega), 1.0);
+    let hits = max(found.u, vec4f(0.0));
+    var light = vec4f(weighted(s, r, hits, weights, half_log2_omega, is_sharp && MARCHES > 1u), 1.0);
     // a loop, which software adapters leave before its first turn where they would take both sides of a branch
-    var at_edge = HAS_SKY && QUARTERS && nearest > 0.0 && found.at_edge && is_narrow(half_log2_omega);
+    var at_edge = HAS_SKY && QUARTERS && found.at_edge && is_sharp;
     for (; at_edge; at_edge = false) {
         light = edge_at(s, s.x + object.centre.xyz + r / nearest, weights);
     }

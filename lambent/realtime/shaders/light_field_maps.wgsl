@@ -50,6 +50,16 @@ fn map_place(w: vec3f) -> vec2f {
     return 0.5 * octahedral(w) + 0.5;
 }
 
+// Weight of a sharp look-up along w, by how near a texel's centre it is: the 8th power of the sum of squared bilinear
+// weights. Of several points that see the same surface, those that blur it least count most.
+fn focus_along(w: vec3f) -> f32 {
+    let share = fract(map_place(w) * f32(field.side) - 0.5);
+    let sums = share * share + (1.0 - share) * (1.0 - share);
+    let sum = sums.x * sums.y;
+    let square = sum * sum;
+    return square * square * square * square;
+}
+
 fn light_corner(map: Map, level: u32) -> vec2u {
     if (level == 0u) { return corner_of(map.place, columns_of(field.tile), vec2u(field.tile)); }
     let tile = field.coarse[level - 1u];
