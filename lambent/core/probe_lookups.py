@@ -10,7 +10,6 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.cubemap import face_directions, sample
-from lambent.core.directions import normalize
 
 PLANE_ACTIVE_M = 1e-6  # planes closer to x than this, or behind it, are ignored
 NEARNESS_MIN = 1e-6  # 1/m: farther planes count as infinitely far
