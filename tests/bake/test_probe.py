@@ -17,9 +17,10 @@ from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.camera import Camera
 from lambent.core.cubemap import face_directions, sample
 from lambent.core.directions import normalize
+from lambent.core.plain import Triple
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
-from lambent.scenes.geometry import box, merge, patch, placed, sphere
+from lambent.scenes.geometry import box, cylinder, merge, patch, placed, sphere
 from lambent.scenes.scene import PointLight, Scene, SceneObject
 from lambent.store.contract import FAR
 from tests.bake.small_scenes import COLOURS, MIRROR, TINY, coloured_room, room_with_step
@@ -151,6 +152,53 @@ def test_the_probe_of_a_floor_does_not_stand_below_the_table_in_its_middle(tmp_p
     x, y, z = meta["centre"]
     assert max(abs(x), abs(z)) > 1 and 1 < y <= 1.6
     assert meta["hidden_share"] < 0.3
+
+
+def tray_on_a_column() -> tuple[SceneObject, ...]:
+    """High above the scene's centre, seen from above."""
+    column = SceneObject("column", placed(box((0.2, 10, 0.2)), (0, -5, 0)), "d")
+    return SceneObject("flat", placed(box((0.8, 0.02, 0.6)), (0, 0.02, 0)), "m"), column
+
+
+def panel_under_a_mast() -> tuple[SceneObject, ...]:
+    """A ceiling panel far below the scene's centre, seen from below."""
+    mast = SceneObject("mast", placed(box((0.2, 20, 0.2)), (2, 12, 0)), "d")
+    return SceneObject("flat", placed(box((0.8, 0.02, 0.6)), (0, 2.0, 0)), "m"), mast
+
+
+def saucer_on_a_hanging_cloth() -> tuple[SceneObject, ...]:
+    cloth = [patch((-0.5, 0, 0.5), (1, 0, 0), (0, 0, -1)), patch((-0.5, -0.8, 0.5), (1, 0, 0), (0, 0.8, 0))]
+    dish = SceneObject("flat", placed(cylinder(0.08, 0.01, 24), (0.1, 0.001, 0.1)), "m")
+    return dish, SceneObject("cloth", merge(cloth), "d")
+
+
+def picture_on_a_house() -> tuple[SceneObject, ...]:
+    house = SceneObject("house", placed(box((6, 4, 8)), (0, 0, -4)), "d")
+    return SceneObject("flat", placed(box((0.8, 0.6, 0.02)), (0, 0.3, 0.02)), "m"), house
+
+
+@pytest.mark.parametrize(
+    ("objects", "eye", "side"),
+    [
+        (tray_on_a_column(), (0.3, 1.2, 1.5), (0, 1, 0)),
+        (panel_under_a_mast(), (0.3, 0.5, 1.5), (0, -1, 0)),
+        (saucer_on_a_hanging_cloth(), (0.3, 0.6, 0.9), (0, 1, 0)),
+        (picture_on_a_house(), (0.6, 0.6, 2.0), (0, 0, 1)),
+    ],
+    ids=["tray", "panel", "saucer", "picture"],
+)
+def test_the_probe_of_a_flat_thing_stands_where_viewers_see_it(
+    tmp_path: Path, objects: tuple[SceneObject, ...], eye: Triple, side: Triple
+) -> None:
+    """Also where the scene's centre lies on its other side."""
+    flat = objects[0].mesh
+    middle = np.mean(flat.bounds, axis=0)
+    camera = Camera("c", eye, (float(middle[0]), float(middle[1]), float(middle[2])))
+    lamp = PointLight((0.5, 0.9, 3.0), (9.0, 9.0, 9.0))
+    scene = Scene("s", objects, {"m": MIRROR, "d": Material(kd=0.5)}, cameras=(camera,), lights=(lamp,))
+    assert (np.mean(scene.bounds, axis=0) - middle) @ side < 0
+    meta = bake(scene, tmp_path / "s", quality=TINY, only={"probe"}).artefact("probe/flat/radiance").meta
+    assert (np.array(meta["centre"]) - middle) @ side > 0.02
 
 
 def test_the_probe_of_a_thing_within_another_is_moved_out() -> None:

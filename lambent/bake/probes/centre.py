@@ -1,9 +1,10 @@
 """Position of an object's probe.
 
 - As given by the scene; else
-- for a flat object (floor, mirror, table top), above it on the side that faces the scene's centre. Half the object's
-  length, half the free distance and EYE_HEIGHT_M bound the height. It is above the object's centre, or, if much of the
-  scene that viewers see mirrored is hidden from there, above another point (`places_above`, `ProbeSet`); else
+- for a flat object (floor, mirror, table top), above it on the side that viewers see, or, without viewers, on the side
+  that faces the scene's centre. Half the object's length, half the free distance and EYE_HEIGHT_M bound the height. It
+  is above the object's centre, or, if much of the scene that viewers see mirrored is hidden from there, above another
+  point (`places_above`, `ProbeSet`); else
 - at the centre of the object's bounds, moved out by the shortest way if it is within another solid.
 """
 
@@ -53,15 +54,15 @@ def centre_among(points: Floats, normals: Floats, middle: Floats, solids: SolidT
 def _centre(points: Floats, axis: Floats | None, middle: Floats, solids: SolidTest | None, without: Any) -> Floats:
     centre = _middle(points)
     if axis is not None:
-        return _above(points, centre, axis, middle, without)
+        return _above(points, centre, _facing(axis, middle - centre), without)
     return centre if solids is None else _moved_out(centre, solids, without)
 
 
-def outside(mesh: Mesh, middle: Floats, whole: Any) -> Floats:
-    """Approximate position of a mesh's probe, from the whole scene."""
+def outside(mesh: Mesh, middle: Floats, ways: Floats, whole: Any) -> Floats:
+    """Approximate position of a mesh's probe, from the whole scene; `middle` and `ways` as for `places_above`."""
     axis = flat_axis(mesh)
     centre = _middle(mesh.positions)
-    return centre if axis is None else _above(mesh.positions, centre, axis, middle, whole)
+    return centre if axis is None else _above(mesh.positions, centre, _seen_side(axis, centre, middle, ways), whole)
 
 
 def _middle(points: Floats) -> Floats:
@@ -83,25 +84,38 @@ def _axis_of(n: Floats, weights: Floats) -> Floats | None:
     return np.asarray(vectors[:, 2]) if values[2] > FLAT_SHARE else None
 
 
-def _above(points: Floats, centre: Floats, axis: Floats, middle: Floats, without: Any) -> Floats:
-    axis = axis if axis @ (middle - centre) >= 0 else -axis
+def _facing(axis: Floats, way: Floats) -> Floats:
+    return axis if axis @ way >= 0 else -axis
+
+
+def _seen_side(axis: Floats, centre: Floats, middle: Floats, ways: Floats) -> Floats:
+    """The axis on the side of most `ways` (n, 3); without any, towards the `middle`."""
+    return _facing(axis, axis * np.sign(ways @ axis).sum() if len(ways) else middle - centre)
+
+
+def _above(points: Floats, centre: Floats, axis: Floats, without: Any) -> Floats:
     top = centre + axis * ((points - centre) @ axis).max()
     size = float(np.ptp(points, axis=0).max())
     free = float(distances(without, rays_from(top + axis * CONTACT_M, axis[None]))[0])
     return np.asarray(top + axis * min(EYE_HEIGHT_M, size / 2, free / 2))
 
 
-def places_above(mesh: Mesh, middle: Floats, without: Any) -> Floats:
-    """(n, 3) candidate positions of a flat object's probe: above its centre, then above points all over it."""
+def places_above(mesh: Mesh, middle: Floats, ways: Floats, without: Any) -> Floats:
+    """(n, 3) candidate positions of a flat object's probe: above its centre, then above points all over it.
+
+    All are on the side of most `ways` (n, 3), rays that viewers see mirrored; without any, on that of the scene's
+    centre, `middle`.
+    """
     axis, centre = flat_axis(mesh), _middle(mesh.positions)
     if axis is None:
         return np.asarray(centre[None])
+    axis = _seen_side(axis, centre, middle, ways)
     steps = (np.arange(GRID) + 0.5) / GRID
     across = np.stack([aside.reshape(3) for aside in basis(axis[None])], axis=1)
     flat = mesh.positions @ across
     at = flat.min(axis=0) + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) * np.ptp(flat, axis=0)
     over = at @ across.T + axis * (axis @ centre)
-    return np.stack([_above(mesh.positions, place, axis, middle, without) for place in (centre, *over)])
+    return np.stack([_above(mesh.positions, place, axis, without) for place in (centre, *over)])
 
 
 def _moved_out(centre: Floats, solids: SolidTest, without: Any) -> Floats:

@@ -125,7 +125,7 @@ class ProbeSet:
         if name in scene.probe_centres or rays is None or self._transmits(name) or flat_axis(mesh) is None:
             return probe_centre(self._builder, name, without, self._solids.within(without))
         seen = seen_along(rays.origins, rays.directions, without)
-        places = places_above(mesh, np.mean(scene.bounds, axis=0), without)
+        places = places_above(mesh, np.mean(scene.bounds, axis=0), rays.directions, without)
         first, *hidden = (hidden_share(seen, place, without) for place in places)
         if first <= HIDDEN:
             return np.asarray(places[0])

@@ -115,8 +115,10 @@ def _judged(builder: SceneBuilder, whole: Any, places: Floats, names: list[str])
     scene = builder.scene
     meshes = [scene.object(name).mesh for name in names]
     middle = np.mean(scene.bounds, axis=0)
-    centres = np.stack([outside(mesh, middle, whole) for mesh in meshes])
     looked = _looked(builder, whole, places, names)
+    clear = np.array([scene.materials[scene.object(name).material].transmits for name in names])
+    ways = [way[valid & ~through] for way, valid, through in zip(looked.ways, looked.valid, clear, strict=True)]
+    centres = np.stack([outside(mesh, middle, way, whole) for mesh, way in zip(meshes, ways, strict=True)])
     given = np.array([name in scene.probe_centres or name in scene.probe_planes for name in names])
     shown = given | ((looked.valid.sum(axis=1) >= SEEN) & (looked.largest >= FEW))
     if not shown.any():
@@ -124,7 +126,6 @@ def _judged(builder: SceneBuilder, whole: Any, places: Floats, names: list[str])
     worth = np.flatnonzero(shown)
     near = np.argsort(np.linalg.norm(centres[worth, None] - centres[worth], axis=2), axis=1)[:, : NEIGHBOURS + 1]
     pairs = np.stack([np.repeat(worth, near.shape[1]), worth[near].ravel()], axis=1)
-    clear = np.array([scene.materials[scene.object(name).material].transmits for name in names])
     alone = np.array([any(scene.object(name).emission) for name in names])  # a lamp that is left out would be missed
     pairs = pairs[(clear[pairs[:, 0]] == clear[pairs[:, 1]]) & ~given[pairs[:, 0]] & ~alone[pairs].any(axis=1)]
     blur = np.array([widest_lobe(scene.materials[scene.object(name).material]) for name in names])
