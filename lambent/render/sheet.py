@@ -171,14 +171,16 @@ def laid_out(
     pictures: Sequence[NDArray[np.uint8]], names: Sequence[str], columns: int, notes: Sequence[str] = ()
 ) -> NDArray[np.uint8]:
     """Pictures (H, W, 3) of one size in rows, with captions: a name, shortened if too long, and a note."""
-    from PIL import Image, ImageDraw, ImageFont
+    from PIL import Image, ImageDraw
+
+    from lambent.core.captions import caption_font
 
     height, width = pictures[0].shape[:2]
     size = max(LEAST_INK_PX, height // 20)
     gap, caption = size // 2, 2 * size
     rows = math.ceil(len(pictures) / columns)
     page = Image.new("RGB", (columns * (width + gap) + gap, rows * (height + caption) + gap), PAPER)
-    draw, font = ImageDraw.Draw(page), ImageFont.load_default(size)
+    draw, font = ImageDraw.Draw(page), caption_font(size)
     for number, (picture, name, note) in enumerate(zip(pictures, names, notes or [""] * len(names), strict=True)):
         row, column = divmod(number, columns)
         x, y = gap + column * (width + gap), gap + row * (height + caption)

@@ -17,6 +17,7 @@ from lambent.scenes.computed import lat_long_image
 from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, Environment, ImageEnvironment
 from lambent.scenes.textures import halved
 
+LEAST_ROWS, LEAST_COLUMNS = 4, 4  # of a lat-long picture: the path tracer interpolates between them
 _UPRIGHT = np.eye(3)
 # Minimal rotations from +y to an axis: columns are the images of +x, +y, +z. Upside down, front stays front.
 _TURNS: dict[Axis, Floats] = {
@@ -33,7 +34,8 @@ def read_lat_long(file: Path, layout: Layout | None = None) -> Image:
     """(H, W, 3) float32 lat-long picture of a file in any layout, detected if `layout` is None.
 
     Negative values, which filters leave next to bright lamps, become black; so do single ones that are not numbers.
-    Single infinite values become 65504, or the picture's largest value.
+    Single infinite values become 65504, or the picture's largest value. Pixels of a picture with fewer than
+    `LEAST_ROWS` or `LEAST_COLUMNS` are repeated.
 
     Raises
     ------
@@ -42,7 +44,9 @@ def read_lat_long(file: Path, layout: Layout | None = None) -> Image:
     """
     picture = read_surroundings(file)
     np.maximum(picture, 0, out=picture)
-    return as_lat_long(picture, layout or layout_of(picture, file), file)
+    picture = as_lat_long(picture, layout or layout_of(picture, file), file)
+    rows, columns = (-(-least // n) for least, n in zip((LEAST_ROWS, LEAST_COLUMNS), picture.shape, strict=False))
+    return picture if rows == columns == 1 else np.ascontiguousarray(picture.repeat(rows, 0).repeat(columns, 1))
 
 
 def read_surroundings(file: Path) -> Image:

@@ -101,3 +101,15 @@ def test_light_is_the_same_with_its_direct_part_kept() -> None:
 
     (alone,), both = sums(False), sums(True)
     assert np.array_equal(alone, both[0]) and np.array_equal(both[0], both[1]), "without a cache all light is direct"
+
+
+def test_unlit_charts_do_not_overflow() -> None:
+    """Beside a lit chart, one whose samples are almost black: shares stay within 0 and 1, without warnings."""
+    labels = np.zeros((64, 64), int)
+    labels[:, 32:] = 1
+    samples = np.random.default_rng(3).gamma(9.0, 2.0 / 9, (2, 64, 64, 3)).astype(np.float32)
+    samples[:, :, 32:] *= 1e-16
+    variance, light = np.full((64, 64), 1e9, np.float32), np.full((64, 64, 3), 2, np.float16)
+    with np.errstate(over="raise"):
+        direct = direct_part(samples[0], samples.mean(axis=0), variance, light, np.ones((64, 64), bool), labels, 16)
+    assert np.isfinite(direct).all() and direct.min() >= 0 and direct.max() <= 2

@@ -10,6 +10,7 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.core.camera import Camera, CameraPath
+from lambent.core.captions import caption_font
 from lambent.core.errors import UserError
 from lambent.core.images import read_encoded, read_image, write_shown
 from lambent.core.light_mix import GroupMix, LightMix, parse_light
@@ -140,6 +141,13 @@ def test_a_sheet_has_every_variant_and_its_name(adapter: None, store: Path, tmp_
         caption = page[39 + y * 60 : 67 + y * 60, 7 + x * 55 : 55 + x * 55]
         assert caption.min() < 0.5 < caption.mean(), "letters on paper"
     assert any("stay as baked" in note for note in notes), "the store has no answer"
+
+
+def test_captions_have_letters_beyond_ascii() -> None:
+    font = caption_font(20)
+    unknown = bytes(font.getmask("\u0378"))
+    shown = [bytes(font.getmask(letter)) for letter in "üéłжλ"]
+    assert unknown not in shown and len(set(shown)) == len(shown)
 
 
 def test_names_and_shapes_of_sheets() -> None:

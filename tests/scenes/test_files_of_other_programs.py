@@ -134,6 +134,14 @@ def test_single_pixels_that_are_not_finite_do_not_spoil_surroundings(tmp_path: P
         read_lat_long(exr(tmp_path / "a.exr", {"RGB": spoilt}))
 
 
+@pytest.mark.parametrize("shape", [(1, 1), (1, 8), (8, 1), (2, 4)])
+def test_surroundings_of_few_pixels_have_enough_for_the_path_tracer(tmp_path: Path, shape: tuple[int, int]) -> None:
+    """Each pixel is repeated, so the light of a row or column stays."""
+    picture = PICTURE[: shape[0], : shape[1]].copy()
+    read = read_lat_long(exr(tmp_path / "a.exr", {"RGB": picture}))
+    assert min(read.shape[:2]) >= 4 and read.mean(axis=(0, 1)) == pytest.approx(picture.mean(axis=(0, 1)), rel=1e-5)
+
+
 def test_a_square_of_one_colour_needs_no_layout() -> None:
     assert layout_of(np.full((1, 1, 3), 0.7, np.float32)) == "lat-long"
 

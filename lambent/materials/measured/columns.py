@@ -40,6 +40,7 @@ _OUT = ("o", "out", "s", "r", "scat", "refl", "v", "view", "e")
 _IN = ("i", "in", "inc", "l", "light", "incident")
 _WAVELENGTH = re.compile(r"(\d+(?:\.\d+)?)_?nm$", re.IGNORECASE)
 _SEPARATORS = re.compile(r"[\s,;]+")
+_BEFORE_UNIT = re.compile(r"\s+(?=[(\[])")  # "theta_i (deg)" is one name
 _LEAST_NUMBERS = 5
 _SCATTERED = 4  # fewer outgoing directions per incident one do not form a grid
 
@@ -118,7 +119,7 @@ def _split(text: bytes) -> tuple[list[str] | None, bytes]:
         line = text[at:end].strip()
         comment = line.startswith((b"#", b"%", b"//"))
         if line:
-            words = _SEPARATORS.split(shown(line.lstrip(b"#%/")).strip(" \t,;"))
+            words = _SEPARATORS.split(_BEFORE_UNIT.sub("", shown(line.lstrip(b"#%/")).strip(" \t,;")))
             angles = {_angle(word) for word in words}
             if {"theta_i", "theta_o"} <= angles and len(words) > 2:
                 named = words
@@ -219,6 +220,11 @@ def assemble(
     """
     angles = _degrees(rows, layout, phi_i_deg)
     check_angles(angles, path)
+    if not layout.radians and angles[:, 2].max(initial=0.0) <= np.pi / 2 and angles[:, 2].max(initial=0.0) > 0.5:
+        raise UserError(
+            "angles seem to be radians", file=path, got=f"theta_o up to {angles[:, 2].max():.3g}",
+            hint="add (rad) to the names of their columns",
+        )  # fmt: skip
     f, said = _values(rows[:, list(layout.values)], layout)
     f = to_f(f, layout.quantity or "f", angles[:, 2])
     require_values(f, usable_values(f), path)

@@ -25,6 +25,8 @@ NON_RECIPROCAL = 0.05  # shares of the mean from which a difference is reported
 ASYMMETRIC = 0.05
 EXTRAPOLATED = 0.005  # share of the pairs of directions above which it is reported
 UNDER_SAMPLED = 0.5  # share of the peak that its neighbours must reach
+SATURATED = 2.0  # tuples at the maximum, by tuples in the tenth below it, above which the maximum is a device's limit
+_LEAST_SATURATED, _STANDS_OUT = 10, 2.0  # tuples at the maximum; its ratio to the median, which an even table lacks
 _MOST_INCIDENT = 400  # a table with more incident directions than this has no grid of them
 _LEAST_TUPLES = 12
 _BY_LIGHT_DEG = 20  # where the lamp is in the way of most devices
@@ -127,6 +129,36 @@ def under_sampled(samples: MeasuredSamples) -> tuple[int, list[str]]:
         f"the peak is under-sampled at {len(peaks)} incident directions: at theta_i = {theta:.3g}, phi_i = {phi:.3g} "
         f"degrees f falls from {highest:.3g} to {beside:.3g} /sr within one step of {step_deg:.2g} degrees"
     ]
+
+
+def saturated(samples: MeasuredSamples) -> tuple[float, list[str]]:
+    """Percentage of the tuples that are at the highest value of a channel, where this is the limit of the device.
+
+    A peak falls off smoothly, so more tuples lie in the tenth below its maximum than exactly at it. Tables of a few
+    discrete values have none there.
+    """
+    share, said = 0.0, []
+    for channel, name in zip(range(samples.f.shape[1]), _CHANNELS[samples.f.shape[1]], strict=True):
+        f = samples.f[:, channel]
+        highest = float(f.max(initial=0.0))
+        at = f >= highest * (1 - 1e-6)
+        below = np.count_nonzero((f > 0.9 * highest) & ~at)
+        if at.sum() < _LEAST_SATURATED or not 0 < SATURATED * below < at.sum() or highest < _STANDS_OUT * np.median(f):
+            continue
+        share = max(share, 100 * float(at.mean()))
+        said.append(
+            f"{at.sum()} tuples have the highest value{name}, {highest:.3g} /sr, and only {below} are just below"
+        )
+    return share, [f"seems saturated: {'; '.join(said)}"] if said else []
+
+
+def one_incident_angle(samples: MeasuredSamples) -> list[str]:
+    """A line if all tuples have the same angle of incidence."""
+    cosines = samples.wi[:, 2]
+    if not len(cosines) or float(np.ptp(cosines)) > 1e-4:
+        return []
+    theta_deg = float(np.degrees(np.arccos(np.clip(cosines.mean(), -1, 1))))
+    return [f"was measured at one angle of incidence, {theta_deg:.3g} degrees: f at all others is a guess"]
 
 
 def too_bright(theta_i_deg: Floats, albedo: Floats) -> list[str]:

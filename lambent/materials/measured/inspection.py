@@ -30,8 +30,8 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
         `faults`: `not_measured_percent`, `not_finite_percent` of the tuples, `negative_percent` of those used,
         `albedo_max`,
         `energy_above_one` (`more_than_arrives`), `non_reciprocal_percent`, `asymmetry_percent`, `retro_ratio` (1 where
-        there is no peak towards the light), `under_sampled` (incident directions), `extrapolated_percent` (of the pairs
-        of directions, scattered tables alone), see `faults`;
+        there is no peak towards the light), `under_sampled` (incident directions), `saturated_percent` of the tuples,
+        `extrapolated_percent` (of the pairs of directions, scattered tables alone), see `faults`;
         `findings`: a sentence for each fault that matters.
     """
     info, samples = table.info, table.samples()
@@ -45,6 +45,7 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
     retro_ratio, towards_light = retro(table, samples)
     isolated, under_sampled = faults.under_sampled(samples)
     extrapolated, beyond = faults.extrapolation(table)
+    saturated, at_limit = faults.saturated(samples)
     too_bright = faults.too_bright(np.array(_THETA_I_DEG), r + t)
     return {
         "file": info.file,
@@ -72,6 +73,7 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
             "asymmetry_percent": 100 * off,
             "retro_ratio": retro_ratio,
             "under_sampled": isolated,
+            "saturated_percent": saturated,
             "extrapolated_percent": 100 * extrapolated,
         },
         "findings": [
@@ -82,6 +84,8 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
             *asymmetric,
             *towards_light,
             *under_sampled,
+            *at_limit,
+            *faults.one_incident_angle(samples),
             *beyond,
         ],
     }

@@ -41,7 +41,6 @@ def f_of(grid_deg: np.ndarray) -> np.ndarray:
 )
 def test_names_separators_and_units(tmp_path: Path, names: str, separator: str, scale: float) -> None:
     path = tmp_path / "a"
-    names = names.replace(" (rad)", "(rad)").replace(" [1/sr]", "[1/sr]")
     path.write_text("% made up\n" * names.startswith("#") + table_text(
         names, np.column_stack([GRID * scale, f_of(GRID)[:, 0]]), separator))  # fmt: skip
     table = load(path)
@@ -163,6 +162,7 @@ ROWS = "0 0 0 0 1\n0 0 20 0 1\n0 0 20 90 1\n"
         ("theta_in theta_inc theta_out brdf\n0 0 0 1\n", "same angle"),
         ("theta_in phi_in theta_out phi_out brdf\n99 0 0 0 1\n", "outside its range"),
         ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 nan\n", "no measured value"),
+        ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 1\n0 0 1.2 3.1 1\n", r"seem to be radians.*add \(rad\)"),
         ("NUM_POINTS 5\nVARS theta_i,phi_i,theta_s,phi_s,BRDF\n0,0,0,0,1\n", "NUM_POINTS: wrong number of tuples"),
         ("VARS theta_i,phi_i,theta_s,phi_s\n0,0,0,0\n", "unknown value columns; found none"),
     ],

@@ -148,3 +148,23 @@ def peaks_of(curve: np.ndarray) -> int:
 def test_one_channel_that_returns_more_than_arrives_is_said() -> None:
     (said,) = too_bright(np.array([10.0, 20.0, 30.0]), np.array([[0.5, 0.5, 0.5], [0.5, 1.2, 0.5], [1.1, 0.5, 0.5]]))
     assert "1.2 of the light (green) at theta_i = 20 degrees" in said and "over 1 at 20, 30 degrees" in said
+
+
+def glossy(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+    half = (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
+    slope = np.sqrt(np.maximum(1 / np.maximum(half[:, 2], 1e-3) ** 2 - 1, 0))
+    return (0.1 + 2 * np.exp(-((slope / 0.3) ** 2)))[:, None]
+
+
+def test_a_saturated_peak_is_reported() -> None:
+    """A device that stops at 1.2 /sr cuts a peak of 2.1; the peak itself, an even and a black table are sound."""
+    found = [line for line in findings(lambda wi, wo: glossy(wi, wo).clip(0, 1.2)) if "saturated" in line]
+    assert len(found) == 1 and "1.2 /sr" in found[0]
+    for sound in (glossy, lambda wi, wo: np.full((len(wi), 1), 0.1), lambda wi, wo: np.zeros((len(wi), 1))):
+        assert not any("saturated" in line for line in findings(sound))
+
+
+def test_one_angle_of_incidence_is_said() -> None:
+    said = "one angle of incidence, 30 degrees"
+    assert any(said in line for line in findings(glossy, theta_i_deg=(30,)))
+    assert not any("one angle of incidence" in line for line in findings(glossy))
