@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.light.direct import direct_part, variance_of
+from lambent.bake.light.direct import direct_part
+from lambent.bake.light.sampling import variance_of
 from lambent.store.answer import read_answer
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, furnace, room_with_step

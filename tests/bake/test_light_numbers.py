@@ -11,14 +11,12 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.engine import engine
 from lambent.bake.light.sampling import relative_noise
-from lambent.bake.light.seams import blend_seams
 from lambent.core.colour import luminance
 from lambent.core.directions import basis, normalize
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Material
 from lambent.scenes.scene import DirectionalLight, SunSky
 from tests.bake.small_scenes import TINY, furnace, plane
-from tests.bake.test_seams import CUT, two_charts
 
 
 def test_noise_is_half_the_difference_over_the_mean() -> None:
@@ -79,14 +77,6 @@ def test_the_sun_stands_where_it_is_said_to() -> None:
     light = np.where(light > 0.02 * light.max(), light, 0)
     off = np.degrees([light @ x / light.sum(), light @ y / light.sum()])
     assert np.abs(off).max() < 0.03
-
-
-def test_sides_of_a_sheet_are_not_blended() -> None:
-    """Two charts at one height that face away from each other."""
-    texels, labels, image = two_charts(height=0.0)
-    second = texels.index % labels.shape[1] >= 20
-    texels = replace(texels, normals=np.where(second[:, None, None], -texels.normals, texels.normals))
-    assert np.allclose(blend_seams(image, labels >= 0, texels, labels, CUT)[:, :20], 1.0)
 
 
 def test_a_coupled_diffuse_reflectance_falls_with_the_viewers_cosine() -> None:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 KIND = "light_map"
 NEEDS = ("geometry",)
-REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 5, 5, 3, 1, 1
+REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 6, 6, 3, 1, 1
 REVISION_OF_DIRECT, REVISION_OF_PARTS = 4, 3
 IRRADIANCE = tuple(f"light_map/{side}" for side in SIDES)
 NOISE = tuple(noise_name(side) for side in SIDES)
@@ -183,8 +183,8 @@ def _bumpy_faces(context: BakeContext) -> Flags:
 
 
 def _sampled_maps(context: BakeContext) -> Maps:
-    from lambent.bake.light.direct import direct_part, variance_of
-    from lambent.bake.light.sampling import SMOOTH, finished, gathered, path_traced, sampled_halves
+    from lambent.bake.light.direct import direct_part
+    from lambent.bake.light.sampling import SMOOTH, finished, gathered, path_traced, sampled_halves, variance_of
     from lambent.bake.tracing.path_tracer import AllLight
 
     def maps(stage: str, sampling: Sampling) -> Maps:

@@ -32,7 +32,7 @@ def direct_part(
     direct, whole : (H, W, 3)
         Samples of direct and of all light, valid where `known` (H, W).
     variance : (H, W)
-        Squared standard error of the luminance of `whole`, or more: see `variance_of`.
+        Squared standard error of the luminance of `whole`, or more: see `sampling.variance_of`.
     labels : (H, W) int
         Chart of each texel.
     smooth : int
@@ -49,11 +49,6 @@ def direct_part(
     clean += (share - clean) * _trust(share, clean, whole, variance, known, labels)
     clean = fill(clean, known, labels).clip(0, 1)
     return np.asarray(np.minimum(clean.astype(np.float32) * light, light), np.float16)
-
-
-def variance_of(halves: Floats) -> Floats:
-    """Squared standard error (H, W) of the luminance of the mean of two halves (2, H, W, 3), from one difference."""
-    return np.asarray(luminance(np.asarray(halves[0] - halves[1], np.float32) / 2) ** 2)
 
 
 def _trust(share: Floats, clean: Floats, whole: Floats, variance: Floats, known: Flags, labels: Indices) -> Floats:

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from lambent.bake.light.sampling import cleaned, sampled_halves
+from lambent.bake.light.sampling import cleaned, sampled_halves, variance_of
 from lambent.bake.light.stitching import Cuts
 from lambent.bake.surfaces.texels import Texels
 from lambent.bake.watch import Watch
@@ -45,15 +45,16 @@ class EarlyLight:
             return  # the complete light map follows
         halves, known = sampled_halves(raw)
         light = [halves.mean(axis=0)]
+        variance = variance_of(halves)
         if self._groups:
             by_group = self._store.read_partial(self._parts)[0][0]
             light = [by_group[..., 3 * number : 3 * number + 3] for number in range(self._groups)]
-        self._watch.region(np.stack([self._clean(one, known) for one in light]), self._finished())
+        self._watch.region(np.stack([self._clean(one, known, variance) for one in light]), self._finished())
         now_s = time.monotonic()
         self._next_s = now_s + pause * (now_s - began_s)
 
-    def _clean(self, light: Floats, known: Flags) -> Floats:
-        return cleaned(light, known, *self._surface) if light.any() else np.zeros(light.shape, np.float16)
+    def _clean(self, light: Floats, known: Flags, variance: Floats) -> Floats:
+        return cleaned(light, known, *self._surface, variance) if light.any() else np.zeros(light.shape, np.float16)
 
     def _finished(self) -> Flags:
         """(H, W) texels of written tiles."""

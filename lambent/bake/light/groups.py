@@ -15,10 +15,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.light.denoise import denoise_charts, fill
-from lambent.bake.light.direct import direct_part, variance_of
-from lambent.bake.light.level import with_level
-from lambent.bake.light.sampling import SMOOTH, closed, relative_noise, sampled_halves
+from lambent.bake.light.denoise import fill
+from lambent.bake.light.direct import direct_part
+from lambent.bake.light.sampling import SMOOTH, closed, denoised, relative_noise, sampled_halves, variance_of
 from lambent.bake.light.stitching import Cuts
 from lambent.bake.surfaces.texels import BEYOND, Texels
 from lambent.bake.tracing.rays import array_of, vectors
@@ -96,18 +95,19 @@ def finished_groups(
     halves, known = sampled_halves(raw)
     samples = float(raw[..., 3].sum(axis=0)[known].mean()) if known.any() else 0.0
     by_group = np.moveaxis(parts.reshape(*known.shape, -1, 3), 2, 0)
+    variance = variance_of(halves)  # of all groups: of each, it is no more
     clean = by_group[:count].copy()
     for number, one in enumerate(clean):
         progress(number, len(by_group), "denoising by group")
         if known.any() and one.any():
-            clean[number] = with_level(denoise_charts(one, known, labels, smooth=SMOOTH), one, known, labels)
+            clean[number] = denoised(one, known, labels, variance)
     light, direct = np.zeros((count, *known.shape, 3), np.float16), None
     lit = np.flatnonzero(clean.any(axis=(1, 2, 3)))
     if len(by_group) == count:
         light[lit] = _filled(clean[lit], known, labels)
     else:
         light[lit] = closed(clean[lit], known, texels, labels, cuts) if len(lit) else 0
-        direct, variance = np.zeros_like(light), variance_of(halves)  # of all groups: of each, it is no more
+        direct = np.zeros_like(light)
         for number in lit.tolist():
             progress(count + number, len(by_group), "denoising by group")
             of_samples = by_group[count + number], by_group[number], variance

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.light.denoise import denoise_charts, fill
+from lambent.bake.light.detail import with_detail
 from lambent.bake.light.level import with_level
-from lambent.bake.light.seams import blend_seams
 from lambent.bake.light.stitching import Cuts, stitched
 from lambent.bake.surfaces.texels import POINTS, Sides, Texels, area_of_texels, covered_share
 from lambent.bake.tracing import path_tracer
@@ -172,7 +172,12 @@ def finished(raw: Floats, texels: Texels, labels: Indices, cuts: Cuts) -> tuple[
     halves, known = sampled_halves(raw)
     samples = float(raw[..., 3].sum(axis=0)[known].mean()) if known.any() else 0.0
     meta = {"noise": relative_noise(halves[:, known]), "samples": samples}
-    return cleaned(halves.mean(axis=0), known, texels, labels, cuts), meta
+    return cleaned(halves.mean(axis=0), known, texels, labels, cuts, variance_of(halves)), meta
+
+
+def variance_of(halves: Floats) -> Floats:
+    """Squared standard error (H, W) of the luminance of the mean of two halves (2, H, W, 3), from one difference."""
+    return np.asarray(luminance(np.asarray(halves[0] - halves[1], np.float32) / 2) ** 2)
 
 
 def sampled_halves(raw: Floats) -> tuple[Floats, Flags]:
@@ -181,18 +186,29 @@ def sampled_halves(raw: Floats) -> tuple[Floats, Flags]:
     return raw[..., :3] / np.maximum(count, 1), count[0, ..., 0] > 0
 
 
-def cleaned(irradiance: Floats, known: Flags, texels: Texels, labels: Indices, cuts: Cuts) -> NDArray[np.float16]:
-    """Denoise a light map (H, W, 3), fill unknown texels, blend and close its seams."""
+def cleaned(
+    irradiance: Floats, known: Flags, texels: Texels, labels: Indices, cuts: Cuts, variance: Floats | None = None
+) -> NDArray[np.float16]:
+    """Denoise a light map (H, W, 3), fill unknown texels and close its seams; `variance` as in `denoised`."""
     if not known.any():
         return np.zeros(irradiance.shape, np.float16)
-    clean = with_level(denoise_charts(irradiance, known, labels, smooth=SMOOTH), irradiance, known, labels)
+    clean = denoised(irradiance, known, labels, variance)
     return np.asarray(closed(clean[None], known, texels, labels, cuts)[0], np.float16)
 
 
+def denoised(irradiance: Floats, known: Flags, labels: Indices, variance: Floats | None = None) -> Floats:
+    """Denoise a light map (H, W, 3) at the level of its samples.
+
+    With the `variance` (H, W) of its luminance, detail that the filter loses is kept.
+    """
+    clean = with_level(denoise_charts(irradiance, known, labels, smooth=SMOOTH), irradiance, known, labels)
+    return clean if variance is None else with_detail(clean, irradiance, variance, known, labels)
+
+
 def closed(clean: Floats, known: Flags, texels: Texels, labels: Indices, cuts: Cuts) -> NDArray[np.float16]:
-    """Fill unknown texels of denoised light maps (n, H, W, 3), and blend and close their seams."""
+    """Fill unknown texels of denoised light maps (n, H, W, 3), and close their seams."""
     together = np.concatenate(list(clean), axis=-1)
-    together = fill(blend_seams(together, known, texels, labels, cuts), known, labels)
+    together = fill(together, known, labels)
     each = np.split(together, len(clean), axis=-1)
     areas = area_of_texels(texels), covered_share(texels)
     return np.array([np.minimum(stitched(one, cuts, labels, *areas), HALF_MAX) for one in each], np.float16)

@@ -7,6 +7,9 @@ their light more firmly the more surface they hold, because a change shows on al
 
 If one side is a sliver, such as the chamfer of a tile, it follows the broad side: a chamfer's texels include the dark
 joint, which would appear as a line on the broad side.
+
+Sides that differ much keep most of their difference: where a smooth surface dips into a gap or turns away from a
+window, light changes within a texel, and agreement would carry it a texel far into the dark, and darkness into light.
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ FILLED, COVERED = (
     5.0,
 )  # weight of the light of texels that hold none of their own; more for a whole texel of surface
 NARROW = 0.25  # a side with less than this share of the other side's area follows that
+CONTRAST = 0.2  # of the brighter side's light: larger steps are light rather than noise, as at contacts and edges
 DARK = 0.01  # relative to the mean light: smaller differences are ignored
 STEPS, RESIDUE = 100, 1e-3  # of conjugate gradients
 
@@ -106,8 +110,8 @@ def _close(irradiance: Floats, texel: NDArray[Any], share: Floats, own: Floats, 
     least = DARK * max(float(luminance(irradiance).mean()), 1e-12)
     relative = 1 / np.maximum(luminance(values), least) ** 2
     of_row = relative[number].min(axis=1)
-    np.minimum.at(relative, number, of_row[:, None])  # dark texels next to light ones may change
-    weight = np.sqrt(AGREE * of_row)[:, None] * share
+    likeness = _likeness(luminance(values)[number] * share, least)
+    weight = np.sqrt(AGREE * of_row * likeness)[:, None] * share
     rows = np.arange(0, weight.size + 1, weight.shape[1])
     apart = csr_matrix((weight.ravel(), number.ravel(), rows), shape=(len(weight), len(touched)))
     free = moving[touched]
@@ -123,6 +127,13 @@ def _close(irradiance: Floats, texel: NDArray[Any], share: Floats, own: Floats, 
         found[touched[free], channel], _ = cg(system, aim[:, channel], x0=start, rtol=RESIDUE, maxiter=STEPS, M=first)
     found[touched] = found[touched].clip(*_ranges(values, number, share))
     return np.asarray(found.reshape(irradiance.shape), irradiance.dtype)
+
+
+def _likeness(light: Floats, least: float) -> Floats:
+    """Weight (n,) of agreement of look-ups `light` (n, 8), the other side's negative: 1 if equal, less by contrast."""
+    one, other = light[:, :4].sum(axis=1), -light[:, 4:].sum(axis=1)
+    apart = np.abs(one - other) / np.maximum(np.maximum(one, other), least)
+    return np.asarray(1 / (1 + (apart / CONTRAST) ** 2) ** 2)
 
 
 def _ranges(values: Floats, number: NDArray[Any], share: Floats) -> tuple[Floats, Floats]:
