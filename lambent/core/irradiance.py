@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from lambent.core.arrays import Floats
@@ -27,6 +29,11 @@ def irradiance_from(w: Floats, flux: Floats) -> Floats:
 
 def irradiance_of(radiance: Floats) -> Floats:
     """Coefficients (9,), by `basis_of` normals, of the luminance of irradiance from a radiance cube (6, N, N, 3)."""
-    n = radiance.shape[1]
-    flux = luminance(radiance.astype(float)) * texel_solid_angles(n)
-    return irradiance_from(normalize(face_directions(n)).reshape(-1, 3), flux.ravel())
+    return np.asarray(luminance(radiance.astype(float)).ravel() @ _weights_of_cube(radiance.shape[1]))
+
+
+@lru_cache(maxsize=8)
+def _weights_of_cube(n: int) -> Floats:
+    """(6 n n, 9) what a texel's radiance contributes to each coefficient."""
+    by_direction = WEIGHTS * basis_of(normalize(face_directions(n)))  # (6, n, n, 9)
+    return np.asarray((by_direction * texel_solid_angles(n)[..., None]).reshape(-1, 9))

@@ -54,6 +54,16 @@ def edited_albedos(baked: Sequence[Material], edited: Sequence[Material]) -> Alb
     return Albedos(reflected, transmitted)
 
 
+def changed_lobes(baked: Sequence[Material], edited: Sequence[Material]) -> Floats:
+    """(M, 3) how much light the changed lobes of materials scatter less or more, of all that they receive."""
+    found = np.zeros((len(baked), 3))
+    for number, (before, after) in enumerate(zip(baked, edited, strict=True)):
+        if before.lobes != after.lobes:
+            sides = [[lobe_albedo(one, side) for side in ("reflection", "transmission")] for one in (before, after)]
+            found[number] = np.abs(np.subtract(*sides)).sum(axis=0)
+    return found
+
+
 def lobe_albedo(material: Material, side: str) -> Floats:
     """Equivalent diffuse albedo (3,) of a material's lobes on a side, "reflection" or "transmission"."""
     lobes = specular_only(material)

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.answer import Albedos, Answer, side_by_side, upsampled
+from lambent.core.answer_probes import change
 from lambent.core.arrays import Floats
 from lambent.core.irradiance import irradiance_of
-from lambent.materials.diffuse_albedos import albedos_of, edited_albedos
+from lambent.materials.diffuse_albedos import albedos_of, changed_lobes, edited_albedos
 from lambent.materials.document import Material
 from lambent.realtime.answered.gpu_answer import TexelsOnGpu, Unsolved, gpu_answer
 from lambent.realtime.answered.stages import NoRoom
@@ -28,9 +29,10 @@ from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.lit_texels import LitTexels, mix_into
 from lambent.realtime.resources import SceneResources, light_layers
 from lambent.realtime.texture_detail import Detail, TextureDetails, Textures, own_rows, placed_alike, with_own_albedos
-from lambent.store.answer import SeenSpots, StoredAnswer
+from lambent.store.answer import StoredAnswer
 
-MARGIN = 1.4  # factor on the estimated error; error over estimate was at most 1.33 in 19 edits of three rooms
+MOST_WRONG = 0.3  # relative error of the computed indirect light before edits that counts; more lies at contacts
+OF_CHANGE, OF_TEXTURE = 0.1, 0.15  # error of a change itself, by noise; with textures, by detail between points, too
 ERROR_TEXELS = 1 << 15  # texels in the estimate of the error, about; more would make an edit wait
 NO_TEXTURES: Textures = {}
 FAINT = 0.01  # of the mean indirect light: darker texels do not count in the estimate of the error
@@ -41,7 +43,7 @@ class Lit:
     """Light of the answering texels for materials with these albedos.
 
     `is_baked`: this is the baked light. `on_gpu`: the light in GPU memory, if a GPU computed it. `detail`: that of
-    exchanged textures.
+    exchanged textures. `lobes`: (M, 3) how much the lobes of materials scatter less or more than the baked ones.
     """
 
     in_memory: NDArray[np.float32] | None
@@ -50,6 +52,7 @@ class Lit:
     is_baked: bool
     on_gpu: TexelsOnGpu | None = None
     detail: Detail | None = None
+    lobes: Floats | None = None
 
     @cached_property
     def irradiance(self) -> NDArray[np.float32]:
@@ -93,6 +96,7 @@ class AnsweredLight:
         self._reference = stored.answer.reference()
         self._as_baked = Lit(stored.answer.baked, *_shown(self._materials), is_baked=True)
         self._device = device
+        self._seen: dict[str, tuple[NDArray[Any], ...]] = {}
         self._by_material = _Computed(stored.answer, self._reference, stored.texels, device)
 
     @property
@@ -111,7 +115,8 @@ class AnsweredLight:
             by, rows = self._by_point, own_rows(self._stored.answer)
             albedos = detail.albedos(Albedos(of_materials.reflected[rows], of_materials.transmitted[rows]))
         in_memory, on_gpu = by.light(albedos)
-        return Lit(in_memory, *_shown(now), is_baked=False, on_gpu=on_gpu, detail=detail)
+        lobes = changed_lobes(self._materials, now)
+        return Lit(in_memory, *_shown(now), is_baked=False, on_gpu=on_gpu, detail=detail, lobes=lobes)
 
     @cached_property
     def _by_point(self) -> _Computed:
@@ -192,30 +197,29 @@ class AnsweredLight:
 
     def probe_changes(self, name: str, light: Lit) -> NDArray[np.float32]:
         """`probe_change` by light group, (G, 6, N, N, 3)."""
-        seen, before = self._stored.seen[name], self._as_baked
-        at = np.flatnonzero(seen.texel.reshape(-1) >= 0)
-        texel = seen.texel.reshape(-1)[at]
-        tint = seen.tint.reshape(-1, 3).astype(np.float32)
-        both = (tint, tint) if light.detail is None else self._details.tints(name, seen, light.detail)
-        was, now = (one[at] / np.float32(np.pi * self._baked.unit) for one in both)
+        seen, as_baked, stored = self._stored.seen[name], self._as_baked, self._stored
+        places, texels, tint, sun = self._seen_by(name)
+        tints = [tint, tint]
+        if light.detail is not None:
+            per_unit = np.float32(1 / (np.pi * self._baked.unit))
+            tints = [per_unit * one[places] for one in self._details.tints(name, seen, light.detail)]
         found = np.zeros((len(light.irradiance), seen.texel.size, 3), np.float32)
-        for group, of_group in enumerate(found):
-            sent = (self._sent(seen, at, texel, one, group) for one in (before, light))
-            of_group[at] = -was * next(sent) + now * next(sent)
+        states = (
+            (one.irradiance, by, one.reflected, one.transmitted)
+            for one, by in zip((as_baked, light), tints, strict=True)
+        )
+        change(found, places, texels, stored.material, stored.other, sun, stored.of_sun, *states)
         return found.reshape(len(found), *seen.texel.shape, 3)
 
-    def _sent(self, seen: SeenSpots, at: NDArray[np.intp], texel: NDArray[np.int64], light: Lit, group: int) -> Floats:
-        """Diffuse exitance (n, 3), untextured, of the light-map texels that a probe's texels `at` see, by one group."""
-        material, other, irradiance = self._stored.material[texel], self._stored.other[texel], light.irradiance[group]
-        power = self._stored.sun.astype(np.float32) * (group == self._stored.of_sun)
-        sun = seen.sun.reshape(-1)[at].astype(np.float32)[:, None] * power
-        this_side = irradiance[texel] + np.maximum(sun, 0)
-        sent = light.reflected[material] * this_side
-        crossed = np.flatnonzero((other >= 0) & light.transmitted[material].any(axis=1))
-        if len(crossed):
-            other_side = irradiance[other[crossed]] + np.maximum(-sun[crossed], 0)
-            sent[crossed] += light.transmitted[material[crossed]] * other_side
-        return np.asarray(sent)
+    def _seen_by(self, name: str) -> tuple[NDArray[Any], ...]:
+        """Texels (n,) of a probe that see answering ones; numbers, textures over pi (n, 3) and the sun of these."""
+        if name not in self._seen:
+            seen = self._stored.seen[name]
+            places = np.flatnonzero(seen.texel.reshape(-1) >= 0)
+            tint = seen.tint.reshape(-1, 3)[places].astype(np.float32) / np.float32(np.pi * self._baked.unit)
+            sun = seen.sun.reshape(-1)[places].astype(np.float32)[:, None] * self._stored.sun.astype(np.float32)
+            self._seen[name] = places, seen.texel.reshape(-1)[places], tint, sun
+        return self._seen[name]
 
     def probe_irradiance(self, name: str, change: Floats) -> tuple[float, ...]:
         """`Probe.irradiance` of a probe after a `change` (6, N, N, 3) of its radiance; empty if the baked one is."""
@@ -225,21 +229,37 @@ class AnsweredLight:
     def likely_error(self, light: Lit, factors: Floats | None = None) -> float:
         """Estimated bound on the texels' RMS error over their mean light, in a mix of `factors` (G, 3).
 
-        The estimate compares computed with baked indirect light before any edit. This relative error, times MARGIN,
-        applies to the change by the edit, or to the remaining light if that is less. The direct sun counts as light and
-        never changes.
+        The change by the edit, or the remaining light if that is less, is uncertain by the relative error of the
+        computed indirect light before any edit, as far as MOST_WRONG, and by OF_CHANGE. All light that changed lobes
+        scatter less or more is uncertain: where it goes is not known. The direct sun counts as light and never changes.
         """
-        answer = self._stored.answer
-        shares = np.ones((len(answer.baked), 3), np.float32) if factors is None else np.asarray(factors, np.float32)
-        step = max(1, len(self._stored.texels) // ERROR_TEXELS)
-        lights = (of[:, ::step] for of in (light.irradiance, answer.baked, answer.direct, self._reference))
-        now, before, direct, computed = (np.einsum("gtc,gc->tc", one, shares) for one in lights)
+        before, direct, computed = self._error_texels
+        now = np.ascontiguousarray(light.irradiance[:, :: self._error_step])
+        shares = np.ones((len(now), 3), np.float32) if factors is None else np.asarray(factors, np.float32)
+        now, before, direct, computed = (
+            np.einsum("gtc,gc->tc", one, shares) for one in (now, before, direct, computed)
+        )
         indirect = before - direct
         known = indirect > FAINT * indirect.mean()
         wrong = np.divide(computed, indirect, out=np.ones_like(computed), where=known) - 1
-        off = np.minimum(np.abs(wrong), 1) * np.minimum(np.abs(now - before), now)
+        noise = OF_CHANGE if light.detail is None else OF_TEXTURE
+        off = np.hypot(np.minimum(np.abs(wrong), MOST_WRONG), noise) * np.minimum(np.abs(now - before), now)
+        if light.lobes is not None and light.lobes.any():
+            off = np.hypot(off, light.lobes[self._stored.material[:: self._error_step]] * now)
         mean = float((now.mean(axis=0) + self._mean_sun * shares[self._stored.of_sun]).mean())
-        return MARGIN * float(np.sqrt((off**2).mean())) / max(mean, 1e-30)
+        return float(np.sqrt((off**2).mean())) / max(mean, 1e-30)
+
+    @property
+    def _error_step(self) -> int:
+        """Every how many texels one counts in the estimate of the error."""
+        return max(1, len(self._stored.texels) // ERROR_TEXELS)
+
+    @cached_property
+    def _error_texels(self) -> tuple[NDArray[np.float32], ...]:
+        """Baked, direct and computed indirect light (G, n, 3) of the texels that count in the estimate of the error."""
+        answer = self._stored.answer
+        lights = answer.baked, answer.direct, self._reference
+        return tuple(np.ascontiguousarray(of[:, :: self._error_step], np.float32) for of in lights)
 
     @cached_property
     def _mean_sun(self) -> NDArray[np.float32]:

@@ -2,12 +2,14 @@
 
 A thread computes the arrays and never touches the GPU; finished arrays are uploaded before a frame. If the mix changes
 while the thread works, it finishes the current part, then computes the light map, so that a dragged slider shows at
-once, and then the probes in turn. Light that answers edited materials by group (`answering.AnsweredGroups`) takes the
-same path.
+once. Probes follow in turn, one for every few light maps while the mix goes on changing, and all once it rests. Light
+that answers edited materials by group (`answering.AnsweredGroups`) takes the same path.
 """
 
 from __future__ import annotations
 
+import math
+import time
 from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
@@ -29,6 +31,8 @@ from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.resources import SceneResources
 from lambent.realtime.uploads import with_alpha
 
+MAPS_PER_PROBE = 4  # while the light changes: probes that lag show less than a light map that does
+REST_S = 0.25  # after a change: until then the next is expected, as in a drag
 MAP = -1  # number of the light map among the parts; other numbers are probes
 
 
@@ -52,6 +56,9 @@ class LightMixer:
         self._sky_of: Floats | None = None  # mix that the sky was last computed for
         self._answer: GroupLight | None = None  # light for edited materials, which replaces the baked light
         self._answers = 0  # answers received
+        self._maps_in_turn = 0  # light maps since the last probe
+        self._changed_s = -math.inf  # when light or mix changed last
+        self._rests = False  # probes wait for light and mix to rest
         self._is_software = adapter_info(layouts.device).is_software
 
     @property
@@ -77,7 +84,10 @@ class LightMixer:
         groups = self._scene.groups
         if groups is None or (self._wanted is None and not light):
             return
-        self._wanted = groups.factors(light)
+        wanted = groups.factors(light)
+        if self._wanted is None or not np.array_equal(wanted, self._wanted):
+            self._wanted, self._changed_s = wanted, time.monotonic()
+        self._rests = not waits
         while True:
             if self._work is not None and (waits or self._work.done()):
                 self._work.result()
@@ -92,7 +102,7 @@ class LightMixer:
         """Mix these arrays from the next frame on: light that answers edited materials, or the scene's own again."""
         if self._wanted is None:
             self._wanted = groups.factors({})
-        self._answer = replace(self._light, groups=groups)
+        self._answer, self._changed_s = replace(self._light, groups=groups), time.monotonic()
         self._answers += 1  # written last and read first by the thread, so that it never takes old light for new
 
     @property
@@ -138,7 +148,7 @@ class LightMixer:
         return [p for p in sorted(parts, key=lambda p: (p != MAP, age.get(p, -1))) if self._made.get(p) != now]
 
     def _make(self, *, beside: bool) -> None:
-        """Compute stale parts until none is left; while the mix changes, the light map and a probe alternate.
+        """Compute stale parts until none is left; while the mix changes, a probe follows every few light maps.
 
         `beside`: frames are drawn meanwhile, by the processor.
         """
@@ -146,11 +156,14 @@ class LightMixer:
             self._make_stale()
 
     def _make_stale(self) -> None:
-        turn = False
         while stale := self._stale():
             assert self._wanted is not None
-            part = stale[1] if turn and stale[0] == MAP and len(stale) > 1 else stale[0]
-            turn, factors = part == MAP, self._wanted
+            is_turn = self._maps_in_turn >= MAPS_PER_PROBE
+            if stale[0] != MAP and not is_turn and self._rests and time.monotonic() < self._changed_s + REST_S:
+                time.sleep(REST_S / 16)
+                continue
+            part, factors = stale[1] if is_turn and stale[0] == MAP and len(stale) > 1 else stale[0], self._wanted
+            self._maps_in_turn = self._maps_in_turn + 1 if part == MAP else 0
             state = self._state(factors)
             made = self._map(factors) if part == MAP else self._probe(part, factors)
             self._made.pop(part, None)

@@ -15,6 +15,7 @@ from lambent.core.light_mix import Factors
 from lambent.realtime.baked import BakedScene, read_baked
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.group_light import GroupLight
+from lambent.realtime.light_mixer import MAP
 from lambent.realtime.renderer import Renderer
 from lambent.store.contract import scene_record, write_scene_record
 from lambent.store.store import Store
@@ -127,3 +128,25 @@ def test_a_store_without_groups_shows_its_light(device: Any, tmp_path: Path) -> 
     scene = read_baked(Store.open(write_small_store(tmp_path / "s")))
     assert scene.groups is None
     np.testing.assert_array_equal(image(device, scene, {"lamp": DARK}), image(device, scene, {}))
+
+
+def test_probes_follow_every_few_light_maps_while_the_mix_changes(
+    device: Any, scene: BakedScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mixer = Renderer(device, scene).mixer
+    mixer.follow({NAMES[0]: DARK}, waits=True)
+    made: list[int] = []
+
+    def changes(part: int) -> None:
+        made.append(part)
+        if len(made) < 20:  # a slider that is dragged
+            assert mixer._wanted is not None
+            mixer._wanted = mixer._wanted * np.float32(0.9)
+
+    monkeypatch.setattr(mixer, "_map", lambda factors: changes(MAP))
+    monkeypatch.setattr(mixer, "_probe", lambda part, factors: changes(part))
+    mixer._wanted = 0.5 * np.asarray(mixer._wanted)
+    mixer._make(beside=False)
+    dragged = np.array(made[:20]) == MAP
+    assert 0.75 <= dragged.mean() < 1, "maps first, but probes are not forgotten"
+    assert not mixer._stale(), "at rest all parts follow"

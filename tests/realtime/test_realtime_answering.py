@@ -7,6 +7,7 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.core.camera import Camera
+from lambent.materials.document import Lobe
 from lambent.materials.recolour import recoloured
 from lambent.realtime.answer_shown import AnswerShown, answered
 from lambent.realtime.answering import AnsweredLight, answered_scene
@@ -49,11 +50,21 @@ def test_red_walls_redden_the_room_and_its_reflection(store: Store) -> None:
 
 def test_the_error_of_some_texels_stands_for_that_of_all(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     baked, stored = read_baked(store), read_answer(store)
-    answer = AnsweredLight(baked, stored)
+    answer, other = AnsweredLight(baked, stored), AnsweredLight(baked, stored)
     light = answer.lit(recoloured(baked.record.materials, {"grey": (0.5, 0.05, 0.05)}))
     of_all = answer.likely_error(light)
     monkeypatch.setattr("lambent.realtime.answering.ERROR_TEXELS", len(stored.texels) // 3)
-    assert answer.likely_error(light) == pytest.approx(of_all, rel=0.3) and answer.likely_error(light) != of_all
+    assert other.likely_error(light) == pytest.approx(of_all, rel=0.3) and other.likely_error(light) != of_all
+
+
+def test_light_of_changed_lobes_is_uncertain(store: Store) -> None:
+    """A metal that replaces half of a diffuse colour sends as much light, but elsewhere."""
+    baked, stored = read_baked(store), read_answer(store)
+    answer, grey = AnsweredLight(baked, stored), baked.record.materials["grey"]
+    lobe = Lobe(side="reflection", distribution="beckmann", k=(0.5,) * 3, mx=0.1, my=0.1, r0=(0.9,) * 3)
+    half = tuple(c / 2 for c in grey.kd)
+    dull, shiny = (grey.model_copy(update={"kd": half, "lobes": lobes}) for lobes in (grey.lobes, (*grey.lobes, lobe)))
+    assert answer.likely_error(answer.lit({"grey": shiny})) > 1.4 * answer.likely_error(answer.lit({"grey": dull}))
 
 
 def test_light_that_is_changed_on_the_gpu_is_that_of_a_new_scene(store: Store) -> None:

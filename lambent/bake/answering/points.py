@@ -185,13 +185,14 @@ def neighbours(spots: Spots, points: GatherPoints) -> tuple[NDArray[np.uint32], 
             mine = np.flatnonzero(spots.there[side] & (owner + side == one))
             known = np.flatnonzero(point_owner == one)
             count = min(NEAR, len(known))
-            found = np.concatenate(
-                [
-                    KDTree(of[points.texel[known]]).query(of[mine], k=np.arange(1, count + 1))[1]
-                    for of in (place, by_chart)
-                ],
-                axis=1,
+            query = np.arange(1, count + 1)
+            found = np.tile(KDTree(place[points.texel[known]]).query(place[mine], k=query)[1], 2)
+            others = np.flatnonzero(
+                (spots.chart[points.texel[known[found[:, :count]]]] != spots.chart[mine][:, None]).any(axis=1)
             )
+            if len(others):  # elsewhere the nearest of all are the nearest of the chart
+                of_chart = KDTree(by_chart[points.texel[known]]).query(by_chart[mine[others]], k=query)[1]
+                found[others, count:] = of_chart
             found.sort(axis=1)  # files pack it well
             share = _shares(spots, mine, points, known[found])
             share[:, 1:][np.diff(found, axis=1) == 0] = 0  # named twice

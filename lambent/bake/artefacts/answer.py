@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 KIND = "answer"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 10
+REVISION = 11
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
@@ -64,7 +64,7 @@ class Settings:
     """
 
     patches: int = 1000
-    gather_rays: int = 256
+    gather_rays: int = 192
     receiver_rays: int = 64
     block: int = 4
     direct_samples: int = 32
@@ -265,7 +265,7 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     exitance = spots.exitance(context.scene)
 
     def sighted(of: GatherPoints) -> GatherPoints:
-        return seeing(spots, of, light_seen(ends, spots, sides, of, exitance, how.importance_rays, context.seed))
+        return seeing(spots, of, light_seen(ends, spots, sides, of, exitance, how.importance_rays // 2, context.seed))
 
     points = sighted(refined_points(spots, width, coarse, distance))
     receivers = sighted(receiving_points(spots, width, coarse, distance, points))
