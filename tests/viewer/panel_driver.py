@@ -8,7 +8,8 @@ from lambent.viewer import layout
 
 RECORDED = (
     "slider_float", "slider_float3", "slider_int", "combo", "checkbox", "radio_button", "button", "selectable",
-    "input_text", "input_text_with_hint", "collapsing_header", "color_button", "small_button", "drag_float_range2", "begin_combo",
+    "input_text", "input_text_with_hint", "collapsing_header", "color_button", "small_button", "drag_float_range2",
+    "begin_combo",
 )  # fmt: skip
 SIZE = (1400, 1600)
 
