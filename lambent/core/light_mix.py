@@ -165,6 +165,16 @@ def parse_light(texts: Iterable[str]) -> MixTrack:
 
 def mix_of(value: str, text: str) -> GroupMix:
     """Parse the mix of a value such as "0.5,2700K"; raises `UserError` that quotes `text`, the whole argument."""
+    try:
+        return _mix_of(value, text)
+    except UserError as error:
+        if error.field != "light":
+            raise
+        ranges = f"intensities reach {MOST_INTENSITY:g}; a temperature ends in K, {LEAST_K:g}K to {MOST_K:g}K"
+        raise UserError(error.message, field="--light", got=text, hint=ranges) from error
+
+
+def _mix_of(value: str, text: str) -> GroupMix:
     mix, said = AS_BAKED, set[str]()
     for word in (part.strip() for part in value.split(",")):
         if word.lower() in ("on", "off"):

@@ -22,7 +22,7 @@ from lambent.core.progress import Progress, part_of, silent
 from lambent.render.images import PATH_TRACER, Settings
 from lambent.render.output import DEFAULT, Note, Rendered, displayed_as, ignore, images, opened_with_views, view_of
 from lambent.scenes.scene import Variant
-from lambent.scenes.variants import variant_named
+from lambent.scenes.variants import NO_VARIANTS, NO_VARIANTS_HINT
 from lambent.store.answer import has_answer
 from lambent.store.light_groups import light_groups
 from lambent.store.states import says_light, variants_of
@@ -74,7 +74,7 @@ def sheet(
     opened, record = opened_with_views(store)
     found = variants_of(opened, saved=False)
     if not found:
-        variant_named((), "any", "--variants")
+        raise UserError(NO_VARIANTS, field="--variants", hint=NO_VARIANTS_HINT)
     variants = with_the_baked_state(found)
     columns, rows = shape_of(len(variants), settings.width / settings.height)
     pixels = columns * rows * settings.width * settings.height

@@ -19,6 +19,8 @@ from lambent.scenes.image_textures import with_image
 from lambent.scenes.scene import ImageTexture, Look, MaterialTextures, Scene, Variant
 
 FIELD = "--variant"
+NO_VARIANTS = "the store has no variants"
+NO_VARIANTS_HINT = "add [[variants]] to the scene and bake it again, or store states in the window"
 Kept = TypeVar("Kept")
 
 
@@ -96,8 +98,7 @@ def variant_named(variants: Iterable[Variant], name: str, field: str = FIELD) ->
     """The variant of this name; `UserError` that lists all of them if there is none."""
     found = {variant.name: variant for variant in variants}
     if not found:
-        hint = "add [[variants]] to the scene and bake it again, or store states in the window"
-        raise UserError("the store has no variants", field=field, got=name, hint=hint)
+        raise UserError(NO_VARIANTS, field=field, got=name, hint=NO_VARIANTS_HINT)
     return found[known("variant", name, found, field=field)]
 
 

@@ -288,3 +288,11 @@ def test_infinity_where_a_table_begins_is_no_traceback(refused, tmp_path, comman
     (tmp_path / "a.txt").write_text("inf 400 500 600\n1 2 3 4 5\n")
     more = [tmp_path / "b.binary"] if command == "convert" else []
     assert "known format" in refused(command, tmp_path / "a.txt", *more)
+
+
+def test_errors_name_the_option_and_the_missing_file(refused, tmp_path):
+    said = refused("render", tmp_path / "a.store", "-o", tmp_path / "a.png", "--light", "lamp=2700")
+    assert "--light: intensity is out of range; found lamp=2700; " in said and "ends in K" in said
+    for name in ("missing", "missing.json", "missing.glb"):
+        assert f"{name}: cannot be read (" in refused("bake", tmp_path / name, "-o", tmp_path / "s")
+    assert "unknown scene format" in refused("bake", tmp_path, "-o", tmp_path / "s")

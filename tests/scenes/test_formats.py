@@ -67,6 +67,7 @@ def test_every_format_says_what_it_is() -> None:
 
 
 def test_what_no_loader_reads_is_told_with_every_ending(tmp_path: Path) -> None:
+    (tmp_path / "a.fbx").touch()
     with pytest.raises(UserError, match=r"unknown scene format; found .fbx; expected .bpt, .*.gltf, .*.ply, .toml"):
         load_scene(tmp_path / "a.fbx")
     with pytest.raises(UserError, match=r"unknown scene format; found a folder; expected .bpt"):

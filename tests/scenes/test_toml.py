@@ -339,6 +339,7 @@ def test_geometry_does_not_leave_the_folder(tmp_path: Path, geometry: str) -> No
 
 
 def test_missing_and_unknown(tmp_path: Path) -> None:
+    (tmp_path / "a.blend").touch()
     for name, said in (("builtin:rom", "did you mean 'room'"), (str(tmp_path / "none.toml"), "cannot be read"),
                        (str(tmp_path / "a.blend"), "unknown scene format")):  # fmt: skip
         with pytest.raises(UserError, match=said):

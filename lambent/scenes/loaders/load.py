@@ -146,6 +146,8 @@ def formats() -> list[ModuleType]:
 
 def _format_of(path: Path) -> ModuleType:
     module = next((m for m in formats() if path.suffix.lower() in m.ENDINGS), None)
+    if module is None and not path.exists():
+        raise UserError("cannot be read (no such file)", file=path)
     if module is None:
         expected = ", ".join([*(ending for m in formats() for ending in m.ENDINGS), TOML])
         got = "a folder" if path.is_dir() else path.suffix or "no file extension"
