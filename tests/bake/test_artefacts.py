@@ -170,12 +170,12 @@ NAMES = (
     "probe/floor/planes",
 )
 PINNED = {
-    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 62826275 b10c6153 961ea049 c473f316",
-    ("preview", "photons", "traced"): "1dec1a65 4cae5d96 493576a5 b18d77b3 8bbff745 f2524a03",
-    ("normal", "paths", "cached"): "6161cd22 5095e777 ca1bc7db c922d6f4 090fbd2f dd80d1a6",
-    ("normal", "photons", "traced"): "6161cd22 5095e777 c3dd8d8a 65c1843f 0b8a4a9a e4d0565d",
-    ("final", "paths", "cached"): "a38141f9 cef94a2c 6fbf5e5b 27f817ab 1d2942b5 68a263b9",
-    ("final", "photons", "traced"): "a38141f9 cef94a2c 95888972 2aa08bcd ce740dcb e83161eb",
+    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 b84c2534 4c79c1d5 2f72a3e7 bc8739b1",
+    ("preview", "photons", "traced"): "1dec1a65 4cae5d96 493576a5 6b76d473 c6e53977 80b80bae",
+    ("normal", "paths", "cached"): "6161cd22 5095e777 1ef9d426 b0243b2e 061cf715 445a3400",
+    ("normal", "photons", "traced"): "6161cd22 5095e777 c3dd8d8a 38d64f44 5302b083 a1ceb1f9",
+    ("final", "paths", "cached"): "a38141f9 cef94a2c 6fbf5e5b 4f5a7153 86e6eaae a52963ec",
+    ("final", "photons", "traced"): "a38141f9 cef94a2c 95888972 a2a93adc 4bdfc925 07d9707f",
 }
 
 
