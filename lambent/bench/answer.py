@@ -7,7 +7,7 @@ is path traced here too, with the same random numbers, so that errors are those 
 is the light map's, which may be a texel off at edges of light. `shown_rms` adds the light map's own error, which is
 `baked_rms` before any edit; for light separated by group, it refers to the sum of the groups' own answers. `rms`,
 `relative_rms` and `relative_rms_contacts` are roots of mean products of the errors in two independent halves of the
-paths, which cancels noise (`noise`, of both halves together). `relative_rms_most_contacts` leaves out the WORST share of
+paths, which cancels noise (`noise`, of both halves together). `relative_rms_most_contacts` leaves out the WORST part of
 contacts, with the largest error of both halves together. 95 % of contacts have an error below `p95_contacts`, with
 `contact_paths` paths each; it includes noise, and `p95_contacts_noise` is its value for noise alone. `naive` is the
 error of keeping the baked light. `likely_error` is the bound on `rms` that the window shows.
