@@ -170,12 +170,12 @@ NAMES = (
     "probe/floor/planes",
 )
 PINNED = {
-    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 62826275 b10c6153 c2468578 2be4816a",
-    ("preview", "photons", "traced"): "1dec1a65 4cae5d96 493576a5 b18d77b3 ec73ceba d2d23e28",
-    ("normal", "paths", "cached"): "6161cd22 5095e777 ca1bc7db c922d6f4 1a2e75bc 3d33a5e8",
-    ("normal", "photons", "traced"): "6161cd22 5095e777 c3dd8d8a 65c1843f 9165629e d9a49624",
-    ("final", "paths", "cached"): "a38141f9 cef94a2c 6fbf5e5b 27f817ab 7bc2473f 07add8a1",
-    ("final", "photons", "traced"): "a38141f9 cef94a2c 95888972 2aa08bcd e095242b 1e95b1a1",
+    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 493576a5 6b76d473 839c35ca bfedc904",
+    ("preview", "photons", "traced"): "1dec1a65 4cae5d96 493576a5 6b76d473 c6e53977 80b80bae",
+    ("normal", "paths", "cached"): "6161cd22 5095e777 1ef9d426 b0243b2e 09a1647d 3e7a4716",
+    ("normal", "photons", "traced"): "6161cd22 5095e777 c3dd8d8a 38d64f44 07608b62 a04d8932",
+    ("final", "paths", "cached"): "a38141f9 cef94a2c 6fbf5e5b 4f5a7153 bd22c6e4 8c9f84aa",
+    ("final", "photons", "traced"): "a38141f9 cef94a2c 95888972 a2a93adc a9c082c5 6272e483",
 }
 
 

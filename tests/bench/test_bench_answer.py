@@ -5,11 +5,13 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.quality import quality_named
 from lambent.bench import answer, answer_times
+from lambent.bench.answer import most_relative
 from lambent.core.errors import UserError
 from lambent.scenes import builtin, load_scene
 from tests.viewer.small_store import write_small_store
@@ -47,6 +49,7 @@ def test_rows_of_a_store(tmp_path: Path, groups: str) -> None:
         assert row["bytes"] > 1000 and row["precompute_s"] > 0
         assert row["precompute_cpu_s"] > 0 and row["light_map_cpu_s"] > 0
         if row["p95_contacts"] is not None:
+            assert 0 <= row["relative_rms_most_contacts"] < 2 * row["p95_contacts"]
             assert row["p95_contacts_noise"] > 0 and row["relative_rms_contacts"] <= 2 * row["p95_contacts"]
 
 
@@ -64,3 +67,10 @@ def test_edits_of_a_scene_are_of_its_largest_materials() -> None:
 def test_a_store_without_an_answer_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="--only answer"):
         answer.run(EFFORT, [write_small_store(tmp_path / "s")])
+
+
+def test_the_worst_contacts_do_not_decide() -> None:
+    error = np.full((100, 3), 0.1)
+    error[7] = 50.0
+    assert most_relative(error, error) == pytest.approx(10.0)
+    assert most_relative(error, -error) == 0

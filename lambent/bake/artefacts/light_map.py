@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 KIND = "light_map"
 NEEDS = ("geometry",)
-REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 6, 6, 3, 1, 1
+REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 5, 6, 3, 1, 1
 REVISION_OF_DIRECT, REVISION_OF_PARTS = 4, 3
 IRRADIANCE = tuple(f"light_map/{side}" for side in SIDES)
 NOISE = tuple(noise_name(side) for side in SIDES)
@@ -77,6 +77,8 @@ def keys(context: BakeContext) -> dict[str, str]:
     effort += [how.tile_texels, how.max_depth, context.seed]
     if _by_photons(context):
         effort.append([LightMapMethod.photons, how.photons_per_texel])
+    elif how.gather_samples:
+        effort.append(["gathered from maps", REVISION_OF_IRRADIANCE])
     if may_have_sun(context.scene):
         effort.append(["without the sun", REVISION_OF_SUN])
         if panes_of(context.scene):
