@@ -48,8 +48,8 @@ def alike(points: Points, rays: Rays, reflected: Floats, near: Neighbours) -> Ne
     named[itself, chosen], weights[itself, chosen] = itself, 1
     weights[weights < LEAST] = 0
     order = np.argsort(-weights, axis=1, kind="stable")
-    named, weights = (np.take_along_axis(of, order, axis=1) for of in (named, weights))
-    return Neighbours(named, np.rint(BYTE * weights).astype(np.uint8))
+    bytes_of = np.rint(BYTE * np.take_along_axis(weights, order, axis=1)).astype(np.uint8)
+    return Neighbours(np.take_along_axis(named, order, axis=1), bytes_of)
 
 
 def _light_by_sender(points: Points, rays: Rays, reflected: Floats) -> NDArray[np.float32]:

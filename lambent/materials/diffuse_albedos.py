@@ -59,8 +59,8 @@ def changed_lobes(baked: Sequence[Material], edited: Sequence[Material]) -> Floa
     found = np.zeros((len(baked), 3))
     for number, (before, after) in enumerate(zip(baked, edited, strict=True)):
         if before.lobes != after.lobes:
-            sides = [[lobe_albedo(one, side) for side in ("reflection", "transmission")] for one in (before, after)]
-            found[number] = np.abs(np.subtract(*sides)).sum(axis=0)
+            for side in ("reflection", "transmission"):
+                found[number] += np.abs(lobe_albedo(after, side) - lobe_albedo(before, side))
     return found
 
 
