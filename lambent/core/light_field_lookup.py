@@ -214,7 +214,7 @@ def _answered(
     basis = np.maximum(basis_weights(field, place, w, "normal")[:, :count], 1e-6)
     weight = np.where(agree & met[:, None], basis * focus_along(field, q), 0.0)
     weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-30)
-    seen = np.einsum("kj,kjc->kc", weight, radiance_along(field, place.named(count), q))
+    seen = np.einsum("kj,kjc->kc", weight, _without_lone_lights(radiance_along(field, place.named(count), q), weight))
     in_sky = np.asarray(~met & (open_sky & known).any(axis=1))
     at = np.zeros(0, np.int64)
     if edges is not None and field.cover is not None:
@@ -236,6 +236,17 @@ def _answered(
         shown, share = _edge(field, hit, point[at], weight[at], known[at])
         radiance[at] = share[:, None] * shown + (1 - share[:, None]) * other[at]
     return Marched(radiance, met, in_sky, first)
+
+
+def _without_lone_lights(light: Floats, weight: Floats) -> Floats:
+    """Radiance (k, j, 3) of points, limited to the second largest of those with a weight (k, j), by channel.
+
+    Light that one point alone sees on a surface is a highlight in its direction, or noise.
+    """
+    if light.shape[1] < 2:
+        return light
+    second = np.sort(np.where(weight[..., None] > 0, light, -1.0), axis=1)[:, -2]
+    return np.where(second[:, None] < 0, light, np.minimum(light, second[:, None]))
 
 
 def _edge(field: LightField, hit: Floats, point: Indices, weight: Floats, known: Flags) -> tuple[Floats, Floats]:

@@ -127,22 +127,32 @@ fn weights_of(method: u32, s: Surface, r: vec3f) -> vec4f {
 
 // Weighted light of the points along w[j] = r + u[j] (x - p_j); u is 0 without parallax. Rays with one weight leave the
 // loop after one iteration: software adapters run both sides of a branch, but skip iterations that all pixels have
-// left. `focused` look-ups also weigh points by focus_along.
+// left. `focused` look-ups also weigh points by focus_along, and limit their light to the second largest, by channel:
+// what one point alone sees on a surface is a highlight in its direction, or noise.
 fn weighted(s: Surface, r: vec3f, u: vec4f, weights: vec4f, half_log2_omega: f32, focused: bool) -> vec3f {
     let x = s.x + object.centre.xyz;
     var left = weights;
     var light = vec4f(0.0);
+    var largest = vec3f(-1.0);
+    var second = vec3f(-1.0);
+    var weight_of_largest = vec3f(0.0);
     loop {
         let one = first_largest(left);
         let point = u32(dot(select(vec4f(0.0), vec4f(s.points), one > vec4f(0.0)), vec4f(1.0)));
         let q = r + dot(one, u) * (x - place_of_point(point));
         // omega t^2/|q t|^2, as the point sees it
         let weight = dot(one, weights) * select(1.0, focus_along(q), focused);
-        light += weight * vec4f(light_of(point, q, half_log2_omega - 0.5 * log2(dot(q, q))), 1.0);
+        let seen = light_of(point, q, half_log2_omega - 0.5 * log2(dot(q, q)));
+        let is_largest = seen > largest;
+        second = select(max(second, seen), largest, is_largest);
+        weight_of_largest = select(weight_of_largest, vec3f(weight), is_largest);
+        largest = max(largest, seen);
+        light += weight * vec4f(seen, 1.0);
         left *= 1.0 - one;
         if (largest_of(left) <= 0.0) { break; }
     }
-    return light.rgb / light.a;
+    let lone = select(vec3f(0.0), weight_of_largest * (largest - second), second >= vec3f(0.0));
+    return (light.rgb - select(vec3f(0.0), lone, focused)) / light.a;
 }
 
 // Without parallax: the light of the points in the ray's own direction.
