@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.probes.sharing import MOST, _grouped, _largest
+from lambent.bake.probes.sharing import MOST, _grouped, _largest, _reach
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
@@ -135,3 +135,36 @@ def test_objects_beyond_the_most_show_the_nearest_probe(tmp_path: Path, monkeypa
     store = bake(laid_table(), tmp_path / "s", quality=TINY)
     (own,) = probes_of(store)
     assert set(shared_probes(store).values()) == {own} and own not in shared_probes(store)
+
+
+def test_a_ball_before_a_distant_facade_has_its_own_probe(tmp_path: Path) -> None:
+    """Outdoors, most mirrored rays end in the sky, which made a probe 60 m away seem near."""
+    ground = patch((-3, 0, 3), (6, 0, 0), (0, 0, -6))
+    facade = patch((-100, 0, -60), (200, 0, 0), (0, 60, 0))
+    objects = (
+        SceneObject("ground", ground, "grey"),
+        SceneObject("ball", placed(sphere(0.5, 24, 12), (0.8, 0.5, 0.0)), "mirror"),
+        SceneObject("facade", facade, "mirror"),
+    )
+    mirror = Material(name="mirror", lobes=[Lobe(mx=0.02, my=0.02, r0=(0.9,) * 3, k=(1.0,) * 3)])
+    scene = Scene(
+        name="yard",
+        objects=objects,
+        materials={"grey": Material(name="grey", kd=(0.5,) * 3), "mirror": mirror},
+        environment=ConstantEnvironment((1.0, 1.0, 1.0)),
+        cameras=(Camera("front", (0.0, 1.6, 4.0), (0.0, 0.4, 0.0)),),
+    )
+    store = bake(scene, tmp_path / "s", quality=TINY, only=("probe",))
+    assert "ball" in probes_of(store), shared_probes(store)
+
+
+def test_the_distance_to_far_hits_outdoors_and_indoors() -> None:
+    rng = np.random.default_rng(0)
+    indoors = rng.uniform(1, 5, (1, 256))
+    sky = np.where(np.arange(256) < 150, np.inf, indoors)
+    alone = np.where(np.arange(256) < 250, np.inf, indoors)
+    on_a_table = np.where(np.arange(256) < 150, 0.05, indoors)
+    for inside in (indoors, on_a_table):
+        assert _reach(inside, 1000.0) == pytest.approx(np.quantile(inside, 0.75))
+    assert _reach(sky, 1000.0) == pytest.approx(4 * np.median(sky[np.isfinite(sky)]), rel=0.05)
+    assert _reach(alone, 1000.0) == 1000.0

@@ -11,6 +11,7 @@ import pytest
 from lambent.core.directions import normalize
 from lambent.core.environment_layouts import layout_of
 from lambent.core.errors import UserError
+from lambent.core.images import read_image
 from lambent.scenes import load_scene
 from lambent.scenes.environment_images import read_lat_long
 from lambent.scenes.ies import parse_ies
@@ -148,4 +149,4 @@ def test_a_square_of_one_colour_needs_no_layout() -> None:
 
 def test_radiance_headers_may_end_their_lines_in_two_characters(tmp_path: Path) -> None:
     (tmp_path / "a.hdr").write_bytes(b"#?RADIANCE\r\nEXPOSURE=2\r\n\r\n-Y 1 +X 2\r\n" + bytes([128, 64, 32, 129] * 2))
-    assert read_lat_long(tmp_path / "a.hdr") == pytest.approx(np.tile((0.5, 0.25, 0.125), (1, 2, 1)))
+    assert read_image(tmp_path / "a.hdr") == pytest.approx(np.tile((0.5, 0.25, 0.125), (1, 2, 1)))

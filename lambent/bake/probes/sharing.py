@@ -46,6 +46,7 @@ JUDGED = 1024  # objects
 MOST = 64  # probes per scene, about two CPU seconds each at `preview`; exceeded only if the scene places more
 MEDIUM, SMALL = 0.1, 0.06  # radians
 NEAR, REACH = 0.5, 0.75  # limit relative to the mirrored distance, for wide lobes, and the quantile of that distance
+MOST_BEYOND, LEAST_MET = 4.0, 0.05  # limit of that distance by the median hit, if more than this share of rays hits
 NEAR_MIRROR, PER_BLUR = 0.2, 2.0  # limit for mirrors, and its increase by a lobe's roughness, which blurs errors
 OPEN = 0.04  # share of an object's mirrored rays that may hit left out objects with nothing behind
 CROSSINGS = 4  # of left out objects, after which something counts as behind
@@ -181,6 +182,7 @@ def _looked(builder: SceneBuilder, whole: Any, places: Floats, names: list[str])
     t, met = first(leaving(whole, points, normals, directions))
     open_ = _nothing_behind(first, points, directions, t, met)
     far = SKY * float(np.linalg.norm(np.ptp(np.array(scene.bounds), axis=0)))
+    reach = _reach(t.reshape(count, POINTS), far)
     t = np.where(np.isfinite(t), t, far)
     valid, distance = (a.reshape(count, POINTS) for a in (found, np.linalg.norm(eyes - points, axis=1)))
     seen = [
@@ -188,9 +190,21 @@ def _looked(builder: SceneBuilder, whole: Any, places: Floats, names: list[str])
     ]
     largest, size = width / np.array(seen).T
     ways, hits = (a.reshape(count, POINTS, 3) for a in (directions, points + directions * t[:, None]))
-    reach = np.quantile(t.reshape(count, POINTS), REACH, axis=1)
     grid = count, POINTS
     return Looked(ways, hits, met.reshape(grid), open_.reshape(grid), valid, size, largest, reach)
+
+
+def _reach(t: Floats, far: float) -> Floats:
+    """(N,) distance to far hits of rays of lengths (N, POINTS), infinite for the sky, which counts as `far`.
+
+    An object outdoors mirrors the sky, but the ground beside it as well: where far hits are in the sky, MOST_BEYOND
+    limits their distance by that of other hits.
+    """
+    of_all = np.quantile(np.minimum(t, far), REACH, axis=1)
+    count, met = np.isfinite(t).sum(axis=1), np.sort(t, axis=1)
+    longest, middle = (np.take_along_axis(met, at[:, None], axis=1)[:, 0] for at in (count - 1, (count - 1) // 2))
+    outdoors = (count > LEAST_MET * t.shape[1]) & (of_all > longest)
+    return np.asarray(np.where(outdoors, np.minimum(of_all, MOST_BEYOND * middle), of_all))
 
 
 def _nothing_behind(

@@ -50,7 +50,8 @@ class _Element:
 
 def load(path: Path, root: Path | None = None) -> Contents:
     """A file as one grey object; v points up, missing normals are smooth."""
-    mesh, notes = mesh_of(read(path, ignored := []).smooth(), name=path.stem, file=path)
+    ignored: list[str] = []
+    mesh, notes = mesh_of(read(path, ignored).smooth(), name=path.stem, file=path)
     notes += ignored
     if mesh is None:
         raise UserError("holds no triangles", file=path, hint="; ".join(notes) or None)
