@@ -170,8 +170,8 @@ NAMES = (
     "probe/floor/planes",
 )
 PINNED = {
-    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 493576a5 6b76d473 839c35ca bfedc904",
-    ("preview", "photons", "traced"): "1dec1a65 4cae5d96 493576a5 6b76d473 c6e53977 80b80bae",
+    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 b84c2534 4c79c1d5 565d5a03 ee3622dc",
+    ("preview", "photons", "traced"): "1dec1a65 4cae5d96 493576a5 6b76d473 839c35ca bfedc904",
     ("normal", "paths", "cached"): "6161cd22 5095e777 1ef9d426 b0243b2e 09a1647d 3e7a4716",
     ("normal", "photons", "traced"): "6161cd22 5095e777 c3dd8d8a 38d64f44 07608b62 a04d8932",
     ("final", "paths", "cached"): "a38141f9 cef94a2c 6fbf5e5b 4f5a7153 bd22c6e4 8c9f84aa",
