@@ -218,8 +218,6 @@ def command(
         replacements=parse_replacements(replace or ()), variant=variant,
     )  # fmt: skip
     settings.check()
-    if scene is not None and integrator != "path":
-        raise UserError("applies to the path tracer only", field="--scene", hint="add --integrator path")
     for option in ("false_range", "linear"):
         if _is_said(context, option) and not settings.is_false_coloured:
             name = "--range" if option == "false_range" else "--linear"
@@ -232,6 +230,8 @@ def command(
         return
     if surfaces is not None:
         raise UserError("applies to edited views only", field="--surfaces", hint="add --edit SESSION")
+    if scene is not None and integrator != "path":
+        raise UserError("applies to the path tracer only", field="--scene", hint="add --integrator path")
     if variants and (variant or replace):
         option = "--variant" if variant else "--replace"
         raise UserError("excludes --variants", field=option, hint="leave out one")
