@@ -201,8 +201,7 @@ class AnsweredLight:
         places, texels, tint, sun = self._seen_by(name)
         tints = [tint, tint]
         if light.detail is not None:
-            per_unit = np.float32(1 / (np.pi * self._baked.unit))
-            tints = [per_unit * one[places] for one in self._details.tints(name, seen, light.detail)]
+            tints = [self._per_exitance(one[places]) for one in self._details.tints(name, seen, light.detail)]
         found = np.zeros((len(light.irradiance), seen.texel.size, 3), np.float32)
         states = (
             (one.irradiance, by, one.reflected, one.transmitted)
@@ -216,10 +215,14 @@ class AnsweredLight:
         if name not in self._seen:
             seen = self._stored.seen[name]
             places = np.flatnonzero(seen.texel.reshape(-1) >= 0)
-            tint = seen.tint.reshape(-1, 3)[places].astype(np.float32) / np.float32(np.pi * self._baked.unit)
+            tint = self._per_exitance(seen.tint.reshape(-1, 3)[places].astype(np.float32))
             sun = seen.sun.reshape(-1)[places].astype(np.float32)[:, None] * self._stored.sun.astype(np.float32)
             self._seen[name] = places, seen.texel.reshape(-1)[places], tint, sun
         return self._seen[name]
+
+    def _per_exitance(self, tint: Floats) -> Floats:
+        """Radiance, in the scene's units, for each W/m^2 of exitance that textures of factor `tint` send."""
+        return np.asarray(tint / np.float32(np.pi * self._baked.unit))
 
     def probe_irradiance(self, name: str, change: Floats) -> tuple[float, ...]:
         """`Probe.irradiance` of a probe after a `change` (6, N, N, 3) of its radiance; empty if the baked one is."""

@@ -18,6 +18,7 @@ from lambent.scenes.retexturing import texture_named, with_texture
 from lambent.scenes.scene import ImageTexture, Look
 
 USE, FILE, COLOUR, TEXTURE = "use", "file", "colour", "texture"
+ALONE = USE, FILE  # keys that allow no others beside them
 
 
 def looks_told(
@@ -71,7 +72,7 @@ def _look(
     """Another material of the scene, another document, or the same material with another texture or other numbers."""
     path = given.path
     for key in (USE, FILE, TEXTURE):
-        if key in table and len(table) > 1 and key != TEXTURE:
+        if key in table and len(table) > 1 and key in ALONE:
             raise UserError(f"has other keys beside {key}", file=path, field=field, got=sorted({*table} - {key})[0])
         if not isinstance(table.get(key, ""), str):
             raise UserError("is not a name", file=path, field=f"{field}.{key}", got=table[key])
