@@ -47,11 +47,23 @@ def command(
     integrator: Annotated[
         str,
         typer.Option(
-            help="lamps, rings, lobe-4.24, lobe-4.25, fis, split-sum, qmc, oslf, oslf-points, diffuse, or path (the "
-            "path tracer)."
+            help="traced (against the baked light), path (whole paths), or drawn as in motion: lamps, rings, "
+            "lobe-4.24, lobe-4.25, fis, split-sum, qmc, oslf, oslf-points, diffuse."
         ),
-    ] = "lamps",
-    samples: Annotated[int | None, typer.Option(min=1, help="Samples per pixel (path, qmc) or per lobe.")] = None,
+    ] = "traced",
+    samples: Annotated[
+        int | None, typer.Option(min=1, help="Samples per pixel (traced, path, qmc) or per lobe.")
+    ] = None,
+    noise: Annotated[
+        float | None,
+        typer.Option(
+            help="Traced pictures: relative standard error at which they end. [default: .02; path: 64 samples]"
+        ),
+    ] = None,
+    denoise: Annotated[
+        bool | None,
+        typer.Option("--denoise/--no-denoise", help="Denoise traced pictures. [default: traced yes, path no]"),
+    ] = None,
     exposure: Annotated[
         str | None,
         typer.Option(
@@ -211,8 +223,9 @@ def command(
     if variants and not _is_said(context, "size"):
         size = SHEET_SIZE
     settings = render.Settings(
-        *parse_size(size), integrator, samples, exposure_ev, view, scale, log=not linear, show=part, planar=planar,
-        lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb, seed=seed,
+        *parse_size(size), integrator, samples, noise, denoise, exposure_ev, view, scale, log=not linear,
+        show=part, planar=planar, lookup=lookup, projection=Projection(projection),
+        field_deg=field, light_field_mb=light_field_mb, seed=seed,
         light=parse_light(light) if light else None, sky_turn_deg=sky_turn, light_field_cache=light_field_cache,
         recolour=parse_recolours(recolour or ()), textures=parse_textures(texture or ()),
         replacements=parse_replacements(replace or ()), variant=variant,
@@ -267,7 +280,9 @@ def command(
             done = render.still(store, output, camera, settings, scene=scene, note=note, progress=progress)
     size = f"{done.width}x{done.height}"
     exposed = "" if done.ev100 is None else f"EV100 {done.ev100:.1f}, "
-    text = f"{output}: {size}, {done.frames} frame(s), {done.integrator}, {exposed}{done.seconds:.1f} s"
+    how = done.integrator if done.samples is None else f"{done.integrator}, {done.samples} samples"
+    how += "" if done.noise is None else f", noise {100 * done.noise:.1f} %"
+    text = f"{output}: {size}, {done.frames} frame(s), {how}, {exposed}{done.seconds:.1f} s"
     show(asdict(done), text, json)
 
 

@@ -136,13 +136,19 @@ def _in_units(sun: SunRecord | None, unit: float) -> SunRecord | None:
     return sun and sun.model_copy(update={"irradiance": triple(np.divide(sun.irradiance, unit))})
 
 
-def read_baked(store: Store, light_field_mb: float | None = None, policy: str = LEAST_RECENT) -> BakedScene:
-    """All data of a store that the renderer shows. Only the geometry and the scene record are required."""
+def read_baked(
+    store: Store, light_field_mb: float | None = None, policy: str = LEAST_RECENT, *, probes: bool = True
+) -> BakedScene:
+    """All data of a store that the renderer shows. Only the geometry and the scene record are required.
+
+    Without `probes`, light on surfaces alone: no light fields either.
+    """
     known("cache of light fields", policy, POLICIES, field="--light-field-cache")
     record = contract.scene_record(store)
     missing: list[str] = []
-    cubes = [n for n in (ENVIRONMENT, *(contract.probe_name(o.name, "radiance") for o in record.objects)) if n in store]
-    fields = [o.name for o in record.objects if has_light_field(store, o.name)]
+    around = record.objects if probes else ()
+    cubes = [n for n in (ENVIRONMENT, *(contract.probe_name(o.name, "radiance") for o in around)) if n in store]
+    fields = [o.name for o in around if has_light_field(store, o.name)]
     lit = [*cubes, *(light_name(store, name) for name in fields)]
     unit = max((contract.radiance_unit(store, name) for name in lit), default=1.0)
 
@@ -165,12 +171,12 @@ def read_baked(store: Store, light_field_mb: float | None = None, policy: str = 
     two_sided = any(
         contract.is_two_sided(record.materials[o.material], masked=o.material in masked) for o in record.objects
     )
-    probes, without, shared = {}, [], contract.shared_probes(store)
-    for obj in (o for o in record.objects if o.name not in shared):
+    found, without, shared = {}, [], contract.shared_probes(store)
+    for obj in (o for o in around if o.name not in shared):
         name = contract.probe_name(obj.name, "radiance")
         radiance = light(name, None)
         if radiance is not None:
-            probes[obj.name] = _probe(store, obj.name, radiance)
+            found[obj.name] = _probe(store, obj.name, radiance)
         elif obj.probe and contract.needs_probe(record.materials[obj.material]):
             without.append(obj.name)
     if without:
@@ -184,7 +190,7 @@ def read_baked(store: Store, light_field_mb: float | None = None, policy: str = 
         irradiance=light("light_map/irradiance", "diffuse light is black"),
         irradiance_back=light("light_map/irradiance_back", back),
         environment=light(ENVIRONMENT, None),
-        probes=probes,
+        probes=found,
         missing=tuple(missing),
         textures=read_textures(store, record),
         shared_probes=shared,

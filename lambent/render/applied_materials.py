@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import cached_property
 
-from lambent.core.errors import UserError
 from lambent.core.plain import Triple
 from lambent.materials.document import Material
-from lambent.materials.recolour import recoloured
 from lambent.realtime.answer_shown import AnswerShown
 from lambent.realtime.answered.stages import computes
 from lambent.realtime.answering import AnsweredLight
 from lambent.realtime.group_arrays import FIELDS_FOLLOW
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.texture_detail import without_uv
-from lambent.scenes.retexturing import NO_UV, NO_UV_HINT, retextured
-from lambent.scenes.scene import ImageTexture, Look
-from lambent.scenes.variants import looks_as_loaded, worn_by
+from lambent.render.edits import edits_of
+from lambent.scenes.scene import Look
+from lambent.scenes.variants import worn_by
 from lambent.store.answer import NO_ANSWER, has_answer, read_answer
 from lambent.store.contract import needs_probe
 from lambent.store.store import Store
@@ -38,8 +36,8 @@ class AppliedMaterials:
         self._store, self._renderer, self._note = store, renderer, note
         self._noted: set[str] = set()
         self.answers = has_answer(store)
-        self.materials: dict[str, Material] = {}
-        self._looks: dict[str, Look] = {}
+        self.materials: Mapping[str, Material] = {}
+        self._looks: Mapping[str, Look] = {}
 
     def apply(self, looks: Mapping[str, Look], colours: Mapping[str, Triple], textures: Mapping[str, str]) -> None:
         """Apply looks, then textures (`scenes.retexturing`), then diffuse colours, and the light that follows.
@@ -47,17 +45,10 @@ class AppliedMaterials:
         Materials left out stay as baked.
         """
         scene = self._renderer.scene
-        loaded = looks_as_loaded(scene.record.materials, scene.textures)
-        if textures:
-            looks = {**looks, **retextured({**loaded, **looks}, textures, scene.textures, self._without_uv)}
-        changed = {name: look for name, look in looks.items() if look != loaded[name]}
-        documents = {name: look.material for name, look in changed.items()}
-        materials = {**documents, **recoloured({**scene.record.materials, **documents}, colours)}
+        edits = edits_of(scene.record.materials, scene.textures, self._without_uv, looks, colours, textures)
+        changed, materials = edits.looks, edits.materials
         if (changed, materials) == (self._looks, self.materials):
             return
-        for name, look in changed.items():
-            if isinstance(look.textures, ImageTexture) and name in self._without_uv:
-                raise UserError(NO_UV, field=name, hint=NO_UV_HINT)
         if changed != self._looks:
             self._renderer.resources.show_textures(changed)
         self._looks, self.materials = changed, materials

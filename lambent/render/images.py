@@ -30,7 +30,9 @@ from lambent.scenes.look_track import LookTrack
 from lambent.scenes.replacement import Replacement
 from lambent.scenes.scene import Variant
 
-PATH_TRACER = "path"
+TRACED, PATH_TRACER = "traced", "path"
+DRAWN = "lamps"  # the integrator of pictures that cannot be traced
+LEAST_NOISE = 1e-4
 FALSE_COLOUR, NOISE = "false-colour", "noise"
 ANYWHERE = Camera("anywhere", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
 log = logging.getLogger(__name__)
@@ -48,10 +50,16 @@ class Settings:
     width, height : int
         Pixels.
     integrator : str
-        One of `realtime.integrators.INTEGRATORS`, or "path" for the path tracer.
+        "traced" against the baked light, "path" for whole paths, or one of `realtime.integrators.INTEGRATORS`, which
+        draw.
     samples : int, optional
-        Per pixel for converging integrators ("path": 64 by default, "qmc": 256, "oslf": 100), otherwise per lobe (by
-        default chosen from each material's roughness).
+        Per pixel for converging integrators ("traced": as many as `noise` needs, "path": 64, "qmc": 256, "oslf": 100),
+        otherwise per lobe (by default chosen from each material's roughness).
+    noise : float, optional
+        For traced pictures: the relative standard error (`traced.picture.TracedPicture.noise`) that ends them, .02 by
+        default.
+    denoise : bool, optional
+        For traced pictures: by default "traced" ones are denoised, "path" ones are not.
     exposure_ev : float, optional
         Stops, -64 to 64, for displayed images; by default the scene's, else metered from the first image
         (`core.exposure.metered`) and kept for the rest.
@@ -100,8 +108,10 @@ class Settings:
 
     width: int = 1280
     height: int = 720
-    integrator: str = "lamps"
+    integrator: str = TRACED
     samples: int | None = None
+    noise: float | None = None
+    denoise: bool | None = None
     exposure_ev: float | None = None
     view: str = "filmic"
     scale: Range | None = None
@@ -128,6 +138,16 @@ class Settings:
         return bool(self.recolour or self.textures or self.variant or self.looks)
 
     @property
+    def is_traced(self) -> bool:
+        """Whether images are traced, not drawn."""
+        return self.integrator in (TRACED, PATH_TRACER)
+
+    @property
+    def denoises(self) -> bool:
+        """Whether traced images are denoised."""
+        return self.integrator == TRACED if self.denoise is None else self.denoise
+
+    @property
     def is_false_coloured(self) -> bool:
         """Whether displayed images are in false colours."""
         return self.view == FALSE_COLOUR or self.show == NOISE
@@ -138,13 +158,22 @@ class Settings:
 
     def check(self) -> None:
         """Raise `UserError` for an impossible view transform, exposure or field of view; renderers check the rest."""
-        known("integrator", self.integrator, (*INTEGRATORS, PATH_TRACER), field="--integrator")
+        known("integrator", self.integrator, (TRACED, PATH_TRACER, *INTEGRATORS), field="--integrator")
         known("view transform", self.view, VIEWS, field="--view")
         if self.scale is not None:
             self.scale.check()
         if self.exposure_ev is not None and not -MOST_EV <= self.exposure_ev <= MOST_EV:  # also refuses nan
             got, expected = self.exposure_ev, f"-{MOST_EV} to {MOST_EV} EV"
             raise UserError("is out of range", field="--exposure", got=got, expected=expected)
+        for option, value in (("--noise", self.noise), ("--denoise", self.denoise)):
+            if value is not None and not self.is_traced:
+                hint = "leave it out, or choose traced or path"
+                raise UserError("applies to traced pictures only", field=option, got=self.integrator, hint=hint)
+        if self.noise is not None:
+            if not LEAST_NOISE <= self.noise <= 1:  # also refuses nan
+                raise UserError("is out of range", field="--noise", got=self.noise, expected=f"{LEAST_NOISE:g} to 1")
+            if self.samples is not None:
+                raise UserError("excludes --samples", field="--noise", hint="leave out one")
         if not -360 <= self.sky_turn_deg <= 360:  # also refuses nan
             got, expected = self.sky_turn_deg, "-360 to 360 degrees"
             raise UserError("is out of range", field="--sky-turn", got=got, expected=expected)
@@ -161,6 +190,10 @@ class Images(ABC):
 
     quantity: Quantity = LUMINANCE
     time_s: float = 0.0  # time within the film of the next image
+    keeps: bool = False  # whether an interrupted image counts, as it is; `interrupted` then tells
+    interrupted: bool = False
+    samples: int | None = None  # of each pixel of the last image, if it was traced
+    noise: float | None = None  # its relative standard error, if that ended it
 
     def __init__(self, settings: Settings) -> None:
         self.settings, self.scale = settings, settings.scale  # None until an image in false colours was displayed

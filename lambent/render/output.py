@@ -20,13 +20,15 @@ from lambent.core.images import WRITABLE, check_writable, write_image, write_sho
 from lambent.core.light_mix import LightMix, MixTrack
 from lambent.core.progress import Progress, silent, tracked
 from lambent.core.projections import Projection
-from lambent.render.images import PATH_TRACER, Images, Settings
+from lambent.realtime.frame_state import LIGHT_MAP, LIGHT_MAP_NOISE
+from lambent.render.images import DRAWN, TRACED, Images, Settings
 from lambent.render.projected import Projected, faces_settings
 from lambent.scenes.camera_paths import camera_at
 from lambent.scenes.loaders.keyframes import Known, read_keyframes
 from lambent.scenes.variants import looks_as_loaded, variant_named
 from lambent.store.contract import SceneRecord, scene_record
 from lambent.store.light_groups import light_groups
+from lambent.store.source import SOURCE
 from lambent.store.states import says_light, variants_of
 from lambent.store.store import Store
 from lambent.store.views import read_views, with_views
@@ -41,7 +43,8 @@ class Rendered:
     """The written file, its size in pixels, its frames, the time taken in seconds, and its exposure.
 
     `exposure_ev` (stops on radiance) and `ev100` are None for radiance files and for false colours, which have `scale`:
-    low, high, log, unit. For a contact sheet they describe the first picture; `ev100_by_name` has all values if they
+    low, high, log, unit. `samples` of each pixel and `noise`, its relative standard error, are those of the last traced
+    picture. For a contact sheet they describe the first picture; `ev100_by_name` has all values if they
     differ. `light_fields` has the statistics of light fields under the budget `Settings.light_field_mb`.
     """
 
@@ -56,6 +59,8 @@ class Rendered:
     scale: dict[str, float | bool | str] | None = None
     light_fields: dict[str, Any] | None = None
     ev100_by_name: dict[str, float] | None = None
+    samples: int | None = None
+    noise: float | None = None
 
 
 def ignore(text: str) -> None:
@@ -93,6 +98,8 @@ def still(
     ------
     UserError
         If the file cannot be written, the store cannot be read, or a name or value is unknown.
+    KeyboardInterrupt
+        After the picture is written as traced so far, or without a picture.
     """
     began, file = time.perf_counter(), Path(file)
     check_writable(file, WRITABLE)
@@ -102,14 +109,18 @@ def still(
     if camera is not None and not says_mix and (mix := read_views(opened.folder).lights.get(view.name)):
         settings = _lit(settings, opened, MixTrack.of(mix), "saved with the view", note)
     drawn = images(opened, settings, scene=scene, note=note)
+    drawn.keeps = True
     write_still(drawn, file, view, progress)
-    seconds = time.perf_counter() - began
-    return Rendered(file, settings.width, settings.height, settings.integrator, 1, seconds, **displayed_as(file, drawn))
+    if drawn.interrupted:
+        raise KeyboardInterrupt
+    seconds, how = time.perf_counter() - began, drawn.settings.integrator
+    return Rendered(file, settings.width, settings.height, how, 1, seconds, **displayed_as(file, drawn))
 
 
 def displayed_as(file: Path, drawn: Images) -> dict[str, Any]:
     """Exposure or scale of a file, and light field statistics: the last fields of `Rendered`."""
-    streamed = {"light_fields": drawn.light_fields} if drawn.light_fields else {}
+    streamed: dict[str, Any] = {"light_fields": drawn.light_fields} if drawn.light_fields else {}
+    streamed |= {"samples": drawn.samples, "noise": drawn.noise}
     if file.suffix.lower() not in (".png", FILM):
         return streamed
     if drawn.settings.is_false_coloured:
@@ -194,7 +205,7 @@ def film(
     write_frames(file, cameras, draw_next, (settings.width, settings.height), fps, progress)
     seconds = time.perf_counter() - began
     width, height, said = settings.width, settings.height, displayed_as(file, drawn)
-    return Rendered(file, width, height, settings.integrator, len(cameras), seconds, **said)
+    return Rendered(file, width, height, drawn.settings.integrator, len(cameras), seconds, **said)
 
 
 def write_frames(
@@ -214,17 +225,25 @@ def write_frames(
 def images(
     store: Store, settings: Settings = DEFAULT, *, moving: bool = False, scene: str | None = None, note: Note = ignore
 ) -> Images:
-    """Renderer of a store's images as arrays; `moving` for a film, other parameters as of `still`."""
+    """Renderer of a store's images as arrays; `moving` for a film, other parameters as of `still`.
+
+    What cannot be traced is drawn: the light map itself, its noise, and a store without the path of its scene.
+    """
     settings = exposed(settings, store)
     mix = _mix_of_variant(settings, store)
-    if settings.light is None and mix.groups and settings.integrator != PATH_TRACER:
+    if settings.light is None and mix.groups:
         settings = _lit(settings, store, MixTrack.of(mix), "of the variant", note)
+    if settings.integrator == TRACED and settings.show in (LIGHT_MAP, LIGHT_MAP_NOISE):
+        settings = replace(settings, integrator=DRAWN, noise=None, denoise=None)
+    if settings.integrator == TRACED and not isinstance(store.documents.get(SOURCE), str):
+        note(f"drawn by {DRAWN}, not traced: the store has no path of its scene file")
+        settings = replace(settings, integrator=DRAWN, noise=None, denoise=None)
     if settings.projection is not Projection.perspective:
         return Projected(images(store, faces_settings(settings), moving=moving, scene=scene, note=note), settings)
-    if settings.integrator == PATH_TRACER:
-        from lambent.render.path_traced import PathTraced
+    if settings.is_traced:
+        from lambent.render.traced import TracedImages
 
-        return PathTraced(store, settings, scene, note)
+        return TracedImages(store, settings, scene, note)
     from lambent.render.real_time import RealTime
 
     return RealTime(store, settings, moving, note)
@@ -249,9 +268,6 @@ def _mix_of_variant(settings: Settings, store: Store) -> LightMix:
 
 def _lit(settings: Settings, store: Store, light: MixTrack, whose: str, note: Note) -> Settings:
     """Settings with the mix of a view, walk or variant, if store and integrator can show it."""
-    if settings.integrator == PATH_TRACER:
-        note(f"the path tracer ignores the light mix {whose}: it traces the light of the scene")
-        return settings
     missing = sorted(set(light.groups) - {group.name for group in light_groups(store)})
     if missing:
         note(f"light mix {whose} not applied: the store has no light group {', '.join(missing)}")

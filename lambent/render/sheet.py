@@ -91,8 +91,7 @@ def sheet(
         lit = variant if says_light(opened, variant.name) else replace(variant, light=saved)
         shown, stays = _as_possible(lit, opened, settings, note)
         drawn.apply_variant(shown)
-        mixes = settings.light is None and settings.integrator != PATH_TRACER
-        drawn.exposure_ev = metered.wanted(shown.light if mixes else LightMix())
+        drawn.exposure_ev = metered.wanted(shown.light if settings.light is None else LightMix())
         pictures.append(drawn.displayed(view, part))
         metered.take(drawn.exposure_ev)
         names.append(f"{variant.name} ({STAYS})" if stays else variant.name)
@@ -105,7 +104,7 @@ def sheet(
             one.name: ev100_of(ev) for one, ev in zip(variants, metered.used, strict=True) if ev is not None
         }
     height, width = picture.shape[:2]
-    return Rendered(file, width, height, settings.integrator, len(pictures), seconds, **said)
+    return Rendered(file, width, height, drawn.settings.integrator, len(pictures), seconds, **said)
 
 
 class Exposures:
@@ -151,9 +150,7 @@ def with_the_baked_state(variants: Sequence[Variant]) -> list[Variant]:
 
 def _as_possible(variant: Variant, store: Store, settings: Settings, note: Note) -> tuple[Variant, bool]:
     """The variant reduced to what the store can show, and whether light stays as baked although it should change."""
-    if settings.integrator == PATH_TRACER:
-        return variant, bool(variant.light.groups)
-    stays = bool(variant.looks) and not has_answer(store)
+    stays = bool(variant.looks) and settings.integrator != PATH_TRACER and not has_answer(store)
     missing = sorted(set(variant.light.groups) - {group.name for group in light_groups(store)})
     if settings.light is None and missing:
         note(f"{variant.name}: light mix not applied: the store has no light group {', '.join(missing)}")

@@ -48,7 +48,7 @@ def sums_at_points(scene: Scene, *, whole: bool = False, sun_left_out: bool = Tr
     from lambent.bake.sky.sun import sun_of
     from lambent.bake.tracing import path_tracer
     from lambent.bake.tracing.first_light import FirstLight, sky_without
-    from lambent.bake.tracing.group_tally import Direct, GroupTally
+    from lambent.bake.tracing.group_tally import Direct, GroupTally, Sorting
     from lambent.bake.tracing.rays import block_sums, independent, vectors
     from lambent.bake.tracing.scene_builder import SceneBuilder
     from lambent.bake.tracing.sun import Sun
@@ -60,7 +60,9 @@ def sums_at_points(scene: Scene, *, whole: bool = False, sun_left_out: bool = Tr
     unseen = None
     if found is not None and sun_left_out:
         unseen = Sun(found, FirstLight(builder, built, found, sky_without(found, builder, built)))
-    tally = path_tracer.AllLight() if whole else GroupTally(lights, builder, found and Sun(found), Direct.straight)
+    tally = (
+        path_tracer.AllLight() if whole else GroupTally(Sorting(lights, builder, found and Sun(found)), Direct.straight)
+    )
     count, samples, passes = 32, 256, 8
     rng = np.random.default_rng(3)
     places = np.stack([rng.uniform(-0.8, 0.9, count), np.zeros(count), rng.uniform(-0.9, 0.9, count)], -1)

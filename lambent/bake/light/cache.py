@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from lambent.bake.bsdfs.material_plugin import DIFFUSE_ATTRIBUTE
+from lambent.bake.tracing.path_tracer import Points
 from lambent.bake.tracing.scene_builder import SceneBuilder, light_map_uv
 from lambent.bake.tracing.sun import SunRays
 from lambent.core.arrays import Floats
@@ -29,7 +30,7 @@ class LightMapCache:
         self._sun = sun
         # A measured table is traced without the cache: its object has no diffuse term.
         looks = dict(builder.scene.materials) | dict.fromkeys(builder.measured, Material())
-        materials = [looks[o.material] for o in builder.scene.objects]
+        materials = [Material() if o.name in builder.unmapped else looks[o.material] for o in builder.scene.objects]
         self._numbers = builder.numbers
         self._reflected = mi.Color3f(np.array([m.kd for m in materials], np.float32).T / np.float32(np.pi))
         self._coupled = mi.Bool(np.array([m.kd_coupled for m in materials], bool))
@@ -49,17 +50,30 @@ class LightMapCache:
 
     def _shown(self, si: Any, active: Any, irradiance: list[tuple[Any, Any]]) -> list[Any]:
         """Diffuse radiance (mi.Color3f) of surfaces for each pair of irradiances on the normal's side and the other."""
-        number = self._numbers.at(si, active)
         outside = mi.Frame3f.cos_theta(si.wi) > 0
+        reflected, transmitted, coupled = self.colours(si, active)
+        reflected *= dr.select(coupled, under_fresnel(dr.abs(mi.Frame3f.cos_theta(si.wi)), dr), 1.0)
+        by_front, by_back = dr.select(outside, reflected, transmitted), dr.select(outside, transmitted, reflected)
+        return [by_front * front + by_back * back for front, back in irradiance]
+
+    def colours(self, si: Any, active: Any) -> tuple[Any, Any, Any]:
+        """kd/pi, kt_d/pi (mi.Color3f), textured, and whether kd is coupled (mi.Bool)."""
+        number = self._numbers.at(si, active)
         reflected = dr.gather(mi.Color3f, self._reflected, number, active)
         transmitted = dr.gather(mi.Color3f, self._transmitted, number, active)
         coupled = dr.gather(mi.Bool, self._coupled, number, active)
-        reflected *= dr.select(coupled, under_fresnel(dr.abs(mi.Frame3f.cos_theta(si.wi)), dr), 1.0)
         if self._textured:
             texture = si.bsdf().eval_attribute_3(DIFFUSE_ATTRIBUTE, si, active)
             reflected, transmitted = reflected * texture, transmitted * texture
-        by_front, by_back = dr.select(outside, reflected, transmitted), dr.select(outside, transmitted, reflected)
-        return [by_front * front + by_back * back for front, back in irradiance]
+        return reflected, transmitted, coupled
+
+    def sun_on(self, points: Points, active: Any) -> list[tuple[Any, Any]]:
+        """Irradiance (mi.Color3f) of the sun that the light map leaves out, and the direction it comes from."""
+        if self._sun is None:
+            return []
+        si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.position))
+        si.p, si.n, si.sh_frame = points.position, mi.Normal3f(points.flat), mi.Frame3f(mi.Normal3f(points.normal))
+        return [(dr.maximum(self._sun(si, active), 0.0), mi.Vector3f(*map(float, self._sun.direction)))]
 
     def irradiance(self, si: Any, active: Any, *, sun: bool = True) -> Any:
         """Irradiance on the side that a ray came from, with or without the `sun` that the light map leaves out.

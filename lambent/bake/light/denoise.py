@@ -117,8 +117,11 @@ def denoise(irradiance: Floats) -> Floats:
     return _filtered(pyoidn.OIDN_FILTER_TYPE_RT_LIGHTMAP, {pyoidn.OIDN_IMAGE_COLOR: noisy})[RIM:-RIM, RIM:-RIM]
 
 
-def denoise_image(radiance: Floats, albedo: Floats, normal: Floats) -> Floats:
-    """Denoise an image (H, W, 3) of radiance by Open Image Denoise, guided by albedo and normals."""
+def denoise_image(radiance: Floats, albedo: Floats, normal: Floats, *, fast: bool = False) -> Floats:
+    """Denoise an image (H, W, 3) of radiance by Open Image Denoise, guided by albedo and normals.
+
+    `fast` takes half the time, for pictures that are soon replaced.
+    """
     import pyoidn
 
     images = {
@@ -126,10 +129,11 @@ def denoise_image(radiance: Floats, albedo: Floats, normal: Floats) -> Floats:
         pyoidn.OIDN_IMAGE_ALBEDO: albedo,
         pyoidn.OIDN_IMAGE_NORMAL: normal,
     }
-    return _filtered(pyoidn.OIDN_FILTER_TYPE_RT, images, hdr=True)
+    quality = pyoidn.OIDN_QUALITY_FAST if fast else pyoidn.OIDN_QUALITY_HIGH
+    return _filtered(pyoidn.OIDN_FILTER_TYPE_RT, images, quality=quality, hdr=True)
 
 
-def _filtered(kind: str, images: Mapping[str, Floats], **options: bool) -> Floats:
+def _filtered(kind: str, images: Mapping[str, Floats], quality: int | None = None, **options: bool) -> Floats:
     """The output (H, W, 3) of an Open Image Denoise filter, clamped at 0."""
     import pyoidn
 
@@ -142,6 +146,8 @@ def _filtered(kind: str, images: Mapping[str, Floats], **options: bool) -> Float
                 one.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
             for name, value in options.items():
                 one.set_bool(name, value)
+            if quality is not None:
+                one.set_int("quality", quality)
             one.commit()
             one.execute()
         error = device.get_error()

@@ -42,8 +42,8 @@ class Tally(Protocol):
         """
         ...
 
-    def cached(self, sums: list[Any], throughput: Any, cache: Any, si: Any, active: Any) -> list[Any]:
-        """Add the light of a cache at surfaces."""
+    def cached(self, sums: list[Any], throughput: Any, cache: Any, si: Any, active: Any, first: Any) -> list[Any]:
+        """Add the light of a cache at surfaces, which are the path's first ones where `first`."""
         ...
 
 
@@ -61,7 +61,7 @@ class AllLight:
     def emitted(self, sums: list[Any], light: Any, emitter: Any, w: Any, factor: Any, first: Any) -> list[Any]:
         return [total + light for total in sums]
 
-    def cached(self, sums: list[Any], throughput: Any, cache: Any, si: Any, active: Any) -> list[Any]:
+    def cached(self, sums: list[Any], throughput: Any, cache: Any, si: Any, active: Any, first: Any) -> list[Any]:
         if cache is None:
             return sums
         return [sums[0] + dr.select(active, throughput * cache(si, active), 0.0), *sums[1:]]
@@ -73,7 +73,7 @@ class Start:
 
     The density weights the emitters that the ray hits; `direct` counts them in full, if nothing else samples them. The
     ray does not see the sun `unseen`. If that sun passes panes, clear glass is ignored until the path scatters:
-    everything that a ray sees straight through glass is emitter-sampled from the start.
+    everything that a ray sees straight through glass is emitter-sampled from the start. Only `active` paths are traced.
     """
 
     ray: Any
@@ -81,6 +81,7 @@ class Start:
     pdf: Any
     direct: bool
     unseen: Sun | None = None
+    active: Any = True
 
 
 def camera_start(ray: Any) -> Start:
@@ -105,7 +106,7 @@ def radiance_sums(scene: Any, sampler: Any, start: Start, max_depth: int, cache:
     """Likewise as the sums of a tally, with a cache that suits it."""
     found: list[Any] = _trace(
         scene, sampler, mi.Ray3f(start.ray), mi.SurfaceInteraction3f(start.origin), mi.Float(start.pdf),
-        mi.Bool(start.direct), max_depth, cache, rays.has_holes(scene), start.unseen, tally,
+        mi.Bool(start.direct), max_depth, cache, rays.has_holes(scene), start.unseen, tally, start.active,
     )  # fmt: skip
     return found
 
@@ -128,13 +129,13 @@ def sample_emitter(
 
 
 @dr.syntax
-def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, unseen, tally):  # type: ignore[no-untyped-def]
+def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, unseen, tally, active):  # type: ignore[no-untyped-def]
     width = dr.width(ray.o)
     sums = tally.begin(width)
     throughput = dr.ones(mi.Color3f, width)
     straight = dr.full(mi.Bool, unseen is not None, width)  # so far only through clear glass
     depth = dr.zeros(mi.UInt32, width)
-    active = dr.full(mi.Bool, True, width)
+    active = mi.Bool(active) & dr.full(mi.Bool, True, width)
     ctx = mi.BSDFContext()
     while active:
         si = rays.intersect(scene, ray, active, holes)
@@ -153,7 +154,7 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, un
         factor = dr.select(shows_sun, factor, 0.0)
         sums = tally.emitted(sums, brought, emitter, ray.d, factor, straight | (depth == 0))
         active &= si.is_valid() & (depth < max_depth)
-        sums = tally.cached(sums, throughput, cache, si, active)
+        sums = tally.cached(sums, throughput, cache, si, active, depth == 0)
 
         at = mi.SurfaceInteraction3f(si)  # oriented to the ray's side, for sampling a guided sky
         at.n = dr.select(dr.dot(si.n, ray.d) > 0, -si.n, si.n)
@@ -226,10 +227,21 @@ def irradiance_sums(
     unseen: Sun | None = None,
 ) -> list[Any]:  # fmt: skip
     """Likewise as the sums of a tally, with a cache that suits it."""
-    arriving, _, direct, _ = _contributions(
-        scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, tally, unseen
-    )  # fmt: skip
-    return [mi.Color3f(dr.pi * one + other) for one, other in zip(arriving, direct, strict=True)]
+    parts = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, tally, unseen)
+    (along, _), (direct, _) = parts
+    return [mi.Color3f(one + other) for one, other in zip(along, direct, strict=True)]
+
+
+def arriving(
+    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Any, tally: Tally,
+    unseen: Sun | None = None, active: Any = True,
+) -> list[tuple[Any, Any]]:  # fmt: skip
+    """Likewise by direction: irradiances (mi.Color3f) that add up to the sample, and unit directions they come from.
+
+    The tally has one sum.
+    """
+    parts = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, tally, unseen, active)
+    return [(mi.Color3f(sums[0]), mi.Vector3f(w)) for sums, w in parts]
 
 
 def moment(
@@ -237,26 +249,24 @@ def moment(
     unseen: Sun | None = None,
 ) -> Any:  # fmt: skip
     """One sample of the sum of directions (as mi.Color3f), each weighted by its luminance in `irradiance`."""
-    (arriving,), w, (direct,), w_direct = _contributions(
-        scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, AllLight(), unseen
-    )  # fmt: skip
-    return mi.Color3f(mi.luminance(dr.pi * arriving) * mi.Vector3f(w) + mi.luminance(direct) * mi.Vector3f(w_direct))
+    found = arriving(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, AllLight(), unseen)
+    return mi.Color3f(sum(mi.luminance(light) * w for light, w in found))
 
 
 def _contributions(
     scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Any, tally: Tally,
-    unseen: Sun | None,
-) -> tuple[list[Any], Any, list[Any], Any]:  # fmt: skip
-    """Sums of radiance by BSDF sampling, times pi irradiance, and of irradiance by emitters, with directions."""
+    unseen: Sun | None, active: Any = True,
+) -> list[tuple[list[Any], Any]]:  # fmt: skip
+    """Sums of irradiance by sampling of directions, and by emitters, each with the directions it comes from."""
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.position))
     si.p, si.n, si.sh_frame = points.position, mi.Normal3f(points.flat), mi.Frame3f(mi.Normal3f(points.normal))
     local = mi.warp.square_to_cosine_hemisphere(u_bsdf)
     ray = rays.leaving(scene, si.p, si.n, si.to_world(local))
-    start = Start(ray, si, local.z / dr.pi, False, unseen)
-    arriving = radiance_sums(scene, sampler, start, max_depth, cache, tally)
+    start = Start(ray, si, local.z / dr.pi, False, unseen, active)
+    along = radiance_sums(scene, sampler, start, max_depth, cache, tally)
     first = None if unseen is None else unseen.first
     lights = scene if first is None else first.scene
-    ds, value = sample_emitter(scene, lights, si, u_emitter, mi.Bool(True), rays.has_holes(scene), unseen)
+    ds, value = sample_emitter(scene, lights, si, u_emitter, mi.Bool(active), rays.has_holes(scene), unseen)
     cosine = dr.maximum(dr.dot(ds.d, points.normal), 0.0)
     weight = dr.select(ds.delta, 1.0, _balance(ds.pdf, cosine / dr.pi))
     brought = dr.select(ds.pdf > 0, cosine * weight, 0.0)
@@ -264,4 +274,4 @@ def _contributions(
     factor = mi.Color3f(dr.select(shows_sun, brought * dr.rcp(ds.pdf), 0.0))
     sums = tally.begin(dr.width(points.position))
     direct = tally.emitted(sums, brought * value, ds.emitter, ds.d, factor, mi.Bool(True))
-    return arriving, ray.d, direct, ds.d
+    return [([dr.pi * one for one in along], ray.d), (direct, ds.d)]

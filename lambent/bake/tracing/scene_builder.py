@@ -68,6 +68,8 @@ class SceneBuilder:
         By material name, terms and curves that replace those of documents.
     sampling : EmitterSampling, optional
         From another builder of the same scene, to sample emitters identically.
+    unmapped : collection of str, optional
+        Objects without texels in the light map, which keep their diffuse terms even without `diffuse`.
     coarse_sky : bool
         Reduce the environment's picture to a sixteenth of its pixels, for trials that cannot tell the difference.
     """
@@ -81,10 +83,11 @@ class SceneBuilder:
         measured: Mapping[str, Lookup] | None = None,
         sampling: EmitterSampling | None = None,
         edited: Mapping[str, Editable] | None = None,
+        unmapped: Collection[str] = (),
         coarse_sky: bool = False,
     ) -> None:
         register_material_plugin()
-        self.scene, self.measured, self.edited = scene, measured or {}, edited or {}
+        self.scene, self.measured, self.edited, self.unmapped = scene, measured or {}, edited or {}, unmapped
         tables = {name: mi.load_dict(table_dict(grid)) for name, grid in self.measured.items()}
         for name, made in self.edited.items():
             tables[name] = mi.load_dict(edited_dict(scene.materials[name], made, scene.textures.get(name)))
@@ -95,7 +98,7 @@ class SceneBuilder:
             bsdf = tables.get(o.material)
             if bsdf is None:
                 material, textures = scene.materials[o.material], scene.textures.get(o.material)
-                said = material_dict(material, textures, diffuse=diffuse)
+                said = material_dict(material, textures, diffuse=diffuse or o.name in unmapped)
                 look = (said["material"], "clear" in said, textures and o.material)
                 if look not in bsdfs:
                     bsdfs[look] = mi.load_dict(said)

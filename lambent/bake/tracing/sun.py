@@ -12,6 +12,8 @@ from lambent.bake.sky.sun import ALIGNED, FoundSun
 from lambent.bake.tracing import rays
 from lambent.core.arrays import Flags, Floats
 from lambent.core.directions import basis
+from lambent.core.light_mix import WHITE
+from lambent.core.plain import Triple
 
 
 class FirstEmitters(Protocol):
@@ -84,15 +86,19 @@ class Sun:
 
 
 class SunRays:
-    """Irradiance of a sun on surfaces of a Mitsuba scene, by shadow rays to random points of its disc."""
+    """Irradiance of a sun on surfaces of a Mitsuba scene, by shadow rays to random points of its disc.
 
-    def __init__(self, sun: Sun, scene: Any) -> None:
+    `factor` multiplies it by channel.
+    """
+
+    def __init__(self, sun: Sun, scene: Any, factor: Triple = WHITE) -> None:
         self._sun, self._scene = sun, scene
         self._blocked_by_all = not (sun.passes_panes or rays.has_holes(scene))
         across, up = basis(np.array(sun.record.direction))
         self._across, self._up = mi.Vector3f(*map(float, across)), mi.Vector3f(*map(float, up))
         self._tangent = float(np.tan(sun.record.radius_rad))
-        self._irradiance = mi.Color3f(*sun.record.irradiance)
+        light = (one * share for one, share in zip(sun.record.irradiance, factor, strict=True))
+        self._irradiance = mi.Color3f(*(dr.opaque(mi.Float, float(one)) for one in light))
 
     @property
     def direction(self) -> Floats:

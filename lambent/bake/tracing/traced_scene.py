@@ -5,7 +5,7 @@ Everything follows from the scene and the split meshes alone: a resumed bake fin
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -21,30 +21,36 @@ from lambent.bake.surfaces.atlas import Atlas
 from lambent.bake.surfaces.texels import POINTS, Sides, Texels, chart_labels, texels_of
 from lambent.bake.tracing.emitters import balance_emitters
 from lambent.bake.tracing.first_light import FirstLight, sky_without
-from lambent.bake.tracing.group_tally import Direct, GroupTally
+from lambent.bake.tracing.group_tally import Direct, GroupTally, MixTally, Sorting
 from lambent.bake.tracing.scene_builder import EmitterSampling, SceneBuilder
 from lambent.bake.tracing.solids import SolidTest
 from lambent.bake.tracing.sun import Sun, SunRays
 from lambent.bake.tracing.visibility import seen, viewing_places, without_hidden
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.inputs import sha256_of
+from lambent.core.light_mix import WHITE
+from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.materials.measured.patch_sheet import Lookup, lookup_of
 from lambent.materials.measured.registry import load
 from lambent.scenes.light_groups import SortedLights, sorted_lights
+from lambent.scenes.panes import panes_of
+from lambent.scenes.scene import Scene
 
 
 class TracedScene:
     """Shared by the artefacts of a bake. `merged` is the concatenated geometry of the atlas, as from `atlas.merged`.
 
-    `two_sided` flags each object whose back has a light map too: because light crosses it, or viewers see it.
+    `two_sided` flags each object whose back has a light map too: because light crosses it, or viewers see it. The
+    light map leaves out the scene's sun unless `sun_beside` is false. Objects in `unmapped` have no texels in it.
     """
 
     def __init__(
-        self, atlas: Atlas, merged: dict[str, Floats], two_sided: list[bool], progress: Progress = silent
-    ) -> None:
+        self, atlas: Atlas, merged: dict[str, Floats], two_sided: list[bool], progress: Progress = silent, *,
+        sun_beside: bool = True, unmapped: Collection[str] = (),
+    ) -> None:  # fmt: skip
         self.atlas, self.scene, self.merged, self.progress = atlas, atlas.scene, merged, progress
-        self.two_sided = two_sided
+        self.two_sided, self._sun_beside, self._unmapped = two_sided, sun_beside, unmapped
         counts = [len(o.mesh.faces) for o in self.scene.objects]
         self._two_sided, self._crossed = np.repeat(two_sided, counts), np.repeat(crossed_by_light(self.scene), counts)
         self._builder: tuple[tuple[bool, bool], SceneBuilder] | None = None
@@ -65,8 +71,9 @@ class TracedScene:
             self._builder = self._whole = None
             tables = self._measured_tables(photons)
             builder = SceneBuilder(
-                self.scene, self.atlas.uv2, diffuse=diffuse, measured=tables, sampling=self._sampling
-            )
+                self.scene, self.atlas.uv2, diffuse=diffuse, measured=tables, sampling=self._sampling,
+                unmapped=self._unmapped,
+            )  # fmt: skip
             if self._sampling is None:
                 balance_emitters(builder)
                 self._sampling = builder.sampling()
@@ -97,7 +104,7 @@ class TracedScene:
 
     @cached_property
     def _found_sun(self) -> FoundSun | None:
-        return sun_of(self.scene)
+        return sun_of(self.scene) if self._sun_beside else None
 
     def unseen(self, *, diffuse: bool) -> Sun | None:
         """That sun with the emitters of `whole(diffuse=diffuse)`, for sampling at points of the light map."""
@@ -108,10 +115,10 @@ class TracedScene:
             self._sky_without = (sky_without(self._found_sun, builder, whole),)
         return Sun(self._found_sun, FirstLight(builder, whole, self._found_sun, *self._sky_without))
 
-    def cache(self, irradiance: Floats, irradiance_back: Floats | None) -> LightMapCache:
+    def cache(self, irradiance: Floats, irradiance_back: Floats | None, factor_of_sun: Triple = WHITE) -> LightMapCache:
         """A light map (H, W, 3) as radiance cache of the scene without diffuse terms, including the sun it lacks."""
         builder = self.builder(diffuse=False)
-        sun = None if self.sun is None else SunRays(self.sun, self.whole(diffuse=False))
+        sun = None if self.sun is None else SunRays(self.sun, self.whole(diffuse=False), factor_of_sun)
         return LightMapCache(builder, irradiance, irradiance_back, sun)
 
     @cached_property
@@ -123,7 +130,27 @@ class TracedScene:
 
     def tally(self, *, diffuse: bool, direct: Direct | None) -> GroupTally:
         """Separates the light of paths in `whole(diffuse=diffuse)` by group; `direct` light separately as well."""
-        return GroupTally(self.sorted_lights, self.builder(diffuse=diffuse), self.sun, direct)
+        return GroupTally(self._sorting(diffuse=diffuse), direct)
+
+    def mixed(self, factors: Floats, *, diffuse: bool) -> MixTally:
+        """Likewise, the sum of all groups times their factors (n, 3)."""
+        return MixTally(self._sorting(diffuse=diffuse), factors)
+
+    def _sorting(self, *, diffuse: bool) -> Sorting:
+        return Sorting(self.sorted_lights, self.builder(diffuse=diffuse), self.sun)
+
+    def dressed(self, scene: Scene) -> TracedScene:
+        """The same objects under the same lights, with the materials and textures of another scene."""
+        mine = replace(self.scene, materials=scene.materials, textures=scene.textures)
+        found = TracedScene(
+            replace(self.atlas, scene=mine), self.merged, self.two_sided, self.progress,
+            sun_beside=self._sun_beside, unmapped=self._unmapped,
+        )  # fmt: skip
+        found._sampling, found._sky_without = self._sampling, self._sky_without
+        if self._found_sun is not None:
+            record = self._found_sun.record.model_copy(update={"panes": panes_of(mine)})
+            found._found_sun = replace(self._found_sun, record=record)
+        return found
 
     def grouped_cache(self, irradiance: Floats, irradiance_back: Floats | None) -> GroupedCache:
         """`cache` for the light maps (n, H, W, 3) of groups."""

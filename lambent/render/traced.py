@@ -1,0 +1,128 @@
+"""Images traced against the baked light, or by whole paths: the reference for all others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from lambent.core.arrays import Floats
+from lambent.core.camera import Camera
+from lambent.core.errors import UserError
+from lambent.core.interruption import is_interruption
+from lambent.core.light_mix import WHITE, MixTrack
+from lambent.core.progress import Cancelled, Progress, silent
+from lambent.render.edits import Edits, edits_of
+from lambent.render.images import PATH_TRACER, Images, Settings
+from lambent.scenes.retexturing import materials_without_uv
+from lambent.scenes.scene import Look, Variant
+from lambent.scenes.variants import variant_named
+from lambent.store.answer import NO_ANSWER
+from lambent.store.source import changed_inputs, scene_of
+from lambent.store.states import variants_of
+from lambent.store.store import Store
+from lambent.traced.picture import TracedPicture
+from lambent.traced.room import room_of_paths, room_of_store
+
+PATHS = 64  # samples of each pixel by whole paths
+NOISE = 0.02
+FIRST_ASKED, CHECKED_EVERY = 8, 1.5  # samples before the first estimate of the noise, and growth until the next
+MOST_SAMPLES = 4096
+AS_THE_FILE_IS = (
+    "traced with the present lights and surroundings, and the materials of the bake; --scene FILE traces a file with "
+    "its own by --integrator path"
+)
+
+
+class TracedImages(Images):
+    """Images by `traced`, or by `path`, of a store or, whole paths alone, of the file `scene` in its place."""
+
+    def __init__(self, store: Store, settings: Settings, scene: str | None, note: Callable[[str], None]) -> None:
+        super().__init__(settings)
+        self._path = settings.integrator == PATH_TRACER
+        _check(settings)
+        self._note, self._noted = note, set[str]()
+        self._given = scene_of(store, scene)
+        if changed := changed_inputs(store, self._given):
+            traced = f"{scene} is traced as it is now" if scene else AS_THE_FILE_IS
+            note(f"changed since the bake: {', '.join(changed)}; {traced}")
+        how: dict[str, Any] = {"sky_turn_deg": settings.sky_turn_deg, "replacements": settings.replacements}
+        self._room = room_of_paths(self._given, **how) if self._path else room_of_store(store, self._given, **how)
+        self._light, self._looks = settings.light or MixTrack(), dict[str, Look]()
+        if settings.variant:
+            self._looks = dict(variant_named(variants_of(store), settings.variant).looks)
+        self._room.check(dict.fromkeys(self._light.groups, WHITE))
+
+    def apply_variant(self, variant: Variant) -> None:
+        self._light, self._looks = self.settings.light or MixTrack.of(variant.light), dict(variant.looks)
+
+    def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
+        settings, edits = self.settings, self._edits()
+        self._room.wear(edits.looks, edits.materials)
+        self._room.mix(self._light.factors_at(self.time_s))
+        if edits.materials and not self._room.answers:
+            self._once(f"light between surfaces stays as baked: {NO_ANSWER}")
+        picture = TracedPicture(
+            self._room.tracer, camera, (settings.width, settings.height), seed=settings.seed, path=self._path,
+            part=settings.show,
+        )  # fmt: skip
+        try:
+            self.noise = sampled(picture, settings, progress)
+        except BaseException as error:
+            if not (self.keeps and picture.samples and (isinstance(error, Cancelled) or is_interruption(error))):
+                raise
+            self.interrupted = True
+            self._note(f"interrupted: the picture has {picture.samples} samples per pixel")
+        self.samples = picture.samples
+        return picture.denoised() if settings.denoises else picture.mean()
+
+    def _edits(self) -> Edits:
+        """The changed materials of the next image."""
+        settings, track = self.settings, self.settings.looks
+        looks = {**self._looks, **(track.looks_at(self.time_s) if track else {})}
+        scene, bare = self._given, self._without_uv
+        return edits_of(scene.materials, scene.textures, bare, looks, settings.recolour, settings.textures)
+
+    def _once(self, text: str) -> None:
+        if text not in self._noted:
+            self._noted.add(text)
+            self._note(text)
+
+    @cached_property
+    def _without_uv(self) -> frozenset[str]:
+        return materials_without_uv([(o.material, o.mesh.uv) for o in self._given.objects])
+
+
+def sampled(picture: TracedPicture, settings: Settings, progress: Progress = silent) -> float | None:
+    """Add samples until their number, or the noise, is as in the settings; returns the noise if it decided.
+
+    Noise falls with the root of the number of samples, which tells the time left.
+    """
+    wanted = settings.samples or (PATHS if picture.path and settings.noise is None else None)
+    if wanted is not None:
+        while picture.samples < wanted:
+            picture.sample(wanted - picture.samples)
+            progress(picture.samples, wanted, "tracing")
+        return None
+    limit, noise, asked = settings.noise or NOISE, np.inf, FIRST_ASKED
+    expected: float = asked
+    while noise > limit and picture.samples < MOST_SAMPLES:
+        picture.sample(asked - picture.samples)
+        if picture.samples >= asked:
+            noise = picture.noise(denoised=settings.denoises)
+            expected = min(picture.samples * max(1.0, (noise / limit) ** 2), MOST_SAMPLES)
+            asked = int(np.ceil(min(expected, CHECKED_EVERY * picture.samples)))
+        progress(min(picture.samples, expected), expected, "tracing")
+    return noise
+
+
+def _check(settings: Settings) -> None:
+    """Raise `UserError` for choices of the renderer that traced pictures do not have."""
+    if settings.integrator == PATH_TRACER and settings.show != "full":
+        raise UserError("the path tracer shows all light", field="--show", got=settings.show, expected="full")
+    for option, given, usual in (("--planar", settings.planar, "auto"), ("--lookup", settings.lookup, "auto")):
+        if given != usual:
+            hint = "add --integrator lamps"
+            raise UserError("applies to drawn pictures only", field=option, got=given, expected=usual, hint=hint)

@@ -1,0 +1,75 @@
+"""The light map of a store in a state of its room: edited materials answered, light groups mixed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lambent.core.arrays import Floats
+from lambent.core.errors import UserError
+from lambent.core.light_mix import Factors
+from lambent.materials.document import Material
+from lambent.realtime.answering import AnsweredLight, Lit
+from lambent.realtime.baked import read_baked
+from lambent.realtime.group_arrays import BAKE_GROUPS, NO_GROUPS, GroupArrays
+from lambent.scenes.scene import MaterialTextures
+from lambent.store.answer import has_answer, read_answer
+from lambent.store.store import Store
+
+if TYPE_CHECKING:
+    from lambent.bake.pictures.tracer import LightMap
+
+Worn = Mapping[str, MaterialTextures | None]  # exchanged textures, by material
+
+
+class StoredLight:
+    """The light map of a store; `answers` tells whether it follows edited materials."""
+
+    def __init__(self, store: Store) -> None:
+        self._store, self.answers = store, has_answer(store)
+        self._baked = read_baked(store, probes=False)
+        self._lit: tuple[object, Lit] | None = None
+
+    def of(self, materials: Mapping[str, Material], textures: Worn, factors: Factors) -> LightMap:
+        """The light map for edited materials, exchanged textures and factors of light groups, all by name."""
+        from lambent.bake.pictures.tracer import LightMap  # imports Mitsuba, whose variant `engine` has set
+
+        lit, baked = self._answered(materials, textures), self._baked
+        if not factors:
+            maps = (baked.irradiance, baked.irradiance_back) if lit is None else self._answer.maps(lit)
+            return LightMap(*map(self._in_watts, maps))
+        groups, by_group = self._groups, self._groups.factors(factors)
+        answered = None if lit is None else self._answer.groups(lit)
+        mixed = [None if side is None else side[..., :3] for side in (answered or groups).light_map(by_group)]
+        return LightMap(self._in_watts(mixed[0]), self._in_watts(mixed[1]), by_group)
+
+    def check(self, factors: Factors) -> None:
+        """Raise `UserError` if the store has no light groups, or none of a name."""
+        if factors:
+            self._groups.factors(factors)
+
+    @property
+    def _groups(self) -> GroupArrays:
+        if self._baked.groups is None:
+            raise UserError(NO_GROUPS, field="--light", hint=BAKE_GROUPS)
+        return self._baked.groups
+
+    def _answered(self, materials: Mapping[str, Material], textures: Worn) -> Lit | None:
+        """The answer to edits; None without edits, or where light stays as baked."""
+        if not self.answers or not (materials or textures):
+            return None
+        of = dict(materials), dict(textures)
+        if self._lit is None or self._lit[0] != of:
+            self._lit = of, self._answer.lit(materials, textures)
+        return self._lit[1]
+
+    @cached_property
+    def _answer(self) -> AnsweredLight:
+        return AnsweredLight(self._baked, read_answer(self._store))
+
+    def _in_watts(self, side: Floats | None) -> Floats | None:
+        """A side (H, W, 3) as float32, W/m^2."""
+        return None if side is None else np.asarray(side, np.float32) * np.float32(self._baked.unit)

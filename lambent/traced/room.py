@@ -1,0 +1,130 @@
+"""A room as traced, in a state: which materials its objects wear, and how its light is mixed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lambent.bake.engine import engine
+from lambent.core.errors import UserError, did_you_mean
+from lambent.core.light_mix import WHITE, Factors
+from lambent.materials.document import Material
+from lambent.scenes.replacement import Replacement, with_replacements
+from lambent.scenes.scene import Look, Scene
+from lambent.scenes.textures import prepared
+from lambent.scenes.turned_sky import under_turned_sky
+from lambent.scenes.variants import textures_worn, worn_by
+from lambent.store.store import Store
+from lambent.traced.light import StoredLight
+
+if TYPE_CHECKING:
+    from lambent.bake.pictures.tracer import Tracer
+    from lambent.bake.tracing.traced_scene import TracedScene
+
+
+class TracedRoom:
+    """A traced scene, with the light map of its store, or for whole paths without one.
+
+    Materials are the documents that are drawn, not measured tables. Made by `room_of_store` and `room_of_paths`.
+    """
+
+    def __init__(self, traced: TracedScene, light: StoredLight | None, folder: Any = None) -> None:
+        self._given = self._traced = traced
+        self._light, self._folder = light, folder  # the folder has images that the scene reads
+        self._looks: Mapping[str, Look] = {}
+        self._materials: Mapping[str, Material] = {}
+        self._factors: Factors = {}
+        self._tracer: Tracer | None = None
+
+    @property
+    def answers(self) -> bool:
+        """Whether light between surfaces follows edited materials."""
+        return self._light is None or self._light.answers
+
+    def wear(self, looks: Mapping[str, Look], materials: Mapping[str, Material]) -> None:
+        """Show materials with other textures (`looks`) and other documents (`materials`), by name; others as baked."""
+        if (looks, materials) == (self._looks, self._materials):
+            return
+        self._looks, self._materials, self._tracer = dict(looks), dict(materials), None
+        if not (looks or materials):
+            self._traced = self._given
+            return
+        scene = self._given.scene
+        self._traced = self._given.dressed(replace(
+            scene, materials={**scene.materials, **materials}, textures=prepared(textures_worn(scene.textures, looks))
+        ))  # fmt: skip
+
+    def mix(self, factors: Factors) -> None:
+        """Show a mix of light groups by name; those left out are as baked.
+
+        Raises
+        ------
+        UserError
+            If there is no such group.
+        """
+        if factors != self._factors:
+            self.check(factors)
+            self._factors, self._tracer = dict(factors), None
+
+    def check(self, factors: Factors) -> None:
+        """Raise `UserError` if a group of a mix is missing."""
+        if self._light is not None:
+            self._light.check(factors)
+        elif factors:
+            names = [group.name for group in self._given.sorted_lights.groups]
+            for name in (one for one in factors if one not in names):
+                hint, expected = did_you_mean(name, names), ", ".join(names)
+                raise UserError("unknown light group", field="light", got=name, expected=expected, hint=hint)
+
+    @property
+    def tracer(self) -> Tracer:
+        """Samples of pictures in the present state."""
+        from lambent.bake.pictures.tracer import Tracer  # imports Mitsuba, whose variant `engine` has set
+
+        if self._tracer is None and self._light is not None:
+            worn = {name: worn_by(name, look, self._given.scene.textures) for name, look in self._looks.items()}
+            self._tracer = Tracer.of_baked(self._traced, self._light.of(self._materials, worn, self._factors))
+        elif self._tracer is None:
+            self._tracer = Tracer.of_paths(self._traced, self._factors_by_group())
+        return self._tracer
+
+    def _factors_by_group(self) -> np.ndarray | None:
+        if not self._factors:
+            return None
+        groups = self._given.sorted_lights.groups
+        return np.array([self._factors.get(group.name, WHITE) for group in groups], np.float32)
+
+
+def room_of_store(
+    store: Store, scene: Scene, *, sky_turn_deg: float = 0.0, replacements: Sequence[Replacement] = ()
+) -> TracedRoom:
+    """A store's room: its geometry and light map, under the lights of its scene (`store.source.scene_of`).
+
+    Sky and sun can be rotated about the vertical, and meshes take the place of objects; the light map stays as baked.
+    """
+    engine()
+    from lambent.bake.pictures.stored import stored_scene  # imports Mitsuba, whose variant `engine` has set
+
+    folder = TemporaryDirectory()
+    lit = under_turned_sky(_as_drawn(scene), sky_turn_deg, Path(folder.name))
+    return TracedRoom(stored_scene(store, lit, replacements), StoredLight(store), folder)
+
+
+def room_of_paths(scene: Scene, *, sky_turn_deg: float = 0.0, replacements: Sequence[Replacement] = ()) -> TracedRoom:
+    """A scene for whole paths, without a light map."""
+    engine()
+    from lambent.bake.pictures.stored import scene_alone  # imports Mitsuba, whose variant `engine` has set
+
+    folder = TemporaryDirectory()
+    lit = under_turned_sky(_as_drawn(with_replacements(scene, replacements)), sky_turn_deg, Path(folder.name))
+    return TracedRoom(scene_alone(lit), None, folder)
+
+
+def _as_drawn(scene: Scene) -> Scene:
+    """The scene with documents in place of measured tables."""
+    return replace(scene, textures=prepared(scene.textures), measured={})
