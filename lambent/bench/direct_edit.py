@@ -25,7 +25,7 @@ import numpy as np
 from lambent.bake.bake import bake
 from lambent.bake.quality import quality_named
 from lambent.bake.view import View
-from lambent.bench.reference import Reference
+from lambent.bench.reference import Reference, path_traced
 from lambent.bench.sum_over_lights import errors_of_sums
 from lambent.core.arrays import Flags, Floats
 from lambent.core.files import folder_bytes
@@ -250,10 +250,10 @@ def _against_path_tracing(
     scene: Scene, pictures: list[Floats], shown: Flags, effort: Effort
 ) -> Iterator[dict[str, Any]]:
     """Errors of edited pictures, and the time of path tracing with a denoiser for the same error."""
-    from lambent.bake.reference.denoised import DenoisedView
+    from lambent.bake.reference.path_traced import tracer_of
 
-    tracer = DenoisedView(scene, scene.cameras[0], effort.size, effort.size, max_depth=1)
-    halves = [tracer.image(effort.reference_spp // 2, seed) for seed in (1, 2)]
+    view = tracer_of(scene, max_depth=1), scene.cameras[0], (effort.size, effort.size)
+    halves = [path_traced(*view, effort.reference_spp // 2, seed).mean() for seed in (1, 2)]
     converged = np.mean(halves, axis=0)
     exposure_ev = display_exposure(converged)  # of the whole picture: surfaces alone may be darker than its mean
     reference, half = (
@@ -262,12 +262,12 @@ def _against_path_tracing(
     )
     noise = half.errors(halves[1])["flip_shown"]
     wanted = [reference.errors(picture) for picture in pictures]
-    tracer.denoised(2)  # compiles
+    path_traced(*view, 2, seed=3).denoised()  # compiles
     tried: list[tuple[int, float, float]] = []
     while not tried or (tried[-1][1] < effort.rival_s / 2 and tried[-1][2] > min(w["flip_shown"] for w in wanted)):
         spp = 2 ** (len(tried) + 1)
         began = time.perf_counter()
-        image = tracer.denoised(spp, seed=3)
+        image = path_traced(*view, spp, seed=3).denoised()
         tried.append((spp, time.perf_counter() - began, reference.errors(image)["flip_shown"]))
     for errors in wanted:
         found = {"psnr": errors["psnr"], "flip": errors["flip_shown"], "reference_flip": noise}

@@ -35,6 +35,7 @@ from lambent.bake.quality import quality_named
 from lambent.bake.view import View
 from lambent.bench.direct_edit import MIB, held_bytes
 from lambent.bench.gi_edit_states import KINDS, flip_between, interior, relative_mse, setting, summed_up
+from lambent.bench.reference import path_traced
 from lambent.core.arrays import Flags, Floats
 from lambent.core.errors import UserError
 from lambent.core.files import folder_bytes
@@ -316,20 +317,19 @@ def _rival(
     room: _Room, large: _Room, state: dict[str, Editable], converged: Floats, wanted: float, effort: Effort
 ) -> dict[str, Any]:
     """The fewest samples that reach the error in the small view, and their seconds in the large one."""
-    from lambent.bake.reference.denoised import DenoisedView
+    from lambent.bake.reference.path_traced import tracer_of
 
     edited = {name: one for name, one in state.items() if name not in room.fixed}
     depth = len(room.case.series)
-    small, tracer = (
-        DenoisedView(one.scene, one.camera, *one.size, max_depth=depth, edited=edited) for one in (room, large)
-    )
-    tracer.denoised(2)  # compiles
+    tracer = tracer_of(room.scene, max_depth=depth, edited=edited)
+    small, whole = ((tracer, room.camera, size) for size in (room.size, large.size))
+    path_traced(*whole, 2, seed=3).denoised()  # compiles
     spp, seconds, flip = 1, 0.0, np.inf
     while flip > wanted and seconds < effort.rival_s / 2:
         spp *= 2
-        flip = flip_between(converged, small.denoised(spp, seed=3))
+        flip = flip_between(converged, path_traced(*small, spp, seed=3).denoised())
         began = time.perf_counter()
-        tracer.denoised(spp, seed=3)
+        path_traced(*whole, spp, seed=3).denoised()
         seconds = time.perf_counter() - began
     said: dict[str, Any] = {"rival_spp": spp, "rival_seconds": round(seconds, 2)}
     if flip > wanted:

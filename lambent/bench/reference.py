@@ -6,14 +6,19 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lambent.core import metrics
 from lambent.core.arrays import Flags, Floats
+from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.images import HDR_SUFFIXES, read_image
+from lambent.traced.picture import TracedPicture
+
+if TYPE_CHECKING:
+    from lambent.bake.pictures.tracer import Tracer
 
 
 @dataclass(frozen=True)
@@ -67,6 +72,18 @@ def finished(paths: Sequence[Path]) -> list[Floats]:
             raise UserError("reference is black", file=path)
         found.append(picture)
     return found
+
+
+def path_traced(tracer: Tracer, camera: Camera, size: tuple[int, int], samples: int, seed: int) -> TracedPicture:
+    """A view by a number of whole paths per pixel."""
+    return with_samples(TracedPicture(tracer, camera, size, seed=seed, path=True), samples)
+
+
+def with_samples(picture: TracedPicture, samples: int) -> TracedPicture:
+    """The picture, when it has a number of samples per pixel."""
+    while picture.samples < samples:
+        picture.sample(samples - picture.samples)
+    return picture
 
 
 def mean(digits: int) -> Callable[[list[float]], float]:

@@ -8,6 +8,7 @@ import pytest
 
 from lambent.bench import direct_edit
 from lambent.bench.direct_edit import CASES, Effort, held_bytes, run
+from lambent.bench.reference import path_traced
 
 SMALL = Effort(48, (60,), frames=4, edits=10, reference_spp=64, rival_s=0.5, checked=4)
 
@@ -36,14 +37,15 @@ def test_the_rival_comes_closer_with_more_samples() -> None:
     from lambent.bake.engine import engine
 
     engine()
-    from lambent.bake.reference.denoised import DenoisedView
+    from lambent.bake.reference.path_traced import tracer_of
     from lambent.scenes import load_scene
 
     scene = load_scene("builtin:teatray")
-    tracer = DenoisedView(scene, scene.cameras[0], 48, 48, max_depth=1)
-    reference = np.log(1e-2 + tracer.image(1024, seed=1))
-    errors = {spp: np.abs(np.log(1e-2 + tracer.denoised(spp, seed=2)) - reference).mean() for spp in (2, 64)}
-    noisy = np.abs(np.log(1e-2 + tracer.image(2, seed=2)) - reference).mean()
+    view = tracer_of(scene, max_depth=1), scene.cameras[0], (48, 48)
+    reference = np.log(1e-2 + path_traced(*view, 1024, seed=1).mean())
+    pictures = {spp: path_traced(*view, spp, seed=2) for spp in (2, 64)}
+    errors = {spp: np.abs(np.log(1e-2 + one.denoised()) - reference).mean() for spp, one in pictures.items()}
+    noisy = np.abs(np.log(1e-2 + pictures[2].mean()) - reference).mean()
     assert errors[64] < errors[2] < noisy
 
 

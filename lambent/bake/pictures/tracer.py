@@ -27,6 +27,8 @@ from lambent.core.camera import Camera, image_plane
 from lambent.core.light_mix import WHITE
 from lambent.core.plain import triple
 from lambent.materials.document import Material
+from lambent.materials.factored.albedo import term_albedo
+from lambent.materials.factored.terms import Editable
 
 MAX_DEPTH = 16  # surfaces on the longest path
 Image = NDArray[np.float32]
@@ -64,9 +66,10 @@ class Tracer:
     """Samples of pictures of one scene: of all kinds `of_baked` light, of whole paths alone `of_paths`."""
 
     def __init__(
-        self, scene: Any, builder: SceneBuilder, tally: path_tracer.Tally, gathering: Gathering | None = None
-    ) -> None:
-        self._scene, self._tally, self._gathering = scene, tally, gathering
+        self, scene: Any, builder: SceneBuilder, tally: path_tracer.Tally, gathering: Gathering | None = None,
+        max_depth: int = MAX_DEPTH,
+    ) -> None:  # fmt: skip
+        self._scene, self._tally, self._gathering, self._max_depth = scene, tally, gathering, max_depth
         self._worn = _Worn(builder)
 
     @classmethod
@@ -101,7 +104,7 @@ class Tracer:
         start, gathering = path_tracer.camera_start(ray), self._gathering
         if kind is Kind.path or gathering is None:
             assert kind is Kind.path and part is Part.full, "there is no light map"
-            return path_tracer.radiance_sums(self._scene, sampler, start, MAX_DEPTH, None, self._tally)[0]
+            return path_tracer.radiance_sums(self._scene, sampler, start, self._max_depth, None, self._tally)[0]
         gathers, diffuse = kind is Kind.gathered and part is not Part.specular, mi.Color3f(0.0)
         if gathers:
             si = intersect(self._scene, ray, mi.Bool(True), has_holes(self._scene))
@@ -109,7 +112,7 @@ class Tracer:
             if part is Part.diffuse:
                 return diffuse
         tally = Shown(self._tally, part, cached_first=not gathers)
-        depth = 1 if part is Part.diffuse else MAX_DEPTH
+        depth = 1 if part is Part.diffuse else self._max_depth
         return diffuse + path_tracer.radiance_sums(self._scene, sampler, start, depth, gathering.cache, tally)[0]
 
     def guides(self, camera: Camera, size: tuple[int, int], samples: int, seed: int) -> tuple[Image, Image]:
@@ -157,7 +160,7 @@ class _Worn:
 
     def __init__(self, builder: SceneBuilder) -> None:
         self._numbers = builder.numbers
-        looks = {name: _look(material) for name, material in builder.scene.materials.items()}
+        looks = {name: _look(one, builder.edited.get(name)) for name, one in builder.scene.materials.items()}
         worn = np.array([looks[o.material] for o in builder.scene.objects], np.float32)
         self._diffuse, self._specular = (mi.Color3f(np.ascontiguousarray(column.T)) for column in worn.swapaxes(0, 1))
         self._textured = any(t.diffuse or t.specular for t in builder.scene.textures.values())
@@ -173,10 +176,15 @@ class _Worn:
         return dr.select(hit, dr.clip(albedo, 0, 1), 0.0), dr.select(hit, normal, 0.0)
 
 
-def _look(material: Material) -> Floats:
-    """(2, 3) approximate reflectance of the diffuse term and, at normal incidence, of the lobes."""
-    specular = sum((np.multiply(lobe.k, lobe.r0) for lobe in material.lobes), np.zeros(3))
-    return np.stack([np.broadcast_to(material.kd, 3), specular])
+def _look(material: Material, edited: Editable | None) -> Floats:
+    """(2, 3) approximate reflectance of the diffuse term and of all others; for lobes, at normal incidence."""
+    if edited is None:
+        specular = sum((np.multiply(lobe.k, lobe.r0) for lobe in material.lobes), np.zeros(3))
+        return np.stack([np.broadcast_to(material.kd, 3), specular])
+    found = np.zeros((2, 3))
+    for term in edited.terms:
+        found[0 if term.is_diffuse else 1] += term_albedo(term, edited.curves)
+    return found
 
 
 def camera_rays(camera: Camera, size: tuple[int, int], samples: int, sampler: Any) -> Any:

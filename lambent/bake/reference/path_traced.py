@@ -7,24 +7,23 @@ from dataclasses import replace
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from lambent.bake.pictures.tracer import MAX_DEPTH, Tracer, camera_rays
 from lambent.bake.tiles import seed_of
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.emitters import balance_emitters
 from lambent.bake.tracing.rays import block_sums, independent
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera, image_plane
+from lambent.core.camera import Camera
 from lambent.core.progress import Progress, silent
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
 from lambent.scenes.textures import prepared
 
 PATHS_AT_ONCE = 1 << 20
-MAX_DEPTH = 16
 
 
 def render_reference(
@@ -70,6 +69,12 @@ def built(scene: Scene, edited: Mapping[str, Editable] | None = None) -> tuple[S
     return builder, builder.build()
 
 
+def tracer_of(scene: Scene, *, max_depth: int = MAX_DEPTH, edited: Mapping[str, Editable] | None = None) -> Tracer:
+    """Samples for pictures by whole paths; arguments as of `render_reference`."""
+    builder, whole = built(scene, edited)
+    return Tracer(whole, builder, path_tracer.AllLight(), max_depth=max_depth)
+
+
 def traced(
     whole: Any,
     camera: Camera,
@@ -104,23 +109,3 @@ def _pass(scene: object, camera: Camera, size: tuple[int, int], samples: int, se
     value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
     dr.eval(value)
     return np.stack([block_sums(v, samples) for v in (value, value * value)]).astype(float)
-
-
-def camera_rays(camera: Camera, size: tuple[int, int], samples: int, sampler: Any) -> Any:
-    """mi.Ray3f through random places of the pixels, `samples` for each, pixel after pixel.
-
-    The camera is not a constant of the kernel: another view of the same size reuses it.
-    """
-    width, height = size
-    count = width * height * samples
-    pixel = dr.arange(mi.UInt32, count) // samples
-    jitter = sampler.next_2d()
-    x, y = (pixel % width + jitter.x) / width * 2 - 1, 1 - (pixel // width + jitter.y) / height * 2
-    across, up, forward = (_opaque(mi.Vector3f, axis) for axis in image_plane(camera, width, height))
-    origin = _opaque(mi.Point3f, camera.position) + dr.zeros(mi.Point3f, count)
-    return mi.Ray3f(origin, dr.normalize(across * x + up * y + forward))
-
-
-def _opaque(kind: Any, components: ArrayLike) -> Any:
-    """mi.Vector3f or mi.Point3f that kernels read from memory."""
-    return kind(*(dr.opaque(mi.Float, float(x)) for x in np.asarray(components)))
