@@ -1,10 +1,13 @@
-"""`equal-time`: one frame in motion against path tracing with Open Image Denoise, by error and by time.
+"""`equal-time`: traced pictures and frames in motion against path tracing, by error and by time.
 
-Rows are scene x method. `frame` is the window's frame in motion; `path N spp` is N paths per pixel plus albedo, normals
-and the denoiser; both are compared as displayed. Times are processor time over all cores on a software adapter, where
-drawing and path tracing share a processor; on a graphics card they are seconds. Kernels are compiled and the scene is
-loaded before timing starts. The row marked `equal` has the fewest paths that take at least the frame's time, so that
-the comparison never favours the frame.
+Rows are scene x method. `frame` is the window's frame in motion. `traced N` is the picture at rest with N samples per
+pixel, and `path N spp` has N whole paths; both include albedo, normals and the denoiser. All are compared as displayed.
+Times are processor time over all cores on a software adapter, where drawing and tracing share a processor; on a
+graphics card they are seconds. Kernels are compiled and the scene is loaded before timing starts. The row marked
+`equal` has the fewest paths that take at least the frame's time, so that the comparison never favours the frame.
+
+`equal_error` in the summary has the times at which traced pictures and path tracing reach a mean FLIP of COMPARED,
+interpolated between rows on log time, or the least FLIP that path tracing reaches, and their ratio.
 
 The truth is path traced with the store's own materials in two halves, or the mean of finished pictures of the first
 camera (`--reference`), which then set the size of the rows. `reference_flip` is the FLIP between the halves, or between
@@ -14,21 +17,20 @@ figure. A single picture has none.
 
 from __future__ import annotations
 
+import math
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lambent.bench.reference import finished
+from lambent.bench.reference import Truth, finished, path_traced_halves, with_samples
 from lambent.bench.views import first_camera, given_or_baked
-from lambent.core import metrics
 from lambent.core.arrays import Floats
-from lambent.core.colour import srgb_encode
+from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, part_of, silent
 from lambent.realtime.device import adapter_info, open_device
@@ -37,24 +39,30 @@ from lambent.realtime.renderer import Renderer
 from lambent.store.contract import scene_record
 from lambent.store.source import scene_of
 from lambent.store.store import Store
+from lambent.traced.picture import ENDED, TracedPicture
+from lambent.traced.room import room_of_paths, room_of_store
+
+if TYPE_CHECKING:
+    from lambent.bake.pictures.tracer import Tracer
 
 NAME = "equal-time"
-T = TypeVar("T")
+COMPARED = 0.06  # mean FLIP
+COMPILING = 32, 18  # pixels; kernels serve all sizes
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Pixels, samples of the truth, timings of a frame, tried numbers of paths; the scene if no store is given."""
+    """Pixels, samples of the truth, timings, compared numbers of samples; the scene if no store is given."""
 
     width: int = 960
     height: int = 540
     truth_spp: int = 1024
     runs: int = 5
-    spps: tuple[int, ...] = (1, 2, 4, 8, 16)
+    samples: tuple[int, ...] = (1, 4, 16, 32, 64)
     scene: str = "builtin:room"
 
 
-FULL, QUICK = Effort(), Effort(320, 180, 64, 3, (1, 4), "builtin:box")
+FULL, QUICK = Effort(), Effort(320, 180, 64, 3, (1, 4, 20), "builtin:box")
 
 
 def run(
@@ -80,71 +88,89 @@ def rows_of(
     store: Store, effort: Effort, progress: Progress = silent, pictures: Sequence[Floats] = ()
 ) -> list[dict[str, Any]]:
     """The frame and its rivals in the first camera of a store; `pictures` (H, W, 3) are finished references of it."""
-    from lambent.bake.engine import engine
-
-    engine()
-    from lambent.bake.reference.denoised import DenoisedView  # imports Mitsuba, whose variant is set by `engine`
-
     if pictures:
         effort = replace(effort, width=pictures[0].shape[1], height=pictures[0].shape[0])
-    camera = first_camera(store, scene_record(store))
-    tracer = DenoisedView(scene_of(store), camera, effort.width, effort.height)
-    parts = list(pictures)
-    for seed in () if pictures else (1, 2):
-        parts.append(tracer.image(effort.truth_spp // 2, seed))
-        progress(seed, 3, "truth")
-    truth = np.mean(parts, axis=0)
-    exposure_ev = metrics.display_exposure(truth)
-
-    def shown(radiance: Floats) -> Floats:
-        return srgb_encode(radiance * np.float32(2.0**exposure_ev))
-
-    def row(method: str, picture: Floats, seconds: list[float]) -> dict[str, Any]:
-        flip = metrics.flip_error(encoded, picture)
-        return {
-            "scene": store.folder.name,
-            "method": method,
-            "seconds": statistics.median(seconds),
-            "seconds_min": min(seconds),
-            "seconds_max": max(seconds),
-            "flip": round(float(flip.mean()), 4),
-            "flip_worst_tile": round(float(metrics.tile_means(flip).max()), 4),
-            "psnr": round(metrics.psnr(encoded, picture), 2),
-            "reference_flip": reference_flip,
-        }
-
-    encoded = shown(truth)
-    halves = [shown(np.mean(half, axis=0)) for half in (parts[::2], parts[1::2]) if half]
-    reference_flip = round(float(metrics.flip_error(*halves).mean()), 4) if len(halves) == 2 else None
+    camera, size = first_camera(store, scene_record(store)), (effort.width, effort.height)
     device = open_device()
-    renderer = Renderer(device, store)
     clock = time.process_time if adapter_info(device).is_software else time.perf_counter
-    state = FrameState(camera, effort.width, effort.height, exposure_ev=exposure_ev, view_transform="linear")
-    frame, seconds = _timed(lambda: renderer.display_image(state), effort.runs, clock)
-    rows = [row("frame", frame.astype(np.float32) / 255, seconds)]
-    for spp in effort.spps:
-        image, taken = _timed(partial(tracer.denoised, spp, seed=9), effort.runs, clock)
-        rows.append(row(f"path {spp} spp", shown(image), taken))
-    rivals = rows[1:]
-    equal = next((one for one in rivals if one["seconds"] >= rows[0]["seconds"]), rivals[-1])
-    return [{**one, "equal": one is equal} for one in rows]
+    paths = room_of_paths(scene_of(store)).tracer
+    truth = Truth.of(pictures or path_traced_halves(paths, camera, size, effort.truth_spp, progress))
+
+    def row(method: str, seconds: list[float], errors: dict[str, Any]) -> dict[str, Any]:
+        times = {"seconds": statistics.median(seconds), "seconds_min": min(seconds), "seconds_max": max(seconds)}
+        return {"scene": store.folder.name, "method": method, **times, **errors}
+
+    rivals = [
+        row(f"path {n} spp", taken, truth.errors(image))
+        for n, image, taken in _converging(paths, camera, size, effort, clock, path=True)
+    ]
+    del paths  # kernels contain the materials of every live scene
+    tracer = room_of_store(store, scene_of(store)).tracer
+    traced = [
+        row(f"traced {n}", taken, truth.errors(image))
+        for n, image, taken in _converging(tracer, camera, size, effort, clock, path=False)
+    ]
+    renderer = Renderer(device, store)
+    state = FrameState(camera, *size, exposure_ev=truth.exposure_ev, view_transform="linear")
+    renderer.display_image(state)  # compiles
+    taken = []
+    for _ in range(effort.runs):
+        begun = clock()
+        image = renderer.display_image(state)
+        taken.append(clock() - begun)
+    frame = row("frame", taken, truth.errors_shown(image.astype(np.float32) / 255))
+    equal = next((one for one in rivals if one["seconds"] >= frame["seconds"]), rivals[-1])
+    return [{**one, "equal": one is equal} for one in (frame, *traced, *rivals)]
+
+
+def _converging(
+    tracer: Tracer, camera: Camera, size: tuple[int, int], effort: Effort, clock: Callable[[], float], *, path: bool
+) -> Iterator[tuple[int, Floats, list[float]]]:
+    """Compared numbers of samples, their denoised picture, and the seconds from the first ray to it in each run."""
+    with_samples(TracedPicture(tracer, camera, COMPILING, path=path), ENDED + 1).denoised()
+    taken: dict[int, list[float]] = {n: [] for n in effort.samples}
+    images: dict[int, Floats] = {}
+    for _ in range(effort.runs):
+        picture, begun = TracedPicture(tracer, camera, size, seed=9, path=path), clock()
+        picture.guides()
+        tracing = clock() - begun
+        for n in effort.samples:
+            begun = clock()
+            with_samples(picture, n)
+            traced = clock()
+            images[n] = picture.denoised()
+            tracing += traced - begun
+            taken[n].append(tracing + clock() - traced)
+    for n in effort.samples:
+        yield n, images[n], taken[n]
 
 
 def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """By scene, FLIP of the rival of equal time relative to the frame's, and the rival's time in frames."""
+    """By scene, FLIP of the rival of equal time relative to the frame's, its time in frames, and `equal_error`."""
     frames = {row["scene"]: row for row in rows if row["method"] == "frame"}
     equal = [row for row in rows if row["equal"]]
     return {
         "flip_of_path_over_frame": {r["scene"]: round(r["flip"] / frames[r["scene"]]["flip"], 3) for r in equal},
         "time_of_path_over_frame": {r["scene"]: round(r["seconds"] / frames[r["scene"]]["seconds"], 2) for r in equal},
+        "equal_error": {scene: _equal_error([row for row in rows if row["scene"] == scene]) for scene in frames},
     }
 
 
-def _timed(make: Callable[[], T], runs: int, clock: Callable[[], float]) -> tuple[T, list[float]]:
-    """The last result, and the seconds of each run but the first, which compiles."""
-    made, seconds = make(), []
-    for _ in range(runs):
-        begun = clock()
-        made = make()
-        seconds.append(clock() - begun)
-    return made, seconds
+def _equal_error(rows: Sequence[dict[str, Any]]) -> dict[str, float | None]:
+    """flip, the seconds in which traced and path reach it, and their ratio; None if it is not reached."""
+    series = {kind: [row for row in rows if row["method"].startswith(kind)] for kind in ("traced", "path")}
+    flip = max(COMPARED, min(row["flip"] for row in series["path"]))
+    traced, path = (seconds_to(flip, one) for one in series.values())
+    ratio = round(traced / path, 3) if traced and path else None
+    return {"flip": flip, "traced": traced, "path": path, "ratio": ratio}
+
+
+def seconds_to(flip: float, rows: Sequence[dict[str, Any]]) -> float | None:
+    """Seconds in which a series of pictures reaches a FLIP, at most those of its first picture; None if it does not."""
+    at = next((k for k, row in enumerate(rows) if row["flip"] <= flip), None)
+    if at is None:
+        return None
+    before, after = rows[max(0, at - 1)], rows[at]
+    share = (before["flip"] - flip) / (before["flip"] - after["flip"]) if at else 1.0
+    logs = [math.log(row["seconds"]) for row in (before, after)]
+    return round(math.exp(logs[0] + share * (logs[1] - logs[0])), 3)

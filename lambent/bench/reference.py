@@ -13,8 +13,10 @@ import numpy as np
 from lambent.core import metrics
 from lambent.core.arrays import Flags, Floats
 from lambent.core.camera import Camera
+from lambent.core.colour import shown
 from lambent.core.errors import UserError
 from lambent.core.images import HDR_SUFFIXES, read_image
+from lambent.core.progress import Progress
 from lambent.traced.picture import TracedPicture
 
 if TYPE_CHECKING:
@@ -49,6 +51,53 @@ class Reference:
             "flip_shown": round(float(flip[self.shown].mean()), 5),
             "flip_worst_tile": round(float(metrics.tile_means(flip).max()), 5),
         }
+
+
+@dataclass(frozen=True)
+class Truth:
+    """A view as displayed: sRGB (H, W, 3) at `exposure_ev`. `noise` is the FLIP between its halves, if it has any.
+
+    The halves are independent: the error of each is 1.4 times that of the truth, and a part of every figure.
+    """
+
+    radiance: Floats
+    exposure_ev: float
+    encoded: Floats
+    noise: float | None
+
+    @classmethod
+    def of(cls, parts: Sequence[Floats]) -> Truth:
+        """The mean of pictures (H, W, 3) of equal samples; the halves are every second one and the others."""
+        radiance = np.mean(parts, axis=0)
+        exposure_ev = metrics.display_exposure(radiance)
+        halves = [shown(np.mean(half, axis=0), "linear", exposure_ev) for half in (parts[::2], parts[1::2]) if half]
+        noise = round(float(metrics.flip_error(*halves).mean()), 4) if len(halves) == 2 else None
+        return cls(radiance, exposure_ev, shown(radiance, "linear", exposure_ev), noise)
+
+    def errors(self, radiance: Floats) -> dict[str, Any]:
+        """`errors_shown` of a picture's radiance (H, W, 3)."""
+        return self.errors_shown(shown(radiance, "linear", self.exposure_ev))
+
+    def errors_shown(self, encoded: Floats) -> dict[str, Any]:
+        """flip, flip_worst_tile and psnr of a displayed picture (H, W, 3), beside the truth's noise."""
+        flip = metrics.flip_error(self.encoded, encoded)
+        return {
+            "flip": round(float(flip.mean()), 4),
+            "flip_worst_tile": round(float(metrics.tile_means(flip).max()), 4),
+            "psnr": round(metrics.psnr(self.encoded, encoded), 2),
+            "reference_flip": self.noise,
+        }
+
+
+def path_traced_halves(
+    tracer: Tracer, camera: Camera, size: tuple[int, int], samples: int, progress: Progress
+) -> list[Floats]:
+    """A view in two independent halves of a number of whole paths per pixel."""
+    parts: list[Floats] = []
+    for seed in (1, 2):
+        parts.append(path_traced(tracer, camera, size, samples // 2, seed).mean())
+        progress(seed, 3, "truth")
+    return parts
 
 
 def finished(paths: Sequence[Path]) -> list[Floats]:

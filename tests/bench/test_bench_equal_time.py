@@ -1,4 +1,4 @@
-"""One frame in motion beside denoised path tracing: times of one clock, errors to one truth."""
+"""Frames in motion and traced pictures beside denoised path tracing: times of one clock, errors to one truth."""
 
 from __future__ import annotations
 
@@ -31,18 +31,39 @@ def store(tmp_path_factory):
 
 
 def test_rows_name_the_rival_of_equal_time(store):
-    effort = replace(equal_time.QUICK, width=96, height=64, truth_spp=32, runs=1, spps=(1, 64))
+    effort = replace(equal_time.QUICK, width=96, height=64, truth_spp=32, runs=1, samples=(1, 64))
     report = equal_time.run(effort, inputs=[store])
-    frame, one, many = report["rows"]
-    assert (frame["method"], one["method"], many["method"]) == ("frame", "path 1 spp", "path 64 spp")
-    assert sum(row["equal"] for row in report["rows"]) == 1 and not frame["equal"]
+    frame, first, traced, one, many = report["rows"]
+    assert [row["method"] for row in report["rows"]] == ["frame", "traced 1", "traced 64", "path 1 spp", "path 64 spp"]
+    assert [row["equal"] for row in (one, many)].count(True) == 1
+    assert not any(row["equal"] for row in (frame, first, traced))
     assert many["flip"] < one["flip"] and many["psnr"] > one["psnr"]
+    assert traced["flip"] < first["flip"] < one["flip"], "baked light has less noise"
+    assert first["seconds"] < traced["seconds"]
     assert 0 < frame["flip"] < 0.3 and frame["flip_worst_tile"] >= frame["flip"]
     assert report["summary"]["flip_of_path_over_frame"].keys() == {"box.store"}
+    assert report["summary"]["equal_error"]["box.store"]["flip"] == max(equal_time.COMPARED, many["flip"])
+
+
+def test_times_of_equal_error_are_interpolated():
+    rows = [{"flip": flip, "seconds": seconds} for flip, seconds in ((0.1, 1.0), (0.05, 4.0), (0.04, 16.0))]
+    assert equal_time.seconds_to(0.075, rows) == pytest.approx(2.0)
+    assert equal_time.seconds_to(0.05, rows) == pytest.approx(4.0)
+    assert equal_time.seconds_to(0.2, rows) == 1.0
+    assert equal_time.seconds_to(0.03, rows) is None
+    made = [
+        {"scene": "room", "method": method, "flip": flip, "seconds": seconds, "equal": method == "path 4 spp"}
+        for method, flip, seconds in (
+            ("frame", 0.1, 1.0), ("traced 1", 0.09, 1.0), ("traced 4", 0.05, 2.0),
+            ("path 1 spp", 0.12, 2.0), ("path 4 spp", 0.07, 8.0),
+        )
+    ]  # fmt: skip
+    equal = equal_time.summary(made)["equal_error"]["room"]
+    assert equal == {"flip": 0.07, "traced": pytest.approx(2**0.5, abs=1e-3), "path": 8.0, "ratio": 0.177}
 
 
 def test_finished_references_are_the_truth_of_rows_of_their_size(store, tmp_path):
-    effort = replace(equal_time.QUICK, width=96, height=64, runs=1, spps=(1,))
+    effort = replace(equal_time.QUICK, width=96, height=64, runs=1, samples=(1,))
     files = []
     camera = scene_record(Store.open(store)).cameras[0]
     for seed in (1, 2):
