@@ -1,7 +1,8 @@
 """`flicker`: changes of a static scene's picture from frame to frame.
 
-Rows are scene x case. `still` compares two frames of one resting camera in motion's own integrator, `at rest` the
-pictures that follow while that camera converges, `walk` frames of a slow walk, STEP_M apart at REFRESH_HZ. FLIP
+Rows are scene x case. `still` compares two frames of one resting camera in motion, `change over` such a frame with the
+first traced picture that replaces it, and `at rest` each traced picture, as the window shows it, with the next one.
+`walk` compares frames of a slow walk, STEP_M apart, and `walk, traced` those of a traced film. FLIP
 compares each frame with the previous one, reprojected onto the surfaces that the later frame sees; pixels hidden in the
 earlier frame count as unchanged. Reprojection blurs, and reflections really move: `walk, smooth` measures the same for
 antialiased frames (16 samples per pixel) and is the lower bound. Anything above it is flicker.
@@ -17,11 +18,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lambent.bench.reference import with_samples
 from lambent.bench.reprojection import reprojected
 from lambent.bench.views import first_camera, given_or_baked
 from lambent.core import metrics
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera, camera_axes
+from lambent.core.colour import shown
 from lambent.core.plain import triple
 from lambent.core.progress import Progress, silent
 from lambent.realtime.device import open_device
@@ -29,29 +32,35 @@ from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.camera_paths import path_length, sample_path
 from lambent.store.contract import SceneRecord
+from lambent.store.source import scene_of
 from lambent.store.store import Store
-from lambent.viewer.pacing import prior_share
+from lambent.traced.picture import TracedPicture
+from lambent.traced.room import room_of_store
 
 if TYPE_CHECKING:
     from lambent.bake.reference.surfaces import Surfaces
 
 NAME = "flicker"
+CASES = 6
 STEP_M = 0.02  # half a metre a second at 25 frames
-REST_FRAMES = 128  # of a series at rest, with one sample each, as in the window on a software adapter
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Pixels, places along the walk, frames compared at rest, and the scene that is baked if no store is given."""
+    """Pixels, places along the walk, samples of traced pictures; the scene that is baked if no store is given.
+
+    `rest`: samples per pixel of the pictures that are shown at rest; `film`: of each frame of a film.
+    """
 
     width: int = 960
     height: int = 540
     places: int = 5
-    rest: int = 16
+    rest: tuple[int, ...] = (1, 2, 4, 8, 16, 24, 32, 48, 64)
+    film: int = 8
     scene: str = "builtin:room"
 
 
-FULL, QUICK = Effort(), Effort(240, 135, 2, 4, "builtin:box")
+FULL, QUICK = Effort(), Effort(240, 135, 2, (1, 4, 24), 4, "builtin:box")
 
 
 def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
@@ -66,11 +75,11 @@ def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[d
     from lambent.bake.engine import engine
 
     engine()
-    from lambent.bake.reference import surfaces as traced  # imports Mitsuba, whose variant is set by `engine`
+    from lambent.bake.reference import surfaces as geometry  # imports Mitsuba, whose variant is set by `engine`
 
     renderer = Renderer(open_device(), store)
     record, scene = renderer.scene.record, renderer.scene
-    surfaces = traced.Surfaces(scene.positions, scene.faces)
+    surfaces = geometry.Surfaces(scene.positions, scene.faces)
     state = FrameState(first_camera(store, record), effort.width, effort.height)
     exposure_ev = record.exposure_ev
     if exposure_ev is None:
@@ -84,7 +93,7 @@ def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[d
         mean = float(np.mean([error.mean() for error in errors]))
         told = {"scene": store.folder.name, "case": case, "pairs": len(errors)}
         rows.append({**told, "flip": round(mean, 5), "flip_worst_tile": round(worst, 4)})
-        progress(len(rows), 4, case)
+        progress(len(rows), CASES, case)
 
     def frame(camera: Camera) -> Floats:
         return _encoded(renderer.display_image(replace(state, camera=camera)))
@@ -92,10 +101,19 @@ def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[d
     def smooth(camera: Camera) -> Floats:
         return _encoded(renderer.still(replace(state, camera=camera)))
 
-    row("still", [metrics.flip_error(frame(state.camera), frame(state.camera))])
-    series = list(_at_rest(renderer, state, effort.rest))
+    tracer = room_of_store(store, scene_of(store)).tracer
+
+    def traced(camera: Camera, *samples: int) -> list[Floats]:
+        """A picture after each number of samples."""
+        picture, view = TracedPicture(tracer, camera, state.size), state.view_transform
+        return [shown(with_samples(picture, n).denoised(), view, exposure_ev) for n in samples]
+
+    drawn, series = frame(state.camera), traced(state.camera, *effort.rest)
+    row("still", [metrics.flip_error(drawn, frame(state.camera))])
+    row("change over", [metrics.flip_error(drawn, series[0])])
     row("at rest", [metrics.flip_error(a, b) for a, b in pairwise(series)])
-    for case, draw in (("walk", frame), ("walk, smooth", smooth)):
+    films = ("walk", frame), ("walk, traced", lambda camera: traced(camera, effort.film)[0]), ("walk, smooth", smooth)
+    for case, draw in films:
         row(case, [_changed(draw(before), draw(after), before, after, surfaces) for before, after in steps])
     return rows
 
@@ -117,15 +135,6 @@ def _steps(record: SceneRecord, places: int) -> Iterator[tuple[Camera, Camera]]:
         aside = STEP_M * np.asarray(camera_axes(camera)[0])
         position, target = (triple(np.asarray(at) + aside) for at in (camera.position, camera.target))
         yield camera, replace(camera, position=position, target=target)
-
-
-def _at_rest(renderer: Renderer, state: FrameState, count: int) -> Iterator[Floats]:
-    """The frame in motion, then the pictures of a series at rest that replace it."""
-    yield _encoded(renderer.display_image(state))
-    for index in range(count):
-        prior = prior_share(index + 1, REST_FRAMES, 1)
-        frame = replace(state, integrator="qmc", n=1, accumulate=index, prior=prior)
-        yield _encoded(renderer.display_image(frame))
 
 
 def _encoded(image: Any) -> Floats:

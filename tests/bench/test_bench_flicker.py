@@ -59,11 +59,13 @@ def test_what_was_hidden_is_not_taken_from_what_hid_it() -> None:
 def test_bench_sees_what_flickers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     coarse = quality_named("preview").changed("coarse", geometry={"texels": 64}, environment={"texels": 32})
     store = bake(load_scene("builtin:box"), tmp_path / "box.store", quality=coarse)
-    effort = flicker.Effort(96, 64, 1, 2)
+    effort = flicker.Effort(96, 64, 1, (1, 2, 20), 4)
     rows = {row["case"]: row for row in flicker.run(effort, inputs=[tmp_path / "box.store"])["rows"]}
-    assert list(rows) == ["still", "at rest", "walk", "walk, smooth"]
+    assert list(rows) == ["still", "change over", "at rest", "walk", "walk, traced", "walk, smooth"]
     assert rows["still"]["flip"] == 0
-    assert 0 < rows["at rest"]["flip"] < 0.1
+    assert rows["at rest"]["pairs"] == 2
+    assert 0 < rows["at rest"]["flip"] < rows["change over"]["flip"] < 0.1
+    assert 0 < rows["walk, traced"]["flip"] < 0.1
     assert 0 < rows["walk, smooth"]["flip"] <= rows["walk"]["flip"] < 0.1
     frames = iter(range(1000))
     shown = Renderer.display_image
@@ -74,3 +76,4 @@ def test_bench_sees_what_flickers(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(Renderer, "display_image", uneven)
     flickering = {row["case"]: row for row in flicker.rows_of(store, effort)}
     assert flickering["still"]["flip"] > 0.02 and flickering["walk"]["flip"] > 3 * rows["walk"]["flip"]
+    assert flickering["walk, traced"] == rows["walk, traced"], "traced pictures repeat"
