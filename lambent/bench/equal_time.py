@@ -27,11 +27,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lambent.bench.reference import Truth, finished, path_traced_halves, with_samples
+from lambent.bench.reference import Truth, compile_kernels, finished, path_traced_parts, with_samples
 from lambent.bench.views import first_camera, given_or_baked
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
-from lambent.core.errors import UserError
 from lambent.core.progress import Progress, part_of, silent
 from lambent.realtime.device import adapter_info, open_device
 from lambent.realtime.frame_state import FrameState
@@ -39,7 +38,7 @@ from lambent.realtime.renderer import Renderer
 from lambent.store.contract import scene_record
 from lambent.store.source import scene_of
 from lambent.store.store import Store
-from lambent.traced.picture import ENDED, TracedPicture
+from lambent.traced.picture import TracedPicture
 from lambent.traced.room import room_of_paths, room_of_store
 
 if TYPE_CHECKING:
@@ -47,7 +46,6 @@ if TYPE_CHECKING:
 
 NAME = "equal-time"
 COMPARED = 0.06  # mean FLIP
-COMPILING = 32, 18  # pixels; kernels serve all sizes
 
 
 @dataclass(frozen=True)
@@ -72,10 +70,7 @@ def run(
 
     `reference`: finished pictures of the only input's first camera, with equal samples and different seeds.
     """
-    if reference and len(inputs) != 1:
-        got, expected = f"{len(inputs)} inputs", "one store, of whose first camera it is a picture"
-        raise UserError("a reference belongs to one store", field="--reference", got=got, expected=expected)
-    pictures = finished(reference)
+    pictures = finished(reference, inputs)
     with given_or_baked(inputs, effort.scene, progress) as stores:
         parts = [part_of(progress, k, k + 1, s.folder.name) for k, s in enumerate(stores)]
         rows = [
@@ -94,7 +89,7 @@ def rows_of(
     device = open_device()
     clock = time.process_time if adapter_info(device).is_software else time.perf_counter
     paths = room_of_paths(scene_of(store)).tracer
-    truth = Truth.of(pictures or path_traced_halves(paths, camera, size, effort.truth_spp, progress))
+    truth = Truth.of(pictures or path_traced_parts(paths, camera, size, effort.truth_spp, 2, progress))
 
     def row(method: str, seconds: list[float], errors: dict[str, Any]) -> dict[str, Any]:
         times = {"seconds": statistics.median(seconds), "seconds_min": min(seconds), "seconds_max": max(seconds)}
@@ -127,7 +122,7 @@ def _converging(
     tracer: Tracer, camera: Camera, size: tuple[int, int], effort: Effort, clock: Callable[[], float], *, path: bool
 ) -> Iterator[tuple[int, Floats, list[float]]]:
     """Compared numbers of samples, their denoised picture, and the seconds from the first ray to it in each run."""
-    with_samples(TracedPicture(tracer, camera, COMPILING, path=path), ENDED + 1).denoised()
+    compile_kernels(tracer, camera, path=path)
     taken: dict[int, list[float]] = {n: [] for n in effort.samples}
     images: dict[int, Floats] = {}
     for _ in range(effort.runs):

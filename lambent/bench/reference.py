@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,10 +17,12 @@ from lambent.core.colour import shown
 from lambent.core.errors import UserError
 from lambent.core.images import HDR_SUFFIXES, read_image
 from lambent.core.progress import Progress
-from lambent.traced.picture import TracedPicture
+from lambent.traced.picture import ENDED, TracedPicture
 
 if TYPE_CHECKING:
     from lambent.bake.pictures.tracer import Tracer
+
+COMPILING = 32, 18  # pixels
 
 
 @dataclass(frozen=True)
@@ -70,13 +72,18 @@ class Truth:
         """The mean of pictures (H, W, 3) of equal samples; the halves are every second one and the others."""
         radiance = np.mean(parts, axis=0)
         exposure_ev = metrics.display_exposure(radiance)
-        halves = [shown(np.mean(half, axis=0), "linear", exposure_ev) for half in (parts[::2], parts[1::2]) if half]
+        found = cls(radiance, exposure_ev, shown(radiance, "linear", exposure_ev), None)
+        halves = [found.shown(np.mean(half, axis=0)) for half in (parts[::2], parts[1::2]) if half]
         noise = round(float(metrics.flip_error(*halves).mean()), 4) if len(halves) == 2 else None
-        return cls(radiance, exposure_ev, shown(radiance, "linear", exposure_ev), noise)
+        return replace(found, noise=noise)
+
+    def shown(self, radiance: Floats) -> Floats:
+        """Radiance (H, W, 3) as displayed."""
+        return shown(radiance, "linear", self.exposure_ev)
 
     def errors(self, radiance: Floats) -> dict[str, Any]:
         """`errors_shown` of a picture's radiance (H, W, 3)."""
-        return self.errors_shown(shown(radiance, "linear", self.exposure_ev))
+        return self.errors_shown(self.shown(radiance))
 
     def errors_shown(self, encoded: Floats) -> dict[str, Any]:
         """flip, flip_worst_tile and psnr of a displayed picture (H, W, 3), beside the truth's noise."""
@@ -89,25 +96,34 @@ class Truth:
         }
 
 
-def path_traced_halves(
-    tracer: Tracer, camera: Camera, size: tuple[int, int], samples: int, progress: Progress
+def compile_kernels(tracer: Tracer, camera: Camera, *, path: bool) -> None:
+    """Trace a tiny picture with samples of all kinds; its kernels serve all sizes."""
+    with_samples(TracedPicture(tracer, camera, COMPILING, path=path), ENDED + 1).denoised()
+
+
+def path_traced_parts(
+    tracer: Tracer, camera: Camera, size: tuple[int, int], samples: int, count: int, progress: Progress
 ) -> list[Floats]:
-    """A view in two independent halves of a number of whole paths per pixel."""
+    """`count` independent pictures of a view, with a number of whole paths per pixel in all."""
     parts: list[Floats] = []
-    for seed in (1, 2):
-        parts.append(path_traced(tracer, camera, size, samples // 2, seed).mean())
-        progress(seed, 3, "truth")
+    for seed in range(count):
+        parts.append(path_traced(tracer, camera, size, samples // count, seed + 1).mean())
+        progress(seed + 1, count + 1, "truth")
     return parts
 
 
-def finished(paths: Sequence[Path]) -> list[Floats]:
-    """Radiance (H, W, 3) of path traced pictures of one view.
+def finished(paths: Sequence[Path], inputs: Sequence[Path]) -> list[Floats]:
+    """Radiance (H, W, 3) of path traced pictures of the first view of the only input.
 
     Raises
     ------
     UserError
-        If a file cannot be read, holds display values, is black, or differs in size from the first.
+        If there are several inputs or none, or if a file cannot be read, holds display values, is black, or differs in
+        size from the first.
     """
+    if paths and len(inputs) != 1:
+        got, expected = f"{len(inputs)} inputs", "one store, of whose first camera it is a picture"
+        raise UserError("a reference belongs to one store", field="--reference", got=got, expected=expected)
     found: list[Floats] = []
     for path in paths:
         if path.suffix.lower() not in HDR_SUFFIXES:

@@ -23,7 +23,7 @@ def command(
     reference: Annotated[
         list[Path] | None,
         typer.Option(
-            help="Bench equal-time: path traced pictures (.exr) of the input's first camera, equal in samples."
+            help="Benches equal-time and rest: path traced .exr of the input's first camera, equal in samples."
         ),
     ] = None,
     json: Json = False,
