@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.bake.light.denoise import denoise, denoise_charts, fill, layers_of
+from lambent.bake.light.denoise import denoise, denoise_charts, denoise_image, fill, layers_of
 
 
 def test_gutters_take_what_is_next_to_them() -> None:
@@ -56,3 +56,8 @@ def test_a_bright_chart_stays_out_of_a_dark_one_beside_it() -> None:
     assert abs(joined[:, 30].mean() - 1) > 0.5, "in one layer the filter smears"
     assert clean[:, 33:36].mean() == pytest.approx(100, abs=10)
     assert not layers_of(np.where(known, 1.0, 0.0)[..., None] * np.ones(3), known, labels)[known].any()
+
+
+def test_black_pictures_stay_black() -> None:
+    albedo, normal = np.full((2, 32, 48, 3), 0.5, np.float32)
+    assert not denoise_image(np.zeros((32, 48, 3), np.float32), albedo, normal).any()

@@ -124,6 +124,8 @@ def denoise_image(radiance: Floats, albedo: Floats, normal: Floats, *, fast: boo
     """
     import pyoidn
 
+    if not radiance.any():
+        return radiance  # as in `denoise`
     images = {
         pyoidn.OIDN_IMAGE_COLOR: radiance,
         pyoidn.OIDN_IMAGE_ALBEDO: albedo,
