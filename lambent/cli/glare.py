@@ -22,7 +22,7 @@ def command(
     camera: Annotated[
         str | None, typer.Option(help="Stores: camera or saved view by name. [default: the first]")
     ] = None,
-    integrator: Annotated[str, typer.Option(help="Stores: integrator, as of `lambent render`.")] = "rings",
+    integrator: Annotated[str, typer.Option(help="Stores: integrator, as of `lambent render`.")] = "traced",
     threshold: Annotated[float, typer.Option(min=1, help="Least luminance of a glare source, cd/m2.")] = 2000.0,
     force: Force = False,
     json: Json = False,

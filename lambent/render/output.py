@@ -28,10 +28,10 @@ from lambent.scenes.loaders.keyframes import Known, read_keyframes
 from lambent.scenes.variants import looks_as_loaded, variant_named
 from lambent.store.contract import SceneRecord, scene_record
 from lambent.store.light_groups import light_groups
-from lambent.store.source import SOURCE
 from lambent.store.states import says_light, variants_of
 from lambent.store.store import Store
 from lambent.store.views import read_views, with_views
+from lambent.traced.room import why_untraceable
 
 Named = TypeVar("Named", Camera, CameraPath)
 Note = Callable[[str], None]
@@ -227,17 +227,18 @@ def images(
 ) -> Images:
     """Renderer of a store's images as arrays; `moving` for a film, other parameters as of `still`.
 
-    What cannot be traced is drawn: the light map itself, its noise, and a store without the path of its scene.
+    What cannot be traced is drawn: the light map itself, its noise, and what `why_untraceable` says, with a note.
     """
     settings = exposed(settings, store)
     mix = _mix_of_variant(settings, store)
     if settings.light is None and mix.groups:
         settings = _lit(settings, store, MixTrack.of(mix), "of the variant", note)
-    if settings.integrator == TRACED and settings.show in (LIGHT_MAP, LIGHT_MAP_NOISE):
-        settings = replace(settings, integrator=DRAWN, noise=None, denoise=None)
-    if settings.integrator == TRACED and not isinstance(store.documents.get(SOURCE), str):
-        note(f"drawn by {DRAWN}, not traced: the store has no path of its scene file")
-        settings = replace(settings, integrator=DRAWN, noise=None, denoise=None)
+    if settings.integrator == TRACED and settings.show not in (LIGHT_MAP, LIGHT_MAP_NOISE):
+        if why := why_untraceable(store):
+            note(f"drawn by {DRAWN}, not traced: {why}")
+            settings = drawn_instead(settings)
+    elif settings.integrator == TRACED:
+        settings = drawn_instead(settings)
     if settings.projection is not Projection.perspective:
         return Projected(images(store, faces_settings(settings), moving=moving, scene=scene, note=note), settings)
     if settings.is_traced:
@@ -247,6 +248,11 @@ def images(
     from lambent.render.real_time import RealTime
 
     return RealTime(store, settings, moving, note)
+
+
+def drawn_instead(settings: Settings) -> Settings:
+    """Settings of a picture that cannot be traced."""
+    return replace(settings, integrator=DRAWN, samples=None, noise=None, denoise=None)
 
 
 def _with_keyframes(settings: Settings, store: Store, record: SceneRecord, file: Path) -> Settings:

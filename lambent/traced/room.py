@@ -19,12 +19,16 @@ from lambent.scenes.scene import Look, Scene
 from lambent.scenes.textures import prepared
 from lambent.scenes.turned_sky import under_turned_sky
 from lambent.scenes.variants import textures_worn, worn_by
+from lambent.store.contract import SIDES
+from lambent.store.source import SOURCE
 from lambent.store.store import Store
 from lambent.traced.light import StoredLight
 
 if TYPE_CHECKING:
     from lambent.bake.pictures.tracer import Tracer
     from lambent.bake.tracing.traced_scene import TracedScene
+
+LIGHT_MAP = f"light_map/{SIDES[0]}"
 
 
 class TracedRoom:
@@ -123,6 +127,22 @@ def room_of_paths(scene: Scene, *, sky_turn_deg: float = 0.0, replacements: Sequ
     folder = TemporaryDirectory()
     lit = under_turned_sky(_as_drawn(with_replacements(scene, replacements)), sky_turn_deg, Path(folder.name))
     return TracedRoom(scene_alone(lit), None, folder)
+
+
+def why_untraceable(store: Store) -> str:
+    """Why a store cannot be traced, in one line: no scene file, no light map, no engine; else empty."""
+    place = store.documents.get(SOURCE)
+    if not isinstance(place, str):
+        return "the store has no path of its scene file"
+    if not place.startswith("builtin:") and not (store.folder / place).exists():
+        return f"its scene {store.folder / place} is not there"
+    if LIGHT_MAP not in store:
+        return "the store has no light map"
+    try:
+        engine()
+    except UserError as error:
+        return str(error)
+    return ""
 
 
 def _as_drawn(scene: Scene) -> Scene:

@@ -34,8 +34,9 @@ def filmed(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.M
 
     def by_render(path: CameraPath, fps: int) -> int:
         drawn = SimpleNamespace(
-            displayed=draw, radiance=None, settings=Settings(2, 2), exposure_ev=0.0, light_fields={}
-        )
+            displayed=draw, radiance=None, settings=Settings(2, 2), exposure_ev=0.0, light_fields={}, samples=None,
+            noise=None,
+        )  # fmt: skip
         monkeypatch.setattr(output, "images", lambda *_, **__: drawn)
         store = write_small_store(tmp_path / f"{path.name}-{fps}.store")
         return film(store, tmp_path / f"{path.name}-{fps}-#.png", path, Settings(2, 2), fps=fps).frames

@@ -24,7 +24,7 @@ from lambent.store.store import Store
 from tests.viewer.small_store import FRONT, SIDE, write_small_store
 
 pytestmark = pytest.mark.usefixtures("adapter")
-SMALL = Settings(48, 32)
+SMALL = Settings(48, 32, integrator="lamps")
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import Any
 
 import drjit as dr
@@ -16,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lambent.bake.bsdfs.material_plugin import DIFFUSE_ATTRIBUTE, NORMAL_ATTRIBUTE, SPECULAR_ATTRIBUTE
+from lambent.bake.light.cache import LightMapCache
 from lambent.bake.pictures.gathering import Gathering
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.rays import block_sums, has_holes, intersect
@@ -66,11 +69,11 @@ class Tracer:
     """Samples of pictures of one scene: of all kinds `of_baked` light, of whole paths alone `of_paths`."""
 
     def __init__(
-        self, scene: Any, builder: SceneBuilder, tally: path_tracer.Tally, gathering: Gathering | None = None,
-        max_depth: int = MAX_DEPTH,
+        self, scene: Any, builder: SceneBuilder, tally: path_tracer.Tally, cache: LightMapCache | None = None,
+        gather: Callable[[], Gathering] | None = None, max_depth: int = MAX_DEPTH,
     ) -> None:  # fmt: skip
-        self._scene, self._tally, self._gathering, self._max_depth = scene, tally, gathering, max_depth
-        self._worn = _Worn(builder)
+        self._scene, self._tally, self._cache, self._max_depth = scene, tally, cache, max_depth
+        self._gather, self._worn = gather, _Worn(builder)
 
     @classmethod
     def of_baked(cls, traced: TracedScene, light: LightMap) -> Tracer:
@@ -79,14 +82,21 @@ class Tracer:
         if light.factors is not None and (sun := traced.sorted_lights.sun) is not None:
             of_sun = triple(light.factors[sun])
         front = np.zeros((1, 1, 3), np.float32) if light.front is None else light.front
-        gathering = Gathering(traced, traced.cache(front, light.back, of_sun), tally)
-        return cls(traced.whole(diffuse=False), traced.builder(diffuse=False), tally, gathering)
+        cache = traced.cache(front, light.back, of_sun)
+        scene, builder = traced.whole(diffuse=False), traced.builder(diffuse=False)
+        return cls(scene, builder, tally, cache, lambda: Gathering(traced, cache, tally))
 
     @classmethod
     def of_paths(cls, traced: TracedScene, factors: Floats | None = None) -> Tracer:
         """Samples of whole paths, in a mix of light groups with these factors (n, 3)."""
         tally = tally_of(traced, factors, diffuse=True)
         return cls(traced.whole(diffuse=True), traced.builder(diffuse=True), tally)
+
+    @cached_property
+    def _gathering(self) -> Gathering:
+        """Made for the first sample that gathers: it guides the sampling of the sky once more."""
+        assert self._gather is not None, "there is no light map"
+        return self._gather()
 
     def radiance(
         self, kind: Kind, camera: Camera, size: tuple[int, int], first: int, count: int, seed: int, part: Part
@@ -101,19 +111,19 @@ class Tracer:
         return block_sums(value, count).reshape(height, width, 3)
 
     def _traced(self, kind: Kind, part: Part, ray: Any, sampler: Any) -> Any:
-        start, gathering = path_tracer.camera_start(ray), self._gathering
-        if kind is Kind.path or gathering is None:
+        start = path_tracer.camera_start(ray)
+        if kind is Kind.path or self._cache is None:
             assert kind is Kind.path and part is Part.full, "there is no light map"
             return path_tracer.radiance_sums(self._scene, sampler, start, self._max_depth, None, self._tally)[0]
         gathers, diffuse = kind is Kind.gathered and part is not Part.specular, mi.Color3f(0.0)
         if gathers:
             si = intersect(self._scene, ray, mi.Bool(True), has_holes(self._scene))
-            diffuse = gathering.radiance(si, sampler, si.is_valid())
+            diffuse = self._gathering.radiance(si, sampler, si.is_valid())
             if part is Part.diffuse:
                 return diffuse
         tally = Shown(self._tally, part, cached_first=not gathers)
         depth = 1 if part is Part.diffuse else self._max_depth
-        return diffuse + path_tracer.radiance_sums(self._scene, sampler, start, depth, gathering.cache, tally)[0]
+        return diffuse + path_tracer.radiance_sums(self._scene, sampler, start, depth, self._cache, tally)[0]
 
     def guides(self, camera: Camera, size: tuple[int, int], samples: int, seed: int) -> tuple[Image, Image]:
         """Albedo and normals (height, width, 3) for a denoiser; 0 without a surface."""

@@ -1,0 +1,164 @@
+"""Traced pictures of rooms whose light is known: by hand, or by whole paths."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.core.camera import Camera
+from lambent.core.errors import UserError
+from lambent.materials.document import Lobe, Material
+from lambent.scenes.geometry import box, patch, placed, sphere
+from lambent.scenes.replacement import Replacement
+from lambent.scenes.scene import PointLight, Scene, SceneObject
+from lambent.store.store import Store
+from lambent.traced.picture import TracedPicture
+from lambent.traced.room import TracedRoom, room_of_paths, room_of_store
+from tests.bake.small_scenes import TINY, furnace, turned_inwards
+
+pytestmark = [pytest.mark.usefixtures("mi"), pytest.mark.slow]
+SIZE = (24, 16)
+BLACKENED = dict.fromkeys(("wall", "floor", "black", "glossy"), Material())
+WIDE = Camera("wide", (0.0, 1.0, 0.9), (0.1, 1.0, -0.5), fov_y_deg=110)
+INSIDE = Camera("inside", (0.0, 1.1, 0.9), (0.2, 0.4, -0.6), fov_y_deg=70)
+
+
+def lit_room() -> Scene:
+    """A room of 2 m with a glossy box on its coloured floor, a lamp with a surface and a point light."""
+    floor = patch((-1, 0.001, 1), (2, 0, 0), (0, 0, -2))
+    objects = (
+        SceneObject("room", turned_inwards(placed(box((2, 2, 2)), (0, 1, 0))), "wall"),
+        SceneObject("floor", floor, "floor"),
+        SceneObject("cube", placed(box((0.5, 0.5, 0.5)), (0.2, 0.251, -0.3)), "glossy"),
+        SceneObject("lamp", placed(box((0.4, 0.05, 0.4)), (0, 1.9, 0)), "black", emission=(6.0, 6.0, 6.0)),
+    )
+    materials = {
+        "wall": Material(kd=0.6), "floor": Material(kd=(0.6, 0.2, 0.1), kd_coupled=True), "black": Material(),
+        "glossy": Material(kd=0.2, lobes=(Lobe(mx=0.2, my=0.1, r0=0.3),)),
+    }  # fmt: skip
+    light = PointLight((-0.7, 1.2, 0.5), (0.4, 0.6, 0.9), name="bulb")
+    return Scene("lit room", objects, materials, lights=(light,), cameras=(INSIDE,))
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory, mi: Any) -> Store:
+    folder = tmp_path_factory.mktemp("traced") / "s"
+    return bake(lit_room(), folder, quality=TINY, only=("light_map", "answer"), light_groups="scene")
+
+
+@pytest.fixture(scope="module")
+def room(store: Store) -> TracedRoom:
+    return room_of_store(store, lit_room())
+
+
+@pytest.fixture(scope="module")
+def paths() -> TracedRoom:
+    return room_of_paths(lit_room())
+
+
+def traced(
+    room: TracedRoom, samples: int, seed: int = 0, *, path: bool = False, part: str = "full", camera: Camera = INSIDE
+) -> TracedPicture:
+    picture = TracedPicture(room.tracer, camera, SIZE, seed=seed, path=path, part=part)
+    while picture.samples < samples:
+        picture.sample(samples - picture.samples)
+    return picture
+
+
+def brightness(room: TracedRoom, *, path: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Mean radiance (3,) of the picture over seeds, and its standard error."""
+    means = np.array([traced(room, 272, seed, path=path).mean().mean(axis=(0, 1)) for seed in range(4)])
+    return means.mean(axis=0), means.std(axis=0, ddof=1) / 2
+
+
+def test_a_furnace_has_radiance_1(tmp_path: Path) -> None:
+    scene = furnace()
+    baked = bake(scene, tmp_path / "s", quality=TINY, only=("light_map",))
+    inside = Camera("inside", (0.3, 0.1, 0.2), (0.0, 0.3, -1.0), fov_y_deg=100)
+    for room, path in ((room_of_store(baked, scene), False), (room_of_paths(scene), True)):
+        picture = TracedPicture(room.tracer, inside, SIZE, path=path)
+        while picture.samples < 80:
+            picture.sample()
+        assert picture.mean().mean() == pytest.approx(1, abs=0.01)
+        assert np.abs(picture.mean() - 1).max() < 0.25
+
+
+def test_gathered_light_is_that_of_whole_paths(room: TracedRoom, paths: TracedRoom) -> None:
+    (found, one), (true, other) = brightness(room), brightness(paths, path=True)
+    assert np.abs(found - true).max() < 0.02 * true.max(), "the map's error, seen by one more bounce"
+    assert (one < 0.01 * found).all() and (other < 0.01 * true).all()
+
+
+@pytest.mark.parametrize("factors", [{"bulb": (0.0, 0.0, 0.0)}, {"lamp": (0.2, 0.5, 1.0), "bulb": (2.0, 2.0, 2.0)}])
+def test_a_mix_is_the_scene_with_other_lamps(store: Store, factors: dict[str, Any]) -> None:
+    scene = lit_room()
+    lamp, bulb = (np.array(factors.get(name, (1.0, 1.0, 1.0))) for name in ("lamp", "bulb"))
+    objects = tuple(replace(o, emission=tuple(np.array(o.emission) * lamp)) for o in scene.objects)
+    light = replace(scene.lights[0], intensity=tuple(np.array(scene.lights[0].intensity) * bulb))
+    expected, error = brightness(room_of_paths(replace(scene, objects=objects, lights=(light,))), path=True)
+    for room, path in ((room_of_paths(scene), True), (room_of_store(store, scene), False)):
+        room.mix(factors)
+        found, noise = brightness(room, path=path)
+        assert np.abs(found - expected).max() < 0.02 * expected.max() + 4 * float((noise + error).max())
+
+
+def test_an_unknown_group_is_an_error(room: TracedRoom, paths: TracedRoom) -> None:
+    for one in (room, paths):
+        with pytest.raises(
+            UserError, match="unknown light group; found lomp; expected bulb, lamp; did you mean 'lamp'"
+        ):
+            one.mix({"lomp": (0.0, 0.0, 0.0)})
+
+
+def test_an_edited_material_shows_with_its_light(store: Store) -> None:
+    scene, blue = lit_room(), Material(name="wall", kd=(0.05, 0.1, 0.7))
+    edited, true = room_of_store(store, scene), room_of_paths(scene)
+    for one in (edited, true):
+        one.wear({}, {"wall": blue})
+    (found, _), (expected, _) = brightness(edited), brightness(true, path=True)
+    before, _ = brightness(room_of_store(store, scene))
+    assert np.abs(found - expected).max() < 0.04 * expected.max()
+    assert np.abs(before - expected).max() > 0.2 * expected.max(), "the edit is seen"
+    edited.wear({}, {})
+    assert brightness(edited)[0] == pytest.approx(before, rel=1e-5)
+
+
+def test_parts_of_the_light_add_up(room: TracedRoom) -> None:
+    parts = {part: traced(room, 16, part=part, camera=WIDE).mean() for part in ("full", "diffuse", "specular")}
+    rest = parts["full"] - parts["diffuse"] - parts["specular"]
+    assert parts["diffuse"].mean() > 0.1 * parts["full"].mean() and parts["specular"].max() > 1e-3
+    lamp = traced(room_of_paths(replace(lit_room(), materials=BLACKENED)), 16, path=True, camera=WIDE).mean()
+    shows_lamp = lamp.max(axis=-1) > 0
+    assert 0 < shows_lamp.mean() < 0.5
+    np.testing.assert_allclose(rest, lamp, atol=1e-4, err_msg="the lamp's own light remains")
+
+
+def test_a_replacing_mesh_is_lit_although_it_has_no_texels(store: Store) -> None:
+    scene, ball = lit_room(), Replacement("cube", sphere(1.0, 32, 16), "wall")
+    expected, _ = brightness(room_of_paths(scene, replacements=[ball]), path=True)
+    found, _ = brightness(room_of_store(store, scene, replacements=[ball]))
+    assert np.abs(found - expected).max() < 0.03 * expected.max()
+
+
+def test_the_stated_noise_is_the_error(room: TracedRoom) -> None:
+    """Both are relative to a pixel's own light; the truth is the mean of many pictures with the same samples."""
+    pictures = [traced(room, 48, seed) for seed in range(12)]
+    images = np.array([picture.mean().mean(axis=-1) for picture in pictures])
+    true = images.mean(axis=0)
+    error = np.abs(images - true).mean(axis=0) * np.sqrt(np.pi / 2 * 12 / 11) / np.maximum(true, 0.1 * true.mean())
+    stated = np.mean([picture.noise(denoised=False) for picture in pictures])
+    assert stated == pytest.approx(float(error.mean()), rel=0.35)
+    assert pictures[0].noise(denoised=True) < pictures[0].noise(denoised=False)
+
+
+def test_more_samples_have_less_noise_and_seeds_differ(room: TracedRoom) -> None:
+    few, many = traced(room, 16, 1), traced(room, 16, 2)
+    assert not np.array_equal(few.mean(), many.mean())
+    np.testing.assert_array_equal(few.mean(), traced(room, 16, 1).mean())
+    few_paths, many_paths = (traced(room_of_paths(lit_room()), n, path=True) for n in (8, 128))
+    assert many_paths.noise(denoised=False) < 0.6 * few_paths.noise(denoised=False)
