@@ -20,10 +20,10 @@ class Given:
     """One picture; `view` is the view of its display texture, None before the first `show`."""
 
     def __init__(self, layouts: Layouts, resources: SceneResources) -> None:
-        self._layouts, self._scene, self._device = layouts, resources.scene, layouts.device
+        self._layouts, self._scene, self.device = layouts, resources.scene, layouts.device
         self._layout = layouts.of("exact", "exact")
         self._pipeline = screen_pipeline(
-            self._device, "tonemap", [layouts.frame, self._layout], [DISPLAY_FORMAT], constants={"MARKED": False}
+            self.device, "tonemap", [layouts.frame, self._layout], [DISPLAY_FORMAT], constants={"MARKED": False}
         )
         self._frame_buffer = layouts.uniform(FRAME_DTYPE.itemsize)
         self._frame_group = layouts.group(layouts.frame, self._frame_buffer, resources.sampler)
@@ -37,11 +37,11 @@ class Given:
         texels = np.ones((height, width, 4), np.float32)
         texels[..., :3] = radiance / self._scene.unit
         usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
-        texture = self._device.create_texture(size=(width, height, 1), format="rgba32float", usage=usage)
+        texture = self.device.create_texture(size=(width, height, 1), format="rgba32float", usage=usage)
         rows = {"bytes_per_row": 16 * width, "rows_per_image": height}
-        self._device.queue.write_texture({"texture": texture}, texels, rows, (width, height, 1))
+        self.device.queue.write_texture({"texture": texture}, texels, rows, (width, height, 1))
         self._group = self._layouts.group(self._layout, texture.create_view(), texture.create_view())
-        self._target = target_texture(self._device, (width, height, 1), DISPLAY_FORMAT)
+        self._target = target_texture(self.device, (width, height, 1), DISPLAY_FORMAT)
         self.view = self._target.create_view()
 
     def show(self, state: FrameState) -> None:
@@ -50,7 +50,7 @@ class Given:
         for factor in (data["exposure"], data["scale"][3:]):
             factor *= self._scene.unit
         data["prior"] = 0.0
-        self._device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
-        encoder = self._device.create_command_encoder()
+        self.device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
+        encoder = self.device.create_command_encoder()
         cover(encoder, [self.view], self._pipeline, [self._frame_group, self._group], {})
-        self._device.queue.submit([encoder.finish()])
+        self.device.queue.submit([encoder.finish()])

@@ -149,11 +149,14 @@ def _pictures(drawing: Drawing, place: Rect, textures: Textures) -> bool:
     if a is None:
         return False
     divider = drawing.divider
+    share = divider.share if divider is not None and b is not None else 1.0
+    at, _ = place.point(share, 0)
+    tint, before = imgui.get_color_u32((1, 1, 1, drawing.share)), textures.get("before A")
+    if before is not None:
+        behind.add_image(before, begin, (at, end[1]), (0, 0), (share, 1))
+    behind.add_image(a, begin, (at, end[1]), (0, 0), (share, 1), tint if before is not None else 0xFFFFFFFF)
     if b is None or divider is None:
-        behind.add_image(a, begin, end)
         return False
-    share, (at, _) = divider.share, place.point(divider.share, 0)
-    behind.add_image(a, begin, (at, end[1]), (0, 0), (share, 1))
     behind.add_image(b, (at, begin[1]), end, (share, 0), (1, 1))
     held, at = _border("divider", (at, place.y), place.height, upright=True)
     divider.move((at - place.x) / place.width)

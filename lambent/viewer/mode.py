@@ -57,7 +57,8 @@ class Beside:
 class Drawing:
     """Fills the picture's place with `views` of textures: of A and, with a `divider`, of B.
 
-    `images` are further textures by name, arrays or views; one named "picture A" replaces A's view.
+    `images` are further textures by name, arrays or views; one named "picture A" replaces A's view, and over one named
+    "before A", A is blended by its `share`.
     """
 
     def __init__(self, device: Any) -> None:
@@ -74,6 +75,10 @@ class Drawing:
     @property
     def images(self) -> Mapping[str, Any]:
         return {}
+
+    @property
+    def share(self) -> float:
+        return 1.0
 
     @property
     def divider(self) -> Divider | None:

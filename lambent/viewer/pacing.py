@@ -7,8 +7,8 @@ is too slow, planar reflectors lose their mirrored views and show their probes. 
 edit, does not replace a picture of full size by a smaller one: the picture stays until the whole frame with the new
 light is complete.
 
-`REST_S` after the last change, the same picture is drawn whole, with mirrored views. Then every frame adds samples of
-`qmc`, up to a set count; after that, nothing is drawn.
+`REST_S` after the last change, the same picture is drawn whole, with mirrored views, if no traced picture will replace
+it. After that, nothing is drawn.
 """
 
 from __future__ import annotations
@@ -24,21 +24,19 @@ FIXED_SHARE = 1.5  # a frame in motion may take this multiple of its cost withou
 LEAP = 2.0  # a larger frame may take this multiple of the target if all of its cost were that of pixels
 LEAST_MIRRORED = 0.5  # least scale in motion with mirrored views; below, they are left out
 MIRROR_COST = 4.0  # cost of a frame with mirrored views, relative to one without; measured in software: 3 to 4
-PRIOR_SAMPLES = 16  # weight of the last picture in motion, in `qmc` samples, while few are accumulated
 
 
 @dataclass(frozen=True)
 class Plan:
-    """One picture to draw: its size relative to the window, its index in the accumulation (None: in motion),
-    whether planar reflectors get mirrored views, and whether it is drawn over the last one, see `FrameState.over`."""
+    """One picture to draw: its size relative to the window, whether planar reflectors get mirrored views, and whether
+    it is drawn over the last one, see `FrameState.over`."""
 
     scale: float
-    accumulate: int | None
     mirrors: bool = True
     over: bool = False
 
 
-WHOLE = Plan(1.0, None)
+WHOLE = Plan(1.0)
 
 
 class Beat:
@@ -106,13 +104,11 @@ class Resolution:
 class Pacer:
     """Decides what to draw next, from the given time, wanted picture and frame costs."""
 
-    def __init__(self, *, accumulate_to: int, slow_adapter: bool) -> None:
-        self.accumulate_to = accumulate_to
+    def __init__(self, *, slow_adapter: bool) -> None:
         self._mirrors = not slow_adapter  # whether mirrored views are drawn in motion
         start = 0.5 if slow_adapter else 1.0
         self._sizes = {True: Resolution(start), False: Resolution(start)}  # with mirrored views, and without
         self.shown: object = None  # the picture that the window shows or is about to
-        self.accumulated = 0  # accumulated frames; 0: a frame in motion
         self._changed_s = 0.0
         self._last: Plan | None = None
         self._sharp = False  # whether all of the last picture has full size
@@ -121,53 +117,44 @@ class Pacer:
     @property
     def moving(self) -> Plan:
         """Plan of the next frame in motion."""
-        return Plan(self._sizes[self._mirrors].scale, None, self._mirrors)
+        return Plan(self._sizes[self._mirrors].scale, self._mirrors)
 
     def aim(self, seconds: float) -> None:
         """Set the target time of a frame in motion."""
         self._budget_s = seconds
 
     def plan(
-        self, picture: object, now_s: float, *, refine: bool, adaptive: bool, over: bool = False, keeps: bool = False
+        self, picture: object, now_s: float, *, sharpen: bool, adaptive: bool, over: bool = False, keeps: bool = False
     ) -> Plan | None:
         """Plan for `now_s` to show `picture`; None when it is already shown, or not yet due.
 
-        `over`: in motion, draw the changes over the last picture, at full size. `keeps`: if the last picture has full
-        size, keep that size.
+        `sharpen`: draw it whole at rest. `over`: in motion, draw the changes over the last picture, at full size.
+        `keeps`: if the last picture has full size, keep that size.
         """
         if picture != self.shown:
-            self.shown, self._changed_s, self.accumulated = picture, now_s, 0
+            self.shown, self._changed_s = picture, now_s
             if keeps and self._sharp:
                 return WHOLE
             if over:
-                return Plan(1.0, None, self._mirrors or not adaptive, over=True)
+                return Plan(1.0, self._mirrors or not adaptive, over=True)
             return self.moving if adaptive else WHOLE
-        return self._next(refine) if now_s - self._changed_s >= REST_S else None
+        return WHOLE if self._wants_more(sharpen) and now_s - self._changed_s >= REST_S else None
 
-    def wait_s(self, now_s: float, *, refine: bool) -> float | None:
+    def wait_s(self, now_s: float, *, sharpen: bool) -> float | None:
         """Seconds until the next picture is due although nothing changes; None: never."""
-        return None if self._next(refine) is None else max(0.0, self._changed_s + REST_S - now_s)
+        return max(0.0, self._changed_s + REST_S - now_s) if self._wants_more(sharpen) else None
 
-    def _next(self, refine: bool) -> Plan | None:
-        """Next step of refinement at rest."""
-        if not (self.accumulated or self._last == WHOLE):
-            return WHOLE
-        return Plan(1.0, self.accumulated) if refine and self.accumulated < self.accumulate_to else None
-
-    def forget_refinement(self) -> None:
-        """Plan the frame in motion again, whole, in place of an accumulated one."""
-        if self.accumulated:
-            self.accumulated, self._last = 0, None
+    def _wants_more(self, sharpen: bool) -> bool:
+        return sharpen and self._last != WHOLE
 
     def drawn(self, plan: Plan) -> None:
         """Learn that a frame is shown."""
         self._last = plan
         self._sharp = plan.scale == 1.0 and (self._sharp or not plan.over)
-        self.accumulated = 0 if plan.accumulate is None else plan.accumulate + 1
 
     def cost(self, plan: Plan, seconds: float, mirrors: int = 0) -> None:
         """Learn the time of a frame in motion with a number of mirrored views, and choose the next."""
-        if plan.accumulate is not None or plan.over:
+        if plan.over:
             return
         size = self._sizes[plan.mirrors]
         size.learn(plan.scale, seconds, self._budget_s)
@@ -176,15 +163,3 @@ class Pacer:
         elif not plan.mirrors and plan.scale == 1.0 and MIRROR_COST * seconds <= self._budget_s:
             self._mirrors = True
             self._sizes[True] = Resolution(LEAST_MIRRORED)  # forget earlier times
-
-
-def prior_share(accumulated: int, accumulate_to: int, samples: int) -> float:
-    """Share of the last picture in motion that is blended with the mean of `accumulated` frames of `samples` each.
-
-    A mean of few `qmc` frames is noisy and looks worse than the sharp picture in motion. With a share of a/(a + N) for
-    that picture, the shown noise never exceeds that of 4 a frames. The share is 0 at the end.
-    """
-    weight = PRIOR_SAMPLES / samples
-    share = weight / (accumulated + weight)
-    last = weight / (accumulate_to + weight)
-    return max(0.0, (share - last) / (1 - last))

@@ -12,25 +12,22 @@ import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.false_colour import with_scale
 from lambent.core.images import write_image, write_shown
 from lambent.realtime.device import adapter_info
-from lambent.realtime.frame_state import QMC_N, FrameState, quantity_of
+from lambent.realtime.frame_state import FrameState, quantity_of
 from lambent.realtime.planar_integrators import OFF
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.slices import SLICE_S, Cut
 from lambent.realtime.targets import DISPLAY_FORMAT
 from lambent.viewer.edits import unused
 from lambent.viewer.mode import Drawing
-from lambent.viewer.pacing import WHOLE, Pacer, Plan, prior_share
+from lambent.viewer.pacing import WHOLE, Pacer, Plan
 from lambent.viewer.screen import Rect, Screen, Statistics, least
 
-# At rest: frames of the progressive series, and samples per pixel and lobe in each. Software takes one sample at a
-# time, so that a frame is short and the window answers in between.
-REST_FRAMES = 128
 LARGEST_PX = 8192  # of a texture, by WebGPU's default limits; a larger window shows a magnified picture
-SOFTWARE_N = 1
 LONGEST_OVER_S = 0.15  # longest frame over another one that is not drawn in parts
 QUIET_S = 0.5  # longest pause of frames at rest after an event; else the time of a part of such a frame
 
@@ -55,9 +52,8 @@ class Picture:
         self._adapter = adapter.name
         if screen.pace.covers is None:
             screen.pace.covers = not adapter.is_software
-        self._rest_n = SOFTWARE_N if adapter.is_software else QMC_N
-        self.pacer = Pacer(accumulate_to=REST_FRAMES, slow_adapter=adapter.is_software)
-        self._refine = True
+        self.pacer = Pacer(slow_adapter=adapter.is_software)
+        self._sharpen = True
         self._part_s = 0.0  # longest part of the last frame at rest
         self._whole_s = math.inf if adapter.is_software else 0.0  # time of the last whole frame at rest
         self._over_s = 0.0  # time of the last frame drawn over another
@@ -69,13 +65,13 @@ class Picture:
         self._size: tuple[int, int] = (0, 0)
         self._spare: list[Any] = []  # unused views of that size, at most two
 
-    def update(self, wanted: FrameState, *, refine: bool | None = None, share: float = 1.0) -> None:
+    def update(self, wanted: FrameState, *, sharpen: bool = True, share: float = 1.0) -> None:
         """Draw the next due frame towards the picture `wanted`.
 
-        `refine` overrides the user's choice; `share` is this picture's share of the frame time.
+        `sharpen`: draw it whole at rest; `share` is this picture's share of the frame time.
         """
         pace, now_s = self._screen.pace, self._screen.clock()
-        self._refine = pace.refine if refine is None else refine
+        self._sharpen = sharpen
         self.pacer.aim(share * pace.target_ms / 1e3)
         rests = wanted == self.pacer.shown
         soon = pace.dragging or self._renderer.mixer.lags  # soon rather than sharp: the user waits for this light
@@ -88,7 +84,7 @@ class Picture:
             self._under_way = None  # another frame is wanted: drop this one
         if self._under_way is not None:
             return
-        plan = self.pacer.plan(wanted, now_s, refine=self._refine, adaptive=pace.adaptive, over=over, keeps=relit)
+        plan = self.pacer.plan(wanted, now_s, sharpen=self._sharpen, adaptive=pace.adaptive, over=over, keeps=relit)
         if plan is None or (rests and (pace.answering or self._quiet_for_s() > 0)):
             return
         frame = self._planned(wanted, plan)
@@ -119,15 +115,19 @@ class Picture:
         return (0, 0) if self.radiance is None else self.radiance.size[:2]
 
     @property
-    def accumulated(self) -> int:
-        """Accumulated frames of the progressive series."""
-        return self.pacer.accumulated
+    def drawing(self) -> object:
+        """What the picture shows."""
+        return self.version
 
     @property
     def readable(self) -> bool:
         """Whether `radiance` belongs to `view`: an unfinished frame may overwrite it."""
-        over = self._under_way is not None and self._under_way.plan.accumulate is None
-        return self.radiance is not None and not over
+        return self.radiance is not None and self._under_way is None
+
+    @property
+    def rests(self) -> bool:
+        """Whether the picture is complete, and no other is due."""
+        return self._under_way is None and self.wait_s() is None
 
     def work(self) -> bool:
         """Draw a part of the frame in progress; returns whether there is a new picture to show.
@@ -166,7 +166,7 @@ class Picture:
         """Seconds until a frame is due although nothing changes; None: never."""
         if self._under_way is not None:
             return None  # `work` continues by itself
-        due = self.pacer.wait_s(self._screen.clock(), refine=self._refine)
+        due = self.pacer.wait_s(self._screen.clock(), sharpen=self._sharpen)
         return None if due is None else max(due, self._quiet_for_s())
 
     def _quiet_for_s(self) -> float:
@@ -174,32 +174,15 @@ class Picture:
         return max(0.0, self._screen.pace.touched_s + min(self._part_s, QUIET_S) - self._screen.clock())
 
     def save(self, name: str) -> str | None:
-        """Write the picture at full size, PNG as shown and EXR as linear radiance, called after the scene's `name`.
-
-        Returns the files' common stem; None if they could not be written.
-        """
+        """Write the picture at full size, see `write_picture`."""
         self._under_way = None  # the renderer draws one frame at a time; this one restarts later
-        folder, say = self._screen.folder, self._screen.say
-        stem = "".join(c if c.isalnum() or c in "._-" else "-" for c in name).strip(".-") or "picture"
-        stem = unused(folder, stem, ".png", ".exr")
         frame = self.pacer.shown
         assert isinstance(frame, FrameState), "saved before the first frame"
-        if self.pacer.accumulated:
-            frame = self._planned(frame, Plan(1.0, self.pacer.accumulated))
-        try:
-            write_image(folder / f"{stem}.exr", self._renderer.image(frame))
-            write_shown(folder / f"{stem}.png", scaled(self._renderer.display_image(frame), frame))
-        except (UserError, OSError) as error:
-            say(f"picture not saved: {error}")
-            return None
-        say(f"saved {stem}.png and {stem}.exr")
-        return stem
+        return write_picture(
+            self._screen, name, frame, self._renderer.image(frame), self._renderer.display_image(frame)
+        )  # fmt: skip
 
     def _planned(self, frame: FrameState, plan: Plan) -> FrameState:
-        if plan.accumulate is not None:
-            shown = plan.accumulate + 1
-            prior = 0.0 if frame.integrator == "qmc" else prior_share(shown, self.pacer.accumulate_to, self._rest_n)
-            return replace(frame, integrator="qmc", n=self._rest_n, accumulate=plan.accumulate, prior=prior)
         if not plan.mirrors:
             frame = replace(frame, planar=OFF)
         width, height = (max(1, round(plan.scale * size)) for size in (frame.width, frame.height))
@@ -233,15 +216,15 @@ class Picture:
 
     @property
     def samples(self) -> int:
-        """Accumulated samples per pixel and lobe; 0: a frame in motion."""
-        return self.pacer.accumulated * self._rest_n
+        """Samples that the picture has gathered: none, it is one frame."""
+        return 0
 
     def _statistics(self, drawn: Mapping[str, Any], seconds: float, plan: Plan) -> Statistics:
         return Statistics(
             self._adapter, drawn["integrator"], frame_ms=seconds * 1e3, gpu_ms=drawn["gpu_ms"],
             draw_calls=drawn["draw_calls"], resolution=(drawn["width"], drawn["height"]),
-            samples=drawn["samples_per_pixel"], accumulated=self.samples, accumulate_to=REST_FRAMES * self._rest_n,
-            scale=plan.scale, light_fields=drawn["light_fields"], mirrors=drawn["mirrors"] if plan.mirrors else None,
+            samples=drawn["samples_per_pixel"], scale=plan.scale, light_fields=drawn["light_fields"],
+            mirrors=drawn["mirrors"] if plan.mirrors else None,
         )  # fmt: skip
 
 
@@ -255,10 +238,19 @@ class Shown(Protocol):
     @property
     def readable(self) -> bool: ...
     @property
+    def size(self) -> tuple[int, int]: ...
+    @property
     def samples(self) -> int: ...
+    @property
+    def version(self) -> int: ...
+    @property
+    def drawing(self) -> object: ...
+    @property
+    def rests(self) -> bool: ...
     def work(self) -> bool: ...
     def wait_s(self) -> float | None: ...
     def read(self, at: tuple[float, float] | None = None) -> NDArray[np.float32]: ...
+    def save(self, name: str) -> str | None: ...
 
 
 class Pair(Drawing):
@@ -280,6 +272,25 @@ class Pair(Drawing):
 
     def wait_s(self) -> float | None:
         return least(*(picture.wait_s() for picture in self.shown))
+
+
+def write_picture(
+    screen: Screen, name: str, frame: FrameState, radiance: Floats, display: NDArray[np.uint8]
+) -> str | None:
+    """Write a picture as shown (PNG) and its linear radiance (EXR), called after the scene's `name`.
+
+    Returns the files' common stem; None if they could not be written.
+    """
+    stem = "".join(c if c.isalnum() or c in "._-" else "-" for c in name).strip(".-") or "picture"
+    stem = unused(screen.folder, stem, ".png", ".exr")
+    try:
+        write_image(screen.folder / f"{stem}.exr", radiance)
+        write_shown(screen.folder / f"{stem}.png", scaled(display, frame))
+    except (UserError, OSError) as error:
+        screen.say(f"picture not saved: {error}")
+        return None
+    screen.say(f"saved {stem}.png and {stem}.exr")
+    return stem
 
 
 def is_relit(wanted: FrameState, shown: object) -> bool:

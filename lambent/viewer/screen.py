@@ -48,8 +48,6 @@ class Statistics:
     draw_calls: int = 0
     resolution: tuple[int, int] = (0, 0)
     samples: int = 0  # per pixel in the frame
-    accumulated: int = 0  # per pixel since the camera is at rest
-    accumulate_to: int = 0
     scale: float = 1.0  # scale of width and height, chosen by the pacing
     light_fields: Mapping[str, Any] = field(default_factory=dict)  # `Streaming.statistics`
     mirrors: int | None = 0  # planar reflectors with a mirrored view; None: skipped by the pacing
@@ -59,13 +57,13 @@ class Statistics:
 class Pace:
     """The user's pacing choices, and the time of the last event."""
 
-    refine: bool = True  # accumulate samples at rest
+    traces: bool = True  # trace the picture at rest
     adaptive: bool = True  # draw fewer pixels in motion if the adapter is slow
     target_ms: float = 1e3 * BUDGET_S  # target time of a frame in motion
     covers: bool | None = None  # several depth samples per pixel in motion; None: if the adapter is fast enough
     touched_s: float = -math.inf  # time of the last event
     dragging: bool = False  # a material is being dragged: its light is shown soon rather than sharp
-    answering: bool = False  # an event was just handled: draw the interface before refining the picture
+    answering: bool = False  # an event was just handled: draw the interface before a frame at rest
 
 
 @dataclass
@@ -78,6 +76,7 @@ class Screen:
     pace: Pace = field(default_factory=Pace)
     statistics: Statistics = field(default_factory=Statistics)
     messages: list[Message] = field(default_factory=list)
+    at_rest: str = ""  # a line on the picture at rest
     panels_shown: bool = True
     save_wanted: bool = False  # whether to save the picture
     close_wanted: bool = False  # whether a key asked to close the window

@@ -99,9 +99,6 @@ def _samples(look: Look) -> None:
 
 def draw_quality(pace: Pace) -> None:
     imgui.separator_text("quality")
-    pace.refine = check(
-        "refine while nothing moves", pace.refine, "averages unbiased frames at rest until the picture is clean"
-    )
     meaning = "lowers the resolution in motion where frames would take too long"
     covers = "keeps wires and slats whole in motion: five depth samples per pixel; 1.5 times slower in software"
     pace.covers = check("thin things in motion", bool(pace.covers), covers)

@@ -1,4 +1,4 @@
-"""Overlay of the picture: messages, progress of refinement, colour scales."""
+"""Overlay of the picture: messages, the picture at rest, colour scales."""
 
 from __future__ import annotations
 
@@ -23,11 +23,10 @@ FLAGS = (
 )  # fmt: skip
 
 
-def draw(screen: Screen, first: Sequence[str] = (), *, refining: bool = True) -> None:
-    """Draw lines at the lower left: `first`, the messages, and, with `refining`, the progress of refinement."""
-    lines, s, picture = [*first, *(message.text for message in screen.messages)], screen.statistics, screen.picture
-    if refining and 0 < s.accumulated < s.accumulate_to:
-        lines.append(f"refining: {s.accumulated} of {s.accumulate_to}")
+def draw(screen: Screen, first: Sequence[str] = ()) -> None:
+    """Draw lines at the lower left: `first`, the messages, and the line on the picture at rest."""
+    last = [screen.at_rest] if screen.at_rest else []
+    lines, picture = [*first, *(message.text for message in screen.messages), *last], screen.picture
     if not lines:
         return
     x, y = picture.point(0, 1)

@@ -21,7 +21,7 @@ def draw(screen: Screen, editor: Editor | None, notes: Sequence[str] = ()) -> No
         ("picture", f"{width} x {height}" + (f" ({100 * s.scale:.0f} % of the window's)" if s.scale < 1 else "")),
         ("target", f"{pace.target_ms:.0f} ms" if pace.adaptive else "-"),
         ("samples per pixel", str(s.samples)),
-        ("at rest", f"{s.accumulated} of {s.accumulate_to}" if s.accumulated else "-"),
+        ("at rest", screen.at_rest or "-"),
         ("draw calls", str(s.draw_calls)),
         ("planar reflections", "skipped in motion" if s.mirrors is None else str(s.mirrors)),
     ]

@@ -104,7 +104,7 @@ class EditMode(Mode):
             shadowed(imgui.get_background_draw_list(), (x + 14, y + 4), state.pointed[1], (1, 1, 1, 1))
         if state.scale is not None:
             overlay.scale_bar_of(place, state.scale, LUMINANCE.unit)
-        overlay.draw(self.screen, self._lines(), refining=False)
+        overlay.draw(self.screen, self._lines())
 
     def _lines(self) -> list[str]:
         """Lines on background work and its errors."""

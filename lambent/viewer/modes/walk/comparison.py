@@ -1,8 +1,8 @@
-"""Comparison of the picture A with B, drawn by another integrator or the path tracer.
+"""Comparison of the picture A with B: drawn by another integrator, or traced.
 
-By default B uses the unbiased `qmc`, which accumulates at rest: the difference is then the error of A's few samples. A
-difference from the path tracer includes the error of the bake. Figures compare displayed pictures; the map of
-differences compares luminances.
+By default B is traced against the baked light, and A is drawn: the difference is the error of drawing. Against other
+pictures, A is the picture at rest: the difference from whole paths is the error of the baked light, that from a drawn B
+the error of B. Figures compare displayed pictures; the map of differences compares luminances.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from lambent.core.images import to_bytes
 from lambent.core.metrics import psnr
 from lambent.core.progress import Progress
 from lambent.viewer.mode import Divider, Image
+from lambent.viewer.modes.walk.tracing import KINDS as TRACED
+from lambent.viewer.modes.walk.tracing import Kind as TracedKind
 from lambent.viewer.work import POLL_S, Work, pending
 
 Mode = Literal["off", "side by side", "error map"]
 Kind = Literal["difference", "FLIP"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 KINDS: tuple[Kind, ...] = get_args(Kind)
-REFERENCE = "qmc"
-TRACED = "path"  # B by the path tracer, in another process
 AS_A = "as A"  # look-up of B: the same as A's
 PERCENT = Range(1.0, 100.0)  # scale of the map of differences
 FLOOR = 0.02  # least divisor of relative differences, as a share of the mean luminance
@@ -52,9 +52,9 @@ class Figures:
 
     psnr_db: float
     difference_percent: float
-    of: int  # samples per pixel and lobe of B; 0 if B does not accumulate
+    of: tuple[int, int]  # samples per pixel of A and B; 0 if drawn
     flip_mean: float | None = None
-    flip_of: int = 0
+    flip_of: tuple[int, int] = (0, 0)
     flip_step: int = 1  # side of the pixel blocks that were averaged before FLIP
 
 
@@ -63,7 +63,7 @@ class Comparison:
 
     def __init__(self) -> None:
         self.mode: Mode = "off"
-        self.integrator = REFERENCE
+        self.integrator: str = TRACED[0]
         self.look_up = AS_A
         self.fault = ""  # why there is no B, in one line
         self.kind: Kind = "difference"
@@ -74,7 +74,7 @@ class Comparison:
         self._flip: Floats | None = None
         self._work: Work | None = None
         self._of: object = None
-        self._next = 1  # number of accumulated frames for the next comparison
+        self._next = 1  # number of samples for the next comparison
         self._painted: object = None  # values drawn in `map`
 
     @property
@@ -82,20 +82,20 @@ class Comparison:
         return self.mode != "off"
 
     @property
-    def is_traced(self) -> bool:
-        """Whether B is path traced."""
-        return self.on and self.integrator == TRACED
+    def traced_kind(self) -> TracedKind | None:
+        """How B is traced; None if it is drawn or there is none."""
+        return next((kind for kind in TRACED if self.on and kind == self.integrator), None)
 
     @property
     def busy(self) -> bool:
         return self._work is not None
 
-    def due(self, of: object, accumulated: int) -> bool:
-        """Whether to compare the pictures of `of` now: when B has accumulated 1, 2, 4, 8... frames."""
+    def due(self, of: object, samples: int) -> bool:
+        """Whether to compare the pictures of `of` now: when the samples have doubled."""
         if of != self._of:
             self.forget()
             self._of, self._next = of, 1
-        return accumulated >= self._next
+        return samples >= self._next
 
     def forget(self) -> None:
         """Drop maps and work for earlier pictures; keep the figures."""
@@ -103,9 +103,9 @@ class Comparison:
             self._work.cancel()
         self._work = self._difference = self._flip = self.map = self._painted = self._of = None
 
-    def compare(self, a: Floats, b: Floats, view: str, exposure_ev: float, frames: int, samples: int) -> None:
-        """Compare pictures (H, W, 3) of radiance; FLIP runs in the background."""
-        self._next = 2 * max(frames, 1)
+    def compare(self, a: Floats, b: Floats, view: str, exposure_ev: float, samples: tuple[int, int]) -> None:
+        """Compare pictures (H, W, 3) of radiance with `samples` per pixel; FLIP runs in the background."""
+        self._next = 2 * max(1, *samples)
         self._difference = difference(a, b)
         pair = [shown(np.asarray(x, np.float32), view, exposure_ev) for x in (b, a)]
         figures, before = Figures(psnr(pair[0], pair[1]), float(self._difference.mean()), samples), self.figures
@@ -124,7 +124,7 @@ class Comparison:
         elif values is not self._painted:
             self.map, self._painted = _painted(values, self.kind), values
 
-    def _start_flip(self, pair: list[Floats], samples: int) -> None:
+    def _start_flip(self, pair: list[Floats], samples: tuple[int, int]) -> None:
         step = 1 if pair[0].shape[0] * pair[0].shape[1] <= FLIP_PIXELS else 2
         reference, test = (_shrunk(picture, step) for picture in pair)
         of = self._of

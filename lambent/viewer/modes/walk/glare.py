@@ -48,7 +48,7 @@ class GlareDrawing:
         if around is None or view is None:
             return
         side, camera = around.side_px, around.cameras[self._done]
-        drawn = replace(frame, camera=camera, width=side, height=side, show="full", accumulate=None, prior=0.0)
+        drawn = replace(frame, camera=camera, width=side, height=side, show="full")
         around.fill(self._done, renderer.still_radiance(drawn, SUPERSAMPLES))
         self._done += 1
         meter.share = self._done / len(around.cameras)

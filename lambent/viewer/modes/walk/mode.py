@@ -123,7 +123,7 @@ class WalkMode(Mode):
         lines = [] if filming is None else [f"film: frame {filming.done} of {filming.total}"]
         if recorder.on:
             lines.append(f"recording {self.screen.clock() - recorder.began_s:.0f} s   (R stops)")
-        overlay.draw(self.screen, lines, refining=filming is None)  # a film uses the adapter alone
+        overlay.draw(self.screen, lines)
 
         if not imgui.is_any_item_active():
             state.materials.edits.end_stroke()
@@ -225,7 +225,7 @@ def panels(state: WalkState) -> tuple[Panel, ...]:
             partial(metering.draw, state.meter, state.look, state.navigation),
             "luminance of the picture in numbers, and glare",
         ),
-        Panel("Compare", partial(compare.draw, state.comparison), "the picture compared with another integrator's"),
+        Panel("Compare", partial(compare.draw, state.comparison), "the picture compared with another"),
         Panel(
             "Film",
             partial(film.draw, state.films, state.recordings, state.navigation, state.screen),

@@ -17,7 +17,7 @@ from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 from lambent.viewer.mode import Divider
 from lambent.viewer.modes.walk.answering import AnsweringLight
-from lambent.viewer.modes.walk.comparison import AS_A, REFERENCE
+from lambent.viewer.modes.walk.comparison import AS_A
 from lambent.viewer.modes.walk.filming import QUALITIES, SIZES, Filming, film_file
 from lambent.viewer.modes.walk.glare import GlareDrawing
 from lambent.viewer.modes.walk.lanes import Lane
@@ -26,8 +26,9 @@ from lambent.viewer.modes.walk.metering import read
 from lambent.viewer.modes.walk.outlining import Outlining
 from lambent.viewer.modes.walk.rebaking import RebakedLight
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.modes.walk.traced import TracedPicture
-from lambent.viewer.picture import Pair, Picture, size_px
+from lambent.viewer.modes.walk.traced import TRACEABLE, AtRest, TracedPicture
+from lambent.viewer.modes.walk.tracing import ALL_LIGHT, Kind
+from lambent.viewer.picture import Pair, Picture, Shown, size_px
 from lambent.viewer.screen import Rect, least
 from lambent.viewer.work import POLL_S
 
@@ -47,14 +48,18 @@ class Pictures(Pair):
             None if state.store is None else RebakedLight(state.store, renderer.scene, state.screen, state.rebaking)
         )
         self._b: Picture | None = None
-        self._traced: TracedPicture | None = None
+        self._at_rest = AtRest(
+            lambda: self._renderer.given(), state.screen, state.store, state.sky_turn_deg, state.replaced
+        )
+        self._said = ""  # the last reason for which nothing is traced
         self._stands_for: Any = None
         self._stand_in: Any = None
-        self.shown = (self._a,)
+        self.shown: tuple[Shown, ...] = (self._a,)
         self._film_renderer: Renderer | None = None
         self._outlining = Outlining(renderer)
         self._fields = FieldDrawing(renderer.discs(), state.fields)
-        self._read_version, self._read_s = -1, -1e9
+        self._read_of: object = None  # picture of the last meter reading
+        self._read_s = -1e9
         self._glare = GlareDrawing(state.meter.glare)
         self._glare_renderer: Renderer | None = None
 
@@ -68,10 +73,20 @@ class Pictures(Pair):
 
     @property
     def images(self) -> Mapping[str, Any]:
-        """Mirror balls, the selection's outline and light field, and the error map in place of the picture."""
-        error = self._state.comparison.map
-        own = {} if error is None else {"picture A": error}
+        """Mirror balls, outline and light field of the selection, the error map in place of A, what A replaces."""
+        error, (before, _) = self._state.comparison.map, self._fading
+        own = {} if before is None else {"before A": before}
+        own |= {} if error is None else {"picture A": error}
         return {**self._state.marks.images, **self._outlining.images, **self._fields.images, **own}
+
+    @property
+    def share(self) -> float:
+        return self._fading[1]
+
+    @property
+    def _fading(self) -> tuple[Any, float]:
+        a = self.shown[0]
+        return a.fading if isinstance(a, TracedPicture) and self._state.comparison.map is None else (None, 1.0)
 
     @property
     def views(self) -> tuple[Any, ...]:
@@ -96,21 +111,18 @@ class Pictures(Pair):
             self._rebaked.update(self._lane, state.recordings.light, state.navigation.camera, size, in_stroke=in_stroke)
         wanted = self._frame(size)
         self._outlining.update(wanted, state.selection.record)
-        traces = state.comparison.is_traced and state.films.under_way is None and not state.states.split
-        if self._traced is not None and not traces:
-            self._traced.rest()
-        if state.states.split and state.films.under_way is None:
+        filming, before = state.films.under_way is not None, self.shown[0].view
+        rebaked = self._rebaked is not None and self._rebaked.is_copied(self._lane.room)
+        self._at_rest.update(wanted, self._lane.textures, self._traced_kinds(wanted), rebaked=rebaked, before=before)
+        if state.states.split and not filming:
             self._compare_states(wanted)
-        elif state.comparison.is_traced and state.films.under_way is None:
-            self._compare_traced(wanted)
-        elif state.comparison.on and state.films.under_way is None:
+        elif state.comparison.on and not filming:
             self._compare(wanted)
         else:
             state.comparison.forget()
             state.comparison.figures = None
-            self.shown = (self._a,)
-            averages = state.films.under_way is None and not shows_choice(wanted)  # a mean would mix points' colours
-            self._a.update(wanted, refine=None if averages else False)
+            self.shown = (self._picture_a(wanted),)
+        self._say_at_rest()
         look, size = state.look, (max(1, place.width), max(1, place.height))
         exposure_ev = look.exposure_ev + math.log2(self._renderer.scene.unit)  # probes have these units
         state.marks.update(state.navigation.camera, size, look.display_transform, exposure_ev)
@@ -126,6 +138,41 @@ class Pictures(Pair):
         frame = state.look.frame(state.navigation.camera, size, state.materials.edits.edited)
         return self._lane.frame(frame, state.recordings.light)
 
+    # at rest
+
+    def _traced_kinds(self, wanted: FrameState) -> tuple[Kind, ...]:
+        """Kinds of traced pictures that the window shows at rest."""
+        state, comparison = self._state, self._state.comparison
+        if state.films.under_way is not None or state.states.split:
+            return ()
+        b = comparison.traced_kind if comparison.on else None
+        # A near plane cuts away what paths would meet; colours of a choice are no light.
+        traceable = wanted.show in TRACEABLE and wanted.near_m is None and not shows_choice(wanted)
+        kinds: list[Kind] = ["traced"] if traceable and state.screen.pace.traces and b != "traced" else []
+        if b is not None and (wanted.show == ALL_LIGHT or (b == "traced" and traceable)):
+            kinds.append(b)
+        return tuple(kinds)
+
+    def _picture_a(self, wanted: FrameState, share: float = 1.0) -> Shown:
+        """The picture A: traced if it is at rest and there is one, else drawn."""
+        a, traces = self._a, self._state.screen.pace.traces and self._state.comparison.traced_kind != "traced"
+        traced = self._at_rest.picture("traced") if traces and self._at_rest.still else None
+        if traced is not None:
+            return traced
+        a.update(wanted, sharpen=not (traces and self._at_rest.coming), share=share)
+        if a.version > 0:
+            self._at_rest.start()
+        return a
+
+    def _say_at_rest(self) -> None:
+        """Update the line on the picture at rest; say once why nothing is traced."""
+        fault, screen = self._at_rest.fault, self._state.screen
+        traces = screen.pace.traces and self._state.store is not None
+        if fault != self._said and traces:
+            self._said = fault
+            screen.say(f"not traced at rest: {fault}")
+        screen.at_rest = self._at_rest.line if traces and self._state.films.under_way is None else ""
+
     def wait_s(self) -> float | None:
         if self._state.films.under_way is not None or self._glare.busy:
             return 0.0
@@ -133,16 +180,12 @@ class Pictures(Pair):
         beside = self._beside.wait_s() if self._beside is not None and self._state.states.split else None
         compares = POLL_S if len(self.shown) == 2 and self._state.comparison.busy else None
         rebakes = None if self._rebaked is None else self._rebaked.wait_s()
-        return least(super().wait_s(), loading, self._lane.wait_s(), beside, compares, rebakes)
-
-    def work(self) -> bool:
-        """Continue the unfinished frame that has accumulated less."""
-        busy = [picture for picture in self.shown if picture.under_way]
-        return bool(busy) and min(busy, key=lambda picture: picture.samples).work()
+        resting = self._at_rest.wait_s()
+        return least(super().wait_s(), loading, self._lane.wait_s(), beside, compares, rebakes, resting)
 
     def save(self) -> None:
         """Write the picture A, and a shown error map."""
-        name = self._a.save(self._state.scene.name)
+        name = self.shown[0].save(self._state.scene.name)
         screen, error_map = self._state.screen, self._state.comparison.map
         if name is None or error_map is None:
             return
@@ -161,8 +204,7 @@ class Pictures(Pair):
             if lane is not None:
                 lane.close()
         self._state.comparison.forget()
-        if self._traced is not None:
-            self._traced.close()
+        self._at_rest.close()
         if self._state.films.under_way is not None:
             self._state.films.under_way.cancel()
 
@@ -194,80 +236,73 @@ class Pictures(Pair):
         state.states.label()
 
     def _compare(self, wanted: FrameState) -> None:
+        """Show B beside A: by another integrator, each in half of a frame's time, or traced."""
+        comparison, kind = self._state.comparison, self._state.comparison.traced_kind
+        comparison.fault = self._fault_of_b(kind, wanted)
+        if kind is not None:
+            a, label = self._picture_a(wanted), self._at_rest.label(kind)
+            if comparison.fault:
+                self.shown = (a,)
+                return
+            b: Shown = self._at_rest.held(kind)
+        else:
+            b = self._b_drawn(wanted)
+            a, label = self._picture_a(wanted, SHARED), comparison.integrator
+            label += f", {comparison.look_up}" if comparison.look_up != AS_A else ""
+        self.shown, traced = (a, b), isinstance(a, TracedPicture)
+        comparison.divider.a_label = f"traced, {a.samples} samples" if traced else wanted.integrator
+        comparison.divider.b_label = label
+        of = a.drawing, b.drawing, comparison.integrator, comparison.look_up, comparison.mode
+        self._measure(a, b, of)
+
+    def _fault_of_b(self, kind: Kind | None, wanted: FrameState) -> str:
+        """Why there is no traced B, in one line; else empty."""
+        if kind is None or self._at_rest.fault:
+            return "" if kind is None else f"not traced: {self._at_rest.fault}"
+        if kind == "path" and wanted.show != ALL_LIGHT:
+            return "The path tracer shows all light: set 'show' to full."
+        return "" if kind in self._traced_kinds(wanted) else "This light is drawn, not traced."
+
+    def _b_drawn(self, wanted: FrameState) -> Picture:
         comparison = self._state.comparison
         if self._b is None:
             renderer = self._another_renderer()
             renderer.waits = False
             self._b = Picture(renderer, self._state.screen)
-        a, b = self._a, self._b
-        self.shown = (a, b)
-        # A samples pixel centres; so must B, for the difference of the integrators only.
-        edges = comparison.mode == "side by side"
-        beside = replace(wanted, integrator=comparison.integrator, antialias=edges)
+        beside = replace(wanted, integrator=comparison.integrator)
         if comparison.look_up != AS_A:
             beside = replace(beside, lookup=comparison.look_up, lookups={})
-        b.update(beside, refine=comparison.integrator == REFERENCE, share=SHARED)
-        a.pacer.forget_refinement()
-        a.update(wanted, refine=False, share=SHARED)  # last, because the window shows its statistics
-        comparison.divider.a_label = wanted.integrator
-        comparison.divider.b_label = ", ".join(
-            [comparison.integrator]
-            + ([comparison.look_up] if comparison.look_up != AS_A else [])
-            + ([f"{b.samples} samples"] if b.samples else [])
-        )
-        self._measure(a, b, (a.version, comparison.integrator, comparison.look_up, comparison.mode))
-
-    def _compare_traced(self, wanted: FrameState) -> None:
-        """Show B by the path tracer, which uses the CPU time that drawing leaves."""
-        comparison, a = self._state.comparison, self._a
-        if self._traced is None:
-            state = self._state
-            if state.store is None:
-                comparison.fault = "There is no scene file to trace."
-                self.shown = (a,)
-                a.update(wanted, refine=False)
-                return
-            self._traced = TracedPicture(
-                self._renderer.given(), state.screen, state.store, state.sky_turn_deg, state.replaced
-            )
-        b = self._traced
-        self.shown = (a, b)
-        b.update(wanted, self._lane.textures)
-        a.pacer.forget_refinement()
-        a.update(wanted, refine=False)
-        comparison.fault = b.fault
-        comparison.divider.a_label, comparison.divider.b_label = wanted.integrator, b.label
-        self._measure(a, b, (a.version, comparison.integrator, comparison.mode))
+        self._b.update(beside, share=SHARED)
+        return self._b
 
     def _another_renderer(self) -> Renderer:
         return Renderer(self.device, self._renderer.scene, beside=self._renderer)
 
-    def _measure(self, a: Picture, b: Picture | TracedPicture, of: object) -> None:
+    def _measure(self, a: Shown, b: Shown, of: object) -> None:
         """Compare A and B, the pictures of `of`, where both are complete and at rest."""
         comparison, look = self._state.comparison, self._state.look
-        done = not a.under_way and a.wait_s() is None
-        at_rest = done and (b.samples > 0 or (isinstance(b, Picture) and not b.under_way and b.wait_s() is None))
+        at_rest = a.rests and b.rests
         if not at_rest or not a.readable or not b.readable or a.size != b.size:
             comparison.figures = comparison.figures if at_rest else None
             comparison.forget()
-        elif comparison.due(of, max(1, b.accumulated)):
+        elif comparison.due(of, max(1, a.samples, b.samples)):
             view, exposure_ev = look.display_transform, look.exposure_ev
-            comparison.compare(a.read(), b.read(), view, exposure_ev, b.accumulated, b.samples)
+            comparison.compare(a.read(), b.read(), view, exposure_ev, (a.samples, b.samples))
         comparison.tick()
 
     # readings
 
     def _meter(self) -> None:
-        meter, look, now_s, a = self._state.meter, self._state.look, self._state.screen.clock(), self._a
+        meter, look, now_s, a = self._state.meter, self._state.look, self._state.screen.clock(), self.shown[0]
         if not a.readable:
             return
         wanted, meter.wanted = meter.wanted, False
         if look.is_false_coloured and look.shows_noise not in meter.fitted:
             meter.fit_wanted = True  # the first time
         asked = meter.expose_wanted or (meter.fit_wanted and look.is_false_coloured)
-        if asked or (wanted and a.version != self._read_version and now_s - self._read_s >= METER_S):
+        if asked or (wanted and (a, a.version) != self._read_of and now_s - self._read_s >= METER_S):
             meter.reading = read(a.read(), look.quantity)
-            self._read_version, self._read_s = a.version, now_s
+            self._read_of, self._read_s = (a, a.version), now_s
             self._apply()
         meter.under_cursor = None
         if meter.cursor is not None and (meter.readout_on or look.is_false_coloured):

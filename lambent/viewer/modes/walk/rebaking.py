@@ -52,6 +52,7 @@ class RebakedLight:
         self._reading: Work | None = None
         self._light: Rebaked | None = None  # last light read for the wanted state
         self._whole: tuple[RoomState, Rebaked] | None = None  # the last complete bake and its state
+        self._copied = False  # whether the copy still holds that bake
         self._fade: Fade | None = None
 
     def update(self, lane: Lane, light: Factors, camera: Camera, size: tuple[int, int], *, in_stroke: bool) -> None:
@@ -102,6 +103,12 @@ class RebakedLight:
         """Whether light was read that the picture does not show."""
         return self._fade is None or self._fade.shown is not self._light
 
+    def is_copied(self, room: RoomState) -> bool:
+        """Whether the copy has all light of a room's materials and textures, and the picture shows it."""
+        state = room.model_copy(update={"light": LightMix()})
+        shown = self._fade is not None and self._fade.done and self._copied
+        return shown and self._whole is not None and self._whole[0] == state
+
     def close(self) -> None:
         """Stop the process; its finished work stays in the copy."""
         self._stop()
@@ -131,7 +138,7 @@ class RebakedLight:
                 self._fail(error or "the bake ended too soon")
 
     def _begin(self) -> None:
-        self._arrivals, self._light = Arrivals(), None
+        self._arrivals, self._light, self._copied = Arrivals(), None, False
         self._step, self._shown.share = "starting", 0.0
         self._began_s, self._first_s = self._screen.clock(), first_bake_s(self._store)
         words = [str(self._store), str(self._copy)]
@@ -159,7 +166,7 @@ class RebakedLight:
             if wanted == self._wanted:
                 self._light = light
             if light.arrived.whole:
-                self._whole = wanted, light
+                self._whole, self._copied = (wanted, light), True
 
         def failed(error: UserError) -> None:
             if wanted == self._wanted:  # else another bake has changed the copy

@@ -1,8 +1,11 @@
-"""The path traced picture B of a comparison: requested at rest, shown while it refines."""
+"""Traced pictures: requested as soon as the view stands still, shown while they converge.
+
+The picture at rest is traced against the baked light. A comparison's B can be traced so too, or by whole paths.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,34 +13,41 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.false_colour import Range
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.given import Given
+from lambent.realtime.targets import pixels
 from lambent.scenes.scene import ImageTexture
-from lambent.viewer.modes.walk.tracing import Traced, Tracing
-from lambent.viewer.pacing import REST_S
+from lambent.viewer.modes.walk.tracing import ALL_LIGHT, MOST_SAMPLES, Kind, Traced, Tracing, Wish
+from lambent.viewer.picture import write_picture
 from lambent.viewer.screen import Screen
 from lambent.viewer.work import POLL_S
 
-ALL_LIGHT = "full"  # the only part of the light that the path tracer has
+STILL_S = 0.1  # time without a change before pictures are requested
+SOON_S = 0.02  # interval of polling for the first picture
+FADE_S, FADE_STEP_S = 0.2, 1 / 30  # duration and steps of the blend from one picture to the next
+TRACEABLE = (ALL_LIGHT, "diffuse", "specular")
+NO_SCENE = "there is no scene file to trace"
+Textures = Mapping[str, str | ImageTexture]
 
 
 class TracedPicture:
-    """Shows the present path traced picture; `view` is None before the first."""
+    """The present picture of a kind; `view` is None before the first."""
 
     under_way = False  # nothing is drawn in parts on the GPU
 
-    def __init__(
-        self, given: Given, screen: Screen, store: Path, sky_turn_deg: float, replaced: tuple[str, ...]
-    ) -> None:  # fmt: skip
-        self._given, self._screen, self._tracing = given, screen, Tracing(store, sky_turn_deg, replaced)
-        self._of: tuple[FrameState, Mapping[str, str | ImageTexture]] | None = (
-            None  # the requested frame, reduced to what paths depend on
-        )
-        self._is_mixed = False  # whether the picture A has another light mix than the scene
-        self._asked = False
-        self._changed_s = 0.0
+    def __init__(self, given: Given, screen: Screen) -> None:
+        self._given, self._screen = given, screen
         self._taken: Traced | None = None
-        self._shown: object = None
+        self._frame: FrameState | None = None  # as it is shown
+        self._before: Any = None  # view that is blended out
+        self._began_s = 0.0
+        self.version = 0  # counts pictures
+
+    @property
+    def taken(self) -> Traced | None:
+        """The present picture."""
+        return self._taken
 
     @property
     def view(self) -> Any:
@@ -45,71 +55,59 @@ class TracedPicture:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height; 0, 0 before the first picture, reduced while it is coarse."""
-        return (0, 0) if self._taken is None else size_of(self._taken)
+        """Width and height; 0, 0 before the first picture."""
+        return (0, 0) if self._taken is None else (self._taken.radiance.shape[1], self._taken.radiance.shape[0])
 
     @property
     def samples(self) -> int:
-        """Paths per pixel; 0 while there is only a coarse picture, or none."""
-        return self._taken.samples if self._taken is not None and self._is_whole else 0
+        """Samples per pixel; 0 before the first picture."""
+        return 0 if self._taken is None else self._taken.samples
 
     @property
-    def accumulated(self) -> int:
-        """Passes in the picture's mean, one path per pixel each."""
-        return self.samples
+    def drawing(self) -> object:
+        """What the picture shows: the same while it converges."""
+        return None if self._taken is None else (self._taken.kind, self._taken.number)
 
     @property
     def readable(self) -> bool:
         return self._taken is not None
 
     @property
-    def fault(self) -> str:
-        """Reason why there is no picture, in one line; else empty."""
-        if self._of is not None and self._of[0].show != ALL_LIGHT:
-            return "The path tracer shows all light: set 'show' to full."
-        return self._tracing.error
+    def rests(self) -> bool:
+        return self._taken is not None
 
     @property
-    def label(self) -> str:
-        """Label of the picture, for the divider."""
-        if self.fault:
-            return "not path traced"
-        if self._taken is None:
-            return f"path tracing: {self._tracing.what}" if self._asked else "path tracing: at rest"
-        mix = ", light as baked" if self._is_mixed else ""
-        return f"path traced, {f'{self.samples} samples' if self.samples else 'coarse'}{mix}"
+    def noise(self) -> float | None:
+        """Relative standard error; None before it is known."""
+        return None if self._taken is None else self._taken.noise
 
-    def update(self, wanted: FrameState, textures: Mapping[str, str | ImageTexture]) -> None:
-        """Request a view once it rests, and show its present picture.
-
-        `textures` replace textures of materials. Light mixes are not traced.
-        """
-        self._tracing.tick()
-        of, self._is_mixed = (_traced_of(wanted), dict(textures)), bool(wanted.light)
-        now_s = self._screen.clock()
-        if of != self._of:
-            self._of, self._changed_s, self._asked, self._taken = of, now_s, False, None
-            self._tracing.ask(None, wanted.size, {}, {})
-        if not self._asked and wanted.show == ALL_LIGHT and now_s - self._changed_s >= REST_S:
-            self._asked = True
-            self._tracing.ask(wanted.camera, wanted.size, wanted.materials, textures)
-        last = self._tracing.last if self._asked else None
-        if last is not None and last is not self._taken:
-            self._given.take(last.radiance)
-            self._taken, self._shown = last, None
-        how = (wanted.exposure_ev, wanted.view_transform, wanted.scale)
-        if self._taken is not None and how != self._shown:
+    def show(self, traced: Traced | None, wanted: FrameState, before: Any) -> None:
+        """Show a picture, None for none, as `wanted` shows light; a new one is blended from the view `before`."""
+        if traced is not self._taken:
+            self._taken, self._frame = traced, None
+            if traced is None:
+                self._before = None
+                return
+            self._before, self._began_s = before, self._screen.clock()
+            self._given.take(traced.radiance)
+            self.version += 1
+        if self._taken is not None and (self._frame is None or _display(wanted) != _display(self._frame)):
+            if self._frame is not None:
+                self._before = None  # shown with another exposure
             width, height = self.size
-            self._given.show(replace(wanted, width=width, height=height))
-            self._shown = how
+            self._frame = replace(wanted, width=width, height=height)
+            self._given.show(self._frame)
+
+    @property
+    def fading(self) -> tuple[Any, float]:
+        """The view that is blended out, None without one, and this picture's share."""
+        share = (self._screen.clock() - self._began_s) / FADE_S
+        if share >= 1:
+            self._before = None
+        return self._before, min(max(share, 0.0), 1.0)
 
     def wait_s(self) -> float | None:
-        """Seconds until something may have changed; None: never."""
-        if self.fault:
-            return None
-        if not self._asked:
-            return max(0.0, self._changed_s + REST_S - self._screen.clock())
-        return POLL_S if self._tracing.busy else None
+        return FADE_STEP_S if self._before is not None else None
 
     def work(self) -> bool:
         return False
@@ -120,33 +118,146 @@ class TracedPicture:
         light = self._taken.radiance
         if at is None:
             return np.asarray(light, np.float32)
-        height, width = light.shape[:2]
-        column, row = (
-            min(max(int(share * size), 0), size - 1) for share, size in zip(at, (width, height), strict=True)
-        )
+        column, row = (min(max(int(share * size), 0), size - 1) for share, size in zip(at, self.size, strict=True))
         return np.asarray(light[row : row + 1, column : column + 1], np.float32)
 
-    def rest(self) -> None:
-        """Pause until the next `update`."""
-        if self._of is not None:
-            self._of, self._asked, self._taken = None, False, None
-            self._tracing.ask(None, (1, 1), {}, {})
+    def save(self, name: str) -> str | None:
+        """Write the picture, as `Picture.save` does."""
+        assert self._frame is not None, "saved before there is a picture"
+        display = pixels(self._given.device, self._given.view.texture)
+        return write_picture(self._screen, name, self._frame, self.read(), display)
+
+
+class AtRest:
+    """Requests pictures of the view, in one process, and shows them."""
+
+    def __init__(
+        self, given: Callable[[], Given], screen: Screen, store: Path | None, sky_turn_deg: float,
+        replaced: tuple[str, ...],
+    ) -> None:  # fmt: skip
+        self._make, self._screen = given, screen
+        self._tracing = None if store is None else Tracing(store, sky_turn_deg, replaced)
+        self._pictures: dict[Kind, TracedPicture] = {}
+        self._frame: FrameState | None = None  # what is drawn, without its display
+        self._of: tuple[Wish, tuple[Kind, ...]] | None = None  # what pictures depend on
+        self._wish: Wish | None = None  # the request
+        self._changed_s = 0.0
+
+    @property
+    def fault(self) -> str:
+        """Why nothing can be traced, in one line; else empty."""
+        return NO_SCENE if self._tracing is None else self._tracing.error
+
+    @property
+    def still(self) -> bool:
+        """Whether the view has not changed for a moment."""
+        return self._screen.clock() - self._changed_s >= STILL_S
+
+    @property
+    def coming(self) -> bool:
+        """Whether there are pictures of the view, or will be soon."""
+        asks = self._of is not None and bool(self._of[1])
+        return asks and not self.fault and self._tracing is not None and self._tracing.ready
+
+    def held(self, kind: Kind) -> TracedPicture:
+        """The place of a kind's pictures, at times without one."""
+        if kind not in self._pictures:
+            self._pictures[kind] = TracedPicture(self._make(), self._screen)
+        return self._pictures[kind]
+
+    def picture(self, kind: Kind) -> TracedPicture | None:
+        """The present picture of a kind."""
+        found = self._pictures.get(kind)
+        return found if found is not None and found.readable else None
+
+    @property
+    def line(self) -> str:
+        """A line on the picture at rest; empty without one, and when it is done."""
+        found, tracing = self.picture("traced"), self._tracing
+        if found is not None and self.still:
+            noise = "" if found.noise is None else f", noise {100 * found.noise:.1f} %"
+            return f"traced: {found.samples} samples{noise}" if found.samples < MOST_SAMPLES else ""
+        waits = tracing is not None and not tracing.ready and not self.fault and self._of is not None and self._of[1]
+        return f"tracing at rest: {tracing.what}" if waits and tracing is not None else ""
+
+    def start(self) -> None:
+        """Start the process."""
+        if self._tracing is not None:
+            self._tracing.start()
+
+    def label(self, kind: Kind) -> str:
+        """Label of a picture, for the divider."""
+        name, found = {"traced": "traced", "path": "path traced"}[kind], self.picture(kind)
+        if self.fault:
+            return f"not {name}"
+        if found is None:
+            return f"{name}: at rest" if self.coming or self._tracing is None else f"{name}: {self._tracing.what}"
+        return f"{name}, {found.samples} samples"
+
+    def update(
+        self, wanted: FrameState, textures: Textures, kinds: tuple[Kind, ...], *, rebaked: bool, before: Any
+    ) -> None:
+        """Request a view in these kinds once it stands still, and show its present pictures.
+
+        `textures` replace textures of materials. `rebaked`: the copy beside the store has the light of these
+        materials. The first picture is blended from the view `before`.
+        """
+        tracing, now_s = self._tracing, self._screen.clock()
+        if tracing is None:
+            return
+        tracing.tick()
+        frame = _drawn(wanted)
+        if frame != self._frame:
+            self._frame, self._changed_s = frame, now_s
+        of = _wish_of(wanted, textures), kinds
+        if of != self._of:
+            self._of = of
+            if self._wish is not None:
+                tracing.ask(None)
+            self._wish = None
+            for picture in self._pictures.values():
+                picture.show(None, wanted, None)
+        wish = replace(of[0], kinds=kinds, rebaked=rebaked)
+        if kinds and self.still and wish != self._wish and tracing.ready:
+            self._wish = wish
+            tracing.ask(wish)
+        for kind in kinds:
+            found = tracing.last(kind) if self._wish is not None else None
+            picture = self.held(kind)
+            if found is not None or picture.readable:
+                picture.show(found or picture.taken, wanted, picture.view or before)
+
+    def wait_s(self) -> float | None:
+        """Seconds until something may have changed; None: never."""
+        tracing = self._tracing
+        if tracing is None or tracing.error or self._of is None or not self._of[1]:
+            return None
+        if not tracing.ready:
+            return POLL_S
+        if not self.still:
+            return max(0.0, self._changed_s + STILL_S - self._screen.clock())
+        if self._wish is not None and any(tracing.last(kind) is None for kind in self._wish.kinds):
+            return SOON_S
+        return POLL_S if tracing.busy else None
 
     def close(self) -> None:
         """End the process."""
-        self._tracing.close()
-
-    @property
-    def _is_whole(self) -> bool:
-        return self._taken is not None and self._of is not None and self.size == self._of[0].size
+        if self._tracing is not None:
+            self._tracing.close()
 
 
-def size_of(traced: Traced) -> tuple[int, int]:
-    """Width and height of a traced picture."""
-    height, width = traced.radiance.shape[:2]
-    return width, height
+def _display(frame: FrameState) -> tuple[float, str, Range]:
+    return frame.exposure_ev, frame.view_transform, frame.scale
 
 
-def _traced_of(frame: FrameState) -> FrameState:
-    """A frame reduced to the fields that path tracing depends on."""
-    return FrameState(frame.camera, *frame.size, materials=dict(frame.materials), show=frame.show)
+def _drawn(frame: FrameState) -> FrameState:
+    """A frame without its display, and without how far its light is computed."""
+    return replace(frame, exposure_ev=0.0, view_transform="linear", scale=Range(), maps=0, mixed=0)
+
+
+def _wish_of(frame: FrameState, textures: Textures) -> Wish:
+    """What pictures of a frame depend on, without their kinds."""
+    return Wish(
+        0, (), frame.camera, frame.size, dict(frame.materials), dict(textures), dict(frame.light),
+        frame.show if frame.show in TRACEABLE else ALL_LIGHT,
+    )  # fmt: skip

@@ -1,16 +1,18 @@
-"""Path tracing in another process: the requests, and the last picture."""
+"""Tracing in another process: the requests, and the last pictures."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Literal, get_args
 
 import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
+from lambent.core.light_mix import Factors
+from lambent.core.plain import triple
 from lambent.materials.document import Material
 from lambent.scenes.scene import ImageTexture
 from lambent.store.session import RoomState
@@ -18,63 +20,89 @@ from lambent.viewer.worker_process import WorkerProcess
 
 WORKER = "lambent.viewer.modes.walk.tracing_worker"
 MOST_SAMPLES = 1024  # samples per pixel after which tracing stops
+Kind = Literal["traced", "path"]  # against the baked light, or by whole paths
+KINDS: tuple[Kind, ...] = get_args(Kind)
+ALL_LIGHT = "full"  # the only part of the light that whole paths have
 
 
 @dataclass(frozen=True)
 class Wish:
-    """A numbered request to trace a view; without a `camera`, a request to stop.
+    """A numbered request to trace a view in these kinds of pictures; without kinds, a request to stop.
 
-    `materials` replace the scene's, by name. `textures` maps a material to the one whose textures it gets, to "" for
-    none, or to an image with its path.
+    Attributes
+    ----------
+    materials, textures : mapping
+        What replaces the scene's, by material: documents, and as in `store.session.RoomState` with images' paths.
+    light : mapping
+        Factors of light groups; groups left out are as baked.
+    show : str
+        Part of the light: full, diffuse or specular.
+    rebaked : bool
+        Whether the copy beside the store has the light of these materials and textures.
     """
 
     number: int
-    camera: Camera | None = None
+    kinds: tuple[Kind, ...] = ()
+    camera: Camera = field(default_factory=lambda: Camera("", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)))
     size: tuple[int, int] = (1, 1)
     materials: Mapping[str, Material] = field(default_factory=dict)
     textures: Mapping[str, str | ImageTexture] = field(default_factory=dict)
+    light: Factors = field(default_factory=dict)
+    show: str = ALL_LIGHT
+    rebaked: bool = False
+
+    def numbered(self, number: int) -> Wish:
+        """The same request under another number."""
+        return replace(self, number=number)
 
     def said(self) -> dict[str, Any]:
         """As a JSON object."""
         room = RoomState(materials=dict(self.materials), textures=dict(self.textures))
-        camera = None if self.camera is None else asdict(self.camera)
-        view = {"number": self.number, "camera": camera, "size": list(self.size)}
-        return {**view, "room": room.model_dump(mode="json")}
+        plain = {name: getattr(self, name) for name in ("number", "kinds", "size", "show", "rebaked")}
+        return {
+            **plain, "camera": asdict(self.camera), "room": room.model_dump(mode="json"),
+            "light": {name: list(factor) for name, factor in self.light.items()},
+        }  # fmt: skip
 
     @classmethod
     def of(cls, said: Mapping[str, Any]) -> Wish:
         """From `said`."""
-        camera = said["camera"]
-        if camera is not None:
-            places = {name: tuple(camera[name]) for name in ("position", "target", "up")}
-            camera = Camera(**{**camera, **places})
-        room = RoomState.model_validate(said["room"])
-        size = int(said["size"][0]), int(said["size"][1])
-        return cls(int(said["number"]), camera, size, room.materials, room.textures)
+        camera, room = said["camera"], RoomState.model_validate(said["room"])
+        places = {name: tuple(camera[name]) for name in ("position", "target", "up")}
+        return cls(
+            int(said["number"]), tuple(said["kinds"]), Camera(**{**camera, **places}),
+            (int(said["size"][0]), int(said["size"][1])), room.materials, room.textures,
+            {name: triple(factor) for name, factor in said["light"].items()}, str(said["show"]), bool(said["rebaked"]),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class Traced:
-    """Mean radiance (height, width, 3) of `samples` paths per pixel, for the wish `number`."""
+    """Radiance (height, width, 3) of `samples` per pixel, for the wish `number`.
+
+    `noise` is its relative standard error, None before it is known.
+    """
 
     number: int
+    kind: Kind
     samples: int
+    noise: float | None
     radiance: Floats
 
 
 class Tracing:
-    """The process, from the first wish to `close`.
+    """The process, from `start` to `close`.
 
     Attributes
     ----------
     what : str
-        Step of the process before its first picture.
+        Step of the process before it is `ready` for wishes.
     """
 
     def __init__(self, store: Path, sky_turn_deg: float, replaced: Sequence[str] = ()) -> None:
         self._words = (str(store), str(sky_turn_deg), *replaced)
-        self._last: Traced | None = None
-        self.what = "starting"
+        self._last: dict[Kind, Traced] = {}
+        self.what, self.ready = "starting", False
         self._wish = Wish(0)
         self._process: WorkerProcess | None = None
 
@@ -83,40 +111,33 @@ class Tracing:
         """Reason for the end of the process, in one line; empty while it runs."""
         return "" if self._process is None else self._process.error
 
-    @property
-    def last(self) -> Traced | None:
+    def last(self, kind: Kind) -> Traced | None:
         """The last picture of the present wish."""
-        found = self._last
+        found = self._last.get(kind)
         return found if found is not None and found.number == self._wish.number else None
 
     @property
     def busy(self) -> bool:
-        """Whether another picture will come."""
-        last = self.last
-        samples = 0 if last is None else last.samples
+        """Whether another picture of the present wish will come."""
         runs = self._process is not None and self._process.running
-        return runs and self._wish.camera is not None and samples < MOST_SAMPLES
+        last = [self.last(kind) for kind in self._wish.kinds]
+        return runs and any(one is None or one.samples < MOST_SAMPLES for one in last)
+
+    def start(self) -> None:
+        """Start the process, which loads the room; once."""
+        if self._process is None:
+            self._process = WorkerProcess(WORKER, self._words, "tracing", self._take, ends=False)
 
     def tick(self) -> None:
         """Handle the end of the process."""
         if self._process is not None:
             _ = self._process.running
 
-    def ask(
-        self,
-        camera: Camera | None,
-        size: tuple[int, int],
-        materials: Mapping[str, Material],
-        textures: Mapping[str, str | ImageTexture],
-    ) -> None:
-        """Trace this view from now on; without a camera, stop tracing."""
-        if self.error or (self._process is None and camera is None):
-            return
-        self._wish = Wish(self._wish.number + 1, camera, size, dict(materials), dict(textures))
-        if self._process is None:
-            self._process = WorkerProcess(WORKER, self._words, "path tracing", self._take, ends=False)
-        if not self._process.ask(self._wish.said()):
-            self.what = "ended"
+    def ask(self, wish: Wish | None) -> None:
+        """Trace a wish, whose number is replaced, from now on; None: stop tracing."""
+        self._wish = Wish(self._wish.number + 1) if wish is None else wish.numbered(self._wish.number + 1)
+        if self._process is not None and not self.error:
+            self._process.ask(self._wish.said())  # of a process that has ended, `tick` learns the reason
 
     def close(self) -> None:
         """End the process."""
@@ -125,8 +146,8 @@ class Tracing:
 
     def _take(self, said: Mapping[str, Any], stream: IO[bytes]) -> None:
         if "what" in said:
-            self.what = str(said["what"])
+            self.what, self.ready = str(said["what"]), bool(said["ready"])
             return
-        height, width = int(said["height"]), int(said["width"])
+        height, width, kind = int(said["height"]), int(said["width"]), said["kind"]
         radiance = np.frombuffer(stream.read(height * width * 12), np.float32).reshape(height, width, 3)
-        self._last = Traced(int(said["number"]), int(said["samples"]), radiance)
+        self._last[kind] = Traced(int(said["number"]), kind, int(said["samples"]), said["noise"], radiance)

@@ -1,10 +1,11 @@
-"""Worker process that path traces views of a store's scene for the window, pass after pass.
+"""Worker process that traces views of a store's room for the window, pass after pass.
 
-python -m lambent.viewer.modes.walk.tracing_worker STORE DEGREES  (rotation of the sky)
+python -m lambent.viewer.modes.walk.tracing_worker STORE DEGREES [REPLACEMENT ...]
 
-Every line on stdin is a `Wish` as a JSON object; a newer wish ends older ones at the next pass, and the end of stdin
-ends the process. Every line on stdout is a JSON object: "error", a line for the user; "what", a step; or "number" (of
-the wish), "samples", "width" and "height", followed by the bytes of the mean so far, float32 (height, width, 3).
+DEGREES is the rotation of the sky. Every line on stdin is a `Wish` as a JSON object; a newer wish ends older ones at
+the next pass, and the end of stdin ends the process. Every line on stdout is a JSON object: "error", a line for the
+user; "what", a step, with "ready" for wishes; or "number" (of the wish), "kind", "samples", "noise", "width" and
+"height", followed by the bytes of the picture, float32 (height, width, 3).
 """
 
 from __future__ import annotations
@@ -13,28 +14,30 @@ import json
 import os
 import sys
 import threading
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+import time
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera
 from lambent.core.errors import UserError
-from lambent.materials.document import Material
-from lambent.scenes.replacement import parse_replacements, with_replacements
-from lambent.scenes.scene import ImageTexture, Look, Scene
-from lambent.scenes.turned_sky import under_turned_sky
-from lambent.scenes.variants import textures_worn
+from lambent.scenes.replacement import parse_replacements
+from lambent.scenes.scene import Look
 from lambent.store.source import SOURCE, scene_of
 from lambent.store.store import Store
-from lambent.viewer.modes.walk.tracing import MOST_SAMPLES, Wish
+from lambent.viewer.modes.walk.tracing import MOST_SAMPLES, Kind, Wish
+
+if TYPE_CHECKING:
+    from lambent.traced.picture import TracedPicture
+    from lambent.traced.room import TracedRoom
 
 NICENESS = 10  # the window has priority
-COARSE, COARSE_SAMPLES = 4, 4  # the first picture is reduced by this factor, to appear at once
+PASS_S = 0.1  # time of a pass, as far as single samples allow
+PICTURE_S = 0.5  # shortest time between two pictures
+GROWTH = 0.25  # time of the samples since the last picture, as a share of all samples'
+FINE = 4.0  # fine denoising, which takes twice as long as fast, from this multiple of fast denoising on
 
 
 class Wishes:
@@ -65,67 +68,148 @@ class Wishes:
             self._changed.notify()
 
 
-class Views:
-    """Path traced views of a scene, in the materials that the window shows."""
+class Rooms:
+    """The rooms of a store in which wishes are traced, loaded when they are first needed."""
 
-    def __init__(self, scene: Scene) -> None:
-        self._scene = scene
-        self._applied: tuple[Mapping[str, Material], Mapping[str, str | ImageTexture]] | None = None
-        self._built: Any = None
+    def __init__(self, folder: Path, sky_turn_deg: float, replaced: Sequence[str]) -> None:
+        self._folder, self._store, self._sky_turn_deg = folder, Store.open(folder), sky_turn_deg
+        if not isinstance(self._store.documents.get(SOURCE), str):
+            raise UserError(
+                "the store has no path of its scene file", file=folder, hint="bake the scene again from its file"
+            )
+        self._scene, self._replacements = scene_of(self._store), parse_replacements(replaced)
+        self._by_kind: dict[Kind, TracedRoom] = {}
+        self._rebaked: tuple[object, TracedRoom] | None = None
 
-    def traced(self, camera: Camera, size: tuple[int, int], samples: int, seed: int) -> Floats:
-        """Mean radiance (height, width, 3) of a number of paths per pixel."""
-        from lambent.bake.reference.path_traced import traced
+    def of(self, kind: Kind, wish: Wish) -> TracedRoom:
+        """The room of a kind in the state of a wish."""
+        if wish.rebaked and kind == "traced":
+            room = self._baked_again((wish.materials, wish.textures))
+        else:
+            room, given = self.as_baked(kind), self._scene.materials
+            room.wear({name: Look(given[name], of) for name, of in wish.textures.items()}, wish.materials)
+        room.mix(wish.light)
+        return room
 
-        return traced(self._built, camera, *size, samples, seed)[0]
+    def as_baked(self, kind: Kind) -> TracedRoom:
+        """The room of a kind in the state of the last wish."""
+        from lambent.traced.room import room_of_paths, room_of_store
 
-    def apply_materials(self, materials: Mapping[str, Material], textures: Mapping[str, str | ImageTexture]) -> bool:
-        """Set materials and textures that replace the scene's; return whether the scene must be rebuilt."""
-        if self._built is not None and (materials, textures) == self._applied:
-            return False
-        from lambent.bake.reference.path_traced import built
+        if kind not in self._by_kind:
+            turned, replaced = self._sky_turn_deg, self._replacements
+            self._by_kind[kind] = (
+                room_of_store(self._store, self._scene, sky_turn_deg=turned, replacements=replaced)
+                if kind == "traced"
+                else room_of_paths(self._scene, sky_turn_deg=turned, replacements=replaced)
+            )
+        return self._by_kind[kind]
 
-        self._applied = materials, textures
-        scene = self._scene
-        looks = {name: Look(scene.materials[name], of) for name, of in textures.items()}
-        applied = textures_worn(scene.textures, looks)
-        self._built = built(replace(scene, materials={**scene.materials, **materials}, textures=applied))[1]
-        return True
+    def _baked_again(self, state: object) -> TracedRoom:
+        """The room of the copy beside the store, baked with these materials and textures."""
+        from lambent.bake.again import copy_beside
+        from lambent.traced.room import room_of_store
+
+        if self._rebaked is None or self._rebaked[0] != state:
+            copy = Store.open(copy_beside(self._folder))
+            self._rebaked = state, room_of_store(copy, scene_of(copy))
+        return self._rebaked[1]
+
+
+class Converging:
+    """A picture of a wish that gets better, with the times of its samples and of its denoising."""
+
+    def __init__(self, kind: Kind, picture: TracedPicture) -> None:
+        self.kind, self.picture = kind, picture
+        self._all_s = self._since_s = self._sample_s = self._fast_s = 0.0
+        self._noise: tuple[int, float] | None = None  # samples, and noise then
+
+    def sample(self) -> None:
+        """Trace a pass."""
+        began, before = time.monotonic(), self.picture.samples
+        most = 1 if before == 0 else max(1, int(PASS_S / max(self._sample_s, 1e-6)))
+        count = self.picture.sample(min(most, MOST_SAMPLES - before))
+        seconds = time.monotonic() - began
+        self._sample_s = seconds / count
+        self._all_s, self._since_s = self._all_s + seconds, self._since_s + seconds
+
+    @property
+    def done(self) -> bool:
+        return self.picture.samples >= MOST_SAMPLES
+
+    @property
+    def due(self) -> bool:
+        """Whether the samples since the last picture are worth another one."""
+        first = self.picture.samples == 1
+        return first or self.done or self._since_s >= max(PICTURE_S, self._fast_s, GROWTH * self._all_s)
+
+    def image(self) -> Floats:
+        """The picture so far (height, width, 3): whole paths as they are, others denoised."""
+        if self.picture.path:
+            image = self.picture.mean()
+        else:
+            began, fast = time.monotonic(), self._since_s < FINE * self._fast_s or self._fast_s == 0.0
+            image = self.picture.denoised(fast=fast)
+            if fast:
+                self._fast_s = time.monotonic() - began
+        self._since_s = 0.0
+        return image
+
+    @property
+    def noise(self) -> float | None:
+        """Noise of the picture by the last estimate."""
+        return None if self._noise is None else self._noise[1] * (self._noise[0] / self.picture.samples) ** 0.5
+
+    def estimate_noise(self) -> None:
+        """Estimate the noise anew if the samples have doubled."""
+        samples = self.picture.samples
+        if samples >= 2 * (self._noise[0] if self._noise is not None else 1):
+            noise = self.picture.noise(denoised=not self.picture.path)
+            self._noise = (samples, noise) if np.isfinite(noise) else self._noise
 
 
 def main(folder: Path, sky_turn_deg: float, replaced: Sequence[str], wishes: Wishes, out: BinaryIO) -> None:
     """Trace wishes until the stream ends; `replaced` as `scenes.replacement` reads it."""
-    from lambent.bake.engine import engine
-
-    store = Store.open(folder)
-    if not isinstance(store.documents.get(SOURCE), str):
-        raise UserError(
-            "the store has no path of its scene file", file=folder, hint="bake the scene again from its file"
-        )
-    say(out, what="loading the scene")
-    engine()
-    with TemporaryDirectory() as images:
-        scene = with_replacements(scene_of(store), parse_replacements(replaced))
-        views, wish = Views(under_turned_sky(scene, sky_turn_deg, Path(images))), wishes.newest(None)
-        while wish is not None:
-            if wish.camera is not None:
-                trace(views, wish, wish.camera, wishes, out)
-            wish = wishes.newest(wish)
+    say(out, what="loading the scene", ready=False)
+    rooms = Rooms(folder, sky_turn_deg, replaced)
+    warm_up(rooms)
+    say(out, what="ready", ready=True)
+    wish = wishes.newest(None)
+    while wish is not None:
+        if wish.kinds:
+            trace(rooms, wish, wishes, out)
+        wish = wishes.newest(wish)
 
 
-def trace(views: Views, wish: Wish, camera: Camera, wishes: Wishes, out: BinaryIO) -> None:
-    """Write pictures of a wish with more and more samples, while it is the newest."""
-    say(out, what="building the scene")
-    views.apply_materials(wish.materials, wish.textures)
-    coarse = max(1, wish.size[0] // COARSE), max(1, wish.size[1] // COARSE)
-    if wishes.stands(wish):
-        send(out, wish, views.traced(camera, coarse, COARSE_SAMPLES, 0), COARSE_SAMPLES)
-    total = np.zeros((wish.size[1], wish.size[0], 3))
-    for samples in range(1, MOST_SAMPLES + 1):
-        if not wishes.stands(wish):
-            return
-        total += views.traced(camera, wish.size, 1, samples)
-        send(out, wish, total / samples, samples)
+def warm_up(rooms: Rooms) -> None:
+    """Compile what pictures against the baked light need, by a small one."""
+    from lambent.traced.picture import ENDED, TracedPicture
+
+    camera = Wish(0).camera
+    picture = TracedPicture(rooms.as_baked("traced").tracer, camera, (8, 8))
+    while picture.samples <= ENDED:
+        picture.sample()
+    picture.denoised(fast=True)
+
+
+def trace(rooms: Rooms, wish: Wish, wishes: Wishes, out: BinaryIO) -> None:
+    """Write pictures of a wish with more and more samples, in turns by kind, while it is the newest."""
+    from lambent.traced.picture import TracedPicture
+
+    pictures = []
+    for kind in wish.kinds:
+        path = kind == "path"
+        tracer = rooms.of(kind, wish).tracer
+        picture = TracedPicture(tracer, wish.camera, wish.size, path=path, part="full" if path else wish.show)
+        pictures.append(Converging(kind, picture))
+    while pictures:
+        for one in pictures:
+            if not wishes.stands(wish):
+                return
+            one.sample()
+            if wishes.stands(wish) and one.due:
+                send(out, wish, one)
+                one.estimate_noise()
+        pictures = [one for one in pictures if not one.done]
 
 
 def say(out: BinaryIO, **words: object) -> None:
@@ -134,11 +218,12 @@ def say(out: BinaryIO, **words: object) -> None:
     out.flush()  # BrokenPipeError ends this process when the window is gone
 
 
-def send(out: BinaryIO, wish: Wish, mean: Floats, samples: int) -> None:
+def send(out: BinaryIO, wish: Wish, one: Converging) -> None:
     """Write a picture."""
-    height, width = mean.shape[:2]
-    say(out, number=wish.number, samples=samples, width=width, height=height)
-    out.write(np.ascontiguousarray(mean, np.float32).tobytes())
+    image, samples = one.image(), one.picture.samples
+    height, width = image.shape[:2]
+    say(out, number=wish.number, kind=one.kind, samples=samples, noise=one.noise, width=width, height=height)
+    out.write(np.ascontiguousarray(image, np.float32).tobytes())
     out.flush()
 
 

@@ -1,11 +1,12 @@
-"""The Compare panel: the picture beside another integrator's, or a map of their differences."""
+"""The Compare panel: the picture beside another, or a map of their differences."""
 
 from __future__ import annotations
 
 from imgui_bundle import imgui
 
 from lambent.viewer.look import INTEGRATORS, LOOKUPS
-from lambent.viewer.modes.walk.comparison import AS_A, KINDS, MODES, TRACED, Comparison
+from lambent.viewer.modes.walk.comparison import AS_A, KINDS, MODES, Comparison
+from lambent.viewer.modes.walk.tracing import KINDS as TRACED
 from lambent.viewer.panels.widgets import choice, rows, wrapped
 
 
@@ -14,17 +15,15 @@ def draw(comparison: Comparison) -> None:
         "compare",
         comparison.mode,
         MODES,
-        "compares this picture A with another integrator's B: side by side, or as an error map",
+        "compares this picture A with another B: side by side, or as an error map",
     )
     if not comparison.on:
-        imgui.text_wrapped("Off: the picture refines at rest.")
         return
     meaning = (
-        "integrator of B; qmc is unbiased and accumulates at rest; path traces the scene in another process; A is "
-        "drawn as in motion"
+        "B: traced against the baked light, beside a drawn A; whole paths, or an integrator, beside the picture at rest"
     )
-    comparison.integrator = choice("with B", comparison.integrator, (*INTEGRATORS, TRACED), meaning)
-    if comparison.is_traced:
+    comparison.integrator = choice("with B", comparison.integrator, (*TRACED, *INTEGRATORS), meaning)
+    if comparison.traced_kind is not None:
         if comparison.fault:
             wrapped([comparison.fault])
             return
@@ -43,12 +42,12 @@ def draw(comparison: Comparison) -> None:
     flip = "computing" if comparison.busy and figures.flip_mean is None else "-"
     if figures.flip_mean is not None:
         half = " at half size" if figures.flip_step > 1 else ""
-        older = f", of {figures.flip_of} samples" if figures.flip_of != figures.of else ""
+        older = f", of {max(figures.flip_of)} samples" if figures.flip_of != figures.of else ""
         flip = f"{figures.flip_mean:.4f}{half}{older}"
     table = [
         ("PSNR", f"{figures.psnr_db:.1f} dB"),
         ("mean FLIP", flip),
         ("mean difference", f"{figures.difference_percent:.2f} % of B"),
-        ("B so far", f"{figures.of} samples" if figures.of else "one frame"),
+        *((f"{side} so far", f"{n} samples" if n else "one frame") for side, n in zip("AB", figures.of, strict=True)),
     ]
     rows(table, "figures")

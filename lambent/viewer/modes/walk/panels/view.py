@@ -57,7 +57,10 @@ def draw_drawing(state: WalkState) -> None:
     if state.selection.name is not None:
         _look_up_of(state.selection.name, state.look)
         light_field.warn_of_look_up(state)
-    draw_quality(state.screen.pace)
+    pace = state.screen.pace
+    draw_quality(pace)
+    meaning = "replaces the drawn picture at rest by one traced against the baked light, which gets sharper"
+    pace.traces = check("trace while nothing moves", pace.traces, meaning)
 
 
 def _look_up_of(name: str, look: Look) -> None:
