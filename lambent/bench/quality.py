@@ -35,7 +35,7 @@ class Effort:
     """Pixels along each side; samples per pixel of the references (0: no path tracing); the cases."""
 
     size_px: int = 128
-    qmc_spp: int = 4096
+    qmc_spp: int = 32768
     path_spp: int = 512
     ns: tuple[int, ...] = (3, 5, 7, 9, 11, 13, 15, 17, 19)
     materials: tuple[Material, ...] = MATERIALS

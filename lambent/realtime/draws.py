@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 from lambent.materials.clear import clear_terms
 from lambent.materials.document import Material
@@ -17,7 +17,6 @@ from lambent.realtime.resources import ObjectResources, SceneResources
 from lambent.realtime.textures import WIDENING, bits_that_show
 
 FAINT_N = 5  # samples per lobe that suffice if no lamp's highlight shows
-LampUse = Literal["", "aim", "lamps"]  # aim: samples aim at lamps; lamps: lamps are taken out of the cube map
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class Draw:
     look_up: LookUp
     material_group: Any
     textures: int = 0  # bits of the textures to read, see realtime.textures
-    table: LampUse = ""  # use of the probe's lamps
+    takes_lamps: bool = False  # out of the probe's cube map, and evaluates them
     planar_n: int = 0  # samples per lobe on planar reflectors; 0 for objects without pixels on any
     is_beyond: bool = False  # light of a part, added to neighbouring parts
     is_dark: bool = False  # drawn without its emission
@@ -39,10 +38,10 @@ class Draw:
     has_holes: bool = False
 
     def by(self, how: Integrator, resources: SceneResources, n: int) -> Draw:
-        """The same object by another integrator that does not aim, for a pass that does not read reflections."""
+        """The same object by another integrator, for a pass that does not read reflections."""
         group = resources.materials[self.item.record.material].group(self.material, how, n)
-        table = lamp_use(how, self.item.light, self.look_up, self.material, self.textures)
-        return replace(self, integrator=how, n=n, material_group=group, table=table, planar_n=0)
+        takes = takes_lamps(how, self.item.light, self.look_up, self.material, self.textures)
+        return replace(self, integrator=how, n=n, material_group=group, takes_lamps=takes, planar_n=0)
 
     @property
     def planar(self) -> bool:
@@ -56,17 +55,16 @@ class Draw:
     @property
     def shader(self) -> str:
         """File of the integrator's shader."""
-        how = self.integrator
-        return {"aim": how.aimed, "lamps": how.lamps}.get(self.table) or how.shader
+        return (self.takes_lamps and self.integrator.lamps) or self.integrator.shader
 
     @property
     def cube(self) -> Cube:
         """The cube map of the probe that the draw reads."""
-        return "cleaned" if self.table == "lamps" else self.integrator.cube
+        return "cleaned" if self.takes_lamps else self.integrator.cube
 
     @property
     def _layers(self) -> dict[str, float]:
-        if self.table != "lamps":
+        if not self.takes_lamps:
             return {}
         return {"LAYERS": 1 + self.item.light.lamps.mixes(self.material, bool(self.textures & WIDENING))}
 
@@ -86,7 +84,7 @@ class Draw:
 
     @property
     def object_group(self) -> Any:
-        return self.item.group(self.cube, self.look_up, self.table, self.is_dark)
+        return self.item.group(self.cube, self.look_up, self.is_dark)
 
     @property
     def constants(self) -> dict[str, float]:
@@ -104,14 +102,12 @@ class Draw:
         }
 
 
-def lamp_use(how: Integrator, light: ProbeLight, look_up: LookUp, material: Material, textures: int) -> LampUse:
-    """An integrator's use of a probe's lamps for a material; `textures` are the bits of the textures that show."""
-    if brings_light(look_up):
-        return ""
-    widened = bool(textures & WIDENING)
-    if how.aimed and look_up.AIMS and light.aims.is_aimed_at(material, widened):
-        return "aim"
-    return "lamps" if how.lamps and light.lamps.serve(material, widened) else ""
+def takes_lamps(how: Integrator, light: ProbeLight, look_up: LookUp, material: Material, textures: int) -> bool:
+    """Whether an integrator takes a probe's lamps out of its cube map for a material.
+
+    `textures` are the bits of the textures that show.
+    """
+    return bool(how.lamps) and not brings_light(look_up) and light.lamps.serve(material, bool(textures & WIDENING))
 
 
 def shows_no_lamp(how: Integrator, light: ProbeLight, look_up: LookUp, material: Material, textures: int) -> bool:
@@ -160,11 +156,11 @@ def draws_of(
         buffers, light = resources.materials[item.record.material], item.light
         wish = state.lookups.get(item.record.name, state.lookup)
         look_up = light.look_up(wish) if how.specular else light.cheapest
-        table = lamp_use(how, light, look_up, material, bits)
-        alone = table == "lamps" and light.lamps.all_out(material, bool(bits & WIDENING))
+        takes = takes_lamps(how, light, look_up, material, bits)
+        alone = takes and light.lamps.all_out(material, bool(bits & WIDENING))
         rough = buffers.textures.rough
         n = how.rows or (state.samples(material, rough, alone) if how.specular else 1)
-        if state.n is None and not table and shows_no_lamp(how, light, look_up, material, bits):
+        if state.n is None and not takes and shows_no_lamp(how, light, look_up, material, bits):
             n = min(n, FAINT_N)
         is_pane, has_holes = item.record.name in panes, item.record.name in resources.masked
         mirrors = how.specular and item.record.name in reflecting and not is_pane
@@ -172,7 +168,7 @@ def draws_of(
         group = buffers.group(material, how, n)
         draws.append(
             Draw(
-                item, material, how, n, look_up, group, bits, table, on_planes, is_pane=is_pane, has_holes=has_holes
+                item, material, how, n, look_up, group, bits, takes, on_planes, is_pane=is_pane, has_holes=has_holes
             )
         )  # fmt: skip
     return draws

@@ -34,7 +34,6 @@ class Integrator:
     specular: bool = True
     progressive: bool = False  # unbiased: frames of few samples may be averaged
     spp: int = 256  # samples per pixel of a progressive still
-    aimed: str | None = None  # shader for a probe with prominent lamps: part of the samples aims at them
     lamps: str | None = None  # shader for a probe with lamps smaller than a lobe, which leave the cube map
     clears_views: bool = False  # planar: lamps smaller than a lobe leave the mirrored view
 
@@ -47,11 +46,8 @@ INTEGRATORS: dict[str, Integrator] = {
     "lobe-4.25": Integrator("thesis.wgsl", patterns.lobe_table, {"FORMULA": 25}, cube="box"),
     "fis": Integrator("quadrature.wgsl", patterns.fis_table, cube="box"),
     "split-sum": Integrator("split_sum.wgsl", lambda lobe, n: albedo_table(lobe), rows=TABLE_ROWS, cube="prefiltered"),
-    "qmc": Integrator("qmc.wgsl", constants=SUN_SAMPLED, progressive=True, aimed="qmc_aimed.wgsl"),
-    "qmc-lobe": Integrator("qmc.wgsl", constants=SUN_SAMPLED, progressive=True),  # no sample aims at lamps
-    "oslf": Integrator(
-        "oslf.wgsl", constants=SUN_SAMPLED, progressive=True, spp=100
-    ),  # as qmc-lobe, by thesis R's numbers
+    "qmc": Integrator("qmc.wgsl", constants=SUN_SAMPLED, progressive=True),
+    "oslf": Integrator("oslf.wgsl", constants=SUN_SAMPLED, progressive=True, spp=100),  # as qmc, by thesis R's numbers
     "oslf-points": Integrator("oslf.wgsl", constants={"BY_POINTS": 1, **SUN_SAMPLED}, progressive=True, spp=100),
     "diffuse": Integrator("diffuse.wgsl", specular=False),
 }

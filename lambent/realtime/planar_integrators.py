@@ -78,9 +78,8 @@ PLANAR: dict[str, dict[str, Integrator]] = {
     "lobe-4.25": {"thesis": Integrator("planar_thesis.wgsl", multi_ring_table, {"FORMULA": 25})},
     "fis": {"fis": Integrator("planar_quadrature.wgsl", patterns.fis_table, THREE_STEPS)},
     "qmc": {"qmc": Integrator("planar_qmc.wgsl")},
-    "qmc-lobe": {"qmc": Integrator("planar_qmc.wgsl")},  # its samples follow the lobe on curved objects, too
 }
-PLANAR["oslf"] = PLANAR["oslf-points"] = PLANAR["qmc-lobe"]
+PLANAR["oslf"] = PLANAR["oslf-points"] = PLANAR["qmc"]
 # Small lamps leave the mirrored view (reflector_lamps.py); light outside the view comes from the whole probe.
 PLANAR["lamps"] = {name: replace(how, clears_views=True) for name, how in PLANAR["rings"].items()}
 AUTO, OFF = "auto", "off"

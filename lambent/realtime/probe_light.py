@@ -1,4 +1,4 @@
-"""A probe on the GPU: its cube maps, tables of its lamps, and resources of its look-ups."""
+"""A probe on the GPU: its cube maps, table of its lamps, and resources of its look-ups."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.core.plain import Triple
-from lambent.materials.document import Material
-from lambent.realtime.aim import aim_table, aimed_share, widest_lobe
 from lambent.realtime.baked import DARK, Probe
 from lambent.realtime.cube_mips import SMOOTH_AREA, finite, light_change, mip_chain, smooth_chain
 from lambent.realtime.incident import LookUp, look_up_of
@@ -29,19 +27,6 @@ def kind_of(cube: Cube) -> str:
     return "cubes" if cube == "cleaned" else "cube"
 
 
-class AimTable:
-    """The table of a probe's lamps that samples aim by (aim.py), and their prominence, 0 to 1."""
-
-    def __init__(self, layouts: Layouts, radiance: Floats) -> None:
-        table = aim_table(finite(radiance)[0])
-        self.buffer = layouts.buffer("STORAGE", table)
-        self.prominence = float(table[0, 1])
-
-    def is_aimed_at(self, material: Material, textured: bool) -> bool:
-        """Whether any sample of a material's lobes would aim; `textured`: textures may widen the lobes."""
-        return aimed_share(widest_lobe(material, textured), self.prominence) > 1 / 16
-
-
 class ProbeLight:
     """Bindings of a probe, shared by its objects; objects without a probe are dark.
 
@@ -53,7 +38,7 @@ class ProbeLight:
         self._texture = cache(self._new_texture)
         self._levels: dict[Cube, list[NDArray[np.float16]]] = {}  # of cube maps prepared in advance
         self._used: set[Cube] = set()
-        self.table = cache(self._new_table)  # of lamps, by use and look-up
+        self.table = cache(self._new_table)  # of lamps, by look-up
         self.streams: list[ResidentMaps] = []  # of the light field, if some of its maps are not on the GPU
         self._resources: dict[str, tuple[Any, ...]] = {}  # of look-ups, by their files
         self.as_baked = self  # the same probe in baked light
@@ -128,16 +113,10 @@ class ProbeLight:
         return other
 
     @cached_property
-    def aims(self) -> AimTable:
-        return AimTable(self._layouts, self.probe.radiance)
-
-    @cached_property
     def lamps(self) -> ProbeLamps:
         return ProbeLamps(self.probe.radiance)
 
-    def _new_table(self, use: str, look_up: LookUp) -> Any:
-        if use == "aim":
-            return self.aims.buffer
+    def _new_table(self, look_up: LookUp) -> Any:
         return self._layouts.buffer("UNIFORM", self.lamps.table(self.probe, look_up))
 
     @cached_property

@@ -68,8 +68,8 @@ class ObjectResources:
             self.light, self.emission = light, emission
             self.group.cache_clear()
 
-    def _new_group(self, cube: Cube, look_up: LookUp, table: str = "", dark: bool = False) -> Any:
-        """Group 2: cube map, resources of the look-up, and the table of the probe's lamps (aim, lamps or none).
+    def _new_group(self, cube: Cube, look_up: LookUp, dark: bool = False) -> Any:
+        """Group 2: cube map, resources of the look-up, and the table of the lamps taken out of a `cleaned` cube map.
 
         If the look-up has its own light and the light is not as baked, the cube map holds the ratio to the baked light.
         `dark`: without the object's emission.
@@ -85,7 +85,7 @@ class ObjectResources:
         data["irradiance"].reshape(-1)[EVEN_NICHES] = probe.even_niches
         data["borders"][0] = [*self.record.borders, *[WITHIN] * (MOST_BORDERS - len(self.record.borders))]
         uniform = self._layouts.buffer("UNIFORM", data)
-        lamps = self.light.table(table, look_up) if table else self._layouts.empty
+        lamps = self.light.table(look_up) if cube == "cleaned" else self._layouts.empty
         layout = self._layouts.object(look_up.BINDINGS, kind_of(cube))
         return self._layouts.group(layout, uniform, view, lamps, *self.light.resources(look_up))
 

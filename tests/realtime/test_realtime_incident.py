@@ -35,7 +35,7 @@ TOY = """
 import numpy as np
 import wgpu
 
-NAME, COST, PREFERENCE, AIMS = "toy", 9, -1, False
+NAME, COST, PREFERENCE = "toy", 9, -1
 BINDINGS = ("storage",)
 
 

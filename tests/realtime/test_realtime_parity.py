@@ -12,7 +12,7 @@ from lambent.core.directions import normalize, reflect
 from lambent.core.false_colour import STOPS, Range, false_colour
 from lambent.core.photometry import LM_PER_W
 from lambent.materials.shader_layout import lobe_shader
-from lambent.realtime import aim, albedo
+from lambent.realtime import albedo
 from lambent.realtime.passes import planar, planar_buffer
 from lambent.realtime.shader_source import assemble
 from lambent.store import contract
@@ -86,7 +86,6 @@ def test_perpendiculars_and_octahedral_coordinates() -> None:
         ("albedo_factor", f"const FACTOR_ROWS = {albedo.FACTORS // 4}u;"),
         ("split_sum", f"const LAST_LEVEL = {albedo.LEVELS - 1}.0;"),
         ("lobes", f"const LAMBENT_COS_MIN: f32 = {albedo.COS_MIN:.0e};".replace("e-0", "e-")),
-        ("aim", f"const AIM_NODES = {aim.HEAD_ROWS}u;"),
         ("planar_view", f"const CELL_PX = {planar_buffer.FIRST_PX};"),
         ("planar_buffer_sky", f"const FAR = {contract.FAR:.0e};".replace("e+0", "e")),
         ("planar_layers", f"const PLANAR_NARROW = {planar.FOUND};"),

@@ -4,11 +4,7 @@ A look-up is a module with the members of `LookUp`, and a shader of the same nam
     fn incident_look_up(x: vec3f, w: vec3f) -> LookUp    look-up from x, about the probe's centre, along w
     fn incident_bound(x: vec3f, w: vec3f) -> f32         1 over the distance, in m, to the nearest known wall along w; 0
                                                          without one
-and, if samples can be aimed at lamps through it (AIMS),
-    fn aim_maps(x: vec3f) -> bool                        whether aiming works at x
-    fn aimed_look_up(x: vec3f, w: vec3f) -> Aimed        incident_look_up, and the density of the probe's directions
-    fn aim_towards(x: vec3f, q: vec3f) -> Towards        inverse: from a direction q of the probe
-shaders/incident.wgsl declares the types. Bindings of the look-up are in group 2, from 3 on. A look-up with its own
+shaders/incident.wgsl declares the type. Bindings of the look-up are in group 2, from 3 on. A look-up with its own
 light, other than the probe's cube map, must also define all functions of shaders/incident_light.wgsl.
 """
 
@@ -32,7 +28,6 @@ class LookUp(Protocol):
     NAME: str  # on the command line and in the window
     COST: int  # relative; sorts lists
     PREFERENCE: int  # AUTO takes the look-up of highest preference that serves the probe
-    AIMS: bool  # whether samples can be aimed at the probe's lamps through it
     BINDINGS: tuple[str, ...]  # kinds (`layouts.KINDS`) of its resources
     __file__: str
 

@@ -13,7 +13,7 @@ from lambent.core.probe_lookups import inverse_depth
 from lambent.realtime.baked import Probe
 from lambent.realtime.uploads import cube_texture
 
-NAME, COST, PREFERENCE, AIMS = "distance", 2, 1, False  # no aiming: the mapping of directions is not one to one
+NAME, COST, PREFERENCE = "distance", 2, 1
 BINDINGS = ("cube",)
 
 

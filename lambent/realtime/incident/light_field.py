@@ -38,7 +38,6 @@ class LightFieldLookUp:
     RULE: March = field(default_factory=March)
     POWER: int = POWER  # exponent of the cosines that weight points
     SURFACE: bool = False  # whether points also replace the object's light map
-    AIMS: bool = False
     BINDINGS: tuple[str, ...] = ("uniform", "exact", "layers", "number layers", "numbers", "cube")
     __file__: str = __file__
 

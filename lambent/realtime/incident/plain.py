@@ -9,7 +9,7 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.realtime.baked import Probe
 
-NAME, COST, PREFERENCE, AIMS = "plain", 0, 0, True
+NAME, COST, PREFERENCE = "plain", 0, 0
 BINDINGS: tuple[str, ...] = ()
 
 

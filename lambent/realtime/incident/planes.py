@@ -12,7 +12,7 @@ from lambent.core.arrays import Floats
 from lambent.core.probe_lookups import distances_to_planes
 from lambent.realtime.baked import Probe
 
-NAME, COST, PREFERENCE, AIMS = "planes", 1, 2, True
+NAME, COST, PREFERENCE = "planes", 1, 2
 BINDINGS = ("storage",)
 STEP = 6  # plane counts are padded to multiples of this, because each count needs its own pipeline
 
