@@ -1,6 +1,6 @@
 """Convergence for a still camera: the error of the mean of 1, 2, 4 ... 256 `qmc` frames.
 
-The truth is a longer series for the image shifted by one pixel, so that every place gets another pixel's rotation of the
+The truth is a longer series for the image shifted by one pixel: every place gets another pixel's rotation of the
 sequence. The bench counts frames, not seconds, because the adapter decides how many fit into a second.
 """
 
