@@ -17,7 +17,7 @@ from lambent.realtime.targets import DISPLAY_FORMAT, target_texture
 
 
 class Given:
-    """One picture; `view` is the view of its display texture, None before the first `show`."""
+    """One picture: `radiance` is its texture, `view` a view of its display texture; both None before the first."""
 
     def __init__(self, layouts: Layouts, resources: SceneResources) -> None:
         self._layouts, self._scene, self.device = layouts, resources.scene, layouts.device
@@ -29,18 +29,20 @@ class Given:
         self._frame_group = layouts.group(layouts.frame, self._frame_buffer, resources.sampler)
         self._group: Any = None
         self._target: Any = None
+        self.radiance: Any = None
         self.view: Any = None
 
     def take(self, radiance: Floats) -> None:
         """Upload a picture (height, width, 3), W/(sr m^2); `show` shows it from then on."""
         height, width = radiance.shape[:2]
-        texels = np.ones((height, width, 4), np.float32)
-        texels[..., :3] = radiance / self._scene.unit
+        texels = np.ones((height, width, 4), np.float16)
+        texels[..., :3] = np.minimum(radiance / self._scene.unit, np.finfo(np.float16).max)
         usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
-        texture = self.device.create_texture(size=(width, height, 1), format="rgba32float", usage=usage)
-        rows = {"bytes_per_row": 16 * width, "rows_per_image": height}
+        texture = self.device.create_texture(size=(width, height, 1), format="rgba16float", usage=usage)
+        rows = {"bytes_per_row": 8 * width, "rows_per_image": height}
         self.device.queue.write_texture({"texture": texture}, texels, rows, (width, height, 1))
         self._group = self._layouts.group(self._layout, texture.create_view(), texture.create_view())
+        self.radiance = texture
         self._target = target_texture(self.device, (width, height, 1), DISPLAY_FORMAT)
         self.view = self._target.create_view()
 

@@ -170,6 +170,10 @@ class Renderer:
         """What shows radiance that was made elsewhere as frames show theirs."""
         return Given(self._layouts, self.resources)
 
+    def base(self, radiance: Any, state: FrameState) -> None:
+        """Draw the next frame with `FrameState.over` over a texture (rgba16float) of radiance that shows a state."""
+        self._few, self._few_state = radiance, state
+
     def redrawn(self, state: FrameState) -> frozenset[str] | None:
         """Materials whose objects alone a frame would draw with `FrameState.over`; None where it is drawn whole."""
         before = self._few_state
@@ -298,14 +302,13 @@ class Renderer:
             o.name: max((max(lobe.mx, lobe.my) for lobe in shown[o.material].lobes if not lobe.retro), default=0.0)
             for o in record.objects
         }
-        whole = integrator(state.integrator).progressive
         wanted = [k for k, r in enumerate(record.reflectors) if any(part.object not in panes for part in r.parts)]
         reflectors, shares = (
             [record.reflectors[k] for k in wanted],
             self._reflector_faces.shares(data)[np.array(wanted, int)],
         )
         return planar_views(
-            data, reflectors, state.width, state.height, MOST_REFLECTORS, widest, whole, self._bevels.of, shares
+            data, reflectors, state.width, state.height, MOST_REFLECTORS, widest, self._bevels.of, shares
         )
 
 

@@ -92,15 +92,6 @@ class Drawing:
         """Seconds until something is due without an event; None: never."""
         return None
 
-    @property
-    def under_way(self) -> bool:
-        """Whether a frame is being drawn in parts, which `work` continues."""
-        return False
-
-    def work(self) -> bool:
-        """Draw a part of the present frame; return whether there is a new picture to show."""
-        return False
-
     def save(self) -> None:
         """Write the picture into the screen's folder, and report success or failure."""
 

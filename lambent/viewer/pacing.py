@@ -3,12 +3,11 @@
 A changed material is drawn over the last picture at full size, on its objects only.
 
 In motion, the few-sample integrator draws fewer pixels if the adapter is too slow. If even half of the width and height
-is too slow, planar reflectors lose their mirrored views and show their probes. Light that changes by itself, after an
-edit, does not replace a picture of full size by a smaller one: the picture stays until the whole frame with the new
-light is complete.
+is too slow, planar reflectors lose their mirrored views and show their probes.
 
 `REST_S` after the last change, the same picture is drawn whole, with mirrored views, if no traced picture will replace
-it. After that, nothing is drawn.
+it; on a slow adapter with as many pixels as take `LONGEST_REST_S`, because events wait for it. After that, nothing is
+drawn.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from dataclasses import dataclass
 
 REST_S = 0.25
 BUDGET_S = 1 / 15  # target time of a frame in motion
+LONGEST_REST_S = 1.0  # of a frame at rest; a software adapter on two cores takes 0.5 to 0.7 s for 960x540
 SCALES = (1.0, 0.75, 0.5, 0.35, 0.25, 0.18)
 PROBE_FRAMES = 8
 FIXED_SHARE = 1.5  # a frame in motion may take this multiple of its cost without pixels
@@ -110,8 +110,7 @@ class Pacer:
         self._sizes = {True: Resolution(start), False: Resolution(start)}  # with mirrored views, and without
         self.shown: object = None  # the picture that the window shows or is about to
         self._changed_s = 0.0
-        self._last: Plan | None = None
-        self._sharp = False  # whether all of the last picture has full size
+        self._rested = False  # whether the picture was drawn whole
         self._budget_s = BUDGET_S
 
     @property
@@ -123,34 +122,28 @@ class Pacer:
         """Set the target time of a frame in motion."""
         self._budget_s = seconds
 
-    def plan(
-        self, picture: object, now_s: float, *, sharpen: bool, adaptive: bool, over: bool = False, keeps: bool = False
-    ) -> Plan | None:
+    def plan(self, picture: object, now_s: float, *, sharpen: bool, adaptive: bool, over: bool = False) -> Plan | None:
         """Plan for `now_s` to show `picture`; None when it is already shown, or not yet due.
 
         `sharpen`: draw it whole at rest. `over`: in motion, draw the changes over the last picture, at full size.
-        `keeps`: if the last picture has full size, keep that size.
         """
         if picture != self.shown:
-            self.shown, self._changed_s = picture, now_s
-            if keeps and self._sharp:
-                return WHOLE
+            self.shown, self._changed_s, self._rested = picture, now_s, False
             if over:
                 return Plan(1.0, self._mirrors or not adaptive, over=True)
             return self.moving if adaptive else WHOLE
-        return WHOLE if self._wants_more(sharpen) and now_s - self._changed_s >= REST_S else None
+        if self._rested or not sharpen or now_s - self._changed_s < REST_S:
+            return None
+        size = self._sizes[True]
+        return Plan(next((s for s in SCALES if size.seconds(s) <= LONGEST_REST_S), SCALES[-1]))
 
     def wait_s(self, now_s: float, *, sharpen: bool) -> float | None:
         """Seconds until the next picture is due although nothing changes; None: never."""
-        return max(0.0, self._changed_s + REST_S - now_s) if self._wants_more(sharpen) else None
+        return max(0.0, self._changed_s + REST_S - now_s) if sharpen and not self._rested else None
 
-    def _wants_more(self, sharpen: bool) -> bool:
-        return sharpen and self._last != WHOLE
-
-    def drawn(self, plan: Plan) -> None:
-        """Learn that a frame is shown."""
-        self._last = plan
-        self._sharp = plan.scale == 1.0 and (self._sharp or not plan.over)
+    def drawn(self, plan: Plan, *, rests: bool = False) -> None:
+        """Learn that a frame is shown; `rests`: the one of a picture at rest."""
+        self._rested = rests or plan == WHOLE
 
     def cost(self, plan: Plan, seconds: float, mirrors: int = 0) -> None:
         """Learn the time of a frame in motion with a number of mirrored views, and choose the next."""

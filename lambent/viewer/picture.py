@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Generator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -20,27 +19,15 @@ from lambent.realtime.device import adapter_info
 from lambent.realtime.frame_state import FrameState, quantity_of
 from lambent.realtime.planar_integrators import OFF
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.slices import SLICE_S, Cut
 from lambent.realtime.targets import DISPLAY_FORMAT
 from lambent.viewer.edits import unused
 from lambent.viewer.mode import Drawing
-from lambent.viewer.pacing import WHOLE, Pacer, Plan
+from lambent.viewer.pacing import Pacer, Plan
 from lambent.viewer.screen import Rect, Screen, Statistics, least
 
 LARGEST_PX = 8192  # of a texture, by WebGPU's default limits; a larger window shows a magnified picture
-LONGEST_OVER_S = 0.15  # longest frame over another one that is not drawn in parts
-QUIET_S = 0.5  # longest pause of frames at rest after an event; else the time of a part of such a frame
-
-
-@dataclass
-class Job:
-    """A frame that is drawn in parts."""
-
-    plan: Plan
-    view: Any
-    steps: Generator[None, None, Any]
-    seconds: float = 0.0
-    longest_s: float = 0.0
+LONGEST_OVER_S = 0.15  # longest frame over another one; changes that take longer are drawn as motion is
+QUIET_S = 0.5  # longest pause of frames at rest after an event; else the time of such a frame
 
 
 class Picture:
@@ -54,11 +41,8 @@ class Picture:
             screen.pace.covers = not adapter.is_software
         self.pacer = Pacer(slow_adapter=adapter.is_software)
         self._sharpen = True
-        self._part_s = 0.0  # longest part of the last frame at rest
-        self._whole_s = math.inf if adapter.is_software else 0.0  # time of the last whole frame at rest
-        self._over_s = 0.0  # time of the last frame drawn over another
-        self._cut = Cut()
-        self._under_way: Job | None = None
+        self._whole_s = 0.0  # time of the last frame at rest
+        self._over_s: dict[frozenset[str], float] = {}  # time of the last frame over another one, by its materials
         self.view: Any = None
         self.radiance: Any = None  # texture that `view` shows, linear
         self.version = 0  # counts drawn frames
@@ -76,38 +60,33 @@ class Picture:
         rests = wanted == self.pacer.shown
         soon = pace.dragging or self._renderer.mixer.lags  # soon rather than sharp: the user waits for this light
         relit = not rests and not soon and is_relit(wanted, self.pacer.shown)
-        over = not rests and bool(self._renderer.redrawn(wanted))
-        under_way = None if self._under_way is None else self._under_way.plan
-        # Finish a frame over another one, and a whole one whose light alone has changed: the next one shows the change.
-        # Otherwise a drag, or light that arrives part by part, would show nothing until its end.
-        if not (rests or (over and under_way is not None and under_way.over) or (relit and under_way == WHOLE)):
-            self._under_way = None  # another frame is wanted: drop this one
-        if self._under_way is not None:
+        if relit and not sharpen:
             return
-        plan = self.pacer.plan(wanted, now_s, sharpen=self._sharpen, adaptive=pace.adaptive, over=over, keeps=relit)
+        redrawn = None if rests else self._renderer.redrawn(wanted)
+        over = bool(redrawn) and self._over_s.get(redrawn or frozenset(), 0.0) <= LONGEST_OVER_S
+        plan = self.pacer.plan(wanted, now_s, sharpen=sharpen, adaptive=pace.adaptive, over=over)
         if plan is None or (rests and (pace.answering or self._quiet_for_s() > 0)):
             return
         frame = self._planned(wanted, plan)
         view = self._view_of(frame.width, frame.height)
-        whole = rests or (relit and plan == WHOLE)
-        if (whole and self._whole_s > SLICE_S) or (over and self._over_s > LONGEST_OVER_S):
-            self._under_way = Job(plan, view, self._renderer.slices(frame, view, self._cut))
-            return
         started = time.perf_counter()
-        radiance = self._renderer.draw(frame, view)
+        self.radiance, self.view = self._renderer.draw(frame, view), view
         # Waiting keeps the queue short, so that a frame shows the latest event, and measures its cost.
         self._renderer.finish()
         seconds = time.perf_counter() - started
-        if whole:
-            self._whole_s = self._part_s = seconds
-        elif over:
-            self._over_s = seconds
-        self._show(plan, view, radiance, seconds)
+        if rests:
+            self._whole_s = seconds
+        elif plan.over and redrawn is not None:
+            self._over_s[redrawn] = seconds
+        self.version += 1
+        drawn = self._renderer.statistics
+        self.pacer.drawn(plan, rests=rests)
+        self.pacer.cost(plan, seconds, drawn["mirrors"])
+        self._screen.statistics = self._statistics(drawn, seconds, plan)
 
-    @property
-    def under_way(self) -> bool:
-        """Whether a frame is being drawn in parts, see `work`."""
-        return self._under_way is not None
+    def stand_in(self, texture: Any, frame: FrameState) -> None:
+        """Draw later changes over a texture of radiance (rgba16float) that shows `frame`."""
+        self._renderer.base(texture, replace(frame, covers=bool(self._screen.pace.covers)))
 
     @property
     def size(self) -> tuple[int, int]:
@@ -121,61 +100,24 @@ class Picture:
 
     @property
     def readable(self) -> bool:
-        """Whether `radiance` belongs to `view`: an unfinished frame may overwrite it."""
-        return self.radiance is not None and self._under_way is None
+        return self.radiance is not None
 
     @property
     def rests(self) -> bool:
-        """Whether the picture is complete, and no other is due."""
-        return self._under_way is None and self.wait_s() is None
-
-    def work(self) -> bool:
-        """Draw a part of the frame in progress; returns whether there is a new picture to show.
-
-        Slices take about `slices.SLICE_S`, so that events are handled in between. The last frame stays in `view` until
-        the new one is complete.
-        """
-        job = self._under_way
-        if job is None:
-            return False
-        started = time.perf_counter()
-        try:
-            next(job.steps)
-        except StopIteration as done:
-            self._under_way = None
-            if job.plan.over:
-                self._over_s = job.seconds
-            else:
-                self._whole_s, self._part_s = job.seconds, job.longest_s
-            self._show(job.plan, job.view, done.value, job.seconds)
-            return True
-        seconds = time.perf_counter() - started
-        job.seconds, job.longest_s = job.seconds + seconds, max(job.longest_s, seconds)
-        return False
-
-    def _show(self, plan: Plan, view: Any, radiance: Any, seconds: float) -> None:
-        """Show a finished frame."""
-        self.view, self.radiance = view, radiance
-        self.version += 1
-        self.pacer.drawn(plan)
-        drawn = self._renderer.statistics
-        self.pacer.cost(plan, seconds, drawn["mirrors"])
-        self._screen.statistics = self._statistics(drawn, seconds, plan)
+        """Whether no other frame is due."""
+        return self.wait_s() is None
 
     def wait_s(self) -> float | None:
         """Seconds until a frame is due although nothing changes; None: never."""
-        if self._under_way is not None:
-            return None  # `work` continues by itself
         due = self.pacer.wait_s(self._screen.clock(), sharpen=self._sharpen)
         return None if due is None else max(due, self._quiet_for_s())
 
     def _quiet_for_s(self) -> float:
-        """Seconds for which no frame at rest is started: events wait while a part of it is drawn."""
-        return max(0.0, self._screen.pace.touched_s + min(self._part_s, QUIET_S) - self._screen.clock())
+        """Seconds for which no frame at rest is started: events wait while it is drawn."""
+        return max(0.0, self._screen.pace.touched_s + min(self._whole_s, QUIET_S) - self._screen.clock())
 
     def save(self, name: str) -> str | None:
         """Write the picture at full size, see `write_picture`."""
-        self._under_way = None  # the renderer draws one frame at a time; this one restarts later
         frame = self.pacer.shown
         assert isinstance(frame, FrameState), "saved before the first frame"
         return write_picture(
@@ -234,8 +176,6 @@ class Shown(Protocol):
     @property
     def view(self) -> Any: ...
     @property
-    def under_way(self) -> bool: ...
-    @property
     def readable(self) -> bool: ...
     @property
     def size(self) -> tuple[int, int]: ...
@@ -247,7 +187,6 @@ class Shown(Protocol):
     def drawing(self) -> object: ...
     @property
     def rests(self) -> bool: ...
-    def work(self) -> bool: ...
     def wait_s(self) -> float | None: ...
     def read(self, at: tuple[float, float] | None = None) -> NDArray[np.float32]: ...
     def save(self, name: str) -> str | None: ...
@@ -261,14 +200,6 @@ class Pair(Drawing):
     @property
     def views(self) -> tuple[Any, ...]:
         return tuple(picture.view for picture in self.shown)
-
-    @property
-    def under_way(self) -> bool:
-        return any(picture.under_way for picture in self.shown)
-
-    def work(self) -> bool:
-        busy = next((picture for picture in reversed(self.shown) if picture.under_way), None)
-        return busy is not None and busy.work()
 
     def wait_s(self) -> float | None:
         return least(*(picture.wait_s() for picture in self.shown))

@@ -62,7 +62,6 @@ class Window:
         self._beat = Beat(1 / MAX_FPS)
         self._moving = False  # whether something moves between this frame and the next
         self._wake_at_s: float | None = None
-        self._working = False  # whether a frame at rest is drawn in parts
         self._error: Exception | None = None
         self.canvas.add_event_handler(self._on_event, *EVENTS, order=BEFORE_IMGUI)
         self._take_dropped_files()
@@ -213,25 +212,10 @@ class Window:
         self._moving = self.mode.moving
         if self._moving or self._extra_frames or self._frames is not None:
             self.canvas.request_draw()
-        if self.mode.drawing.under_way and not self._working:
-            self._working = True
-            loop.call_later(0, self._work)
         messages = (message.until_s - self.screen.clock() for message in self.screen.messages)
         due_s = least(self.mode.wait_s(), self.mode.drawing.wait_s(), *messages)
         if due_s is not None:
             self._wake_in(max(0.0, due_s))
-
-    def _work(self) -> None:
-        """Draw a part of a frame at rest; the loop handles events before the next part."""
-        self._working = False
-        if self.canvas.get_closed():
-            return
-        with self._watched():
-            if self.mode.drawing.work():
-                self.canvas.request_draw()
-            elif self.mode.drawing.under_way:
-                self._working = True
-                loop.call_later(0, self._work)
 
     def _wake_in(self, seconds: float) -> None:
         at_s = self.screen.clock() + seconds

@@ -1,47 +1,62 @@
 """What the window draws when: quick in motion, better at rest, then nothing."""
 
-import itertools
-
 import numpy as np
 import pytest
 
-from lambent.viewer.pacing import BUDGET_S, REST_S, SCALES, Beat, Pacer, Plan, prior_share
+from lambent.viewer.pacing import BUDGET_S, LONGEST_REST_S, REST_S, SCALES, WHOLE, Beat, Pacer, Plan
 
 
 def pacer(**options):
-    return Pacer(**{"accumulate_to": 4, "slow_adapter": False, **options})
+    return Pacer(**{"slow_adapter": False, **options})
 
 
-def step(pacer, picture, now_s, refine=True, adaptive=True):
-    plan = pacer.plan(picture, now_s, refine=refine, adaptive=adaptive)
+def step(pacer, picture, now_s, sharpen=True, adaptive=True):
+    rests = picture == pacer.shown
+    plan = pacer.plan(picture, now_s, sharpen=sharpen, adaptive=adaptive)
     if plan:
-        pacer.drawn(plan)
+        pacer.drawn(plan, rests=rests)
     return plan
 
 
-def test_motion_then_rest_then_idle():
+def test_motion_then_idle():
     p = pacer()
-    assert step(p, "a", 0.0) == Plan(1.0, None)
+    assert step(p, "a", 0.0) == WHOLE
+    assert step(p, "a", 1.0) is None
+    assert p.wait_s(1.0, sharpen=True) is None
+    assert step(p, "b", 1.01) == WHOLE
+
+
+def test_a_slow_adapter_sharpens_once_at_rest():
+    p = pacer(slow_adapter=True)
+    assert step(p, "a", 0.0) == Plan(0.5, mirrors=False)
     assert step(p, "a", 0.1) is None
-    assert p.wait_s(0.1, refine=True) == pytest.approx(REST_S - 0.1)
-    assert [step(p, "a", 1.0 + k).accumulate for k in range(4)] == [0, 1, 2, 3]
-    assert p.accumulated == 4
-    assert step(p, "a", 9.0) is None
-    assert p.wait_s(9.0, refine=True) is None
+    assert p.wait_s(0.1, sharpen=True) == pytest.approx(REST_S - 0.1)
+    assert [step(p, "a", 1.0 + k) for k in range(3)] == [WHOLE, None, None]
+    assert p.wait_s(2.0, sharpen=True) is None
+    assert step(p, "b", 2.0) == Plan(0.5, mirrors=False)
 
 
-def test_motion_returns_to_few_samples_at_once():
+def test_nothing_is_sharpened_that_a_traced_picture_replaces():
+    p = pacer(slow_adapter=True)
+    step(p, "a", 0.0, sharpen=False)
+    assert step(p, "a", 9.0, sharpen=False) is None and p.wait_s(9.0, sharpen=False) is None
+    assert step(p, "a", 9.0) == WHOLE, "tracing has failed"
+
+
+def test_events_wait_no_longer_for_a_frame_at_rest():
+    p = pacer(slow_adapter=True)
+    p.cost(WHOLE, 3 * LONGEST_REST_S)
+    step(p, "a", 0.0)
+    plan = step(p, "a", 1.0)
+    assert plan.mirrors and plan.scale == 0.5, "the largest size that takes less"
+
+
+def test_what_is_drawn_over_a_picture_is_drawn_whole_at_rest():
     p = pacer()
     step(p, "a", 0.0)
-    assert step(p, "a", 1.0) == Plan(1.0, 0)
-    assert step(p, "b", 1.01) == Plan(1.0, None)
-    assert step(p, "b", 2.0) == Plan(1.0, 0)
-
-
-def test_a_slow_adapter_is_sharp_before_it_refines():
-    p = pacer(slow_adapter=True)
-    assert step(p, "a", 0.0) == Plan(0.5, None, mirrors=False)
-    assert [step(p, "a", 1.0 + k) for k in range(3)] == [Plan(1.0, None), Plan(1.0, 0), Plan(1.0, 1)]
+    plan = p.plan("b", 1.0, sharpen=True, adaptive=True, over=True)
+    p.drawn(plan)
+    assert plan == Plan(1.0, over=True) and step(p, "b", 2.0) == WHOLE
 
 
 def walk(p, with_mirrors_s, without_s, frames):
@@ -66,24 +81,14 @@ def test_mirrored_views_come_back_when_there_is_time_for_them():
     p = pacer()
     p.cost(p.moving, 50 * BUDGET_S, 1)  # a shader being compiled
     plans = walk(p, 0.3 * BUDGET_S, 0.1 * BUDGET_S, 10)
-    assert not plans[0].mirrors and plans[-1] == Plan(1.0, None)
+    assert not plans[0].mirrors and plans[-1] == Plan(1.0)
     assert step(p, "a", 0.0) == plans[-1], "what is at rest has them in any case"
 
 
 def test_a_scene_without_reflectors_keeps_what_it_has():
     p = pacer()
-    p.cost(Plan(1.0, None), 10 * BUDGET_S, mirrors=0)
+    p.cost(Plan(1.0), 10 * BUDGET_S, mirrors=0)
     assert p.moving.mirrors
-
-
-@pytest.mark.parametrize("samples", [1, 8])
-def test_the_noise_of_few_samples_is_not_shown(samples):
-    """One frame has the variance 1/samples; what is shown of N of them, (1 - prior)^2/(samples N), never much of it."""
-    shares = [prior_share(n, 128, samples) for n in range(1, 129)]
-    assert all(a > b for a, b in itertools.pairwise(shares)) and shares[-1] == 0
-    shown = [(1 - share) ** 2 / (samples * n) for n, share in enumerate(shares, 1)]
-    assert max(shown) < 1.5 / 64
-    assert prior_share(16 // samples, 10**9, samples) == pytest.approx(0.5), "the last picture counts for 16 samples"
 
 
 @pytest.mark.parametrize(("share", "mirrors"), [(0.2, True), (0.5, False)])
@@ -91,52 +96,38 @@ def test_mirrors_come_back_where_four_frames_fit_one(share, mirrors):
     """A frame with mirrored views costs four without; of a frame that takes half the budget, they are left out."""
     p = pacer(slow_adapter=True)
     for _ in range(6):
-        p.cost(Plan(1.0, None, mirrors=False), share * BUDGET_S)
+        p.cost(Plan(1.0, mirrors=False), share * BUDGET_S)
     assert p.moving.mirrors is mirrors
 
 
-def test_without_refinement_a_slow_adapter_sharpens_once():
-    p = pacer(slow_adapter=True)
-    assert step(p, "a", 0.0, refine=False) == Plan(0.5, None, mirrors=False)
-    assert step(p, "a", 1.0, refine=False) == Plan(1.0, None)
-    assert step(p, "a", 2.0, refine=False) is None
-    assert p.wait_s(2.0, refine=False) is None
-
-
 def test_full_resolution_on_request():
-    assert step(pacer(slow_adapter=True), "a", 0.0, adaptive=False) == Plan(1.0, None)
+    assert step(pacer(slow_adapter=True), "a", 0.0, adaptive=False) == Plan(1.0)
 
 
 def test_the_size_in_motion_meets_the_budget():
     p = pacer()
-    p.cost(Plan(1.0, None), 10 * BUDGET_S)
+    p.cost(Plan(1.0), 10 * BUDGET_S)
     assert p.moving.scale == 0.25
-    p.cost(Plan(0.25, None), BUDGET_S / 8)
+    p.cost(Plan(0.25), BUDGET_S / 8)
     assert p.moving.scale == 0.5  # larger only when it fits with room to spare
-    p.cost(Plan(0.5, None), BUDGET_S * 0.9)
+    p.cost(Plan(0.5), BUDGET_S * 0.9)
     assert p.moving.scale == 0.5
-    p.cost(Plan(0.5, None), BUDGET_S / 100)
+    p.cost(Plan(0.5), BUDGET_S / 100)
     assert p.moving.scale == 1.0
-    p.cost(Plan(1.0, None), 1e3)
+    p.cost(Plan(1.0), 1e3)
     assert p.moving.scale == SCALES[-1]
-
-
-def test_accumulated_frames_do_not_count_as_motion():
-    p = pacer()
-    p.cost(Plan(1.0, 3), 10.0)
-    assert p.moving.scale == 1.0
 
 
 def test_a_shorter_frame_time_takes_fewer_pixels():
     p = pacer()
     p.aim(0.1)
-    p.cost(Plan(1.0, None), 0.09)
+    p.cost(Plan(1.0), 0.09)
     assert p.moving.scale == 1.0
     p.aim(0.02)
-    p.cost(Plan(1.0, None), 0.09)
+    p.cost(Plan(1.0), 0.09)
     assert p.moving.scale == 0.35
     p.aim(0.1)
-    p.cost(Plan(0.35, None), 0.09 * 0.35**2)
+    p.cost(Plan(0.35), 0.09 * 0.35**2)
     assert p.moving.scale > 0.7
 
 
@@ -168,8 +159,8 @@ def test_a_stall_at_the_start_is_forgotten():
 def test_noise_does_not_lead_to_a_frame_of_seconds():
     """A busy machine: 100 ms and 2 s per full picture, once slower in a smaller frame than in a larger one."""
     p = pacer(slow_adapter=True)
-    p.cost(Plan(0.25, None, mirrors=False), 0.22)
-    p.cost(Plan(0.18, None, mirrors=False), 0.25)
+    p.cost(Plan(0.25, mirrors=False), 0.22)
+    p.cost(Plan(0.18, mirrors=False), 0.25)
     taken = []
     for _ in range(60):
         taken.append(0.1 + 2.0 * p.moving.scale**2)
@@ -214,8 +205,8 @@ def test_a_frame_that_an_event_brings_early_delays_none():
 def test_a_stall_at_the_least_size_does_not_make_pixels_look_free():
     """The only frame of the least size waits for its shaders; a full picture takes .6 s more than no pixels."""
     p = pacer(slow_adapter=True)
-    p.cost(Plan(0.5, None, mirrors=False), 0.46)
-    p.cost(Plan(SCALES[-1], None, mirrors=False), 1.7)
+    p.cost(Plan(0.5, mirrors=False), 0.46)
+    p.cost(Plan(SCALES[-1], mirrors=False), 1.7)
     seen = []
     for _ in range(40):
         p.cost(p.moving, 0.15 + 0.6 * p.moving.scale**2)

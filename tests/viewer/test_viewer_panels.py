@@ -158,9 +158,9 @@ def test_view(panels, state):
         panels.button(False)
         panels.frame()
         assert getattr(state.look, field) != before, label
-    panels.click("refine while nothing moves", 0.1)
+    panels.click("trace while nothing moves", 0.1)
     panels.click("fewer pixels in motion where needed", 0.1)
-    assert not state.screen.pace.refine and not state.screen.pace.adaptive
+    assert not state.screen.pace.traces and not state.screen.pace.adaptive
 
 
 def test_samples(panels, state):
@@ -349,7 +349,7 @@ def test_comparison_film_and_marks(whole):
     assert state.meter.wanted
     pick(whole, "compare", 2)
     assert state.comparison.mode == "error map"
-    state.comparison.figures = Figures(33.3, 1.2, 64, 0.04, 32, 2)
+    state.comparison.figures = Figures(33.3, 1.2, (0, 64), 0.04, (0, 32), 2)
     whole.frame()
     pick(whole, "map", 1)
     assert state.comparison.kind == "FLIP"
@@ -377,7 +377,7 @@ def test_what_stands_over_the_picture_is_drawn(whole):
     for scale in (Range(1, 1000), Range(0, 500, log=False), Range(33, 34)):
         state.look.view_transform, state.look.scale = "false-colour", scale
         whole.frame()
-    state.comparison.mode, state.comparison.figures = "error map", Figures(33.3, 1.2, 64)
+    state.comparison.mode, state.comparison.figures = "error map", Figures(33.3, 1.2, (0, 64))
     for state.comparison.kind in ("difference", "FLIP"):
         whole.frame()
     assert imgui.get_draw_data().total_vtx_count > bare + 300

@@ -202,7 +202,7 @@ class Room:
     """The walk's pictures on a store whose worker is a script."""
 
     def __init__(self, folder, screen, monkeypatch, tmp_path, then):
-        screen.pace.adaptive = screen.pace.refine = False
+        screen.pace.adaptive = screen.pace.traces = False
         screen.clock = time.monotonic
         (tmp_path / "baking_worker.py").write_text(WORKER.format(then=then))
         monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{ROOT}")
@@ -219,8 +219,6 @@ class Room:
 
     def frame(self):
         self.pictures.update(PLACE, 1.0)
-        while self.pictures.under_way:
-            self.pictures.work()
         self.lines.append(self.state.rebaking.line)
 
     def until(self, condition):

@@ -67,7 +67,6 @@ def test_the_dragged_material_is_drawn_at_full_size(pictures, state):
         pull(state, red)
         pictures.update(PLACE, 1.0)
         assert state.screen.statistics.resolution == (96, 64)
-    assert not pictures.under_way
     ball = shown(pictures)[25:40, 42:54]
     assert (ball[..., 0] > ball[..., 2] + 20).all(), "what is shown is the last one"
     slow_down(pictures)
@@ -82,8 +81,6 @@ def test_the_whole_frame_follows_at_rest(pictures, state):
     over = shown(pictures)
     state.screen.clock.now_s += 1.0
     pictures.update(PLACE, 1.0)
-    while pictures.under_way:
-        pictures.work()
     whole = shown(pictures)
     assert np.array_equal(over[25:40, 42:54], whole[25:40, 42:54])
     assert abs(over - whole).max() > 2, "around the ball it was the small frame"
@@ -96,26 +93,29 @@ def relight(renderer, factor):
     renderer.resources.light_version += 1
 
 
-def test_light_that_follows_an_edit_keeps_the_picture_sharp(pictures, state, renderer):
+def test_light_that_follows_an_edit_is_shown_at_once_and_sharp_at_rest(pictures, state, renderer):
     rest(pictures, state)
     before = shown(pictures)
-    pictures._a._whole_s = 10.0
-    relight(renderer, 0.5)
+    slow_down(pictures)
+    relight(renderer, 0.25)
     pictures.update(PLACE, 1.0)
-    assert pictures.under_way, "drawn in parts, beside the picture"
-    pictures.work()
-    relight(renderer, 0.5)
+    assert state.screen.statistics.resolution == (24, 16)
+    rest(pictures, state)
+    assert shown(pictures).mean() < 0.6 * before.mean()
+
+
+def test_changes_that_take_long_are_drawn_as_motion_is(pictures, state):
+    """Of the materials whose changes took long, and of no other."""
+    pictures._a._over_s[frozenset({"brass"})] = 10.0
+    slow_down(pictures)
+    pull(state, 0.2)
     pictures.update(PLACE, 1.0)
-    finish(pictures)
-    assert state.screen.statistics.resolution == (96, 64), "more light does not start the frame again"
+    assert state.screen.statistics.resolution == (24, 16)
+    rest(pictures, state)
+    plaster = state.scene.materials["plaster"].model_copy(update={"kd": (0.2, 0.2, 0.2)})
+    state.materials.edits.change("plaster", plaster)
     pictures.update(PLACE, 1.0)
-    finish(pictures)
     assert state.screen.statistics.resolution == (96, 64)
-    assert shown(pictures).mean() < 0.6 * before.mean(), "the latest light, a quarter; half would leave 0.69"
-    state.screen.clock.now_s += 1.0
-    pictures.update(PLACE, 1.0)
-    finish(pictures)
-    assert state.screen.statistics.accumulated == 1, "it refines next"
 
 
 def test_light_during_a_drag_is_shown_soon(pictures, state, renderer):
@@ -146,45 +146,8 @@ def test_the_light_of_a_mix_is_shown_soon(pictures, state, renderer):
 def rest(pictures, state):
     state.screen.clock.now_s += 1.0
     pictures.update(PLACE, 1.0)
-    finish(pictures)
     assert state.screen.statistics.resolution == (96, 64)
     slow_down(pictures)
-
-
-def finish(pictures):
-    while pictures.under_way:
-        pictures.work()
-
-
-def test_a_slow_one_is_drawn_in_parts_and_not_begun_anew(pictures, state):
-    pictures._a._over_s = 10.0
-    pull(state, 0.2)
-    pictures.update(PLACE, 1.0)
-    assert pictures.under_way
-    pictures.work()
-    pull(state, 0.5)
-    pictures.update(PLACE, 1.0)
-    version = pictures._a.version
-    for _ in range(1000):
-        if pictures.work():
-            break
-    assert pictures._a.version == version + 1, "a drag that never rests would otherwise show nothing"
-    pictures._a._over_s = 0.0
-    pictures.update(PLACE, 1.0)
-    assert (shown(pictures)[30, 48] != shown_of(pictures, state, 0.2)[30, 48]).any()
-    pull(state, 0.3)
-    pictures._a._over_s = 10.0
-    pictures.update(PLACE, 1.0)
-    assert pictures.under_way
-    state.navigation.jump(SIDE)
-    pictures.update(PLACE, 1.0)
-    assert not pictures.under_way, "a moving camera drops it"
-
-
-def shown_of(pictures, state, red):
-    pull(state, red)
-    pictures.update(PLACE, 1.0)
-    return shown(pictures)
 
 
 def test_what_is_selected_is_outlined_until_it_is_not(pictures, state):
@@ -196,9 +159,7 @@ def test_what_is_selected_is_outlined_until_it_is_not(pictures, state):
     assert alpha.shape == (64, 96) and alpha.max() > 200 and alpha[30, 48] == 0
     state.screen.clock.now_s += 1.0
     pictures.update(PLACE, 1.0)
-    while pictures.under_way:
-        pictures.work()
-    assert pictures.images["outline"] is line, "it rests while the picture refines"
+    assert pictures.images["outline"] is line, "it rests while the picture is drawn whole"
     state.navigation.jump(replace(SIDE, name="elsewhere"))
     pictures.update(PLACE, 1.0)
     assert pictures.images["outline"] is not line

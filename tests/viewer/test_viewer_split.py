@@ -38,7 +38,7 @@ def renderer(store):
 
 @pytest.fixture
 def state(renderer, screen):
-    screen.pace.adaptive = screen.pace.refine = False
+    screen.pace.adaptive = False
     state = WalkState.of(renderer.scene.record, "walk", screen)
     state.lights.groups = renderer.scene.groups.records
     state.look.exposure_ev, state.meter.expose_wanted = 0.0, False
@@ -109,20 +109,6 @@ def test_an_exchange_takes_one_frame_and_computes_nothing(pictures, state):
     edits.undo()
     pictures.update(PLACE, 1.0)
     np.testing.assert_array_equal(pictures.shown[0].read(), a)
-
-
-def test_both_sides_refine_by_turns(pictures, state):
-    state.screen.pace.refine = True
-    state.materials.edits.change("plaster", RED)
-    state.states.split = True
-    pictures.update(PLACE, 1.0)
-    for _ in range(60):
-        state.screen.clock.now_s += 0.3
-        pictures.update(PLACE, 1.0)
-        while pictures.under_way:
-            pictures.work()
-    a, b = (picture.samples for picture in pictures.shown)
-    assert a > 4 and abs(a - b) <= 2
 
 
 def test_a_split_ends_other_comparisons_and_the_room_alone_comes_back(pictures, state):

@@ -95,7 +95,7 @@ def test_the_walk_mode(walk):
     check(walk, seen)
     state.selection.choose("table")
     state.look.near_m, state.look.n, state.look.view_transform = 0.1, 3, "false-colour"
-    state.comparison.mode, state.comparison.figures = "error map", Figures(33.3, 1.2, 64)
+    state.comparison.mode, state.comparison.figures = "error map", Figures(33.3, 1.2, (0, 64))
     check(walk, seen)
     state.materials.edits.store("evening")
     state.lights.groups = (LightGroupRecord(name="lamp", members=("bulb",), share=1.0),)

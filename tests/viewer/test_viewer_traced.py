@@ -1,4 +1,4 @@
-"""Path tracing as B of a comparison: asked for at rest, in a process of its own, shown as frames are."""
+"""The picture at rest, and B of a comparison, traced in a process of its own and shown as frames are."""
 
 import time
 from dataclasses import replace
@@ -7,28 +7,30 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
+from lambent.core.camera import CameraPath
+from lambent.core.images import read_image
 from lambent.realtime.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.scenes import load_scene
 from lambent.store.store import Store
-from lambent.viewer.modes.walk.comparison import TRACED
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.modes.walk.tracing import Wish
-from lambent.viewer.modes.walk.tracing_worker import Wishes
+from lambent.viewer.modes.walk.traced import FADE_S, STILL_S
+from lambent.viewer.screen import Rect
 from lambent.viewer.work import POLL_S
 from tests.bake.small_scenes import TINY
 from tests.viewer.drawn_frames import drawn
-from tests.viewer.small_store import FRONT, MATERIALS, SIDE
 
 SIZE = (48, 32)
+PLACE = Rect(0, 0, *SIZE)
 LONGEST_S = 180.0  # for a picture: libraries are loaded and kernels compiled first
+BLACK = {"kd": (0.0, 0.0, 0.0), "lobes": ()}
 
 
 @pytest.fixture(scope="module")
 def store(mi, tmp_path_factory):
     folder = tmp_path_factory.mktemp("traced") / "box.store"
-    with bake(load_scene("builtin:box"), folder, quality=TINY, only={"geometry", "environment"}):
+    with bake(load_scene("builtin:box"), folder, quality=TINY, only={"geometry", "environment", "light_map"}):
         return folder
 
 
@@ -40,28 +42,53 @@ def renderer(adapter, store):
 @pytest.fixture
 def state(renderer, screen, store):
     state = WalkState.of(renderer.scene.record, "walk", screen, store)
-    state.comparison.mode, state.comparison.integrator = "side by side", TRACED
+    state.look.exposure_ev, state.meter.expose_wanted = 0.0, False
     return state
 
 
-@pytest.fixture
-def pictures(renderer, state):
-    made = Pictures(renderer, state)
+@pytest.fixture(scope="module")
+def workers():
+    """Pictures whose processes end with the module: loading one takes seconds."""
+    made = []
     yield made
-    made.close()
+    for pictures in made:
+        pictures.close()
 
 
-def traced_until(pictures, state, samples):
-    """The picture B once it has that many samples."""
+@pytest.fixture
+def pictures(renderer, state, workers):
+    """With the process of an earlier test, if there is one."""
+    made = Pictures(renderer, state)
+    if workers:
+        made._at_rest._tracing = workers[0]._at_rest._tracing
+        made._at_rest._tracing.ask(None)
+    else:
+        workers.append(made)
+    return made
+
+
+def until(pictures, state, condition):
+    """Draw frames until a condition is met."""
     began_s = time.monotonic()
     while time.monotonic() - began_s < LONGEST_S:
         drawn(pictures, state, SIZE)
-        assert not state.comparison.fault
-        b = pictures.shown[1]
-        if b.samples >= samples:
-            return b
-        time.sleep(POLL_S)
-    raise AssertionError(f"no picture of {samples} samples: {b.label}")
+        if condition():
+            return
+        assert not pictures._at_rest.fault
+        time.sleep(min(POLL_S, pictures.wait_s() or POLL_S))
+    raise AssertionError("never met")
+
+
+def traced(pictures, state, samples=1):
+    """The picture A, once it is traced with that many samples."""
+    until(pictures, state, lambda: pictures.shown[0].samples >= samples)
+    return pictures.shown[0]
+
+
+def b_of(pictures, state, samples):
+    """The picture B, once it has that many samples."""
+    until(pictures, state, lambda: pictures.shown[-1].samples >= samples)
+    return pictures.shown[1]
 
 
 def reference(store, camera, samples):
@@ -71,103 +98,132 @@ def reference(store, camera, samples):
     return render_reference(scene_of(Store.open(store)), camera, *SIZE, samples, seed=5)
 
 
+def tiles(values):
+    return values.reshape(-1, 8, 2, 24, 3).mean(axis=(1, 3)).reshape(-1, 3)
+
+
 def z_of(b, reference):
     """(8, 3) differences of B from a mean of 64 samples, in its standard errors, over tiles of 8 rows by 24 columns."""
     (mean, variance), got = reference, b.read()
-
-    def tiles(values):
-        return values.reshape(-1, 8, 2, 24, 3).mean(axis=(1, 3)).reshape(-1, 3)
-
     return tiles(got - mean) / np.sqrt(tiles(variance) * (1 + 64 / b.samples) / (8 * 24))
 
 
-def test_b_is_the_path_traced_scene_and_follows_the_camera(pictures, state, store):
-    """Against the reference by z; at rest only, and A stands in until there is something."""
+def test_the_picture_at_rest_is_traced_and_movement_draws_at_once(pictures, state, store):
     drawn(pictures, state, SIZE)
-    a, b = pictures.shown
-    views = pictures.views
-    assert views[0] is a.view and views[1] is not a.view and views[1].texture is a.view.texture and "at rest" in b.label
-    b = traced_until(pictures, state, 8)
-    first = reference(store, state.navigation.camera, 64)
-    assert np.abs(z_of(b, first)).max() < 4
-    assert (
-        pictures.views[1].texture is not a.view.texture and f"{b.samples} samples" in state.comparison.divider.b_label
-    )
-    camera = state.navigation.camera
-    state.navigation.camera = replace(camera, fov_y_deg=0.6 * camera.fov_y_deg)
-    drawn(pictures, state, SIZE)
-    assert pictures.views[1].texture is a.view.texture and not b.readable, "the last view is not this one"
-    b = traced_until(pictures, state, 16)
-    assert np.abs(z_of(b, reference(store, state.navigation.camera, 64))).max() < 4
-    assert np.abs(z_of(b, first)).max() > 8, "the first view is another one"
-    for _ in range(4):
-        drawn(pictures, state, SIZE)
-    assert state.comparison.figures is not None and state.comparison.figures.of >= 4
+    a = pictures.shown[0]
+    assert a is pictures._a and a.samples == 0
+    found = traced(pictures, state, 32)
+    mean = reference(store, state.navigation.camera, 64)[0]
+    np.testing.assert_allclose(tiles(found.read()), tiles(mean), rtol=0.25, atol=0.05 * mean.mean())
+    assert found.size == SIZE and "samples" in state.screen.at_rest
+    versions = a.version
+    until(pictures, state, lambda: found.samples >= 64)
+    assert a.version == versions, "nothing is drawn meanwhile"
+    state.navigation.camera = replace(state.navigation.camera, fov_y_deg=30.0)
+    pictures.update(PLACE, 1.0)
+    assert pictures.shown[0] is a and a.version == versions + 1 and not pictures._at_rest._tracing.busy
+    assert state.screen.at_rest == ""
+    again = traced(pictures, state)
+    assert np.abs(tiles(again.read()) - tiles(mean)).max() > 0.1 * mean.mean(), "another view"
 
 
-def test_edited_materials_are_traced_and_exposure_needs_no_new_paths(pictures, state):
-    """A black material in place of all takes the light that they scatter."""
-    b = traced_until(pictures, state, 4)
-    before = b.read().mean()
-    process = b._tracing._process._process
+def test_a_picture_is_blended_in_and_a_new_exposure_needs_no_samples(pictures, state):
+    traced(pictures, state)
+    state.navigation.camera = replace(state.navigation.camera, fov_y_deg=42.0)
+    pictures.update(PLACE, 1.0)
+    before = pictures.shown[0].view
+    state.screen.clock.now_s += 2 * STILL_S
+    began_s, found = time.monotonic(), pictures.shown[0]
+    while found.samples == 0:
+        assert time.monotonic() - began_s < LONGEST_S
+        pictures.update(PLACE, 1.0)  # the clock stands still
+        found = pictures.shown[0]
+    assert pictures.images["before A"] is before and pictures.share == 0.0 and pictures.wait_s() < FADE_S
+    state.screen.clock.now_s += FADE_S / 2
+    assert pictures.share == pytest.approx(0.5)
+    state.screen.clock.now_s += FADE_S
+    assert pictures.share == 1.0 and "before A" not in pictures.images
+    number, shown = found.drawing, found.save("x") and read_image(state.screen.folder / "x-001.png")
     state.look.exposure_ev += 1
-    count = b.samples
-    drawn(pictures, state, SIZE)
-    assert b.samples >= count
+    pictures.update(PLACE, 1.0)
+    assert found.drawing == number and found.samples > 0, "the same picture"
+    assert found.save("y") and read_image(state.screen.folder / "y-001.png").mean() > 1.1 * shown.mean()
+    np.testing.assert_allclose(read_image(state.screen.folder / "x-001.exr"), found.read(), rtol=2e-3)
+
+
+def test_what_is_edited_is_traced_and_drawn_over_the_traced_picture(pictures, state):
+    """A black material in place of all takes the light that they scatter."""
+    found = traced(pictures, state)
+    before, texture = found.read().mean(), found.texture
+    name = next(iter(state.scene.materials))
+    state.materials.edits.change(name, state.scene.materials[name].model_copy(update=BLACK))
+    pictures.update(PLACE, 1.0)
+    assert pictures.shown == (pictures._a,) and state.screen.statistics.scale == 1.0
+    assert pictures._renderer._few is not texture, "it was the base"
     for name, material in state.scene.materials.items():
-        state.materials.edits.change(name, material.model_copy(update={"kd": (0.0, 0.0, 0.0), "lobes": ()}))
-    after = traced_until(pictures, state, 4).read().mean()
-    assert after < 0.7 * before, (after, before)
-    state.comparison.mode = "off"
+        state.materials.edits.change(name, material.model_copy(update=BLACK))
+    assert traced(pictures, state).read().mean() < 0.7 * before
+
+
+def test_the_meter_reads_the_traced_picture(pictures, state):
+    found = traced(pictures, state)
+    state.meter.readout_on, state.meter.cursor, state.meter.wanted = True, (0.3, 0.6), True
     drawn(pictures, state, SIZE)
-    assert not b._tracing.busy, "nobody looks"
-    assert process.poll() is None
-    pictures.close()
-    assert process.poll() is not None
+    np.testing.assert_allclose(state.meter.under_cursor, pictures.shown[0].read((0.3, 0.6))[0, 0])
+    assert state.meter.reading is not None and pictures.shown[0] is found
 
 
-def test_what_cannot_be_traced_is_said(pictures, state, tmp_path):
+@pytest.mark.parametrize("how", [{"near_m": 1.0}, {"show": "light-map"}, {"lookup": "light_field-choice"}])
+def test_what_paths_do_not_show_stays_drawn(pictures, state, how):
+    for name, value in how.items():
+        setattr(state.look, name, value)
+    drawn(pictures, state, SIZE, 3)
+    assert pictures.shown == (pictures._a,) and not pictures._at_rest.coming and pictures._a.rests
+
+
+def test_turned_off_the_picture_at_rest_is_drawn(pictures, state):
+    traced(pictures, state)
+    state.screen.pace.traces = False
+    drawn(pictures, state, SIZE, 3)
+    assert pictures.shown == (pictures._a,) and state.screen.at_rest == "" and pictures.wait_s() is None
+
+
+def test_b_is_the_path_traced_scene_beside_the_picture_at_rest(pictures, state, store):
+    """Against the reference by z; at rest only, and A stands in until there is something."""
+    state.comparison.mode, state.comparison.integrator = "side by side", "path"
+    state.navigation.camera = replace(state.navigation.camera, fov_y_deg=50.0)
+    pictures.update(PLACE, 1.0)
+    a, views = pictures.shown[0], pictures.views
+    assert views[0] is a.view and views[1] is not a.view and views[1].texture is a.view.texture
+    b = b_of(pictures, state, 16)
+    assert np.abs(z_of(b, reference(store, state.navigation.camera, 64))).max() < 4
+    until(pictures, state, lambda: state.comparison.figures is not None and min(state.comparison.figures.of) >= 4)
+    assert state.comparison.divider.a_label.startswith("traced") and "path traced" in state.comparison.divider.b_label
+    assert state.comparison.figures.psnr_db > 20
     state.look.show = "specular"
     drawn(pictures, state, SIZE)
-    assert "all light" in state.comparison.fault
-    state.look.show, state.store = "full", None
-    other = Pictures(pictures._renderer, state)
-    drawn(other, state, SIZE)
-    assert "no scene file" in state.comparison.fault and len(other.shown) == 1
+    assert "all light" in state.comparison.fault and len(pictures.shown) == 1
 
 
-def test_a_store_without_a_scene_is_a_line(renderer, state, tmp_path):
-    from tests.viewer.small_store import write_small_store
-
-    state.store = write_small_store(tmp_path / "small.store")
-    pictures, began_s = Pictures(renderer, state), time.monotonic()
-    while not state.comparison.fault and time.monotonic() - began_s < LONGEST_S:
-        drawn(pictures, state, SIZE)
-        time.sleep(POLL_S)
-    assert "no path of its scene file" in state.comparison.fault and "\n" not in state.comparison.fault
-    pictures.close()
+def test_beside_a_traced_b_the_picture_a_is_drawn(pictures, state):
+    state.comparison.mode = "side by side"
+    b = b_of(pictures, state, 4)
+    assert pictures.shown[0] is pictures._a and b.drawing[0] == "traced"
+    until(pictures, state, lambda: state.comparison.figures is not None)
+    assert state.comparison.figures.of[0] == 0 < state.comparison.figures.of[1]
 
 
-def test_wishes_keep_what_they_say_and_the_newest_stands():
-    wish = Wish(3, FRONT, (5, 7), MATERIALS)
-    assert Wish.of(wish.said()) == wish and Wish.of(Wish(4).said()) == Wish(4)
-    wishes = Wishes(iter([]))
-    assert wishes.newest(None) is None, "the stream has ended"
-
-    import json
-    import queue
-
-    lines = queue.Queue()
-    wishes = Wishes(iter(lines.get, None))
-    first = Wish(1, FRONT)
-    lines.put(json.dumps(first.said()).encode())
-    read = wishes.newest(None)
-    assert read == first and wishes.stands(read)
-    lines.put(json.dumps(Wish(2, SIDE).said()).encode())
-    second = wishes.newest(read)
-    assert second.number == 2 and not wishes.stands(read)
-    lines.put(None)
-    assert wishes.newest(second) is None
+def test_a_film_is_traced_frame_by_frame(pictures, state, tmp_path):
+    camera = state.navigation.camera
+    state.films.file_name, state.films.size, state.films.quality = "a-##.exr", "640 x 360", "traced, 16 samples"
+    until(pictures, state, lambda: pictures._at_rest._tracing.ready)
+    state.films.wanted = CameraPath(name="short", keys=(camera, replace(camera, fov_y_deg=30.0)), seconds=0.04)
+    drawn(pictures, state, SIZE)
+    assert state.films.under_way.waits and pictures.wait_s() > 0
+    until(pictures, state, lambda: state.films.under_way is None)
+    assert "2 frames" in state.screen.messages[-1].text
+    first, last = (read_image(tmp_path / f"a-0{number}.exr") for number in (1, 2))
+    assert first.shape == (360, 640, 3) and np.abs(first - last).mean() > 0.02 * first.mean()
 
 
 def test_given_radiance_is_shown_as_frames_show_theirs(renderer, state):
@@ -185,3 +241,17 @@ def test_given_radiance_is_shown_as_frames_show_theirs(renderer, state):
         shown = np.frombuffer(data, np.uint8).reshape(SIZE[1], SIZE[0], 4)[..., :3].astype(int)
         assert np.abs(shown - renderer.display_image(frame)).max() <= 1
     assert shown.std() > 3
+
+
+def test_the_end_of_the_process_is_a_line_and_the_picture_is_drawn(pictures, state, workers):
+    """Last, because it ends the process of the tests before."""
+    traced(pictures, state)
+    pictures._at_rest._tracing._process._process.kill()
+    began_s = time.monotonic()
+    while not pictures._at_rest.fault and time.monotonic() - began_s < LONGEST_S:
+        drawn(pictures, state, SIZE)
+    assert "tracing was killed" in pictures._at_rest.fault
+    state.navigation.camera = replace(state.navigation.camera, fov_y_deg=33.0)
+    drawn(pictures, state, SIZE, 3)
+    assert pictures.shown == (pictures._a,) and pictures.wait_s() is None and pictures._a.rests
+    assert sum("not traced at rest" in message.text for message in state.screen.messages) == 1

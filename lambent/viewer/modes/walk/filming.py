@@ -21,15 +21,16 @@ from lambent.core.film import (
 )
 from lambent.core.light_mix import Factors
 from lambent.core.outputs import is_marked
-from lambent.realtime.frame_state import QMC_N, FrameState
+from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.camera_paths import camera_at
 from lambent.viewer.edits import file_in
+from lambent.viewer.modes.walk.traced import TracedFrames
 from lambent.viewer.picture import scaled
 
 SIZES = {"1280 x 720": (1280, 720), "1920 x 1080": (1920, 1080), "3840 x 2160": (3840, 2160), "640 x 360": (640, 360)}
 FPS = (24, 25, 30, 60)
-QUALITIES = {"as in motion": 0, "refined, 64 samples": 64, "refined, 256 samples": 256}
+QUALITIES = {"as in motion": 0, "traced, 16 samples": 16, "traced, 64 samples": 64}
 SLICE_S = 0.03  # time of work between two checks for events
 LONGEST_FRAMES = 100_000
 
@@ -65,23 +66,22 @@ def film_file(folder: Path, text: str) -> Path:
 class Filming:
     """A running film of frames like `frame` along `path`; `error` is the reason of an early end.
 
-    The window draws with another renderer. `quality` is in samples of `qmc` per pixel, lobe and frame; 0 keeps the
-    integrator of `frame`. `light` is the mix of light groups by time in seconds, by default the mix of `frame`.
+    The window draws with another renderer. `traced` makes the frames instead, if given. `light` is the mix of light
+    groups by time in seconds, by default the mix of `frame`. `waits`: the next frame is made elsewhere.
     """
 
     def __init__(
-        self, renderer: Renderer, file: Path, path: CameraPath, frame: FrameState, fps: int, quality: int = 0,
-        light: Callable[[float], Factors] | None = None,
+        self, renderer: Renderer, file: Path, path: CameraPath, frame: FrameState, fps: int,
+        traced: TracedFrames | None = None, light: Callable[[float], Factors] | None = None,
     ) -> None:  # fmt: skip
         width, height = even_size(frame.width, frame.height)
         self.file, self.total, self.done = file, path.frames(fps), 0
         if self.total > LONGEST_FRAMES:
             raise UserError("film is too long", got=f"{self.total} frames", expected=f"at most {LONGEST_FRAMES}")
         self.error: str | None = None
-        self.over = False
+        self.over = self.waits = False
         self._began_s, self._light = time.monotonic(), light
-        frame = replace(frame, width=width, height=height, accumulate=None)
-        self._work = self._run(renderer, path, frame, fps, -(-quality // QMC_N))
+        self._work = self._run(renderer, path, replace(frame, width=width, height=height), fps, traced)
 
     @property
     def left_s(self) -> float | None:
@@ -93,7 +93,8 @@ class Filming:
         """Work for about `SLICE_S`; return whether the film is finished."""
         end_s = time.monotonic() + SLICE_S
         try:
-            while time.monotonic() < end_s:
+            self.waits = False
+            while time.monotonic() < end_s and not self.waits:
                 next(self._work)
         except StopIteration:
             self.over = True
@@ -107,21 +108,22 @@ class Filming:
         self.over = True
 
     def _run(
-        self, renderer: Renderer, path: CameraPath, frame: FrameState, fps: int, parts: int
+        self, renderer: Renderer, path: CameraPath, frame: FrameState, fps: int, traced: TracedFrames | None
     ) -> Generator[None, None, None]:
-        """Yield after each part of a frame, so that events can be handled."""
+        """Yield after each frame and while one is awaited, so that events can be handled."""
+        linear = radiance_wanted(self.file)
         with pictures_writer(self.file, frame.width, frame.height, fps) as write:
             for index in range(self.total):
                 view = replace(frame, camera=camera_at(path, index / fps))
                 if self._light is not None:
                     view = replace(view, light=self._light(index / fps))
-                for part in range(parts):
-                    view = replace(view, integrator="qmc", n=QMC_N, accumulate=part)
-                    if part < parts - 1:  # the last one is drawn below
-                        renderer.draw(view)
-                        renderer.finish()
+                if traced is not None:
+                    traced.ask(view)
+                    while (light := traced.radiance) is None:
+                        self.waits = True
                         yield
-                linear = radiance_wanted(self.file)
-                write(renderer.image(view) if linear else scaled(renderer.display_image(view), view))
+                    write(light if linear else scaled(traced.display(light, view), view))
+                else:
+                    write(renderer.image(view) if linear else scaled(renderer.display_image(view), view))
                 self.done = index + 1
                 yield

@@ -21,12 +21,12 @@ from lambent.viewer.modes.walk.comparison import AS_A
 from lambent.viewer.modes.walk.filming import QUALITIES, SIZES, Filming, film_file
 from lambent.viewer.modes.walk.glare import GlareDrawing
 from lambent.viewer.modes.walk.lanes import Lane
-from lambent.viewer.modes.walk.light_fields import FieldDrawing, shows_choice
+from lambent.viewer.modes.walk.light_fields import FieldDrawing
 from lambent.viewer.modes.walk.metering import read
 from lambent.viewer.modes.walk.outlining import Outlining
 from lambent.viewer.modes.walk.rebaking import RebakedLight
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.modes.walk.traced import TRACEABLE, AtRest, TracedPicture
+from lambent.viewer.modes.walk.traced import SOON_S, AtRest, TracedPicture, is_traceable
 from lambent.viewer.modes.walk.tracing import ALL_LIGHT, Kind
 from lambent.viewer.picture import Pair, Picture, Shown, size_px
 from lambent.viewer.screen import Rect, least
@@ -112,8 +112,8 @@ class Pictures(Pair):
         wanted = self._frame(size)
         self._outlining.update(wanted, state.selection.record)
         filming, before = state.films.under_way is not None, self.shown[0].view
-        rebaked = self._rebaked is not None and self._rebaked.is_copied(self._lane.room)
-        self._at_rest.update(wanted, self._lane.textures, self._traced_kinds(wanted), rebaked=rebaked, before=before)
+        kinds = self._traced_kinds(wanted)
+        self._at_rest.update(wanted, self._lane.textures, kinds, rebaked=self._is_copied, before=before)
         if state.states.split and not filming:
             self._compare_states(wanted)
         elif state.comparison.on and not filming:
@@ -140,14 +140,18 @@ class Pictures(Pair):
 
     # at rest
 
+    @property
+    def _is_copied(self) -> bool:
+        """Whether the copy beside the store has the light of the room."""
+        return self._rebaked is not None and self._rebaked.is_copied(self._lane.room)
+
     def _traced_kinds(self, wanted: FrameState) -> tuple[Kind, ...]:
         """Kinds of traced pictures that the window shows at rest."""
         state, comparison = self._state, self._state.comparison
         if state.films.under_way is not None or state.states.split:
             return ()
         b = comparison.traced_kind if comparison.on else None
-        # A near plane cuts away what paths would meet; colours of a choice are no light.
-        traceable = wanted.show in TRACEABLE and wanted.near_m is None and not shows_choice(wanted)
+        traceable = is_traceable(wanted)
         kinds: list[Kind] = ["traced"] if traceable and state.screen.pace.traces and b != "traced" else []
         if b is not None and (wanted.show == ALL_LIGHT or (b == "traced" and traceable)):
             kinds.append(b)
@@ -158,6 +162,7 @@ class Pictures(Pair):
         a, traces = self._a, self._state.screen.pace.traces and self._state.comparison.traced_kind != "traced"
         traced = self._at_rest.picture("traced") if traces and self._at_rest.still else None
         if traced is not None:
+            a.stand_in(traced.texture, wanted)
             return traced
         a.update(wanted, sharpen=not (traces and self._at_rest.coming), share=share)
         if a.version > 0:
@@ -174,8 +179,9 @@ class Pictures(Pair):
         screen.at_rest = self._at_rest.line if traces and self._state.films.under_way is None else ""
 
     def wait_s(self) -> float | None:
-        if self._state.films.under_way is not None or self._glare.busy:
-            return 0.0
+        film = self._state.films.under_way
+        if film is not None or self._glare.busy:
+            return SOON_S if film is not None and film.waits else 0.0
         loading = POLL_S if self._renderer.streaming.busy else None
         beside = self._beside.wait_s() if self._beside is not None and self._state.states.split else None
         compares = POLL_S if len(self.shown) == 2 and self._state.comparison.busy else None
@@ -356,4 +362,7 @@ class Pictures(Pair):
         frame = replace(self._frame(SIZES[films.size]), mixed=0)
         track = self._state.recordings.track_of(path)
         light = None if track is None else lambda time_s: self._state.lights.known(track.factors_at(time_s))
-        return Filming(self._film_renderer, file, path, frame, films.fps, QUALITIES[films.quality], light)
+        samples, traced = QUALITIES[films.quality], None
+        if samples:
+            traced = self._at_rest.frames(frame, self._lane.textures, samples, rebaked=self._is_copied)
+        return Filming(self._film_renderer, file, path, frame, films.fps, traced, light)

@@ -13,11 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
+from lambent.core.errors import UserError
 from lambent.core.false_colour import Range
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.given import Given
 from lambent.realtime.targets import pixels
 from lambent.scenes.scene import ImageTexture
+from lambent.viewer.modes.walk.light_fields import shows_choice
 from lambent.viewer.modes.walk.tracing import ALL_LIGHT, MOST_SAMPLES, Kind, Traced, Tracing, Wish
 from lambent.viewer.picture import write_picture
 from lambent.viewer.screen import Screen
@@ -33,8 +36,6 @@ Textures = Mapping[str, str | ImageTexture]
 
 class TracedPicture:
     """The present picture of a kind; `view` is None before the first."""
-
-    under_way = False  # nothing is drawn in parts on the GPU
 
     def __init__(self, given: Given, screen: Screen) -> None:
         self._given, self._screen = given, screen
@@ -77,6 +78,11 @@ class TracedPicture:
         return self._taken is not None
 
     @property
+    def texture(self) -> Any:
+        """The radiance on the GPU, rgba16float."""
+        return self._given.radiance
+
+    @property
     def noise(self) -> float | None:
         """Relative standard error; None before it is known."""
         return None if self._taken is None else self._taken.noise
@@ -109,9 +115,6 @@ class TracedPicture:
     def wait_s(self) -> float | None:
         return FADE_STEP_S if self._before is not None else None
 
-    def work(self) -> bool:
-        return False
-
     def read(self, at: tuple[float, float] | None = None) -> NDArray[np.float32]:
         """Radiance (height, width, 3); (1, 1, 3) `at` shares of the picture from its upper left."""
         assert self._taken is not None, "read before there is a picture"
@@ -126,6 +129,40 @@ class TracedPicture:
         assert self._frame is not None, "saved before there is a picture"
         display = pixels(self._given.device, self._given.view.texture)
         return write_picture(self._screen, name, self._frame, self.read(), display)
+
+
+class TracedFrames:
+    """Single pictures of a number of samples, one after the other."""
+
+    def __init__(self, tracing: Tracing, given: Given, textures: Textures, samples: int, *, rebaked: bool) -> None:
+        self._tracing, self._given, self._textures = tracing, given, dict(textures)
+        self._samples, self._rebaked = samples, rebaked
+
+    def ask(self, frame: FrameState) -> None:
+        """Request the picture of a frame."""
+        wish = _wish_of(frame, self._textures)
+        self._tracing.ask(replace(wish, kinds=("traced",), rebaked=self._rebaked, samples=self._samples))
+
+    @property
+    def radiance(self) -> Floats | None:
+        """Radiance (height, width, 3) of the requested picture; None before it is there.
+
+        Raises
+        ------
+        UserError
+            If it will not come.
+        """
+        self._tracing.tick()
+        if self._tracing.error:
+            raise UserError(self._tracing.error)
+        found = self._tracing.last("traced")
+        return None if found is None else found.radiance
+
+    def display(self, radiance: Floats, frame: FrameState) -> NDArray[np.uint8]:
+        """A picture as shown (height, width, 3)."""
+        self._given.take(radiance)
+        self._given.show(frame)
+        return pixels(self._given.device, self._given.view.texture)
 
 
 class AtRest:
@@ -179,6 +216,21 @@ class AtRest:
             return f"traced: {found.samples} samples{noise}" if found.samples < MOST_SAMPLES else ""
         waits = tracing is not None and not tracing.ready and not self.fault and self._of is not None and self._of[1]
         return f"tracing at rest: {tracing.what}" if waits and tracing is not None else ""
+
+    def frames(self, frame: FrameState, textures: Textures, samples: int, *, rebaked: bool) -> TracedFrames:
+        """Single pictures like a frame, of a number of samples.
+
+        Raises
+        ------
+        UserError
+            If nothing can be traced, or not what the frame shows.
+        """
+        if self.fault or self._tracing is None:
+            raise UserError(f"cannot be traced: {self.fault}")
+        if not is_traceable(frame):
+            raise UserError("this picture is drawn, not traced", hint="choose the quality as in motion")
+        self._tracing.start()
+        return TracedFrames(self._tracing, self._make(), textures, samples, rebaked=rebaked)
 
     def start(self) -> None:
         """Start the process."""
@@ -244,6 +296,14 @@ class AtRest:
         """End the process."""
         if self._tracing is not None:
             self._tracing.close()
+
+
+def is_traceable(frame: FrameState) -> bool:
+    """Whether tracing can show what a frame shows.
+
+    Paths meet what a near plane cuts away, and colours of a choice are no light.
+    """
+    return frame.show in TRACEABLE and frame.near_m is None and not shows_choice(frame)
 
 
 def _display(frame: FrameState) -> tuple[float, str, Range]:

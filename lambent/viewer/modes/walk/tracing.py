@@ -39,6 +39,8 @@ class Wish:
         Part of the light: full, diffuse or specular.
     rebaked : bool
         Whether the copy beside the store has the light of these materials and textures.
+    samples : int
+        Samples of the one wanted picture; 0: pictures with more and more.
     """
 
     number: int
@@ -50,6 +52,7 @@ class Wish:
     light: Factors = field(default_factory=dict)
     show: str = ALL_LIGHT
     rebaked: bool = False
+    samples: int = 0
 
     def numbered(self, number: int) -> Wish:
         """The same request under another number."""
@@ -58,7 +61,7 @@ class Wish:
     def said(self) -> dict[str, Any]:
         """As a JSON object."""
         room = RoomState(materials=dict(self.materials), textures=dict(self.textures))
-        plain = {name: getattr(self, name) for name in ("number", "kinds", "size", "show", "rebaked")}
+        plain = {name: getattr(self, name) for name in ("number", "kinds", "size", "show", "rebaked", "samples")}
         return {
             **plain, "camera": asdict(self.camera), "room": room.model_dump(mode="json"),
             "light": {name: list(factor) for name, factor in self.light.items()},
@@ -73,6 +76,7 @@ class Wish:
             int(said["number"]), tuple(said["kinds"]), Camera(**{**camera, **places}),
             (int(said["size"][0]), int(said["size"][1])), room.materials, room.textures,
             {name: triple(factor) for name, factor in said["light"].items()}, str(said["show"]), bool(said["rebaked"]),
+            int(said["samples"]),
         )  # fmt: skip
 
 

@@ -118,8 +118,9 @@ class Rooms:
 class Converging:
     """A picture of a wish that gets better, with the times of its samples and of its denoising."""
 
-    def __init__(self, kind: Kind, picture: TracedPicture) -> None:
+    def __init__(self, kind: Kind, picture: TracedPicture, samples: int) -> None:
         self.kind, self.picture = kind, picture
+        self._once, self._most = samples > 0, samples or MOST_SAMPLES
         self._all_s = self._since_s = self._sample_s = self._fast_s = 0.0
         self._noise: tuple[int, float] | None = None  # samples, and noise then
 
@@ -127,27 +128,29 @@ class Converging:
         """Trace a pass."""
         began, before = time.monotonic(), self.picture.samples
         most = 1 if before == 0 else max(1, int(PASS_S / max(self._sample_s, 1e-6)))
-        count = self.picture.sample(min(most, MOST_SAMPLES - before))
+        count = self.picture.sample(min(most, self._most - before))
         seconds = time.monotonic() - began
         self._sample_s = seconds / count
         self._all_s, self._since_s = self._all_s + seconds, self._since_s + seconds
 
     @property
     def done(self) -> bool:
-        return self.picture.samples >= MOST_SAMPLES
+        return self.picture.samples >= self._most
 
     @property
     def due(self) -> bool:
         """Whether the samples since the last picture are worth another one."""
-        first = self.picture.samples == 1
-        return first or self.done or self._since_s >= max(PICTURE_S, self._fast_s, GROWTH * self._all_s)
+        if self._once or self.done:
+            return self.done
+        return self.picture.samples == 1 or self._since_s >= max(PICTURE_S, self._fast_s, GROWTH * self._all_s)
 
     def image(self) -> Floats:
         """The picture so far (height, width, 3): whole paths as they are, others denoised."""
         if self.picture.path:
             image = self.picture.mean()
         else:
-            began, fast = time.monotonic(), self._since_s < FINE * self._fast_s or self._fast_s == 0.0
+            began, soon = time.monotonic(), self._since_s < FINE * self._fast_s or self._fast_s == 0.0
+            fast = soon and not self.done
             image = self.picture.denoised(fast=fast)
             if fast:
                 self._fast_s = time.monotonic() - began
@@ -200,7 +203,7 @@ def trace(rooms: Rooms, wish: Wish, wishes: Wishes, out: BinaryIO) -> None:
         path = kind == "path"
         tracer = rooms.of(kind, wish).tracer
         picture = TracedPicture(tracer, wish.camera, wish.size, path=path, part="full" if path else wish.show)
-        pictures.append(Converging(kind, picture))
+        pictures.append(Converging(kind, picture, wish.samples))
     while pictures:
         for one in pictures:
             if not wishes.stands(wish):

@@ -29,7 +29,7 @@ def draw(films: Films, recordings: Recordings, navigation: Navigation, screen: S
     films.size = choice("size", films.size, tuple(SIZES), "width and height of the film in pixels")
     films.fps = int(choice("frames/s", str(films.fps), tuple(map(str, FPS)), "frames of the film per second"))
     meaning = (
-        "as in motion: integrator and samples from the Drawing panel; refined: unbiased and slow, free of grain at 256"
+        "as in motion: drawn as the Drawing panel says; traced: as the picture at rest, seconds to a minute a frame"
     )
     films.quality = choice("quality", films.quality, tuple(QUALITIES), meaning)
     text = films.file_name or f"{plain_name(path.name)}.mp4"
