@@ -57,7 +57,7 @@ def command(
     noise: Annotated[
         float | None,
         typer.Option(
-            help="Traced pictures: relative standard error at which they end. [default: .02; path: 64 samples]"
+            help="Traced pictures: relative error at which they end. [default: .02 or 48 samples; films 8; path 64]"
         ),
     ] = None,
     denoise: Annotated[

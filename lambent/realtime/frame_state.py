@@ -31,7 +31,16 @@ SHOW = {
 QUANTITIES = {LIGHT_MAP: ILLUMINANCE, LIGHT_MAP_NOISE: NOISE}  # shown quantity; luminance for all others
 FALSE_COLOUR = "false-colour"
 VIEW_TRANSFORMS = {FALSE_COLOUR: 3, "linear": 0, "neutral": 1, "filmic": 2}  # as shaders/tonemap.wgsl numbers them
+MOST_PX = 8192  # of a texture, by WebGPU's default limits
 QMC_N = 8  # samples per pixel, lobe and frame of the progressive mode
+
+
+def check_shown(show: str, width: int, height: int) -> None:
+    """Raise `UserError` for an unknown part of the light, or a picture size out of range."""
+    known("part of the light", show, SHOW)
+    if not (0 < width <= MOST_PX and 0 < height <= MOST_PX):
+        got, expected = f"{width}x{height}", f"1x1 to {MOST_PX}x{MOST_PX}"
+        raise UserError("picture size is out of range", got=got, expected=expected)
 
 
 @dataclass(frozen=True)
@@ -121,10 +130,7 @@ class FrameState:
         known("view transform", self.view_transform, reversed(VIEW_TRANSFORMS))
         if self.is_false_coloured:
             self.scale.check()
-        known("part of the light", self.show, SHOW)
-        if not (0 < self.width <= 8192 and 0 < self.height <= 8192):
-            size = f"{self.width}x{self.height}"
-            raise UserError("picture size is out of range", got=size, expected="1x1 to 8192x8192")
+        check_shown(self.show, self.width, self.height)
 
     @property
     def size(self) -> tuple[int, int]:

@@ -25,6 +25,7 @@ from lambent.core.photometry import LUMINANCE, Quantity, photometric
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.core.projections import Projection, View
+from lambent.realtime.frame_state import check_shown
 from lambent.realtime.integrators import INTEGRATORS
 from lambent.scenes.look_track import LookTrack
 from lambent.scenes.replacement import Replacement
@@ -53,11 +54,11 @@ class Settings:
         "traced" against the baked light, "path" for whole paths, or one of `realtime.integrators.INTEGRATORS`, which
         draw.
     samples : int, optional
-        Per pixel for converging integrators ("traced": as many as `noise` needs, "path": 64, "qmc": 256, "oslf": 100),
-        otherwise per lobe (by default chosen from each material's roughness).
+        Per pixel for converging integrators ("traced": as many as `noise` needs, in a film 8, "path": 64, "qmc": 256,
+        "oslf": 100), otherwise per lobe (by default chosen from each material's roughness).
     noise : float, optional
-        For traced pictures: the relative standard error (`traced.picture.TracedPicture.noise`) that ends them, .02 by
-        default.
+        For traced pictures: the relative standard error (`traced.picture.TracedPicture.noise`) that ends them. By
+        default a still ends at .02 or at 48 samples.
     denoise : bool, optional
         For traced pictures: by default "traced" ones are denoised, "path" ones are not.
     exposure_ev : float, optional
@@ -157,8 +158,19 @@ class Settings:
         return View.of(camera, self.projection, self.width, self.height, self.field_deg)
 
     def check(self) -> None:
-        """Raise `UserError` for an impossible view transform, exposure or field of view; renderers check the rest."""
+        """Raise `UserError` for an impossible value, or an option that the integrator does not have.
+
+        Renderers check the rest.
+        """
         known("integrator", self.integrator, (TRACED, PATH_TRACER, *INTEGRATORS), field="--integrator")
+        if self.projection is Projection.perspective:
+            check_shown(self.show, self.width, self.height)
+        if self.integrator == PATH_TRACER and self.show != "full":
+            raise UserError("the path tracer shows all light", field="--show", got=self.show, expected="full")
+        for option, given in (("--planar", self.planar), ("--lookup", self.lookup)):
+            if self.is_traced and given != "auto":
+                hint = "add --integrator lamps"
+                raise UserError("applies to drawn pictures only", field=option, got=given, expected="auto", hint=hint)
         known("view transform", self.view, VIEWS, field="--view")
         if self.scale is not None:
             self.scale.check()

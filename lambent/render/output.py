@@ -244,7 +244,7 @@ def images(
     if settings.is_traced:
         from lambent.render.traced import TracedImages
 
-        return TracedImages(store, settings, scene, note)
+        return TracedImages(store, settings, scene, note, moving=moving)
     from lambent.render.real_time import RealTime
 
     return RealTime(store, settings, moving, note)

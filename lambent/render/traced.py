@@ -10,7 +10,6 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
-from lambent.core.errors import UserError
 from lambent.core.interruption import is_interruption
 from lambent.core.light_mix import WHITE, MixTrack
 from lambent.core.progress import Cancelled, Progress, silent
@@ -27,7 +26,8 @@ from lambent.traced.picture import TracedPicture
 from lambent.traced.room import room_of_paths, room_of_store
 
 PATHS = 64  # samples of each pixel by whole paths
-NOISE = 0.02
+# Samples in a film's frame; limits of a still, whichever is met first. More gain less than .005 FLIP a doubling.
+FILM_SAMPLES, STILL_SAMPLES, NOISE = 8, 48, 0.02
 FIRST_ASKED, CHECKED_EVERY = 8, 1.5  # samples before the first estimate of the noise, and growth until the next
 MOST_SAMPLES = 4096
 AS_THE_FILE_IS = (
@@ -39,10 +39,12 @@ AS_THE_FILE_IS = (
 class TracedImages(Images):
     """Images by `traced`, or by `path`, of a store or, whole paths alone, of the file `scene` in its place."""
 
-    def __init__(self, store: Store, settings: Settings, scene: str | None, note: Callable[[str], None]) -> None:
+    def __init__(
+        self, store: Store, settings: Settings, scene: str | None, note: Callable[[str], None], *, moving: bool = False
+    ) -> None:
         super().__init__(settings)
+        self._limits = limits_of(settings, moving=moving)
         self._path = settings.integrator == PATH_TRACER
-        _check(settings)
         self._note, self._noted = note, set[str]()
         self._given = scene_of(store, scene)
         if changed := changed_inputs(store, self._given):
@@ -69,7 +71,7 @@ class TracedImages(Images):
             part=settings.show,
         )  # fmt: skip
         try:
-            self.noise = sampled(picture, settings, progress)
+            self.noise = sampled(picture, *self._limits, denoised=settings.denoises, progress=progress)
         except BaseException as error:
             if not (self.keeps and picture.samples and (isinstance(error, Cancelled) or is_interruption(error))):
                 raise
@@ -95,34 +97,30 @@ class TracedImages(Images):
         return materials_without_uv([(o.material, o.mesh.uv) for o in self._given.objects])
 
 
-def sampled(picture: TracedPicture, settings: Settings, progress: Progress = silent) -> float | None:
-    """Add samples until their number, or the noise, is as in the settings; returns the noise if it decided.
+def limits_of(settings: Settings, *, moving: bool) -> tuple[int, float | None]:
+    """Most samples of each pixel, and the noise that ends a picture earlier, if any."""
+    if settings.samples is not None:
+        return settings.samples, None
+    if settings.noise is not None:
+        return MOST_SAMPLES, settings.noise
+    if settings.integrator == PATH_TRACER:
+        return PATHS, None
+    return (FILM_SAMPLES, None) if moving else (STILL_SAMPLES, NOISE)
+
+
+def sampled(
+    picture: TracedPicture, most: int, limit: float | None, *, denoised: bool, progress: Progress = silent
+) -> float | None:
+    """Add at most that many samples, fewer if the noise falls below a limit; returns the last estimate of the noise.
 
     Noise falls with the root of the number of samples, which tells the time left.
     """
-    wanted = settings.samples or (PATHS if picture.path and settings.noise is None else None)
-    if wanted is not None:
-        while picture.samples < wanted:
-            picture.sample(wanted - picture.samples)
-            progress(picture.samples, wanted, "tracing")
-        return None
-    limit, noise, asked = settings.noise or NOISE, np.inf, FIRST_ASKED
-    expected: float = asked
-    while noise > limit and picture.samples < MOST_SAMPLES:
-        picture.sample(asked - picture.samples)
-        if picture.samples >= asked:
-            noise = picture.noise(denoised=settings.denoises)
-            expected = min(picture.samples * max(1.0, (noise / limit) ** 2), MOST_SAMPLES)
+    noise, asked, expected = None, FIRST_ASKED if limit is not None else most, float(most)
+    while picture.samples < most and (noise is None or limit is None or noise > limit):
+        picture.sample(min(asked, most) - picture.samples)
+        if limit is not None and picture.samples >= min(asked, most):
+            noise = picture.noise(denoised=denoised)
+            expected = min(picture.samples * max(1.0, (noise / limit) ** 2), most)
             asked = int(np.ceil(min(expected, CHECKED_EVERY * picture.samples)))
         progress(min(picture.samples, expected), expected, "tracing")
     return noise
-
-
-def _check(settings: Settings) -> None:
-    """Raise `UserError` for choices of the renderer that traced pictures do not have."""
-    if settings.integrator == PATH_TRACER and settings.show != "full":
-        raise UserError("the path tracer shows all light", field="--show", got=settings.show, expected="full")
-    for option, given, usual in (("--planar", settings.planar, "auto"), ("--lookup", settings.lookup, "auto")):
-        if given != usual:
-            hint = "add --integrator lamps"
-            raise UserError("applies to drawn pictures only", field=option, got=given, expected=usual, hint=hint)

@@ -56,7 +56,7 @@ WRONG = {
     "render folder -o x.png --light sun=off --light sun=on@3": "films only; found sun at 3 s",
     "render folder -o x.png --range 1:5": "--range: applies to false colours only",
     "render folder -o x.png --linear": "--linear: applies to false colours only",
-    "render folder -o x.png --integrator ray": "diffuse, path",
+    "render folder -o x.png --integrator ray": "expected traced, path, lamps",
     "bake builtin:box -o s --light-fields ''": "--light-fields: matches no object",
     "walk folder --size 0x0": "--size: cannot be read as a picture size",
     "view folder --camera front": "No such option: --camera",
