@@ -1,8 +1,7 @@
-"""Errors of planar reflectors: every drawing method against exact ray casting and the converged image.
+"""Errors of planar reflectors: every drawing method against exact ray casting.
 
 The test is the specular light of the floor of planar_scene, for seven lobes. PSNR covers the floor's pixels; FLIP
-covers the image, black outside the floor, and the floor's pixels alone. The error against `qmc` is sampling error; the
-error against exact casting also includes the limits of the planar reflection buffer.
+covers the image, black outside the floor, and the floor's pixels alone.
 """
 
 from __future__ import annotations
@@ -31,17 +30,16 @@ ROUGHNESSES = ((0.01, 0.01), (0.02, 0.02), (0.05, 0.05), (0.1, 0.1), (0.2, 0.2),
 
 @dataclass(frozen=True)
 class Effort:
-    """Size in pixels, samples per pixel of the references, whether `qmc` is one of them, and the cases."""
+    """Size in pixels, samples per pixel of the reference, and the cases."""
 
     width: int = 1024
     height: int = 768
     spp: int = 512
-    converged: bool = True
     ns: tuple[int, ...] = (3, 5, 7, 9, 11, 15, 19)
     roughnesses: tuple[tuple[float, float], ...] = ROUGHNESSES
 
 
-FULL, QUICK = Effort(), Effort(192, 144, spp=64, converged=False)
+FULL, QUICK = Effort(), Effort(192, 144, spp=64)
 
 
 def lobe_of(mx: float, my: float) -> Lobe:
@@ -54,46 +52,30 @@ def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
     width, height, count = effort.width, effort.height, len(effort.roughnesses)
     renderer = Renderer(open_device(), planar_scene.planar_scene(lobe_of(*effort.roughnesses[0])))
     rows: list[dict[str, Any]] = []
-    converged: list[dict[str, float]] = []
     for done, (mx, my) in enumerate(effort.roughnesses):
         lobe, name = lobe_of(mx, my), f"roughness {mx}/{my}"
-        casting = part_of(progress, done / count, (done + 0.5) / count, f"{name}, exact")
+        casting = part_of(progress, done / count, (done + 1) / count, f"{name}, exact")
         radiance, floor = planar_scene.exact_reflection(lobe, planar_scene.CAMERA, width, height, effort.spp, casting)
-        exact, qmc = Reference.of(radiance, floor), None
-        state = planar_scene.floor_state(lobe, width, height)
-        if effort.converged:
-            sampling = part_of(progress, (done + 0.5) / count, (done + 1) / count, f"{name}, converged")
-            image = renderer.converged(state, effort.spp, sampling)
-            qmc = Reference.of(image, floor)
-            converged.append(exact.errors(image))
+        exact, state = Reference.of(radiance, floor), planar_scene.floor_state(lobe, width, height)
         rows += [
-            {"mx": mx, "my": my, "n": n, "way": method, **_errors(renderer, replace(state, n=n), method, exact, qmc)}
+            {"mx": mx, "my": my, "n": n, "way": method, **_errors(renderer, replace(state, n=n), method, exact)}
             for n in effort.ns
             for method in METHODS
         ]
         progress(done + 1, count, name)
     size = {"width": width, "height": height, "spp": effort.spp}
-    return {"rows": rows, "summary": {**size, **summary(rows, converged)}}
+    return {"rows": rows, "summary": {**size, **summary(rows)}}
 
 
-def _errors(
-    renderer: Renderer, state: FrameState, method: str, exact: Reference, qmc: Reference | None
-) -> dict[str, float | None]:
+def _errors(renderer: Renderer, state: FrameState, method: str, exact: Reference) -> dict[str, float]:
     integrator, planar = METHODS[method]
     image = renderer.image(replace(state, integrator=integrator, planar=planar))
-    against = qmc.errors(image) if qmc else {}
-    found = {"psnr_qmc": against.get("psnr"), "flip_qmc": against.get("flip")}
-    errors = exact.errors(image).items()
-    return found | {f"{name.replace('shown', 'floor')}_path": value for name, value in errors}
+    return {f"{name.replace('shown', 'floor')}_path": value for name, value in exact.errors(image).items()}
 
 
-def summary(rows: list[dict[str, Any]], converged: list[dict[str, float]]) -> dict[str, Any]:
-    """Means over the lobes by method and n, and of the converged image's own error; the maximum of the worst tiles."""
-    keys = ["psnr_path", "flip_path", "flip_floor_path", *(["psnr_qmc"] if converged else [])]
+def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Means over the lobes by method and n; the maximum of the worst tiles."""
+    keys = ("psnr_path", "flip_path", "flip_floor_path")
     found: dict[str, Any] = {key: by_n(rows, "way", key, mean(4)) for key in keys}
     found["flip_worst_tile_path"] = by_n(rows, "way", "flip_worst_tile_path", max)
-    if converged:
-        names = {"psnr": "psnr", "flip": "flip", "flip_floor": "flip_shown"}
-        own = {name: mean(4)([errors[key] for errors in converged]) for name, key in names.items()}
-        found["converged_path"] = own | {"flip_worst_tile": max(errors["flip_worst_tile"] for errors in converged)}
     return found

@@ -25,7 +25,6 @@ TURN = 0.088  # rotation of a pixel's samples relative to the previous pixel's, 
 # hit, or if 64 pixels share the lobe: at grazing angles, round filters blur the slim lobe.
 FIXED_BIAS, INTERLEAVED_BIAS = 0.4, 0.003
 MOST_RINGS = 3
-THREE_STEPS = {"MARCH_STEPS": 0}
 # Hidden hits have a weight of 1/5. Samples outside the buffer are filtered in the probe like fixed rings.
 SHARED = {"HIDDEN_DROP": 0.8, "BEYOND_WIDER": 1.75}
 
@@ -72,18 +71,16 @@ PLANAR: dict[str, dict[str, Integrator]] = {
     "rings": {
         "marched": Integrator("planar_interleaved.wgsl", interleaved_table, {"MARCH_STEPS": 12, **SHARED}),
         "interleaved": Integrator("planar_interleaved.wgsl", interleaved_table, {"CELL_STEPS": 3, **SHARED}),
-        "fixed": Integrator("planar_quadrature.wgsl", fixed_table, THREE_STEPS),
+        "fixed": Integrator("planar_quadrature.wgsl", fixed_table),
     },
     "lobe-4.24": {"thesis": Integrator("planar_thesis.wgsl", multi_ring_table, {"FORMULA": 24})},
     "lobe-4.25": {"thesis": Integrator("planar_thesis.wgsl", multi_ring_table, {"FORMULA": 25})},
-    "fis": {"fis": Integrator("planar_quadrature.wgsl", patterns.fis_table, THREE_STEPS)},
-    "qmc": {"qmc": Integrator("planar_qmc.wgsl")},
+    "fis": {"fis": Integrator("planar_quadrature.wgsl", patterns.fis_table)},
 }
-PLANAR["oslf"] = PLANAR["oslf-points"] = PLANAR["qmc"]
 # Small lamps leave the mirrored view (reflector_lamps.py); light outside the view comes from the whole probe.
 PLANAR["lamps"] = {name: replace(how, clears_views=True) for name, how in PLANAR["rings"].items()}
 AUTO, OFF = "auto", "off"
-CHOICES = tuple(dict.fromkeys([AUTO, OFF, *(name for methods in PLANAR.values() for name in methods if name != "qmc")]))
+CHOICES = tuple(dict.fromkeys([AUTO, OFF, *(name for methods in PLANAR.values() for name in methods)]))
 
 
 @cache

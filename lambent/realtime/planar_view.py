@@ -49,14 +49,14 @@ class PlanarView:
 
 def planar_views(
     frame: Record, reflectors: Sequence[ReflectorRecord], width: int, height: int, most: int,
-    widest: Mapping[str, float] | None = None, whole: bool = False,
+    widest: Mapping[str, float] | None = None,
     bevel_of: Callable[[ReflectorRecord], Bevel] = lambda reflector: FLAT, shares: Floats | None = None,
 ) -> list[PlanarView]:  # fmt: skip
     """Views of the reflectors that a frame (of FRAME_DTYPE) sees, the largest first, at most `most`.
 
-    `widest` is the largest m of an object's lobes, by its name: wide lobes need a larger buffer. `whole`: buffers hold
-    the whole frame, for lobes that are sampled to their very ends. `bevel_of` a reflector is that of its front.
-    `shares` (R,) of the frame are covered by the reflectors, by default as much as by their outlines.
+    `widest` is the largest m of an object's lobes, by its name: wide lobes need a larger buffer. `bevel_of` a
+    reflector is that of its front. `shares` (R,) of the frame are covered by the reflectors, by default as much as by
+    their outlines.
     """
     if shares is None:
         shares = np.array([covered_share(on_screen(frame, np.asarray(r.outline, float))) for r in reflectors])
@@ -79,7 +79,7 @@ def planar_views(
         step = (
             step_px(height) if bevel == FLAT else STEP_PX
         )  # bevels mirror what lies beside the outline's mirror image
-        place = _window(frame, (width, height), m, None if whole else shown, step)
+        place = _window(frame, (width, height), m, shown, step)
         view = _view(frame, plane, reflector, (width, height), place, number)
         if view is not None:
             view.uniform["bevel_depth"], view.uniform["bevel_cos"] = bevel.depth_m, bevel.least_cos
@@ -184,19 +184,17 @@ def _plan(record: PlanRecord | None, plane: Floats, eye: Floats) -> Record | Non
     return uniform
 
 
-def _window(frame: Record, size: tuple[int, int], m: float, shown: Floats | None, step: int) -> tuple[Floats, Floats]:
+def _window(frame: Record, size: tuple[int, int], m: float, shown: Floats, step: int) -> tuple[Floats, Floats]:
     """Size of the buffer of a frame of `size`, and where the frame's first pixel lies in it.
 
-    It holds the polygon `shown` (Q, 2), in clip coordinates, or the whole frame, and around either the half-width 2 m
-    of the widest lobe. A camera that moves moves it in steps of so many pixels, so that MIP levels do not swim.
+    It holds the polygon `shown` (Q, 2), in clip coordinates, and around it the half-width 2 m of the widest lobe. A
+    camera that moves moves it in steps of so many pixels, so that MIP levels do not swim.
     """
     focal_px = size[1] / 2 / float(np.linalg.norm(frame["up"][:3]))
     reach = max(MARGIN_PX, int(2 * m * focal_px))
     margin = min(reach, max(MARGIN_PX, int(MOST_MARGIN * max(size))))
     wide = np.array([-(-(length + 2 * margin) // step) * step for length in size])
     offset = (wide - np.array(size)) // 2
-    if shown is None:
-        return wide, offset
     places = (shown * [1, -1] + 1) / 2 * size + offset
     low = np.clip((places.min(axis=0) - reach) // step * step, 0, wide).astype(int)
     high = np.clip(-(-(places.max(axis=0) + reach) // step) * step, 0, wide).astype(int)

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pytest
 
 from lambent.core.camera import Camera, image_plane
 from lambent.realtime.albedo import gains
@@ -17,8 +16,7 @@ from lambent.realtime.renderer import Renderer
 from tests.realtime.test_realtime_planar import HEIGHT, WIDTH, mirror, scene_of
 
 
-@pytest.mark.parametrize("integrator", ["rings", "qmc"])
-def test_a_floor_at_a_grazing_angle_shows_its_whole_lobe(device: Any, integrator: str) -> None:
+def test_a_floor_at_a_grazing_angle_shows_its_whole_lobe(device: Any) -> None:
     """Under one radiance, viewers at cosines of .04 to .07 see its albedo there; not less of it.
 
     Reference: the mean of f cos_i/pdf over half vectors of the lobe (`realtime.albedo`).
@@ -28,8 +26,8 @@ def test_a_floor_at_a_grazing_angle_shows_its_whole_lobe(device: Any, integrator
     record = scene.record.model_copy(update={"objects": scene.record.objects[-1:]})
     renderer = Renderer(device, replace(scene, record=record, environment=sky, probes={"floor": Probe((0, 0, 0), sky)}))
     low = Camera(name="low", position=(0.0, 0.2, 2.9), target=(0.0, 0.1, 0.0), fov_y_deg=20)
-    asked = FrameState(low, WIDTH, HEIGHT, antialias=False, integrator=integrator, show="specular")
-    image = renderer.converged(asked, 256) if integrator == "qmc" else renderer.image(asked)
+    asked = FrameState(low, WIDTH, HEIGHT, antialias=False, integrator="rings", show="specular")
+    image = renderer.image(asked)
     across, up, forward = image_plane(low, WIDTH, HEIGHT)
     x, y = np.meshgrid((np.arange(WIDTH) + 0.5) / WIDTH * 2 - 1, 1 - (np.arange(HEIGHT) + 0.5) / HEIGHT * 2)
     rays = forward + x[..., None] * across + y[..., None] * up

@@ -236,4 +236,4 @@ def mirrored_by(context: FrameContext, view: PlanarView) -> tuple[Integrator, in
     if wanted.lamps and narrowest >= BLURS_M and not any(draw.textures & BITS["roughness"] for draw in mine):
         return INTEGRATORS["rings"], BLURRED_N
     # published integrators also draw mirrored objects as published
-    return INTEGRATORS["lamps" if wanted.lamps or wanted.progressive else "rings"], MIRRORED_N
+    return INTEGRATORS["lamps" if wanted.lamps else "rings"], MIRRORED_N

@@ -2,7 +2,7 @@
 
 #include "planar_ray.wgsl"
 
-override MARCH_STEPS: u32 = 24u;
+override MARCH_STEPS: u32 = 0u;
 
 // The hit of a ray that passes a wall, or behind something, before anything is found: the surface that the buffer shows
 // where the ray was last before all, as the sky beside the frame of a window.
