@@ -12,13 +12,12 @@ is 1 (times w) in the plane and falls with the distance along every ray to 1 - a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.realtime.bevels import FLAT, Bevel
 from lambent.realtime.structs import MIRRORED_VIEW_DTYPE, PLAN_DTYPE, Record
 from lambent.store.contract import ObjectRecord, PlanRecord, ReflectorRecord
 
@@ -49,14 +48,12 @@ class PlanarView:
 
 def planar_views(
     frame: Record, reflectors: Sequence[ReflectorRecord], width: int, height: int, most: int,
-    widest: Mapping[str, float] | None = None,
-    bevel_of: Callable[[ReflectorRecord], Bevel] = lambda reflector: FLAT, shares: Floats | None = None,
+    widest: Mapping[str, float] | None = None, shares: Floats | None = None,
 ) -> list[PlanarView]:  # fmt: skip
     """Views of the reflectors that a frame (of FRAME_DTYPE) sees, the largest first, at most `most`.
 
-    `widest` is the largest m of an object's lobes, by its name: wide lobes need a larger buffer. `bevel_of` a
-    reflector is that of its front. `shares` (R,) of the frame are covered by the reflectors, by default as much as by
-    their outlines.
+    `widest` is the largest m of an object's lobes, by its name: wide lobes need a larger buffer. `shares` (R,) of
+    the frame are covered by the reflectors, by default as much as by their outlines.
     """
     if shares is None:
         shares = np.array([covered_share(on_screen(frame, np.asarray(r.outline, float))) for r in reflectors])
@@ -75,14 +72,9 @@ def planar_views(
     for number, (_, reflector, plane) in enumerate(seen[:most]):
         shown = on_screen(frame, np.asarray(reflector.outline, float))
         m = max((widest or {}).get(part.object, 0.0) for part in reflector.parts)
-        bevel = bevel_of(reflector) if plane @ reflector.plane > 0 else FLAT
-        step = (
-            step_px(height) if bevel == FLAT else STEP_PX
-        )  # bevels mirror what lies beside the outline's mirror image
-        place = _window(frame, (width, height), m, shown, step)
+        place = _window(frame, (width, height), m, shown, step_px(height))
         view = _view(frame, plane, reflector, (width, height), place, number)
         if view is not None:
-            view.uniform["bevel_depth"], view.uniform["bevel_cos"] = bevel.depth_m, bevel.least_cos
             views.append(view)
     return views
 

@@ -23,7 +23,6 @@ from lambent.core.images import to_bytes
 from lambent.core.progress import Progress, silent
 from lambent.core.sequences import hammersley
 from lambent.realtime.baked import BakedScene, read_baked
-from lambent.realtime.bevels import Bevels
 from lambent.realtime.clusters import Clusters
 from lambent.realtime.context import FrameContext, Pass
 from lambent.realtime.discs import Discs
@@ -90,7 +89,7 @@ class Renderer:
         )
         self.streaming: Streaming = beside.streaming if beside else Streaming(scene, self.resources.objects)
         self.mixer: LightMixer = beside.mixer if beside else LightMixer(layouts, scene, self.resources)
-        self.waits, self._bevels, self._reflector_faces = True, Bevels(scene), ReflectorFaces(scene)
+        self.waits, self._reflector_faces = True, ReflectorFaces(scene)
         depth, base = DepthPass(layouts), BasePass(layouts)
         planar = PlanarPass(layouts, depth)
         light = LightPass(layouts, planar.reflections)
@@ -307,9 +306,7 @@ class Renderer:
             [record.reflectors[k] for k in wanted],
             self._reflector_faces.shares(data)[np.array(wanted, int)],
         )
-        return planar_views(
-            data, reflectors, state.width, state.height, MOST_REFLECTORS, widest, self._bevels.of, shares
-        )
+        return planar_views(data, reflectors, state.width, state.height, MOST_REFLECTORS, widest, shares)
 
 
 def _subframes(state: FrameState, count: int) -> Iterator[FrameState]:

@@ -17,7 +17,7 @@ override HIDDEN_DROP: f32 = 0.0; // of a hit's weight where the buffer shows som
 
 const FARTHEST = 2e4; // m
 const FADE_PX = 24.0; // beyond the edges of the buffer
-const FLAT_COS = 0.998; // least cosine of the reflector's own normals, as in lambent/realtime/bevels.py
+const FLAT_COS = 0.998; // least cosine of the reflector's own normals: bevels beside them have the probe's light
 const BESIDE = 8u;    // neighbours, up to two pixels away
 
 // A pixel of a reflector: q, the plane seen in the mirror direction, the distance to it; x about the probe's centre.
@@ -194,16 +194,15 @@ struct PlanarLight {
     let view = normalize(frame.eye.xyz - v.p_world);
     // seen from right above, so that no normal is bent as those of rounded things are at grazing angles
     var s = shading_frame(v, select(-1.0, 1.0, upright > 0.0), mirrored.plane.xyz);
-    // Bevels lie below the plane. One comparison: software Vulkan (Mesa 22.3) crashes on further branches here.
-    let height = dot(mirrored.plane.xyz, v.p_world) + mirrored.plane.w;
-    let beside = max(height - mirrored.tolerance, -height - max(mirrored.bevel_depth, mirrored.tolerance));
-    if (max(beside, mirrored.bevel_cos - abs(upright)) > 0.0) { discard; }
+    // One comparison: software Vulkan (Mesa 22.3) crashes on further branches here.
+    let height = abs(dot(mirrored.plane.xyz, v.p_world) + mirrored.plane.w);
+    if (max(height - mirrored.tolerance, FLAT_COS - abs(upright)) > 0.0) { discard; }
     let e = layer_of(reflector_light_maps, select(BACK, FRONT, front), v.uv2).rgb;
     s = with_shares(s, reflector_light_maps, v.uv2, front, e);
     let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), max(dot(view, s.n), 1e-3)));
     let place = place_of(v, s, to_world(s, vec3f(-wo.xy, wo.z)));
     var result = PlanarLight(vec4f(0.0, 0.0, 0.0, min(place.t, HALF_MAX)), vec4f(0.0));
-    var interleaved = select(0u, 256u, abs(upright) < FLAT_COS); // bevels are cleaned by themselves
+    var interleaved = 0u;
     for (var i = 0u; i < LOBES; i++) {
         let found = integrate_planar(i, wo, s, place);
         let elsewhere = !lobe_mirrors(lobes[i].lobe); // light from behind the plane or from the viewer: left to the probe

@@ -17,8 +17,6 @@ struct MirroredView {
     focal_px: f32,
     levels: f32,
     number: f32, // of the reflector in this frame
-    bevel_depth: f32, // m below the plane, see lambent/realtime/bevels.py
-    bevel_cos: f32,   // least cosine between normals and the plane's
 }
 
 // The ray from the mirrored eye, of depth 1, through a texel of the buffer.
