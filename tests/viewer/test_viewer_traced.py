@@ -43,6 +43,7 @@ def renderer(adapter, store):
 def state(renderer, screen, store):
     state = WalkState.of(renderer.scene.record, "walk", screen, store)
     state.look.exposure_ev, state.meter.expose_wanted = 0.0, False
+    state.screen.pace.adaptive = False
     return state
 
 
@@ -125,6 +126,21 @@ def test_the_picture_at_rest_is_traced_and_movement_draws_at_once(pictures, stat
     assert state.screen.at_rest == ""
     again = traced(pictures, state)
     assert np.abs(tiles(again.read()) - tiles(mean)).max() > 0.1 * mean.mean(), "another view"
+
+
+def test_a_coarse_picture_is_replaced_by_a_traced_one_of_half_size_first(pictures, state):
+    """Which is no picture to measure or save."""
+    state.screen.pace.adaptive = True
+    for size in pictures._a.pacer._sizes.values():
+        size.scale = 0.5
+    state.comparison.mode, state.comparison.integrator = "side by side", "qmc"
+    found = traced(pictures, state)
+    assert found.size == (24, 16) and found.counted == "half size" and not found.rests
+    assert state.comparison.figures is None and state.screen.at_rest == "traced: half size"
+    pictures.save()
+    assert read_image(state.screen.folder / "box-001.exr").shape == (32, 48, 3)
+    until(pictures, state, lambda: found.is_whole)
+    assert found.size == SIZE and "sample" in state.screen.at_rest
 
 
 def test_a_picture_is_blended_in_and_a_new_exposure_needs_no_samples(pictures, state):

@@ -191,7 +191,9 @@ class Pictures(Pair):
 
     def save(self) -> None:
         """Write the picture A, and a shown error map."""
-        name = self.shown[0].save(self._state.scene.name)
+        a = self.shown[0]
+        shown = self._a if isinstance(a, TracedPicture) and not a.is_whole else a
+        name = shown.save(self._state.scene.name)
         screen, error_map = self._state.screen, self._state.comparison.map
         if name is None or error_map is None:
             return
@@ -255,8 +257,8 @@ class Pictures(Pair):
             b = self._b_drawn(wanted)
             a, label = self._picture_a(wanted, SHARED), comparison.integrator
             label += f", {comparison.look_up}" if comparison.look_up != AS_A else ""
-        self.shown, traced = (a, b), isinstance(a, TracedPicture)
-        comparison.divider.a_label = f"traced, {a.samples} samples" if traced else wanted.integrator
+        self.shown = (a, b)
+        comparison.divider.a_label = f"traced, {a.counted}" if isinstance(a, TracedPicture) else wanted.integrator
         comparison.divider.b_label = label
         of = a.drawing, b.drawing, comparison.integrator, comparison.look_up, comparison.mode
         self._measure(a, b, of)

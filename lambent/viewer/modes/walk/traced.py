@@ -29,6 +29,7 @@ from lambent.viewer.work import POLL_S
 STILL_S = 0.1  # time without a change before pictures are requested
 SOON_S = 0.02  # interval of polling for the first picture
 FADE_S, FADE_STEP_S = 0.2, 1 / 30  # duration and steps of the blend from one picture to the next
+COARSE_SCALE = 0.5  # a drawn picture of this share of the width and height is replaced by one of half of them first
 TRACEABLE = (ALL_LIGHT, "diffuse", "specular")
 NO_SCENE = "there is no scene file to trace"
 Textures = Mapping[str, str | ImageTexture]
@@ -41,6 +42,7 @@ class TracedPicture:
         self._given, self._screen = given, screen
         self._taken: Traced | None = None
         self._frame: FrameState | None = None  # as it is shown
+        self._wanted: tuple[int, int] | None = None  # size of what it shows
         self._before: Any = None  # view that is blended out
         self._began_s = 0.0
         self.version = 0  # counts pictures
@@ -65,6 +67,18 @@ class TracedPicture:
         return 0 if self._taken is None else self._taken.samples
 
     @property
+    def is_whole(self) -> bool:
+        """Whether the picture has the size of what it shows."""
+        return self._wanted is not None and self.size == self._wanted
+
+    @property
+    def counted(self) -> str:
+        """The samples, in words."""
+        if not self.is_whole:
+            return "half size"
+        return "1 sample" if self.samples == 1 else f"{self.samples} samples"
+
+    @property
     def drawing(self) -> object:
         """What the picture shows: the same while it converges."""
         return None if self._taken is None else (self._taken.kind, self._taken.number)
@@ -75,7 +89,7 @@ class TracedPicture:
 
     @property
     def rests(self) -> bool:
-        return self._taken is not None
+        return self.is_whole
 
     @property
     def texture(self) -> Any:
@@ -89,6 +103,7 @@ class TracedPicture:
 
     def show(self, traced: Traced | None, wanted: FrameState, before: Any) -> None:
         """Show a picture, None for none, as `wanted` shows light; a new one is blended from the view `before`."""
+        self._wanted = wanted.size
         if traced is not self._taken:
             self._taken, self._frame = traced, None
             if traced is None:
@@ -213,7 +228,7 @@ class AtRest:
         found, tracing = self.picture("traced"), self._tracing
         if found is not None and self.still:
             noise = "" if found.noise is None else f", noise {100 * found.noise:.1f} %"
-            return f"traced: {found.samples} samples{noise}" if found.samples < MOST_SAMPLES else ""
+            return f"traced: {found.counted}{noise}" if found.samples < MOST_SAMPLES else ""
         waits = tracing is not None and not tracing.ready and not self.fault and self._of is not None and self._of[1]
         return f"tracing at rest: {tracing.what}" if waits and tracing is not None else ""
 
@@ -244,7 +259,7 @@ class AtRest:
             return f"not {name}"
         if found is None:
             return f"{name}: at rest" if self.coming or self._tracing is None else f"{name}: {self._tracing.what}"
-        return f"{name}, {found.samples} samples"
+        return f"{name}, {found.counted}"
 
     def update(
         self, wanted: FrameState, textures: Textures, kinds: tuple[Kind, ...], *, rebaked: bool, before: Any
@@ -272,7 +287,7 @@ class AtRest:
         wish = replace(of[0], kinds=kinds, rebaked=rebaked)
         if kinds and self.still and wish != self._wish and tracing.ready:
             self._wish = wish
-            tracing.ask(wish)
+            tracing.ask(replace(wish, coarse=self._screen.statistics.scale <= COARSE_SCALE))
         for kind in kinds:
             found = tracing.last(kind) if self._wish is not None else None
             picture = self.held(kind)

@@ -41,6 +41,8 @@ class Wish:
         Whether the copy beside the store has the light of these materials and textures.
     samples : int
         Samples of the one wanted picture; 0: pictures with more and more.
+    coarse : bool
+        Whether the first picture may have half the width and height, to appear at once.
     """
 
     number: int
@@ -53,6 +55,7 @@ class Wish:
     show: str = ALL_LIGHT
     rebaked: bool = False
     samples: int = 0
+    coarse: bool = False
 
     def numbered(self, number: int) -> Wish:
         """The same request under another number."""
@@ -61,7 +64,9 @@ class Wish:
     def said(self) -> dict[str, Any]:
         """As a JSON object."""
         room = RoomState(materials=dict(self.materials), textures=dict(self.textures))
-        plain = {name: getattr(self, name) for name in ("number", "kinds", "size", "show", "rebaked", "samples")}
+        plain = {
+            name: getattr(self, name) for name in ("number", "kinds", "size", "show", "rebaked", "samples", "coarse")
+        }
         return {
             **plain, "camera": asdict(self.camera), "room": room.model_dump(mode="json"),
             "light": {name: list(factor) for name, factor in self.light.items()},
@@ -76,7 +81,7 @@ class Wish:
             int(said["number"]), tuple(said["kinds"]), Camera(**{**camera, **places}),
             (int(said["size"][0]), int(said["size"][1])), room.materials, room.textures,
             {name: triple(factor) for name, factor in said["light"].items()}, str(said["show"]), bool(said["rebaked"]),
-            int(said["samples"]),
+            int(said["samples"]), bool(said["coarse"]),
         )  # fmt: skip
 
 

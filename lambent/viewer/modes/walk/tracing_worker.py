@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 NICENESS = 10  # the window has priority
 PASS_S = 0.1  # time of a pass, as far as single samples allow
 PICTURE_S = 0.5  # shortest time between two pictures
+COARSE = 2  # the first picture is reduced by this factor, if that is asked for
 GROWTH = 0.25  # time of the samples since the last picture, as a share of all samples'
 FINE = 4.0  # fine denoising, which takes twice as long as fast, from this multiple of fast denoising on
 
@@ -116,13 +117,17 @@ class Rooms:
 
 
 class Converging:
-    """A picture of a wish that gets better, with the times of its samples and of its denoising."""
+    """A picture of a wish that gets better, with the times of its samples and of its denoising.
 
-    def __init__(self, kind: Kind, picture: TracedPicture, samples: int) -> None:
-        self.kind, self.picture = kind, picture
+    With a number of `samples`, it is sent once it has them; `fine`: the last picture is denoised well.
+    """
+
+    def __init__(self, kind: Kind, picture: TracedPicture, samples: int, *, fine: bool = True) -> None:
+        self.kind, self.picture, self._fine = kind, picture, fine
         self._once, self._most = samples > 0, samples or MOST_SAMPLES
         self._all_s = self._since_s = self._sample_s = self._fast_s = 0.0
         self._noise: tuple[int, float] | None = None  # samples, and noise then
+        self.begun = False  # whether a picture was sent, this one or a coarse one before it
 
     def sample(self) -> None:
         """Trace a pass."""
@@ -142,7 +147,7 @@ class Converging:
         """Whether the samples since the last picture are worth another one."""
         if self._once or self.done:
             return self.done
-        return self.picture.samples == 1 or self._since_s >= max(PICTURE_S, self._fast_s, GROWTH * self._all_s)
+        return not self.begun or self._since_s >= max(PICTURE_S, self._fast_s, GROWTH * self._all_s)
 
     def image(self) -> Floats:
         """The picture so far (height, width, 3): whole paths as they are, others denoised."""
@@ -150,11 +155,11 @@ class Converging:
             image = self.picture.mean()
         else:
             began, soon = time.monotonic(), self._since_s < FINE * self._fast_s or self._fast_s == 0.0
-            fast = soon and not self.done
+            fast = soon and not (self.done and self._fine)
             image = self.picture.denoised(fast=fast)
             if fast:
                 self._fast_s = time.monotonic() - began
-        self._since_s = 0.0
+        self._since_s, self.begun = 0.0, True
         return image
 
     @property
@@ -198,12 +203,19 @@ def trace(rooms: Rooms, wish: Wish, wishes: Wishes, out: BinaryIO) -> None:
     """Write pictures of a wish with more and more samples, in turns by kind, while it is the newest."""
     from lambent.traced.picture import TracedPicture
 
-    pictures = []
-    for kind in wish.kinds:
+    def picture(kind: Kind, size: tuple[int, int]) -> TracedPicture:
         path = kind == "path"
         tracer = rooms.of(kind, wish).tracer
-        picture = TracedPicture(tracer, wish.camera, wish.size, path=path, part="full" if path else wish.show)
-        pictures.append(Converging(kind, picture, wish.samples))
+        return TracedPicture(tracer, wish.camera, size, path=path, part="full" if path else wish.show)
+
+    pictures = [Converging(kind, picture(kind, wish.size), wish.samples) for kind in wish.kinds]
+    if wish.coarse and wishes.stands(wish):
+        width, height = (max(1, round(side / COARSE)) for side in wish.size)
+        first = Converging(wish.kinds[0], picture(wish.kinds[0], (width, height)), COARSE**2, fine=False)
+        while not first.done:
+            first.sample()
+        send(out, wish, first)
+        pictures[0].begun = True
     while pictures:
         for one in pictures:
             if not wishes.stands(wish):
@@ -211,7 +223,8 @@ def trace(rooms: Rooms, wish: Wish, wishes: Wishes, out: BinaryIO) -> None:
             one.sample()
             if wishes.stands(wish) and one.due:
                 send(out, wish, one)
-                one.estimate_noise()
+                if not wish.samples:
+                    one.estimate_noise()
         pictures = [one for one in pictures if not one.done]
 
 
@@ -223,9 +236,11 @@ def say(out: BinaryIO, **words: object) -> None:
 
 def send(out: BinaryIO, wish: Wish, one: Converging) -> None:
     """Write a picture."""
-    image, samples = one.image(), one.picture.samples
+    image = one.image()
     height, width = image.shape[:2]
-    say(out, number=wish.number, kind=one.kind, samples=samples, noise=one.noise, width=width, height=height)
+    say(
+        out, number=wish.number, kind=one.kind, samples=one.picture.samples, noise=one.noise, width=width, height=height
+    )
     out.write(np.ascontiguousarray(image, np.float32).tobytes())
     out.flush()
 
