@@ -19,7 +19,6 @@ from lambent.realtime.renderer import Renderer
 
 NAME = "planar-quality"
 METHODS = {
-    "lamps": ("lamps", "marched"),
     "marched": ("rings", "marched"),
     "interleaved": ("rings", "interleaved"),
     "fixed": ("rings", "fixed"),

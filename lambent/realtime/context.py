@@ -38,7 +38,6 @@ class FrameContext:
     panes: list[Draw]  # clear glass, blended over everything else
     views: list[PlanarView]  # planar reflectors with a buffer in this frame
     counts: Counter[str]  # draw_calls
-    waits: bool = True  # the frame waits for one-time work that takes seconds
     shown: Any = None  # view of the texture for the display image, if any
     radiance: Any = None  # texture of linear light after the previous pass
     prior: Any = None  # texture of the last frame of few samples, if blended with a progressive mean

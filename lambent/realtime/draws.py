@@ -33,7 +33,6 @@ class Draw:
     takes_lamps: bool = False  # out of the probe's cube map, and evaluates them
     planar_n: int = 0  # samples per lobe on planar reflectors; 0 for objects without pixels on any
     is_beyond: bool = False  # light of a part, added to neighbouring parts
-    is_dark: bool = False  # drawn without its emission
     is_pane: bool = False  # clear glass: the background shows straight through it
     has_holes: bool = False
 
@@ -84,7 +83,7 @@ class Draw:
 
     @property
     def object_group(self) -> Any:
-        return self.item.group(self.cube, self.look_up, self.is_dark)
+        return self.item.group(self.cube, self.look_up)
 
     @property
     def constants(self) -> dict[str, float]:

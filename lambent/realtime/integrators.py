@@ -35,7 +35,6 @@ class Integrator:
     progressive: bool = False  # unbiased: frames of few samples may be averaged
     spp: int = 256  # samples per pixel of a progressive still
     lamps: str | None = None  # shader for a probe with lamps smaller than a lobe, which leave the cube map
-    clears_views: bool = False  # planar: lamps smaller than a lobe leave the mirrored view
 
 
 SUN_SAMPLED = {"SUN_SAMPLED": 1}  # sampled, not in closed form: exact also for lobes narrower than the sun's disc

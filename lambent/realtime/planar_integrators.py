@@ -6,9 +6,6 @@ Integrators without one use the probes on planar reflectors, too.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import cache
-
 import numpy as np
 
 from lambent.core.arrays import Floats
@@ -77,16 +74,9 @@ PLANAR: dict[str, dict[str, Integrator]] = {
     "lobe-4.25": {"thesis": Integrator("planar_thesis.wgsl", multi_ring_table, {"FORMULA": 25})},
     "fis": {"fis": Integrator("planar_quadrature.wgsl", patterns.fis_table)},
 }
-# Small lamps leave the mirrored view (reflector_lamps.py); light outside the view comes from the whole probe.
-PLANAR["lamps"] = {name: replace(how, clears_views=True) for name, how in PLANAR["rings"].items()}
+PLANAR["lamps"] = PLANAR["rings"]
 AUTO, OFF = "auto", "off"
 CHOICES = tuple(dict.fromkeys([AUTO, OFF, *(name for methods in PLANAR.values() for name in methods)]))
-
-
-@cache
-def with_lamps(how: Integrator, count: int) -> Integrator:
-    """The planar integrator with `count` lamps of a reflector evaluated in closed form."""
-    return replace(how, constants={**how.constants, "LAMPS": count})
 
 
 def planar_integrator(integrator: str, method: str) -> Integrator | None:

@@ -61,9 +61,9 @@ class Renderer:
     ----------
     scene : BakedScene
     waits : bool
-        Whether a frame waits for the maps of light fields that it needs, where a budget leaves some out, for its mix
-        of light groups, and for the maps of lamps over planar reflectors. Else the nearest maps stand in, the mix comes
-        part by part, lamps stay in mirrored views, and `light_version` and `mixer.version` grow when more is ready.
+        Whether a frame waits for the maps of light fields that it needs, where a budget leaves some out, and for its
+        mix of light groups. Else the nearest maps stand in, the mix comes part by part, and `light_version` and
+        `mixer.version` grow when more is ready.
     missing : tuple of str
         What the store lacks, in plain words.
     """
@@ -272,7 +272,6 @@ class Renderer:
             factor *= self._unit(state)
         self.device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
         self.mixer.follow(state.light, waits=self.waits)
-        self.resources.reflector_lamps.follow()
         panes = panes_of(state, self.resources)
         views = self._planar_views(state, data, panes)
         reflecting = {part.object for view in views for part in view.reflector.parts}
@@ -284,7 +283,7 @@ class Renderer:
         context = FrameContext(
             slicing, state, data, self._frame_group, self.resources, self._clusters, self._targets, self._timer, target,
             [draw for draw in draws if not draw.is_pane], [draw for draw in draws if draw.is_pane], views, Counter(),
-            waits=self.waits, shown=target_view,
+            shown=target_view,
         )  # fmt: skip
         if state.accumulate is not None and state.prior > 0 and self._few and self._few.size == target.radiance.size:
             context.prior = self._few

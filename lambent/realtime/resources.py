@@ -23,7 +23,6 @@ from lambent.realtime.material_buffers import MaterialBuffers
 from lambent.realtime.parts import WITHIN, neighbouring_faces
 from lambent.realtime.pipelines import VERTEX_FLOATS
 from lambent.realtime.probe_light import ProbeLight, kind_of
-from lambent.realtime.reflector_lamps import LampsOverReflectors
 from lambent.realtime.structs import OBJECT_DTYPE
 from lambent.realtime.sun import SunLight, sun_light
 from lambent.realtime.sun_disc import without_sun
@@ -68,11 +67,10 @@ class ObjectResources:
             self.light, self.emission = light, emission
             self.group.cache_clear()
 
-    def _new_group(self, cube: Cube, look_up: LookUp, dark: bool = False) -> Any:
+    def _new_group(self, cube: Cube, look_up: LookUp) -> Any:
         """Group 2: cube map, resources of the look-up, and the table of the lamps taken out of a `cleaned` cube map.
 
         If the look-up has its own light and the light is not as baked, the cube map holds the ratio to the baked light.
-        `dark`: without the object's emission.
         """
         probe, view = self.light.probe, self.light.view(cube)
         if shows_change := brings_light(look_up) and self.light.is_relit:
@@ -80,7 +78,7 @@ class ObjectResources:
         data = np.zeros(1, OBJECT_DTYPE)
         data["centre"][0] = (*probe.centre, self.light.half_log2_texels("box" if shows_change else cube))
         data["sky_change"][0] = (*self.light.sky_change, self._has_shares)
-        data["emission"][0, :3] = 0 if dark else np.array(self.emission) / self._unit
+        data["emission"][0, :3] = np.array(self.emission) / self._unit
         data["irradiance"].reshape(-1)[: len(probe.irradiance)] = np.array(probe.irradiance) / (self._unit * probe.gain)
         data["irradiance"].reshape(-1)[EVEN_NICHES] = probe.even_niches
         data["borders"][0] = [*self.record.borders, *[WITHIN] * (MOST_BORDERS - len(self.record.borders))]
@@ -144,7 +142,6 @@ class SceneResources:
         self.show_textures({})
         self.mixes_parts = any(beyond.values())
         self.sun = sun_light(layouts, scene, self)
-        self.reflector_lamps = LampsOverReflectors(layouts, self)
 
     def show_textures(self, looks: Mapping[str, Look]) -> None:
         """Show materials with images or other materials' textures; materials left out show their own.

@@ -12,7 +12,7 @@ Record = NDArray[np.void]
 _DECLARED = {
     "LambentLobe": "lobes", "PlacedLobe": "surface", "Frame": "frame", "Material": "material", "Object": "surface",
     "Sun": "sun_record", "MirroredView": "planar_view", "Plan": "planar_walls", "Prefilter": "prefilter",
-    "LightFieldRecord": "light_field_record", "PlaneLamps": "planar_lamp_record",
+    "LightFieldRecord": "light_field_record",
 }  # fmt: skip
 STRUCTS = {
     name: wgsl_dtype(name, assemble(f"{file}.wgsl", given={"look_up.wgsl": ""}))[0] for name, file in _DECLARED.items()
@@ -22,4 +22,3 @@ PLACED_LOBE_DTYPE, PREFILTER_DTYPE = STRUCTS["PlacedLobe"], STRUCTS["Prefilter"]
 SUN_DTYPE = STRUCTS["Sun"]
 LIGHT_FIELD_DTYPE = STRUCTS["LightFieldRecord"]
 MIRRORED_VIEW_DTYPE, PLAN_DTYPE = STRUCTS["MirroredView"], STRUCTS["Plan"]
-PLANE_LAMPS_DTYPE = STRUCTS["PlaneLamps"]

@@ -23,7 +23,7 @@ ENTRIES = {
     "vertex_main", "mask_main", "solid_main", "shade_main", "fringe_main", "sky_main", "planar_main",
     "planar_buffer_main", "planar_buffer_sky_main", "planar_buffer_mips_main", "planar_clean_main", "first_cells_main",
     "cells_main", "planar_walls_main", "accumulate_main", "tonemap_main", "smooth_main", "prefilter_main",
-    "enlarge_main", "coverage_main", "missed_main", "cover_main", "planar_lamps_shown_main",
+    "enlarge_main", "coverage_main", "missed_main", "cover_main",
 }  # fmt: skip
 
 

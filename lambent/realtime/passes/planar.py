@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any
 
 from lambent.realtime.context import FrameContext
@@ -14,11 +14,8 @@ from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.light import Shading, Stage
 from lambent.realtime.passes.planar_buffer import PlanarBuffer, PlanarBufferPass, PlanarCells
 from lambent.realtime.pipelines import screen_pipeline
-from lambent.realtime.planar_integrators import interleaved_table, planar_integrator, with_lamps
-from lambent.realtime.planar_view import PlanarView
-from lambent.realtime.reflector_lamps import ReflectorLamps
+from lambent.realtime.planar_integrators import interleaved_table, planar_integrator
 from lambent.realtime.slices import Steps
-from lambent.realtime.structs import PLANE_LAMPS_DTYPE
 from lambent.realtime.targets import stored, target_texture
 
 FORMAT = "rgba16float"
@@ -42,8 +39,7 @@ class PlanarPass:
         self._buffers, self._cells = PlanarBufferPass(layouts, depth), PlanarCells(layouts)
         # Bindings have no gaps, because they crash a software Vulkan (Mesa 22.3). So the light maps have another number
         # than in shading.
-        self._hits = layouts.of("uniform", "layers", "exact", "exact", "uniform", "storage", "layers")
-        self._lamps = cache(lambda index: layouts.uniform(PLANE_LAMPS_DTYPE.itemsize))
+        self._hits = layouts.of("uniform", "flat", "exact", "exact", "layers")
         self._shading = Shading(layouts, STAGE, self._hits)
         self.reflections = layouts.of(*LIGHT, "exact layers")
         found = layouts.of("exact layers")
@@ -59,49 +55,24 @@ class PlanarPass:
         layers = [
             texture.create_view(dimension="2d", base_array_layer=i, array_layer_count=1) for i in range(FOUND + CLEANED)
         ]
-        lamps = [self._lamps_of(context, view, how) for view in context.views]
-        for index, (mirrored, buffer) in enumerate(self._buffers.mirrored(context, lamps)):
-            yield from self._buffers.encode(mirrored, index, context.views[index], buffer, lamps[index])
-            yield from self._encode_hits(context, index, how, buffer, lamps[index], layers[:FOUND])
+        for index, (mirrored, buffer) in enumerate(self._buffers.mirrored(context)):
+            yield from self._buffers.encode(mirrored, index, context.views[index], buffer)
+            yield from self._encode_hits(context, index, how, buffer, layers[:FOUND])
         self._encode_clean(context, how, texture, layers[FOUND:])
         views = *context.light, texture.create_view(dimension="2d-array")
         context.reflections = self._layouts.group(self.reflections, *views)
         yield
 
-    def _lamps_of(self, context: FrameContext, view: PlanarView, how: Integrator) -> ReflectorLamps | None:
-        """The lamps taken out of a mirrored view; None if no lobe of its reflector is wide enough.
-
-        If the frame does not wait for their map, lamps stay in the view until it is complete.
-        """
-        if not how.clears_views:
-            return None
-        found = context.resources.reflector_lamps.of(view)
-        if found is None:
-            return None
-        mine = [draw for draw in context.draws if view.has(draw.item.record)]
-        served = any(
-            found.serve(draw.material.lobes, context.resources.materials[draw.item.record.material].textures.rough)
-            for draw in mine
-        )
-        if not (served and found.are_within(view)):
-            return None
-        return found if context.resources.reflector_lamps.have_map(found, waits=context.waits) else None
-
     def _encode_hits(
-        self, context: FrameContext, index: int, how: Integrator, buffer: PlanarBuffer, lamps: ReflectorLamps | None,
-        layers: list[Any],
-    ) -> Steps:  # fmt: skip
+        self, context: FrameContext, index: int, how: Integrator, buffer: PlanarBuffer, layers: list[Any]
+    ) -> Steps:
         """The light of one view's pixels, band by band."""
-        view, uniform, of_lamps = context.views[index], self._buffers.uniform(index), self._lamps(index)
-        how = how if lamps is None else with_lamps(how, len(lamps.lamps))
-        if lamps is not None:
-            self._layouts.device.queue.write_buffer(of_lamps, 0, lamps.record(view).tobytes())
+        view, uniform = context.views[index], self._buffers.uniform(index)
         if how.constants.get("CELL_STEPS"):
             self._cells.encode(context, buffer.planes, view.size, uniform)
         cells = self._cells.views(view.size)[0]
-        seen = self._layouts.empty if lamps is None else lamps.map
         light_maps = context.resources.light_view
-        group = self._layouts.group(self._hits, uniform, buffer.light, buffer.planes, cells, of_lamps, seen, light_maps)
+        group = self._layouts.group(self._hits, uniform, buffer.light, buffer.planes, cells, light_maps)
         mine = (draw for draw in context.draws if draw.lobes and view.has(draw.item.record))
         draws = [beyond_view(draw).by(how, context.resources, draw.planar_n) for draw in mine]
         for band in context.slicing.bands("planar", context.state.size):

@@ -5,7 +5,7 @@ Also the walls that bound the view, and the nearest surface in each cell of the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from itertools import pairwise
@@ -15,13 +15,11 @@ from lambent.realtime.context import FrameContext
 from lambent.realtime.draws import Draw
 from lambent.realtime.integrators import INTEGRATORS, Integrator
 from lambent.realtime.layouts import Layouts
-from lambent.realtime.passes.depth import DepthPass, draw_seen, set_geometry
+from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.light import Glazing, Shading, Stage
 from lambent.realtime.passes.sun import SunPass
-from lambent.realtime.pipelines import pipeline, screen_pipeline
+from lambent.realtime.pipelines import screen_pipeline
 from lambent.realtime.planar_view import MOST_REFLECTORS, PlanarView, levels_of
-from lambent.realtime.reflector_lamps import ReflectorLamps
-from lambent.realtime.shader_source import assemble
 from lambent.realtime.slices import Steps
 from lambent.realtime.structs import FRAME_DTYPE, MIRRORED_VIEW_DTYPE, PLAN_DTYPE
 from lambent.realtime.targets import DEPTH_FORMAT, Target, target_texture
@@ -45,25 +43,16 @@ class PlanarBuffer:
     """Textures of one size with their views; reflectors that need this size use them one after the other."""
 
     target: Target
-    light: Any  # all levels and layers
-    layers: list[list[Any]]  # levels of the light and, on request, of the lamps seen
+    light: Any  # all levels
+    levels: list[Any]
     planes: Any
 
     @staticmethod
-    def of(device: Any, size: tuple[int, int], with_lamps: bool = False) -> PlanarBuffer:
+    def of(device: Any, size: tuple[int, int]) -> PlanarBuffer:
         depth, planes = (target_texture(device, size, format) for format in (DEPTH_FORMAT, PLANE_FORMAT))
-        light = target_texture(device, (*size, 1 + with_lamps), LIGHT_FORMAT, levels_of(size))
-        layers = [
-            [
-                light.create_view(
-                    dimension="2d", base_array_layer=layer, array_layer_count=1, base_mip_level=i, mip_level_count=1
-                )
-                for i in range(levels_of(size))
-            ]
-            for layer in range(1 + with_lamps)
-        ]
-        whole = light.create_view(dimension="2d-array")
-        return PlanarBuffer(Target(depth, light), whole, layers, planes.create_view())
+        light = target_texture(device, size, LIGHT_FORMAT, levels_of(size))
+        levels = [light.create_view(base_mip_level=i, mip_level_count=1) for i in range(levels_of(size))]
+        return PlanarBuffer(Target(depth, light), light.create_view(), levels, planes.create_view())
 
 
 class PlanarWalls:
@@ -125,30 +114,6 @@ class PlanarCells:
             finer = into
 
 
-class PlanarLampsShown:
-    """Visibility of lamps drawn dark in a mirrored view, with one channel per object."""
-
-    def __init__(self, layouts: Layouts) -> None:
-        module = layouts.device.create_shader_module(code=assemble("planar_lamps_shown.wgsl"))
-        self._pipeline = cache(
-            lambda channel: pipeline(
-                layouts.device, module, "planar_lamps_shown_main", [layouts.frame], [LIGHT_FORMAT], compare="equal",
-                front_face=STAGE.front_face, constants={"CHANNEL": channel},
-            )
-        )  # fmt: skip
-
-    def encode(self, context: FrameContext, objects: Sequence[str], view: Any) -> None:
-        """Draw into the target `view` at the depths of the mirrored view."""
-        render, seen = context.begin("mirror", [view], "clear"), context.seen()
-        set_geometry(render, context.resources)
-        for draw in context.draws:
-            record = draw.item.record
-            if record.name in objects:
-                render.set_pipeline(self._pipeline(objects.index(record.name)))
-                context.counts["draw_calls"] += draw_seen(render, seen, record.first_face, record.face_count)
-        render.end()
-
-
 class PlanarBufferPass:
     """Draws the mirrored views of a frame. Views may share a buffer, so each is used before the next is drawn."""
 
@@ -157,21 +122,16 @@ class PlanarBufferPass:
         self._layouts, self._depth = layouts, depth
         self._sun = SunPass(layouts, "cw")
         self._shading, self._walls = Shading(layouts, STAGE, layouts.light), PlanarWalls(layouts)
-        self.buffer = lru_cache(MOST_REFLECTORS)(lambda size, lamps: PlanarBuffer.of(device, size, lamps))
-        self._lamps, self._glazing = PlanarLampsShown(layouts), Glazing(layouts, STAGE.front_face)
+        self.buffer = lru_cache(MOST_REFLECTORS)(lambda size: PlanarBuffer.of(device, size))
+        self._glazing = Glazing(layouts, STAGE.front_face)
         self.uniform = cache(lambda index: layouts.uniform(MIRRORED_VIEW_DTYPE.itemsize))
         self._frame = cache(lambda index: layouts.uniform(FRAME_DTYPE.itemsize))
         groups = [layouts.frame, layouts.cube]
         self._sky = screen_pipeline(device, "planar_buffer_sky", groups, FORMATS, compare="equal")
         self._mips = screen_pipeline(device, "planar_buffer_mips", [layouts.shown], [LIGHT_FORMAT])
 
-    def mirrored(
-        self, context: FrameContext, lamps: Sequence[ReflectorLamps | None]
-    ) -> Iterator[tuple[FrameContext, PlanarBuffer]]:
-        """The mirrored frames of a frame in turn, with their buffers; `uniform` has the record of each.
-
-        `lamps` are taken out of each view.
-        """
+    def mirrored(self, context: FrameContext) -> Iterator[tuple[FrameContext, PlanarBuffer]]:
+        """The mirrored frames of a frame in turn, with their buffers; `uniform` has the record of each."""
         write, layouts = self._layouts.device.queue.write_buffer, self._layouts
 
         @cache
@@ -182,23 +142,19 @@ class PlanarBufferPass:
             )
             return draws, panes
 
-        for index, (view, gone) in enumerate(zip(context.views, lamps, strict=True)):
+        for index, view in enumerate(context.views):
             draws, panes = drawn_by(*mirrored_by(context, view))
             write(self._frame(index), 0, view.frame.tobytes())
             write(self.uniform(index), 0, view.uniform.tobytes())
             group = layouts.group(layouts.frame, self._frame(index), context.resources.sampler)
-            buffer = self.buffer(view.size, gone is not None)
-            names = gone.objects if gone else ()
-            shown = [replace(d, is_dark=True) if d.item.record.name in names else d for d in draws]
+            buffer = self.buffer(view.size)
             frame = replace(
-                context, data=view.frame, frame_group=group, draws=shown, panes=panes, target=buffer.target,
+                context, data=view.frame, frame_group=group, draws=draws, panes=panes, target=buffer.target,
                 shown=None,
             )  # fmt: skip
             yield frame, buffer
 
-    def encode(
-        self, context: FrameContext, index: int, view: PlanarView, buffer: PlanarBuffer, lamps: ReflectorLamps | None
-    ) -> Steps:
+    def encode(self, context: FrameContext, index: int, view: PlanarView, buffer: PlanarBuffer) -> Steps:
         """Draw a mirrored frame, band by band."""
         resources = context.resources
         render = context.begin("mirror", [], "clear", depth="clear")
@@ -208,7 +164,7 @@ class PlanarBufferPass:
         yield from self._sun.encode(context)
         light = self._layouts.group(self._layouts.light, *context.light)
         for band in context.slicing.bands("mirror", view.size):
-            render = context.begin("mirror", [buffer.layers[0][0], buffer.planes], band.load_op, band=band)
+            render = context.begin("mirror", [buffer.levels[0], buffer.planes], band.load_op, band=band)
             seen = context.seen(band.shares)
             self._shading.draw(render, context, context.draws, seen, FORMATS, light)
             render.set_pipeline(self._sky)
@@ -218,9 +174,7 @@ class PlanarBufferPass:
             self._glazing.draw(render, context, seen, FORMATS)
             render.end()
             yield
-        if lamps is not None:
-            self._lamps.encode(context, lamps.objects, buffer.layers[1][0])
-        for finer, into in (pair for levels in buffer.layers for pair in pairwise(levels)):
+        for finer, into in pairwise(buffer.levels):
             group = self._layouts.group(self._layouts.shown, finer, resources.sampler)
             context.cover("mips", [into], self._mips, [group])
 

@@ -4,14 +4,13 @@
 // Places are kept about the mirrored eye e: q = p - e. A plane is N towards e and N.q, both of the same texel.
 
 #include "planar_view.wgsl"
-#include "planar_lamps.wgsl"
 
 @group(3) @binding(0) var<uniform> mirrored: MirroredView;
-@group(3) @binding(1) var buffer_light: texture_2d_array<f32>; // second layer: see planar_lamps.wgsl
+@group(3) @binding(1) var buffer_light: texture_2d<f32>;
 @group(3) @binding(2) var buffer_planes: texture_2d<f32>;
 @group(3) @binding(3) var buffer_cells: texture_2d<f32>; // of planar_cells.wgsl
 
-@group(3) @binding(6) var reflector_light_maps: texture_2d_array<f32>; // `light_maps` of shade.wgsl, whose number is taken
+@group(3) @binding(4) var reflector_light_maps: texture_2d_array<f32>; // `light_maps` of shade.wgsl, whose number is taken
 
 override HIDDEN_DROP: f32 = 0.0; // of a hit's weight where the buffer shows something else before it
 
@@ -138,14 +137,11 @@ fn find_hit(place: Place, w: vec3f) -> Hit {
     return hit_within(place, w, guess.t, guess.plane);
 }
 
-// `kept`: light of the lamps in the second layer.
-fn buffer_sample(texel: vec2f, level: f32, kept: mat4x3f) -> vec3f {
+fn buffer_sample(texel: vec2f, level: f32) -> vec3f {
     let wanted = clamp(level, 0.0, mirrored.levels - 1.0);
     let uv = clamp(texel, vec2f(0.5), mirrored.size - 0.5) / mirrored.size;
-    let found = textureSampleLevel(buffer_light, linear_sampler, uv, 0, wanted);
-    var light = found.rgb;
-    if (LAMPS > 0u) { light += kept * textureSampleLevel(buffer_light, linear_sampler, uv, 1, wanted); }
-    return light / max(found.a, 1e-3);
+    let found = textureSampleLevel(buffer_light, linear_sampler, uv, wanted);
+    return found.rgb / max(found.a, 1e-3);
 }
 
 // How much a hit counts: less where it lies behind what the buffer shows there, by 2 to 8 % of its depth.
@@ -210,10 +206,6 @@ struct PlanarLight {
         let rough = found.a > 0.0 && !elsewhere;
         result.rough += select(vec4f(0.0), vec4f(light, 0.0), rough);
         result.sharp += select(vec4f(light, 0.0), vec4f(0.0), rough);
-        if (LAMPS > 0u) {
-            let of_lamps = clamp(lamps_light(lobe_here(i, s).lobe, wo, s, v.p_world), vec3f(0.0), vec3f(HALF_MAX));
-            result.sharp += vec4f(select(of_lamps, vec3f(0.0), elsewhere), 0.0);
-        }
         interleaved |= select(0u, 1u << i, rough);
     }
     result.sharp.a = surface_number(interleaved);

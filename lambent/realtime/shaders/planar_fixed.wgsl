@@ -14,7 +14,6 @@ const SHARE_STEPS = 15.0; // of how far a sample lies outside the buffer: 4 bits
 fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place) -> vec3f {
     let first_jitter = fract(0.754878 * f32(s.pixel.x & 3u) + 0.569840 * f32(s.pixel.y & 3u));
     let here = lobe_here(index, s);
-    let kept_lamps = lamps_kept(here.lobe, place.q + mirrored.eye.xyz);
     var sum = vec3f(0.0);
     var held = vec3f(0.0); // gains of all samples that the buffer holds
     var kept = vec3f(1e-9);    // of those not dropped
@@ -32,7 +31,7 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
         beyond |= outside;
         let inside = 1.0 - f32(outside) / SHARE_STEPS;
         let counted = g * inside * seen_share(hit);
-        sum += counted * buffer_sample(hit.texel, level_of(hit, w, half_log2_omega(q, at, here)), kept_lamps);
+        sum += counted * buffer_sample(hit.texel, level_of(hit, w, half_log2_omega(q, at, here)));
         held += g * inside;
         kept += counted;
     }

@@ -30,7 +30,7 @@ fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
         let hit = find_hit(place, to_world(s, at.wi));
         let inside = hit.inside;
         let weight = select(q * q, q, FORMULA == 24u) * (at.wi.z * at.wi.z * p);
-        sum += buffer_sample(hit.texel, level, mat4x3f()) * inside * weight;
+        sum += buffer_sample(hit.texel, level) * inside * weight;
         let share = 1.0 - inside;
         beyond = Beyond(beyond.gain + share * weight, beyond.w + share * at.wi, beyond.omega + share * omega);
         weights += select(q, vec3f(1.0), FORMULA == 24u) * (at.wi.z * p);
