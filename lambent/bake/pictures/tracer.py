@@ -132,6 +132,7 @@ class Tracer:
         ray = camera_rays(camera, size, samples, sampler)
         si = intersect(self._scene, ray, mi.Bool(True), has_holes(self._scene))
         albedo, normal = self._worn.at(si)
+        dr.eval(albedo, normal)  # at once: each sum would trace the rays again
         share = np.float32(1 / samples)
         means: list[Image] = [(block_sums(v, samples) * share).reshape(height, width, 3) for v in (albedo, normal)]
         return means[0], means[1]
