@@ -352,20 +352,3 @@ def test_the_light_map_scales_what_the_mirrored_view_does_not_hold(device: Any, 
     assert (bright - dark).max() > 0.05, "some of the lobe is not in the mirrored view"
     np.testing.assert_allclose(shown(white, 0.0), dark, atol=5e-3)
     np.testing.assert_allclose(shown(white, 1.0), bright, atol=5e-3)
-
-
-def test_what_the_mirrored_view_does_not_hold_is_looked_up_by_distances(device: Any) -> None:
-    """Planes leave out what stands in a room: with a distance map they change nothing on a reflector."""
-    scene = scene_of(mirror(0.2))
-    light = np.zeros((6, 8, 8, 3), np.float32)
-    light[0] = 3.0
-    probe = Probe((0.0, 0.5, 0.0), light, np.full((6, 8, 8), 1.5, np.float32))
-    walled = replace(probe, planes=np.array([[-1, 0, 0, 9.0], [0, 0, -1, 9.0]], np.float32))
-    one, other = (
-        Renderer(device, replace(scene, probes={**scene.probes, "floor": which})).image(state(n=7, show="specular"))
-        for which in (probe, walled)
-    )
-    dark = Renderer(device, scene).image(state(n=7, show="specular"))
-    assert (one - dark).max() > 0.1
-    floor = Renderer(device, scene).image(state(planar="off"))[..., 2] == 0
-    np.testing.assert_allclose(one[floor], other[floor], atol=5e-3)

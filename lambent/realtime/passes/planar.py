@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
 from lambent.realtime.context import FrameContext
-from lambent.realtime.draws import Draw
 from lambent.realtime.integrators import Integrator
 from lambent.realtime.layouts import LIGHT, Layouts
 from lambent.realtime.passes.depth import DepthPass
@@ -21,14 +19,6 @@ from lambent.realtime.targets import stored, target_texture
 FORMAT = "rgba16float"
 FOUND, CLEANED = 2, 3  # numbers of layers (shaders/planar_layers.wgsl) of planar.wgsl and of planar_clean.wgsl
 STAGE = Stage("planar_main")  # of the shader of a planar integrator
-
-
-def beyond_view(draw: Draw) -> Draw:
-    """A reflector's draw that uses its probe's distances, if there are any, for light outside the mirrored view.
-
-    Planes around a whole room ignore furniture, which is near to points on the floor.
-    """
-    return replace(draw, look_up=draw.item.light.look_up("distance"))
 
 
 class PlanarPass:
@@ -74,7 +64,7 @@ class PlanarPass:
         light_maps = context.resources.light_view
         group = self._layouts.group(self._hits, uniform, buffer.light, buffer.planes, cells, light_maps)
         mine = (draw for draw in context.draws if draw.lobes and view.has(draw.item.record))
-        draws = [beyond_view(draw).by(how, context.resources, draw.planar_n) for draw in mine]
+        draws = [draw.by(how, context.resources, draw.planar_n) for draw in mine]
         for band in context.slicing.bands("planar", context.state.size):
             render = context.begin("planar", layers, "load" if index else band.load_op, band=band)
             self._shading.draw(render, context, draws, context.seen(band.shares), (FORMAT,) * FOUND, group)
