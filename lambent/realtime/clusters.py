@@ -1,7 +1,6 @@
 """Frustum culling on the CPU, by bounding boxes of clusters of neighbouring triangles.
 
-A software adapter spends a third of a small frame on vertices (docs/decisions.md), and each band of a frame would spend
-as much again in each pass.
+A software adapter spends a third of a small frame on vertices (docs/decisions.md).
 """
 
 from __future__ import annotations
@@ -68,41 +67,38 @@ class Clusters:
         before = np.concatenate([[0], np.cumsum(faces)])
         return np.asarray(before[self._end] > before[self._begin])
 
-    def seen(self, clip_from_world: Floats, rows: tuple[float, float] = (0.0, 1.0), among: Flags | bool = True) -> Seen:
+    def seen(self, clip_from_world: Floats, among: Flags | bool = True) -> Seen:
         """The clusters that a camera may see.
 
         Parameters
         ----------
         clip_from_world : (4, 4)
             Column vectors, WebGPU's clip space: |x|, |y| <= w, 0 <= z <= w.
-        rows : (top, bottom)
-            The band of the image that is drawn, as shares of its height.
         among
             The clusters that count, by default all.
         """
-        return self._runs(self._visible(clip_from_world, rows) & among)
+        return self._runs(self._visible(clip_from_world) & among)
 
-    def _visible(self, clip_from_world: Floats, rows: tuple[float, float]) -> Flags:
+    def _visible(self, clip_from_world: Floats) -> Flags:
         x, y, z, w = np.asarray(clip_from_world, np.float64)
-        top, bottom = (1 - 2 * share for share in rows)
-        planes = np.array([w + x, w - x, top * w - y, y - bottom * w, z, w - z]).T
+        planes = np.array([w + x, w - x, w - y, y + w, z, w - z]).T
         normals = planes[:3]
         farthest = self._centre @ normals + self._half @ np.abs(normals) + planes[3]  # of the corner farthest inside
         reach = self._largest @ np.abs(normals) + np.abs(planes[3])
         # Clusters with NaN or infinite terms are drawn.
         return np.asarray(~(farthest < -SLACK * reach).any(axis=1))
 
-    def thin(self, clip_from_world: Floats, rows: tuple[float, float], height_px: int) -> Seen:
+    def thin(self, clip_from_world: Floats, height_px: int) -> Seen:
         """The faces in view that may miss all pixel centres: slivers, and clusters of few pixels.
 
-        `height_px` is the height of the whole image; other parameters as in `seen`.
+        `height_px` is the height of the image; `clip_from_world` as in `seen`.
         """
         _, y, _, w = np.asarray(clip_from_world, np.float64)
         away_m = self._centre @ w[:3] + w[3] + self._half @ np.abs(w[:3])
         with np.errstate(invalid="ignore"):
             narrow_m = np.maximum(away_m, 0) * 2 / (np.linalg.norm(y[:3]) * height_px)  # one pixel
             thin = ~(self._sliver_m > SLIVER_PX * narrow_m) | ~(2 * self._half.max(axis=1) > FEW_PX * narrow_m)
-        return self._runs(self._visible(clip_from_world, rows) & thin)
+        return self._runs(self._visible(clip_from_world) & thin)
 
     def _runs(self, visible: Flags) -> Seen:
         at = np.flatnonzero(visible)

@@ -14,7 +14,6 @@ from lambent.realtime.frame_state import FrameState
 from lambent.realtime.pipelines import cover
 from lambent.realtime.planar_view import PlanarView
 from lambent.realtime.resources import SceneResources
-from lambent.realtime.slices import Band, Cut, Steps, Whole
 from lambent.realtime.structs import Record
 from lambent.realtime.targets import PassTimer, Target, Targets, stored
 
@@ -25,7 +24,7 @@ SMOOTH_PRIOR = 0.5  # from this share of the prior on, edges come mostly from on
 class FrameContext:
     """A frame in progress. Passes read it and store their results in it for later passes."""
 
-    slicing: Whole | Cut  # its encoder takes the passes
+    encoder: Any  # takes the passes
     state: FrameState
     data: Record  # of FRAME_DTYPE
     frame_group: Any  # group 0 of all pipelines, with `data`
@@ -69,19 +68,17 @@ class FrameContext:
         smoothed = self.shown is not None and of_one and self.state.is_smoothed
         return self.targets.display("unsmoothed", self.state.size) if smoothed else None
 
-    def seen(self, rows: tuple[float, float] = (0.0, 1.0), among: Flags | bool = True) -> Seen:
-        """The clusters, of those `among` which it looks, that the frame's camera may see in a band of rows."""
-        return self.clusters.seen(self.data["clip_from_world"].T, rows, among)
+    def seen(self, among: Flags | bool = True) -> Seen:
+        """The clusters, of those `among` which it looks, that the frame's camera may see."""
+        return self.clusters.seen(self.data["clip_from_world"].T, among)
 
-    def thin(self, rows: tuple[float, float]) -> Seen:
+    def thin(self) -> Seen:
         """The faces in view that may miss all pixel centres."""
-        return self.clusters.thin(self.data["clip_from_world"].T, rows, self.state.height)
+        return self.clusters.thin(self.data["clip_from_world"].T, self.state.height)
 
-    def begin(
-        self, name: str, views: Iterable[Any], load_op: str, depth: str = "load", band: Band | None = None
-    ) -> Any:
+    def begin(self, name: str, views: Iterable[Any], load_op: str, depth: str = "load") -> Any:
         """A render pass into `views` and the target's depth, which it loads or clears; group 0 is set."""
-        render = self.slicing.encoder.begin_render_pass(
+        render = self.encoder.begin_render_pass(
             color_attachments=stored(views, load_op),
             depth_stencil_attachment={
                 "view": self.target.depth.create_view(), "depth_clear_value": 0.0, "depth_load_op": depth,
@@ -89,19 +86,15 @@ class FrameContext:
             },
             **self.timer.writes(name),
         )  # fmt: skip
-        if band is not None:
-            band.cut(render)
         render.set_bind_group(0, self.frame_group)
         return render
 
-    def cover(
-        self, name: str, views: Iterable[Any], pipeline: Any, groups: Iterable[Any], band: Band | None = None
-    ) -> None:
+    def cover(self, name: str, views: Iterable[Any], pipeline: Any, groups: Iterable[Any]) -> None:
         """A render pass of a `screen_pipeline` into `views`."""
-        cover(self.slicing.encoder, views, pipeline, groups, self.timer.writes(name), band)
+        cover(self.encoder, views, pipeline, groups, self.timer.writes(name))
 
 
 class Pass(Protocol):
     """A step of a frame; does nothing if the frame does not need it."""
 
-    def encode(self, context: FrameContext) -> Steps: ...
+    def encode(self, context: FrameContext) -> None: ...

@@ -44,7 +44,7 @@ class Discs(Overlay):
             )
             render.draw(len(_CORNERS) * len(places))
         render.end()
-        self._device.queue.submit([context.slicing.encoder.finish()])
+        self._device.queue.submit([context.encoder.finish()])
         return shown
 
 

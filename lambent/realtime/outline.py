@@ -41,7 +41,7 @@ class Outline(Overlay):
     def draw(self, state: FrameState, record: ObjectRecord) -> Any:
         """View of an RGBA texture of the state's size: the line around an object or its parts; clear elsewhere."""
         context = self._frame_context(state, SEEN_FORMAT)
-        encoder, target, data = context.slicing.encoder, context.target, context.data
+        encoder, target, data = context.encoder, context.target, context.data
         seen = target.radiance.create_view()
         place = covered(record.bounds, data, state.size)
         render = context.begin("depth", [], "clear", depth="clear")

@@ -13,7 +13,6 @@ from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.planar_integrators import OFF
 from lambent.realtime.resources import SceneResources
-from lambent.realtime.slices import Whole
 from lambent.realtime.structs import FRAME_DTYPE
 from lambent.realtime.targets import PassTimer, Targets
 
@@ -36,7 +35,7 @@ class Overlay:
         self._device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
         draws = draws_of(state, self._resources, panes=panes_of(state, self._resources))
         return FrameContext(
-            Whole(self._device.create_command_encoder()), state, data, self._frame_group, self._resources,
+            self._device.create_command_encoder(), state, data, self._frame_group, self._resources,
             self._clusters, self._targets, self._timer, self._targets.fit(state.size, format),
             [draw for draw in draws if not draw.is_pane], [draw for draw in draws if draw.is_pane], [], Counter(),
         )  # fmt: skip

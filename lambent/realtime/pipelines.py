@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from lambent.realtime.shader_source import assemble
-from lambent.realtime.slices import Band
 from lambent.realtime.targets import DEPTH_FORMAT, stored
 
 _FLOATS = (3, 3, 3, 2, 2)  # of position, normal, tangent, uv2, uv
@@ -52,14 +51,9 @@ def screen_pipeline(
     return pipeline(device, module, entry or f"{shader}_main", layouts, formats, vertex="screen_main", **depth)
 
 
-def cover(
-    encoder: Any, views: Iterable[Any], pipeline: Any, groups: Iterable[Any], stamps: dict[str, Any],
-    band: Band | None = None,
-) -> None:  # fmt: skip
-    """Encode a render pass of a `screen_pipeline` into the targets `views`, or into a band of their rows."""
-    draw = encoder.begin_render_pass(color_attachments=stored(views, band.load_op if band else "clear"), **stamps)
-    if band is not None:
-        band.cut(draw)
+def cover(encoder: Any, views: Iterable[Any], pipeline: Any, groups: Iterable[Any], stamps: dict[str, Any]) -> None:
+    """Encode a render pass of a `screen_pipeline` into the targets `views`."""
+    draw = encoder.begin_render_pass(color_attachments=stored(views), **stamps)
     draw.set_pipeline(pipeline)
     for number, group in enumerate(groups):
         draw.set_bind_group(number, group)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Collection, Generator, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -45,7 +45,6 @@ from lambent.realtime.planar_integrators import planar_integrator
 from lambent.realtime.planar_view import MOST_REFLECTORS, PlanarView, planar_views
 from lambent.realtime.reflector_faces import ReflectorFaces
 from lambent.realtime.resources import SceneResources
-from lambent.realtime.slices import Cut, Steps, Whole
 from lambent.realtime.streaming import Streaming
 from lambent.realtime.structs import FRAME_DTYPE, Record
 from lambent.realtime.targets import PassTimer, Targets, pixels
@@ -105,8 +104,6 @@ class Renderer:
         self._few: Any = None  # radiance of the last displayed frame of few samples
         self._few_state: FrameState | None = None
         self._counts: dict[str, Any] = {}
-        self._gpu_ms: dict[str, float] | None = None  # of a frame in slices
-        self._frames = 0  # that were begun
 
     def draw(self, state: FrameState, target_view: Any = None) -> Any:
         """Draw a frame; returns the texture of linear radiance that it left.
@@ -115,41 +112,12 @@ class Renderer:
         encoded and smoothed. Returns before the GPU is done: see `finish`.
         """
         started = time.perf_counter()
-        whole, self._gpu_ms = Whole(self.device.create_command_encoder()), None
-        context = self._frame_context(whole, state, target_view)
-        for _ in self._steps(context):
-            pass
-        self._timer.resolve(whole.encoder)
-        self.device.queue.submit([whole.encoder.finish()])
+        encoder = self.device.create_command_encoder()
+        context = self._frame_context(encoder, state, target_view)
+        self._encode(context)
+        self._timer.resolve(encoder)
+        self.device.queue.submit([encoder.finish()])
         self._counts["encode_ms"] = (time.perf_counter() - started) * 1e3
-        return context.radiance
-
-    def slices(self, state: FrameState, target_view: Any, cut: Cut) -> Generator[None, None, Any]:
-        """The same frame to the bit, in slices of about `slices.SLICE_S` seconds, each of which is waited for.
-
-        Generator that yields between slices and returns the texture of radiance. It can be dropped at any time; another
-        frame of this renderer ends it with a `RuntimeError`. Until the end `target_view` holds nothing that is to be
-        seen, and what `draw` returned before is drawn over where it has this size.
-        """
-        times: dict[str, float] = {}
-        encode_s, started = 0.0, time.perf_counter()
-        cut.encoder = self.device.create_command_encoder()
-        context = self._frame_context(cut, state, target_view)
-        frame = self._frames
-        for _ in self._steps(context):
-            self._timer.resolve(cut.encoder)
-            self.device.queue.submit([cut.encoder.finish()])
-            encode_s += time.perf_counter() - started
-            self.finish()
-            cut.took(time.perf_counter() - started)
-            for name, ms in self._timer.read().items():
-                times[name] = times.get(name, 0.0) + ms
-            cut.encoder = self.device.create_command_encoder()
-            yield
-            if self._frames != frame:
-                raise RuntimeError("another frame was begun by the same renderer")
-            started = time.perf_counter()
-        self._gpu_ms, self._counts["encode_ms"] = times, encode_s * 1e3
         return context.radiance
 
     @property
@@ -244,12 +212,12 @@ class Renderer:
 
         Waits for the GPU.
         """
-        return {**self._counts, "gpu_ms": self._timer.read() if self._gpu_ms is None else self._gpu_ms}
+        return {**self._counts, "gpu_ms": self._timer.read()}
 
-    def _steps(self, context: FrameContext) -> Steps:
-        """Encode a frame, step by step."""
+    def _encode(self, context: FrameContext) -> None:
+        """Encode all passes of a frame."""
         for one in self._passes:
-            yield from one.encode(context)
+            one.encode(context)
         if context.is_passing:
             self._few, self._few_state = context.radiance, context.state
         self._counts = {
@@ -263,10 +231,9 @@ class Renderer:
             "samples_per_pixel": max((d.n * d.lobes for d in context.draws if d.integrator.specular), default=0),
         }
 
-    def _frame_context(self, slicing: Whole | Cut, state: FrameState, target_view: Any) -> FrameContext:
+    def _frame_context(self, encoder: Any, state: FrameState, target_view: Any) -> FrameContext:
         """A frame before its first pass."""
         state.check()
-        self._frames += 1
         data = frame_data(state, self.scene.record.bounds)
         for factor in (data["exposure"], data["scale"][3:]):  # light is in the scene's units
             factor *= self._unit(state)
@@ -281,7 +248,7 @@ class Renderer:
         halves = passing or self.resources.mixes_parts or panes  # single precision cannot be blended everywhere
         target = self._targets.fit(state.size, "rgba16float" if halves else "rgba32float", passing=passing)
         context = FrameContext(
-            slicing, state, data, self._frame_group, self.resources, self._clusters, self._targets, self._timer, target,
+            encoder, state, data, self._frame_group, self.resources, self._clusters, self._targets, self._timer, target,
             [draw for draw in draws if not draw.is_pane], [draw for draw in draws if draw.is_pane], views, Counter(),
             shown=target_view,
         )  # fmt: skip

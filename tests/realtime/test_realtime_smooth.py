@@ -12,7 +12,6 @@ import wgpu
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.display import SmoothPass
 from lambent.realtime.pipelines import cover
-from lambent.realtime.slices import Whole
 from lambent.realtime.targets import DISPLAY_FORMAT
 
 SIZE = 64
@@ -33,15 +32,13 @@ def smoothed(device) -> Any:
         pixels = np.repeat(np.round(grey * 255).astype(np.uint8)[..., None], 4, axis=-1)
         pixels[..., 3] = 255 if mixed is None else np.where(mixed, 0, 255)
         device.queue.write_texture({"texture": given}, np.ascontiguousarray(pixels), rows, size)
-        part = Whole(device.create_command_encoder())
+        encoder = device.create_command_encoder()
         context = SimpleNamespace(
-            slicing=part, unsmoothed=given, shown=target.create_view(),
-            state=SimpleNamespace(size=(SIZE, SIZE)), resources=SimpleNamespace(sampler=sampler),
-            cover=lambda name, views, pipeline, groups, band: cover(part.encoder, views, pipeline, groups, {}, band),
+            unsmoothed=given, shown=target.create_view(), resources=SimpleNamespace(sampler=sampler),
+            cover=lambda name, views, pipeline, groups: cover(encoder, views, pipeline, groups, {}),
         )  # fmt: skip
-        for _ in smooth.encode(context):
-            pass
-        device.queue.submit([part.encoder.finish()])
+        smooth.encode(context)
+        device.queue.submit([encoder.finish()])
         read = np.frombuffer(device.queue.read_texture({"texture": target}, rows, size), np.uint8)
         return read.reshape(SIZE, SIZE, 4)[..., 0] / 255
 

@@ -250,18 +250,6 @@ def test_frames_without_a_sun_are_dark_and_noise_knows_none(device: Any) -> None
     assert not drawn(device, baked, frames=1, show="noise").any()
 
 
-def test_slices_of_a_frame_are_the_frame(device: Any) -> None:
-    from lambent.realtime.slices import Cut
-    from lambent.realtime.targets import DISPLAY_FORMAT, pixels, target_texture
-
-    renderer = Renderer(device, scene({"floor": floor(), "plate": plate()}, 3.0))
-    state = FrameState(DOWN, SIZE, SIZE)
-    whole, target = renderer.display_image(state), target_texture(device, (SIZE, SIZE), DISPLAY_FORMAT)
-    for _ in renderer.slices(state, target.create_view(), Cut()):
-        pass
-    assert np.array_equal(whole, pixels(device, target))
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="counts memory by glibc's mallinfo2")
 def test_frames_leave_no_memory_behind(device: Any) -> None:
     """Mesa's software adapter keeps a copy of a shader for every render pass if branches depend on uniforms alone."""

@@ -10,7 +10,6 @@ import numpy as np
 from lambent.realtime.context import FrameContext
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.pipelines import screen_pipeline
-from lambent.realtime.slices import Steps
 from lambent.realtime.targets import target_texture
 
 MEAN_FORMAT = "rgba32float"
@@ -26,7 +25,7 @@ class AccumulatePass:
         self._weight = layouts.uniform(16)
         self._means = lru_cache(1)(self._new_means)
 
-    def encode(self, context: FrameContext) -> Steps:
+    def encode(self, context: FrameContext) -> None:
         """Add the frame's radiance, by its index in the series, to the mean, which becomes the frame's radiance."""
         index = context.state.accumulate
         if index is None:
@@ -36,7 +35,6 @@ class AccumulatePass:
         mean, group = self._means(context.radiance)[index % 2]
         context.cover("accumulate", [mean.create_view()], self._pipeline, [group])
         context.radiance = mean
-        yield
 
     def _new_means(self, frame: Any) -> list[tuple[Any, Any]]:
         """Both images, each with the bind group that reads the other image and the frame."""

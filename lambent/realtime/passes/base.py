@@ -5,7 +5,6 @@ from __future__ import annotations
 from lambent.realtime.context import FrameContext
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.pipelines import screen_pipeline
-from lambent.realtime.slices import Steps
 
 
 class BasePass:
@@ -15,10 +14,9 @@ class BasePass:
         self._layouts = layouts
         self._pipeline = screen_pipeline(layouts.device, "enlarge", [layouts.shown], ["rgba16float"])
 
-    def encode(self, context: FrameContext) -> Steps:
+    def encode(self, context: FrameContext) -> None:
         """Draw the base into the target."""
         if context.redrawn is None or context.base is context.target.radiance:
             return
         group = self._layouts.group(self._layouts.shown, context.base.create_view(), context.resources.sampler)
         context.cover("enlarge", [context.target.radiance.create_view()], self._pipeline, [group])
-        yield

@@ -14,7 +14,6 @@ from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.light import LightPass
 from lambent.realtime.pipelines import pipeline, screen_pipeline
 from lambent.realtime.shader_source import assemble
-from lambent.realtime.slices import Steps
 from lambent.realtime.structs import FRAME_DTYPE
 from lambent.realtime.targets import DEPTH_FORMAT, Target, target_texture
 
@@ -82,7 +81,7 @@ class CoverPass:
     def _pipelines(self) -> Pipelines:  # frames that do not ask for it never wait for its shaders
         return Pipelines.of(self._layouts)
 
-    def encode(self, context: FrameContext) -> Steps:
+    def encode(self, context: FrameContext) -> None:
         """Draw the covered radiance, which becomes the frame's."""
         if not context.is_covered:
             return
@@ -93,17 +92,12 @@ class CoverPass:
             render = place.begin("places", [], "clear", depth="clear")
             context.counts["draw_calls"] += self._depth.draw(render, place)
             render.end()
-            yield
         steps = covering.steps.create_view()
         depths = group(use.depths, *(texture.create_view() for texture in (context.target.depth, *covering.places)))
-        for band in context.slicing.bands("coverage", size):
-            context.cover("coverage", [steps], use.coverage, [depths], band)
-            yield
-        yield from self._missed_light(places, group(use.steps, steps))
+        context.cover("coverage", [steps], use.coverage, [depths])
+        self._missed_light(places, group(use.steps, steps))
         read = group(use.read, context.radiance.create_view(), covering.missed.create_view(), steps)
-        for band in context.slicing.bands("cover", size):
-            context.cover("cover", [covering.covered.create_view()], use.cover, [context.frame_group, read], band)
-            yield
+        context.cover("cover", [covering.covered.create_view()], use.cover, [context.frame_group, read])
         context.radiance = covering.covered
 
     def _places(self, context: FrameContext, covering: Covering) -> list[FrameContext]:
@@ -120,12 +114,11 @@ class CoverPass:
             made.append(replace(context, data=data, frame_group=frame, target=Target(depth, covering.missed)))
         return made
 
-    def _missed_light(self, places: Sequence[FrameContext], steps: Any) -> Steps:
+    def _missed_light(self, places: Sequence[FrameContext], steps: Any) -> None:
         for index, (place, known) in enumerate(zip(places, self._pipelines.known, strict=True)):
             render = place.begin("missed", [], "clear")
             render.set_pipeline(known)
             render.set_bind_group(1, steps)
             render.draw(3)
             render.end()
-            yield
-            yield from self._light.missed(place, "load" if index else "clear")
+            self._light.missed(place, "load" if index else "clear")

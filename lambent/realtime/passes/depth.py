@@ -10,7 +10,6 @@ from lambent.realtime.layouts import Layouts
 from lambent.realtime.pipelines import pipeline
 from lambent.realtime.resources import SceneResources
 from lambent.realtime.shader_source import assemble
-from lambent.realtime.slices import Steps
 
 
 class DepthPass:
@@ -24,12 +23,11 @@ class DepthPass:
             for module, entry, count in ((whole, "", 1), (masked, "mask_main", 2), (masked, "solid_main", 2))
         )
 
-    def encode(self, context: FrameContext) -> Steps:
+    def encode(self, context: FrameContext) -> None:
         """Draw the depth of the frame."""
         render = context.begin("depth", [], "clear", depth="clear")
         context.counts["draw_calls"] += self.draw(render, context)
         render.end()
-        yield
 
     def draw(self, render: Any, context: FrameContext) -> int:
         """Encode into a render pass whose group 0 is set; returns the draw calls.

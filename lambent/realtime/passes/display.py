@@ -5,7 +5,6 @@ from __future__ import annotations
 from lambent.realtime.context import FrameContext
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.pipelines import screen_pipeline
-from lambent.realtime.slices import Steps
 from lambent.realtime.targets import DISPLAY_FORMAT
 
 
@@ -20,7 +19,7 @@ class TonemapPass:
             for marked in (False, True)
         )
 
-    def encode(self, context: FrameContext) -> Steps:
+    def encode(self, context: FrameContext) -> None:
         """Draw into `unsmoothed`, or straight into `shown` without blending of edges."""
         if context.shown is None:
             return
@@ -28,9 +27,7 @@ class TonemapPass:
         groups = [context.frame_group, self._layouts.group(self._layout, *views)]
         target = context.unsmoothed.create_view() if context.unsmoothed else context.shown
         pipeline = self._marked if context.unsmoothed else self._plain
-        for band in context.slicing.bands("tonemap", context.state.size):
-            context.cover("tonemap", [target], pipeline, groups, band)
-            yield
+        context.cover("tonemap", [target], pipeline, groups)
 
 
 class SmoothPass:
@@ -40,11 +37,9 @@ class SmoothPass:
         self._layouts = layouts
         self._pipeline = screen_pipeline(layouts.device, "smooth", [layouts.shown], [DISPLAY_FORMAT])
 
-    def encode(self, context: FrameContext) -> Steps:
+    def encode(self, context: FrameContext) -> None:
         """Draw `unsmoothed` into `shown`."""
         if context.unsmoothed is None:
             return
         group = self._layouts.group(self._layouts.shown, context.unsmoothed.create_view(), context.resources.sampler)
-        for band in context.slicing.bands("smooth", context.state.size):
-            context.cover("smooth", [context.shown], self._pipeline, [group], band)
-            yield
+        context.cover("smooth", [context.shown], self._pipeline, [group])

@@ -18,7 +18,6 @@ from lambent.realtime.passes.depth import draw_runs, set_geometry
 from lambent.realtime.pipelines import pipeline, screen_pipeline
 from lambent.realtime.probe_light import kind_of
 from lambent.realtime.shader_source import assemble
-from lambent.realtime.slices import Steps
 
 
 @dataclass(frozen=True)
@@ -146,42 +145,35 @@ class LightPass:
         self._shade, self._fringe = (Shading(layouts, stage, layouts.light, reflections) for stage in (SHADE, FRINGE))
         self._sky: dict[str, Any] = {}
 
-    def encode(self, context: FrameContext) -> Steps:
-        """Draw the bands of the target, which becomes the frame's radiance."""
+    def encode(self, context: FrameContext) -> None:
+        """Draw the target, which becomes the frame's radiance."""
         resources, format, layouts = context.resources, context.target.radiance.format, self._layouts
         shows_noise = context.state.show == LIGHT_MAP_NOISE
         light = resources.noise_group if shows_noise else layouts.group(layouts.light, *context.light)
         masked = resources.masked if context.blends_masks else set()
         fringes = [draw for draw in context.draws if draw.item.record.name in masked]
-        draws, is_whole = context.draws, context.redrawn is None
+        draws = context.draws
         if context.redrawn is not None:
             draws = [draw for draw in draws if draw.item.record.material in context.redrawn]
-        for band in context.slicing.bands("shade", context.state.size):
-            render = context.begin(
-                "shade", [context.target.radiance.create_view()], band.load_op if is_whole else "load", band=band
-            )
-            seen = context.seen(band.shares)
-            self._shade.draw(render, context, draws, seen, (format,), light)
-            if is_whole:  # a base already has sky and fringes, and fringes must not be blended twice
-                self._draw_sky(render, context, format)
-                self._fringe.draw(render, context, fringes, seen, (format,), light)
-                self._glazing.draw(render, context, seen, (format,))
-            render.end()
-            yield
+        load_op = "clear" if context.redrawn is None else "load"
+        render, seen = context.begin("shade", [context.target.radiance.create_view()], load_op), context.seen()
+        self._shade.draw(render, context, draws, seen, (format,), light)
+        if context.redrawn is None:  # a base already has sky and fringes, and fringes must not be blended twice
+            self._draw_sky(render, context, format)
+            self._fringe.draw(render, context, fringes, seen, (format,), light)
+            self._glazing.draw(render, context, seen, (format,))
+        render.end()
         context.radiance = context.target.radiance
 
-    def missed(self, context: FrameContext, load_op: str) -> Steps:
+    def missed(self, context: FrameContext, load_op: str) -> None:
         """Draw the missed surfaces (`CoverPass`), whose depths the target holds, and the sky between them."""
         format, layouts = context.target.radiance.format, self._layouts
         light = layouts.group(layouts.light, *context.light)
-        for band in context.slicing.bands("missed light", context.state.size):
-            load_op = band.load_op if load_op == "clear" else load_op
-            render = context.begin("missed light", [context.target.radiance.create_view()], load_op, band=band)
-            self._shade.draw(render, context, context.draws, context.thin(band.shares), (format,), light)
-            self._draw_sky(render, context, format)
-            self._glazing.draw(render, context, context.seen(band.shares), (format,))
-            render.end()
-            yield
+        render = context.begin("missed light", [context.target.radiance.create_view()], load_op)
+        self._shade.draw(render, context, context.draws, context.thin(), (format,), light)
+        self._draw_sky(render, context, format)
+        self._glazing.draw(render, context, context.seen(), (format,))
+        render.end()
 
     def _draw_sky(self, render: Any, context: FrameContext, format: str) -> None:
         """Draw the environment where depth is infinite."""

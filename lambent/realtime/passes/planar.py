@@ -13,7 +13,6 @@ from lambent.realtime.passes.light import Shading, Stage
 from lambent.realtime.passes.planar_buffer import PlanarBuffer, PlanarBufferPass, PlanarCells
 from lambent.realtime.pipelines import screen_pipeline
 from lambent.realtime.planar_integrators import interleaved_table, planar_integrator
-from lambent.realtime.slices import Steps
 from lambent.realtime.targets import stored, target_texture
 
 FORMAT = "rgba16float"
@@ -36,7 +35,7 @@ class PlanarPass:
         self._clean = screen_pipeline(layouts.device, "planar_clean", [found], [FORMAT] * CLEANED)
         self._texture = lru_cache(1)(lambda size: target_texture(layouts.device, size, FORMAT))
 
-    def encode(self, context: FrameContext) -> Steps:
+    def encode(self, context: FrameContext) -> None:
         """Draw the buffer of each view and the light found in it, after the frame's depth."""
         how = planar_integrator(context.state.integrator, context.state.planar)
         if not context.views or how is None:
@@ -46,17 +45,16 @@ class PlanarPass:
             texture.create_view(dimension="2d", base_array_layer=i, array_layer_count=1) for i in range(FOUND + CLEANED)
         ]
         for index, (mirrored, buffer) in enumerate(self._buffers.mirrored(context)):
-            yield from self._buffers.encode(mirrored, index, context.views[index], buffer)
-            yield from self._encode_hits(context, index, how, buffer, layers[:FOUND])
+            self._buffers.encode(mirrored, index, context.views[index], buffer)
+            self._encode_hits(context, index, how, buffer, layers[:FOUND])
         self._encode_clean(context, how, texture, layers[FOUND:])
         views = *context.light, texture.create_view(dimension="2d-array")
         context.reflections = self._layouts.group(self.reflections, *views)
-        yield
 
     def _encode_hits(
         self, context: FrameContext, index: int, how: Integrator, buffer: PlanarBuffer, layers: list[Any]
-    ) -> Steps:
-        """The light of one view's pixels, band by band."""
+    ) -> None:
+        """The light of one view's pixels."""
         view, uniform = context.views[index], self._buffers.uniform(index)
         if how.constants.get("CELL_STEPS"):
             self._cells.encode(context, buffer.planes, view.size, uniform)
@@ -65,11 +63,9 @@ class PlanarPass:
         group = self._layouts.group(self._hits, uniform, buffer.light, buffer.planes, cells, light_maps)
         mine = (draw for draw in context.draws if draw.lobes and view.has(draw.item.record))
         draws = [draw.by(how, context.resources, draw.planar_n) for draw in mine]
-        for band in context.slicing.bands("planar", context.state.size):
-            render = context.begin("planar", layers, "load" if index else band.load_op, band=band)
-            self._shading.draw(render, context, draws, context.seen(band.shares), (FORMAT,) * FOUND, group)
-            render.end()
-            yield
+        render = context.begin("planar", layers, "load" if index else "clear")
+        self._shading.draw(render, context, draws, context.seen(), (FORMAT,) * FOUND, group)
+        render.end()
 
     def _encode_clean(self, context: FrameContext, how: Integrator, texture: Any, layers: list[Any]) -> None:
         """Clean interleaved light along rows; without any, the layers are black."""
@@ -78,6 +74,4 @@ class PlanarPass:
             group = self._layouts.group(self._layouts.of("exact layers"), found)
             context.cover("clean", layers, self._clean, [group])
         else:
-            context.slicing.encoder.begin_render_pass(
-                color_attachments=stored(layers), **context.timer.writes("clean")
-            ).end()
+            context.encoder.begin_render_pass(color_attachments=stored(layers), **context.timer.writes("clean")).end()

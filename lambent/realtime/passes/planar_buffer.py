@@ -20,7 +20,6 @@ from lambent.realtime.passes.light import Glazing, Shading, Stage
 from lambent.realtime.passes.sun import SunPass
 from lambent.realtime.pipelines import screen_pipeline
 from lambent.realtime.planar_view import MOST_REFLECTORS, PlanarView, levels_of
-from lambent.realtime.slices import Steps
 from lambent.realtime.structs import FRAME_DTYPE, MIRRORED_VIEW_DTYPE, PLAN_DTYPE
 from lambent.realtime.targets import DEPTH_FORMAT, Target, target_texture
 from lambent.realtime.textures import BITS
@@ -154,26 +153,22 @@ class PlanarBufferPass:
             )  # fmt: skip
             yield frame, buffer
 
-    def encode(self, context: FrameContext, index: int, view: PlanarView, buffer: PlanarBuffer) -> Steps:
-        """Draw a mirrored frame, band by band."""
+    def encode(self, context: FrameContext, index: int, view: PlanarView, buffer: PlanarBuffer) -> None:
+        """Draw a mirrored frame."""
         resources = context.resources
         render = context.begin("mirror", [], "clear", depth="clear")
         context.counts["draw_calls"] += self._walls.draw(render, index, view) + self._depth.draw(render, context)
         render.end()
-        yield
-        yield from self._sun.encode(context)
+        self._sun.encode(context)
         light = self._layouts.group(self._layouts.light, *context.light)
-        for band in context.slicing.bands("mirror", view.size):
-            render = context.begin("mirror", [buffer.levels[0], buffer.planes], band.load_op, band=band)
-            seen = context.seen(band.shares)
-            self._shading.draw(render, context, context.draws, seen, FORMATS, light)
-            render.set_pipeline(self._sky)
-            render.set_bind_group(1, resources.mirrored_sky_group)
-            render.draw(3)
-            context.counts["draw_calls"] += 1
-            self._glazing.draw(render, context, seen, FORMATS)
-            render.end()
-            yield
+        render, seen = context.begin("mirror", [buffer.levels[0], buffer.planes], "clear"), context.seen()
+        self._shading.draw(render, context, context.draws, seen, FORMATS, light)
+        render.set_pipeline(self._sky)
+        render.set_bind_group(1, resources.mirrored_sky_group)
+        render.draw(3)
+        context.counts["draw_calls"] += 1
+        self._glazing.draw(render, context, seen, FORMATS)
+        render.end()
         for finer, into in pairwise(buffer.levels):
             group = self._layouts.group(self._layouts.shown, finer, resources.sampler)
             context.cover("mips", [into], self._mips, [group])

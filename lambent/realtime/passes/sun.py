@@ -17,7 +17,6 @@ from lambent.realtime.passes.depth import draw_runs, set_geometry
 from lambent.realtime.pipelines import pipeline
 from lambent.realtime.planar_view import MOST_REFLECTORS
 from lambent.realtime.shader_source import assemble
-from lambent.realtime.slices import Steps
 from lambent.realtime.sun import SunLight
 from lambent.realtime.targets import target_texture
 
@@ -46,8 +45,8 @@ class SunPass:
             lambda size, is_pane: target_texture(layouts.device, size, FORMAT)
         )
 
-    def encode(self, context: FrameContext) -> Steps:
-        """Draw band by band; nothing where there is no sun."""
+    def encode(self, context: FrameContext) -> None:
+        """Draw; nothing where there is no sun."""
         resources, sun = context.resources, context.resources.sun
         views = [sun.nowhere, sun.nowhere]
         if sun.exists:
@@ -55,27 +54,23 @@ class SunPass:
             for index, draws in enumerate((context.draws, context.panes)):
                 if draws:
                     views[index] = self._texture(size, index).create_view()
-                    yield from self._encode(context, draws, views[index])
+                    self._encode(context, draws, views[index])
         context.light, context.pane_light = ((resources.light_view, sun.uniform, view) for view in views)
 
-    def _encode(self, context: FrameContext, draws: list[Draw], view: Any) -> Steps:
+    def _encode(self, context: FrameContext, draws: list[Draw], view: Any) -> None:
         sun = context.resources.sun
         wide = sun.is_wide and not context.state.is_alone  # a frame in motion gains little by it
-        for band in context.slicing.bands("sun", context.target.depth.size[:2]):
-            render = context.begin("sun", [view], band.load_op, band=band)
-            render.set_bind_group(1, sun.group)
-            set_geometry(render, context.resources)
-            seen = context.seen(band.shares, self._reached(context.clusters, sun))
-            for draw in draws:
-                if runs := seen.of(draw.item.record.first_face, draw.item.record.face_count):
-                    render.set_pipeline(
-                        self._pipeline(
-                            draw.is_pane, draw.material.transmits, sun.parts, sun.squares, sun.pane_layers, wide
-                        )
-                    )
-                    context.counts["draw_calls"] += draw_runs(render, runs)
-            render.end()
-            yield
+        render = context.begin("sun", [view], "clear")
+        render.set_bind_group(1, sun.group)
+        set_geometry(render, context.resources)
+        seen = context.seen(self._reached(context.clusters, sun))
+        for draw in draws:
+            if runs := seen.of(draw.item.record.first_face, draw.item.record.face_count):
+                render.set_pipeline(
+                    self._pipeline(draw.is_pane, draw.material.transmits, sun.parts, sun.squares, sun.pane_layers, wide)
+                )
+                context.counts["draw_calls"] += draw_runs(render, runs)
+        render.end()
 
 
 def _reached(clusters: Clusters, sun: SunLight) -> Flags | bool:
