@@ -29,7 +29,7 @@ def test_both_dimensions_are_those_of_the_sequence(mi: Any) -> None:
 def test_every_first_2_to_the_k_samples_are_stratified_in_every_pair(mi: Any) -> None:
     from lambent.bake.tracing.sobol import SobolSampler
 
-    sampler = SobolSampler.of_pixels(3, 4, 0, 64)
+    sampler = SobolSampler.of_pixels(3, range(4), 0, 64)
     for _ in range(5):
         for one in points(sampler, 4):
             for count in (4, 16, 64):
@@ -42,21 +42,23 @@ def test_every_first_2_to_the_k_samples_are_stratified_in_every_pair(mi: Any) ->
 def test_parts_of_a_series_are_the_series(mi: Any) -> None:
     from lambent.bake.tracing.sobol import SobolSampler
 
-    whole = points(SobolSampler.of_pixels(7, 3, 0, 8), 3)
-    parts = [points(SobolSampler.of_pixels(7, 3, first, count), 3) for first, count in ((0, 2), (2, 1), (3, 5))]
+    whole = points(SobolSampler.of_pixels(7, range(3), 0, 8), 3)
+    parts = [points(SobolSampler.of_pixels(7, range(3), first, count), 3) for first, count in ((0, 2), (2, 1), (3, 5))]
     np.testing.assert_array_equal(np.concatenate(parts, axis=1), whole)
+    last = points(SobolSampler.of_pixels(7, range(1, 3), 0, 8), 2)
+    np.testing.assert_array_equal(last, whole[1:])
 
 
 def test_dimensions_pixels_and_seeds_are_independent(mi: Any) -> None:
     from lambent.bake.tracing.sobol import SobolSampler
 
-    sampler = SobolSampler.of_pixels(1, 512, 0, 64)
+    sampler = SobolSampler.of_pixels(1, range(512), 0, 64)
     pairs = [points(sampler, 512) for _ in range(4)]
     values = np.concatenate([*pairs, np.roll(pairs[0], 1, axis=0)], axis=-1)  # the last are another pixel's
     values -= values.mean(axis=1, keepdims=True)
     covariance = np.einsum("pni,pnj->ij", values, values) / values.shape[1] / len(values)
     assert np.abs(12 * covariance - np.eye(10)).max() < 0.03
-    others = points(SobolSampler.of_pixels(2, 512, 0, 64), 512)
+    others = points(SobolSampler.of_pixels(2, range(512), 0, 64), 512)
     assert abs(np.corrcoef(pairs[0].ravel(), others.ravel())[0, 1]) < 0.02
 
 
@@ -64,6 +66,6 @@ def test_dimensions_pixels_and_seeds_are_independent(mi: Any) -> None:
 def test_integrals_converge_faster_than_at_random(mi: Any, function: Any) -> None:
     from lambent.bake.tracing.sobol import SobolSampler
 
-    found = function(*np.moveaxis(points(SobolSampler.of_pixels(5, 256, 0, 64), 256), -1, 0)).mean(axis=1)
+    found = function(*np.moveaxis(points(SobolSampler.of_pixels(5, range(256), 0, 64), 256), -1, 0)).mean(axis=1)
     rng = np.random.default_rng(0).random((256, 64, 2))
     assert found.std() < 0.3 * function(rng[..., 0], rng[..., 1]).mean(axis=1).std()

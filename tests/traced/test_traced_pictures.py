@@ -162,3 +162,14 @@ def test_more_samples_have_less_noise_and_seeds_differ(room: TracedRoom) -> None
     np.testing.assert_array_equal(few.mean(), traced(room, 16, 1).mean())
     few_paths, many_paths = (traced(room_of_paths(lit_room()), n, path=True) for n in (8, 128))
     assert many_paths.noise(denoised=False) < 0.6 * few_paths.noise(denoised=False)
+
+
+def test_bands_of_a_large_picture_are_the_picture(room: TracedRoom, monkeypatch: pytest.MonkeyPatch) -> None:
+    from lambent.bake.pictures import tracer
+
+    whole = traced(room, 4)
+    monkeypatch.setattr(tracer, "RAYS_AT_ONCE", 100)
+    bands = traced(room, 4)
+    np.testing.assert_allclose(bands.mean(), whole.mean(), rtol=1e-5)
+    for one, other in zip(bands.guides(), whole.guides(), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-5)

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from lambent.bake.bsdfs.material_plugin import DIFFUSE_ATTRIBUTE, NORMAL_ATTRIBUTE, SPECULAR_ATTRIBUTE
 from lambent.bake.light.cache import LightMapCache
 from lambent.bake.pictures.gathering import Gathering
+from lambent.bake.tiles import slices
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.rays import block_sums, has_holes, intersect
 from lambent.bake.tracing.scene_builder import SceneBuilder
@@ -34,6 +35,7 @@ from lambent.materials.factored.albedo import term_albedo
 from lambent.materials.factored.terms import Editable
 
 MAX_DEPTH = 16  # surfaces on the longest path
+RAYS_AT_ONCE = 1 << 21
 Image = NDArray[np.float32]
 
 
@@ -102,13 +104,12 @@ class Tracer:
         self, kind: Kind, camera: Camera, size: tuple[int, int], first: int, count: int, seed: int, part: Part
     ) -> Image:
         """Sum (height, width, 3) of radiance, W/(sr m^2), over samples first..first + count - 1 of each pixel."""
-        width, height = size
-        sampler = SobolSampler.of_pixels(seed, width * height, first, count)
-        ray = camera_rays(camera, size, count, sampler)
-        value = self._traced(kind, part, ray, sampler)
-        value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
-        dr.eval(value)
-        return block_sums(value, count).reshape(height, width, 3)
+
+        def sums(ray: Any, sampler: Any) -> list[Any]:
+            value = self._traced(kind, part, ray, sampler)
+            return [dr.select(dr.all(dr.isfinite(value)), value, 0.0)]
+
+        return in_bands(sums, camera, size, first, count, seed)[0]
 
     def _traced(self, kind: Kind, part: Part, ray: Any, sampler: Any) -> Any:
         start = path_tracer.camera_start(ray)
@@ -127,15 +128,29 @@ class Tracer:
 
     def guides(self, camera: Camera, size: tuple[int, int], samples: int, seed: int) -> tuple[Image, Image]:
         """Albedo and normals (height, width, 3) for a denoiser; 0 without a surface."""
-        width, height = size
-        sampler = SobolSampler.of_pixels(seed, width * height, 0, samples)
-        ray = camera_rays(camera, size, samples, sampler)
-        si = intersect(self._scene, ray, mi.Bool(True), has_holes(self._scene))
-        albedo, normal = self._worn.at(si)
-        dr.eval(albedo, normal)  # at once: each sum would trace the rays again
-        share = np.float32(1 / samples)
-        means: list[Image] = [(block_sums(v, samples) * share).reshape(height, width, 3) for v in (albedo, normal)]
-        return means[0], means[1]
+
+        def worn(ray: Any, sampler: Any) -> list[Any]:
+            return list(self._worn.at(intersect(self._scene, ray, mi.Bool(True), has_holes(self._scene))))
+
+        albedo, normal = (sums / np.float32(samples) for sums in in_bands(worn, camera, size, 0, samples, seed))
+        return albedo, normal
+
+
+def in_bands(
+    trace: Callable[[Any, Any], list[Any]], camera: Camera, size: tuple[int, int], first: int, count: int, seed: int
+) -> list[Image]:
+    """Sums (height, width, 3), over samples first..first + count - 1 of each pixel, of what `trace` finds.
+
+    `trace` gets the rays (mi.Ray3f) and the sampler of as many pixels as memory allows at once.
+    """
+    pixels, parts = size[0] * size[1], []
+    for band in slices(pixels, max(1, RAYS_AT_ONCE // count)):
+        sampler = SobolSampler.of_pixels(seed, range(band.start, band.stop), first, count)
+        ray = camera_rays(camera, size, count, sampler, range(band.start, band.stop))
+        found = trace(ray, sampler)
+        dr.eval(found)  # at once: each sum would trace the rays again
+        parts.append([block_sums(value, count) for value in found])
+    return [np.concatenate(sums).reshape(size[1], size[0], 3) for sums in zip(*parts, strict=True)]
 
 
 def tally_of(traced: TracedScene, factors: Floats | None, *, diffuse: bool) -> path_tracer.Tally:
@@ -198,14 +213,15 @@ def _look(material: Material, edited: Editable | None) -> Floats:
     return found
 
 
-def camera_rays(camera: Camera, size: tuple[int, int], samples: int, sampler: Any) -> Any:
-    """mi.Ray3f through random places of the pixels, `samples` for each, pixel after pixel.
+def camera_rays(camera: Camera, size: tuple[int, int], samples: int, sampler: Any, pixels: range | None = None) -> Any:
+    """mi.Ray3f through random places of all pixels, or these, `samples` for each, pixel after pixel.
 
     Neither camera nor size is a constant of the kernel: other views reuse it.
     """
-    width, height, each = (dr.opaque(mi.UInt32, value) for value in (*size, samples))
-    count = size[0] * size[1] * samples
-    pixel = dr.arange(mi.UInt32, count) // each
+    pixels = pixels or range(size[0] * size[1])
+    width, height, each, begin = (dr.opaque(mi.UInt32, value) for value in (*size, samples, pixels.start))
+    count = len(pixels) * samples
+    pixel = begin + dr.arange(mi.UInt32, count) // each
     row = pixel // width
     jitter = sampler.next_2d()
     x = (mi.Float(pixel - row * width) + jitter.x) / mi.Float(width) * 2 - 1

@@ -26,13 +26,15 @@ class SobolSampler:
     dimension: Any
 
     @classmethod
-    def of_pixels(cls, seed: int, pixels: int, first: int, count: int) -> SobolSampler:
-        """Samples first..first + count - 1 of each pixel, pixel after pixel."""
-        thread, each = dr.arange(mi.UInt32, pixels * count), dr.opaque(mi.UInt32, count)
+    def of_pixels(cls, seed: int, pixels: range, first: int, count: int) -> SobolSampler:
+        """Samples first..first + count - 1 of each pixel, pixel after pixel; the range numbers the pixels."""
+        thread, each = dr.arange(mi.UInt32, len(pixels) * count), dr.opaque(mi.UInt32, count)
         pixel = thread // each
         index = thread - pixel * each + dr.opaque(mi.UInt32, first)
-        series = mi.sample_tea_32(pixel, dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))[0]
-        return cls(index, series, dr.zeros(mi.UInt32, pixels * count))
+        series = mi.sample_tea_32(pixel + dr.opaque(mi.UInt32, pixels.start), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))[
+            0
+        ]
+        return cls(index, series, dr.zeros(mi.UInt32, len(pixels) * count))
 
     def next_1d(self, active: Any = True) -> Any:
         """Uniform in [0, 1)."""
