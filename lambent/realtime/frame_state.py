@@ -138,11 +138,6 @@ class FrameState:
         return self.width, self.height
 
     @property
-    def is_alone(self) -> bool:
-        """Whether the frame is shown by itself, not as a part of a mean."""
-        return self.accumulate is None and not any(self.jitter_px)
-
-    @property
     def is_false_coloured(self) -> bool:
         """Whether the display image is in false colours."""
         return self.view_transform == FALSE_COLOUR or self.show == LIGHT_MAP_NOISE
@@ -195,6 +190,5 @@ def frame_data(state: FrameState, bounds: ArrayLike) -> Record:
     data["first_sample"] = (state.accumulate or 0) * (state.n or QMC_N)
     data["view_transform"] = VIEW_TRANSFORMS[FALSE_COLOUR if state.is_false_coloured else state.view_transform]
     data["prior"] = state.prior
-    data["alone"] = state.is_alone
     data["exposure"] = 2.0**state.exposure_ev
     return data

@@ -42,7 +42,7 @@ class SunLight:
     ) -> None:  # fmt: skip
         self.reached_faces = reached_faces
         self.parts = len(parts)
-        self.exists, self.is_wide = self.parts > 0, self.parts > 1
+        self.exists = self.parts > 0
         panes = panes or no_panes(layouts.device)
         self.squares = len(parts[0].squares) if parts else 0
         self.pane_layers = panes.count

@@ -34,10 +34,10 @@ class SunPass:
         module = layouts.device.create_shader_module(code=assemble("sun.wgsl"))
         groups = [layouts.frame, layouts.of(*SHADOW_MAP)]
         self._pipeline = cache(
-            lambda is_pane, transmits, parts, squares, panes, wide: pipeline(
+            lambda is_pane, transmits, parts, squares, panes: pipeline(
                 layouts.device, module, "sun_main", groups, [FORMAT], compare="greater" if is_pane else "equal",
                 front_face=front_face,
-                constants={"TRANSMITS": transmits, "PARTS": parts, "SQUARES": squares, "PANES": panes, "WIDE": wide},
+                constants={"TRANSMITS": transmits, "PARTS": parts, "SQUARES": squares, "PANES": panes},
             )
         )  # fmt: skip
         self._reached = lru_cache(1)(_reached)
@@ -59,7 +59,6 @@ class SunPass:
 
     def _encode(self, context: FrameContext, draws: list[Draw], view: Any) -> None:
         sun = context.resources.sun
-        wide = sun.is_wide and not context.state.is_alone  # a frame in motion gains little by it
         render = context.begin("sun", [view], "clear")
         render.set_bind_group(1, sun.group)
         set_geometry(render, context.resources)
@@ -67,7 +66,7 @@ class SunPass:
         for draw in draws:
             if runs := seen.of(draw.item.record.first_face, draw.item.record.face_count):
                 render.set_pipeline(
-                    self._pipeline(draw.is_pane, draw.material.transmits, sun.parts, sun.squares, sun.pane_layers, wide)
+                    self._pipeline(draw.is_pane, draw.material.transmits, sun.parts, sun.squares, sun.pane_layers)
                 )
                 context.counts["draw_calls"] += draw_runs(render, runs)
         render.end()

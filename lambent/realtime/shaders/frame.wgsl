@@ -12,7 +12,6 @@ struct Frame {
     exposure: f32,   // factor on radiance, 2^EV
     prior: f32,      // share of the last frame of few samples, blended with a progressive mean
     scale: vec4f,      // of false colour: low, high, logarithmic, lm/W
-    alone: u32,        // 1: no other frames are averaged with this one
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

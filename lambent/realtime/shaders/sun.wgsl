@@ -4,10 +4,8 @@
 //
 // A wide sun's disc is cut into parts, each with a map of its own: in one map blockers hide others behind them. Penumbras
 // are as wide as a part's disc makes them behind the mean of the blockers (Fernando 2005, "Percentage-closer soft
-// shadows"). Blockers of a wide sun are too far apart for one mean: each tap is a place of the disc, hidden by what lies
-// on the way there (Guennebaud, Barthe and Paulin 2006, "Real-time soft shadow mapping by backprojection"). The plane of the surface is followed from texel to texel, so that it
-// does not shadow itself. Under the edge of a sheet that touches the surface, texels beyond that edge do not count: what
-// they show is farther from the sun.
+// shadows"). The plane of the surface is followed from texel to texel, so that it does not shadow itself. Under the edge of
+// a sheet that touches the surface, texels beyond that edge do not count: what they show is farther from the sun.
 
 #include "frame.wgsl"
 #include "sun_record.wgsl"
@@ -25,16 +23,13 @@
 override PARTS: u32 = 4u;        // of the disc, each with a map of its own
 override SQUARES: u32 = 4u;      // of each part of the disc
 override PANES: u32 = 0u;        // layers of clear glass
-override WIDE: bool = false;      // taps are places of the disc
 override TRANSMITS: bool = false; // surfaces show light from behind them
 
 const SUN_BLOCK = 8.0;       // texels along the side of the smallest block: BLOCK of realtime/sun.py
 const SUN_SEARCH = 8u;       // taps that look for blockers
 const SUN_TAPS = 16u;        // taps that are compared
-const SUN_PLACES = 8u;       // of a wide sun's disc, likewise
 const SUN_LEAST_PX = 1.5;    // texels: least radius of either
 const SUN_STEEPEST = 20.0;   // slope, depth over width, beyond which a surface is not followed
-const SUN_APART_PX = 0.75;   // texels, by which a blocker may miss the place that it hides
 const SUN_BIAS_PX = 0.3;     // texels, by which what is nearer to the sun casts no shadow
 const SUN_BEYOND_PX = 2.0;   // texels, by which what is farther from the sun is no part of the surface
 const SUN_LEAST_BEND = 0.85; // cosine between a facet and the smooth surface that it stands for
@@ -147,48 +142,6 @@ fn sun_place(p_world: vec3f, n_world: vec3f) -> SunPlace {
     return at;
 }
 
-const SUN_HIDDEN = 1.0;
-const SUN_DOUBTFUL = 0.5; // something nearer to the sun hides from the map what is on the way
-
-// Whether a blocker about `guess_m` away hides a place of the part's disc, `across` times its radius. The first look-up
-// starts from the guess, the second from the distance that the first found. Gentle rises of the surface are no blockers.
-fn sun_hides(at: SunPlace, across: vec2f, px_per_m: f32, guess_m: f32, bias_m: f32) -> f32 {
-    let offset = max(px_per_m * guess_m, SUN_LEAST_PX) * across;
-    let first_m = sun_rise(at, offset);
-    let second_m = sun_rise(at, max(px_per_m * first_m, SUN_LEAST_PX) * across);
-    let apart_px = px_per_m * abs(second_m - first_m) * length(across);
-    let doubtful = select(0.0, SUN_DOUBTFUL, second_m > first_m && first_m > length(offset) * at.texel_m);
-    return select(0.0, select(doubtful, SUN_HIDDEN, apart_px < SUN_APART_PX), min(first_m, second_m) > bias_m);
-}
-
-// Blockers that a search has found, distances in metres towards the sun.
-struct SunBlockers {
-    count: f32,
-    sum_m: f32,
-    nearest_m: f32,
-    farthest_m: f32,
-    highest_m: f32, // no blocker is farther
-}
-
-fn mean_m(found: SunBlockers) -> f32 {
-    return found.sum_m / max(found.count, 1.0);
-}
-
-// Whether anything hides a place of a wide sun's disc. Guesses are the distances that the search found, and two more
-// between contact and the greatest distance; these vary from tap to tap.
-fn hides_place(at: SunPlace, tap: SunTap, px_per_m: f32, found: SunBlockers, bias_m: f32) -> bool {
-    let place = sqrt(tap.order / f32(SUN_PLACES)) * tap.across;
-    let least_m = SUN_LEAST_PX / px_per_m;
-    let steps = 0.5 * log2(max(found.highest_m / least_m, 1.0));
-    let low_m = least_m * exp2(steps * fract(0.6180339887 * tap.order + sun_turn.y));
-    let by_mean = sun_hides(at, place, px_per_m, mean_m(found), bias_m);
-    let by_nearest = sun_hides(at, place, px_per_m, min(found.nearest_m, found.highest_m), bias_m);
-    let by_farthest = sun_hides(at, place, px_per_m, found.farthest_m, bias_m);
-    let by_low = sun_hides(at, place, px_per_m, low_m, bias_m);
-    let by_high = sun_hides(at, place, px_per_m, low_m * exp2(steps), bias_m);
-    return max(by_mean, max(by_nearest, by_farthest)) > 0.0 || max(by_low, by_high) == SUN_HIDDEN;
-}
-
 // The share of the sun's disc that a point sees; n is the normal of the flat surface there, on either side.
 //
 // Adapters in software skip loops of no turns, but neither branches nor what follows a return, and a loop within another
@@ -213,8 +166,9 @@ fn sun_visibility(p_world: vec3f, n_world: vec3f) -> f32 {
     let is_shaded = inside && range.x > tilt_m;
     let is_lit = !inside || range.y <= 2.0 * bias_m - tilt_m;
 
-    let compared = select(SUN_TAPS, SUN_PLACES, WIDE);
-    var found = SunBlockers(0.0, 0.0, 1e30, 0.0, highest_m);
+    var blockers = 0.0;
+    var sum_m = 0.0; // of their distances towards the sun
+    var nearest_m = 1e30;
     var touches = false;
     var open = 0.0;
     var open_here = 0.0;
@@ -226,35 +180,28 @@ fn sun_visibility(p_world: vec3f, n_world: vec3f) -> f32 {
     for (var k = 0u; k < turns; k++) {
         let is_search = k < SUN_SEARCH;
         let reach = select(spread, min(spread, SUN_LEAST_PX), k == 0u); // the first finds what touches the surface
-        var away_px = reach * sqrt(tap.order);
-        if (WIDE && is_search && k > 0u) { away_px = radius * tap.order / f32(SUN_SEARCH); } // denser where near blockers count
-        let rise = sun_rise(at, away_px * tap.across);
+        let rise = sun_rise(at, reach * sqrt(tap.order) * tap.across);
         let blocks = rise > bias_m;
         if (is_search) {
-            // near surfaces far aside lie outside the cone of the disc
-            let counts = blocks && (!WIDE || away_px < max(px_per_m * rise, SUN_LEAST_PX) + SUN_APART_PX);
-            found.count += select(0.0, 1.0, counts);
-            found.sum_m += select(0.0, rise, counts);
-            found.nearest_m = select(found.nearest_m, min(found.nearest_m, rise), counts);
-            found.farthest_m = select(found.farthest_m, max(found.farthest_m, rise), counts);
+            blockers += select(0.0, 1.0, blocks);
+            sum_m += select(0.0, rise, blocks);
+            nearest_m = select(nearest_m, min(nearest_m, rise), blocks);
             touches |= k == 0u && blocks && px_per_m * rise < SUN_LEAST_PX;
         } else {
-            var hidden = blocks;
-            if (WIDE) { hidden = hides_place(at, tap, px_per_m, found, bias_m); }
             let on_surface = select(0.0, 1.0, rise > -SUN_BEYOND_PX * at.texel_m);
-            open += select(1.0, 0.0, hidden);
-            open_here += select(on_surface, 0.0, hidden);
+            open += select(1.0, 0.0, blocks);
+            open_here += select(on_surface, 0.0, blocks);
             here += on_surface;
         }
         tap = next_sun_tap(tap);
         if (k == SUN_SEARCH - 1u) {
-            let behind_m = select(mean_m(found), 0.0, touches);
-            spread = max(px_per_m * behind_m, SUN_LEAST_PX) * inverseSqrt(f32(compared));
+            let behind_m = select(sum_m / max(blockers, 1.0), 0.0, touches);
+            spread = max(px_per_m * behind_m, SUN_LEAST_PX) * inverseSqrt(f32(SUN_TAPS));
             tap = first;
-            turns = select(SUN_SEARCH, SUN_SEARCH + compared, WIDE || found.count > 0.0);
+            turns = select(SUN_SEARCH, SUN_SEARCH + SUN_TAPS, blockers > 0.0);
         }
     }
-    let share = select(open / f32(compared), open_here / max(here, 1.0), px_per_m * found.nearest_m < SUN_LEAST_PX && here > 0.0);
+    let share = select(open / f32(SUN_TAPS), open_here / max(here, 1.0), px_per_m * nearest_m < SUN_LEAST_PX && here > 0.0);
     return select(select(share, 1.0, turns <= SUN_SEARCH), 0.0, is_shaded);
 }
 
@@ -305,13 +252,13 @@ fn sun_through_panes(p_world: vec3f, n_world: vec3f) -> vec3f {
     return select(vec3f(1.0), sum.rgb / sum.a, taps > 0u);
 }
 
-// Mean over four pixels of one triangle, which ask for the four parts, in a frame that is shown alone. Adapters shade 2 x 2
-// pixels at once, and those of them that the triangle does not cover as well.
+// Mean over four pixels of one triangle, which ask for the four parts. Adapters shade 2 x 2 pixels at once, and those of
+// them that the triangle does not cover as well.
 fn mean_of_parts(seen: vec3f, pixel: vec2u) -> vec3f {
     let is_odd = vec2f(pixel & vec2u(1u));
     let row = seen + (0.5 - is_odd.x) * dpdxFine(seen);
     let all = row + (0.5 - is_odd.y) * dpdyFine(row);
-    return select(seen, clamp(all, vec3f(0.0), vec3f(1.0)), (PARTS > 1u) & (frame.alone == 1u));
+    return select(seen, clamp(all, vec3f(0.0), vec3f(1.0)), PARTS > 1u);
 }
 
 // Whether the sun gets to the light map's texel at a place. Along joints of thin sheets, depths alone let light through.
