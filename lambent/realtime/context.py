@@ -17,8 +17,6 @@ from lambent.realtime.resources import SceneResources
 from lambent.realtime.structs import Record
 from lambent.realtime.targets import PassTimer, Target, Targets, stored
 
-SMOOTH_PRIOR = 0.5  # from this share of the prior on, edges come mostly from one frame, and are blended
-
 
 @dataclass
 class FrameContext:
@@ -39,7 +37,6 @@ class FrameContext:
     counts: Counter[str]  # draw_calls
     shown: Any = None  # view of the texture for the display image, if any
     radiance: Any = None  # texture of linear light after the previous pass
-    prior: Any = None  # texture of the last frame of few samples, if blended with a progressive mean
     base: Any = None  # texture of the last frame of few samples, if this frame is drawn over it
     redrawn: frozenset[str] | None = None  # materials; only their objects are drawn over `base`
     light: tuple[Any, ...] = ()  # resources of group 3: light maps, the sun, and its visible share by pixel
@@ -52,21 +49,24 @@ class FrameContext:
         return self.shown is not None and self.state.accumulate is None
 
     @property
+    def is_smoothed(self) -> bool:
+        """Whether edges of the display image are blended."""
+        return self.is_passing and self.state.is_smoothed
+
+    @property
     def blends_masks(self) -> bool:
         """Whether pixels that masked surfaces cover in part are blended with the background."""
-        return self.is_passing and self.state.is_smoothed and bool(self.resources.masked)
+        return self.is_smoothed and bool(self.resources.masked)
 
     @property
     def is_covered(self) -> bool:
         """Whether pixels show the mean over several places. Frames drawn over a base keep the base's pixels."""
-        return self.is_passing and self.state.covers and self.state.is_smoothed and self.redrawn is None
+        return self.is_smoothed and self.state.covers and self.redrawn is None
 
     @property
     def unsmoothed(self) -> Any:
         """Texture of the display image before its edges are blended; None without blending."""
-        of_one = self.state.accumulate is None or (self.prior is not None and self.state.prior > SMOOTH_PRIOR)
-        smoothed = self.shown is not None and of_one and self.state.is_smoothed
-        return self.targets.display("unsmoothed", self.state.size) if smoothed else None
+        return self.targets.display("unsmoothed", self.state.size) if self.is_smoothed else None
 
     def seen(self, among: Flags | bool = True) -> Seen:
         """The clusters, of those `among` which it looks, that the frame's camera may see."""

@@ -83,8 +83,6 @@ class FrameState:
         always in false colours).
     accumulate : int, optional
         Index of the frame in a progressive series: it is averaged into the frames 0 ... index - 1 before it.
-    prior : float
-        Share, 0 to 1, of the last displayed frame of few samples in the display image of a progressive series.
     antialias : bool
         Blend edges of the display image; when accumulating, jitter the frames instead.
     covers : bool
@@ -115,7 +113,6 @@ class FrameState:
     planar: str = AUTO
     show: str = "full"
     accumulate: int | None = None
-    prior: float = 0.0
     antialias: bool = True
     covers: bool = False
     over: bool = False
@@ -189,6 +186,5 @@ def frame_data(state: FrameState, bounds: ArrayLike) -> Record:
     data["scale"] = (state.scale.low, state.scale.high, state.scale.log, quantity_of(state.show).per_y)
     data["first_sample"] = (state.accumulate or 0) * (state.n or QMC_N)
     data["view_transform"] = VIEW_TRANSFORMS[FALSE_COLOUR if state.is_false_coloured else state.view_transform]
-    data["prior"] = state.prior
     data["exposure"] = 2.0**state.exposure_ev
     return data

@@ -21,7 +21,7 @@ class Given:
 
     def __init__(self, layouts: Layouts, resources: SceneResources) -> None:
         self._layouts, self._scene, self.device = layouts, resources.scene, layouts.device
-        self._layout = layouts.of("exact", "exact")
+        self._layout = layouts.of("exact")
         self._pipeline = screen_pipeline(
             self.device, "tonemap", [layouts.frame, self._layout], [DISPLAY_FORMAT], constants={"MARKED": False}
         )
@@ -41,7 +41,7 @@ class Given:
         texture = self.device.create_texture(size=(width, height, 1), format="rgba16float", usage=usage)
         rows = {"bytes_per_row": 8 * width, "rows_per_image": height}
         self.device.queue.write_texture({"texture": texture}, texels, rows, (width, height, 1))
-        self._group = self._layouts.group(self._layout, texture.create_view(), texture.create_view())
+        self._group = self._layouts.group(self._layout, texture.create_view())
         self.radiance = texture
         self._target = target_texture(self.device, (width, height, 1), DISPLAY_FORMAT)
         self.view = self._target.create_view()
@@ -51,7 +51,6 @@ class Given:
         data = frame_data(state, self._scene.record.bounds)
         for factor in (data["exposure"], data["scale"][3:]):
             factor *= self._scene.unit
-        data["prior"] = 0.0
         self.device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
         encoder = self.device.create_command_encoder()
         cover(encoder, [self.view], self._pipeline, [self._frame_group, self._group], {})

@@ -252,8 +252,6 @@ class Renderer:
             [draw for draw in draws if not draw.is_pane], [draw for draw in draws if draw.is_pane], views, Counter(),
             shown=target_view,
         )  # fmt: skip
-        if state.accumulate is not None and state.prior > 0 and self._few and self._few.size == target.radiance.size:
-            context.prior = self._few
         if passing and state.over:
             context.base, context.redrawn = self._few, self.redrawn(state)
         return context

@@ -329,25 +329,3 @@ def test_impossible_frames_are_refused(device, change: dict[str, object]) -> Non
     renderer = Renderer(device, square(gloss))
     with pytest.raises(UserError):
         renderer.image(replace(FrameState(FORWARD, 8, 8), **change))
-
-
-@pytest.mark.parametrize("mixes", [False, True])
-def test_a_series_begins_from_the_frame_of_few_samples(device, mixes: bool) -> None:
-    """Shown is the mean of the progressive series beside what was shown before, by the share that the state says.
-
-    Where parts of objects are mixed, both are half floats.
-    """
-    gloss = Material(name="m", lobes=(Lobe(mx=0.25, my=0.25, r0=1.0),))
-    renderer = Renderer(device, baked_scene(sphere_and_torus(), gloss, studio(32)))
-    renderer.resources.mixes_parts = mixes
-    few = FrameState(CAMERA, 64, 48, view_transform="linear", antialias=False)
-    one = replace(few, integrator="qmc", n=1, accumulate=0)
-    alone = renderer.display_image(replace(one, prior=0.5))
-    np.testing.assert_array_equal(alone, renderer.display_image(one))  # nothing was shown before
-    before = srgb_decode(renderer.display_image(few).astype(np.float32) / 255)
-    both = srgb_decode(renderer.display_image(replace(one, prior=0.5)).astype(np.float32) / 255)
-    inside = (before < 0.99).all(axis=-1) & (alone < 250).all(axis=-1)
-    mean = (before + srgb_decode(alone.astype(np.float32) / 255)) / 2
-    np.testing.assert_allclose(both[inside], mean[inside], atol=0.01)
-    assert np.abs(both - before)[inside].mean() > 0.005
-    np.testing.assert_array_equal(renderer.display_image(one), alone)

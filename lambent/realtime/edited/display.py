@@ -46,7 +46,7 @@ class Display:
     ) -> None:  # fmt: skip
         """Draw `radiance`, and `share` of `fading`, into the texture `shown`; `view` is one of `VIEW_TRANSFORMS`."""
         look = np.zeros((), FRAME_DTYPE)
-        look["view_transform"], look["exposure"], look["prior"] = VIEW_TRANSFORMS[view], 2.0**exposure_ev, share
+        look["view_transform"], look["exposure"], look["fading"] = VIEW_TRANSFORMS[view], 2.0**exposure_ev, share
         look["scale"] = (scale.low, scale.high, scale.log, LUMINANCE.per_y)
         self._device.queue.write_buffer(self._look, 0, look.tobytes())
         views = [texture.create_view() for texture in (radiance, fading or radiance)]

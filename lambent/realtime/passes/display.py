@@ -9,10 +9,10 @@ from lambent.realtime.targets import DISPLAY_FORMAT
 
 
 class TonemapPass:
-    """Draws the radiance, blended with the frame's share of the prior, into the display image."""
+    """Draws the radiance into the display image."""
 
     def __init__(self, layouts: Layouts) -> None:
-        self._layouts, self._layout = layouts, layouts.of("exact", "exact")
+        self._layouts, self._layout = layouts, layouts.of("exact")
         groups = [layouts.frame, self._layout]
         self._plain, self._marked = (
             screen_pipeline(layouts.device, "tonemap", groups, [DISPLAY_FORMAT], constants={"MARKED": marked})
@@ -23,8 +23,7 @@ class TonemapPass:
         """Draw into `unsmoothed`, or straight into `shown` without blending of edges."""
         if context.shown is None:
             return
-        views = [(texture or context.radiance).create_view() for texture in (context.radiance, context.prior)]
-        groups = [context.frame_group, self._layouts.group(self._layout, *views)]
+        groups = [context.frame_group, self._layouts.group(self._layout, context.radiance.create_view())]
         target = context.unsmoothed.create_view() if context.unsmoothed else context.shown
         pipeline = self._marked if context.unsmoothed else self._plain
         context.cover("tonemap", [target], pipeline, groups)

@@ -9,6 +9,6 @@
 @fragment fn edited_display_main(screen: Screen) -> @location(0) vec4f {
     let at = vec2i(screen.position.xy);
     var seen = textureLoad(radiance, at, 0).rgb;
-    if (frame.prior > 0.0) { seen += frame.prior * textureLoad(fading, at, 0).rgb; }
+    if (frame.fading > 0.0) { seen += frame.fading * textureLoad(fading, at, 0).rgb; }
     return vec4f(displayed(max(seen, vec3f(0.0))), 1.0);
 }

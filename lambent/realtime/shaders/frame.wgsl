@@ -10,7 +10,7 @@ struct Frame {
     first_sample: u32, // index of this frame's first sample of a progressive series
     view_transform: u32,
     exposure: f32,   // factor on radiance, 2^EV
-    prior: f32,      // share of the last frame of few samples, blended with a progressive mean
+    fading: f32,     // share of the fading difference in an edited picture
     scale: vec4f,      // of false colour: low, high, logarithmic, lm/W
 }
 
