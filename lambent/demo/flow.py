@@ -33,7 +33,7 @@ from lambent.core.files import write_text
 from lambent.core.images import write_image, write_shown
 from lambent.core.metrics import compare
 from lambent.core.plain import plain
-from lambent.core.progress import Progress
+from lambent.core.progress import Progress, part_of
 from lambent.materials import measured
 from lambent.materials.document import load_material
 from lambent.materials.fitting.fit import fit
@@ -42,7 +42,7 @@ from lambent.materials.measured.gonio_text import write_gonio
 from lambent.realtime.device import adapter_info, open_device
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
-from lambent.render import write_frames
+from lambent.render import Settings, images, write_frames
 from lambent.scenes import load_scene
 from lambent.scenes.camera_paths import camera_at, path_length
 from lambent.scenes.scene import Scene
@@ -63,19 +63,18 @@ STILLS = 8
 class Effort:
     """Sizes of a demo: images in pixels, film frames per second, samples per pixel of the compared view.
 
-    The fit uses `tuples` samples of each table, or all if None. `still_frames` are averaged to a still; `moving_frames`
-    are averaged to the view in motion, so that its edges can be compared.
+    The fit uses `tuples` samples of each table, or all if None. `moving_frames` are averaged to the view in motion, so
+    that its edges can be compared.
     """
 
     quality: Quality
     tuples: int | None
     still: tuple[int, int]
-    still_frames: int
     film: tuple[int, int]
     film_fps: int
     compared: tuple[int, int]
     path_spp: int
-    qmc_spp: int
+    rest_spp: int
     moving_frames: int = 16
 
 
@@ -86,8 +85,8 @@ DRAFT = quality_named("preview").changed(
     environment={"texels": 128},
     probe={"texels": 64, "samples": 8},
 )
-FULL = Effort(quality_named("preview"), None, (1680, 1050), 2, (720, 450), 20, (840, 525), 48, 256)
-QUICK = Effort(DRAFT, 3_000, (960, 600), 1, (480, 300), 10, (420, 262), 32, 128, 4)
+FULL = Effort(quality_named("preview"), None, (1680, 1050), (720, 450), 20, (840, 525), 48, 48)
+QUICK = Effort(DRAFT, 3_000, (960, 600), (480, 300), 10, (420, 262), 32, 24, 4)
 
 
 def cameras(path: CameraPath, count: int) -> list[Camera]:
@@ -177,22 +176,17 @@ class Flow:
         }
 
     def walk(self) -> None:
-        """Stills and a film of the walk, drawn by the window's frame code."""
+        """Traced stills, and a film drawn as in motion."""
         effort, renderer = self.effort, self._renderer
         path, exposure_ev = renderer.scene.record.paths[0], renderer.scene.record.exposure_ev or 0.0
-
-        views = [FrameState(camera, *effort.still, exposure_ev=exposure_ev) for camera in cameras(path, STILLS)]
-        renderer.display_image(views[0])  # the first frame also compiles the pipelines
+        traced = images(Store.open(self.store_path), Settings(*effort.still, exposure_ev=exposure_ev))
+        views = cameras(path, STILLS)
         with self._timed("stills"):
-            for number, view in enumerate(views, 1):
-                started = time.perf_counter()
-                image = renderer.still(view, effort.still_frames)
-                frame_ms = (time.perf_counter() - started) * 1e3 / effort.still_frames
-                self.report.setdefault("frame_ms", []).append(frame_ms)
-                write_shown(self.out / f"walk_{number}.png", image)
-                self.progress(number, STILLS, "stills")
+            for number, view in enumerate(views):
+                part = part_of(self.progress, number / STILLS, (number + 1) / STILLS, "stills")
+                write_shown(self.out / f"walk_{number + 1}.png", traced.displayed(view, part))
         planar = "interleaved" if adapter_info(renderer.device).is_software else "auto"  # takes half the time
-        frame = FrameState(views[0].camera, *effort.film, exposure_ev=exposure_ev, planar=planar)
+        frame = FrameState(views[0], *effort.film, exposure_ev=exposure_ev, planar=planar)
 
         def draw(camera: Camera) -> Any:
             return renderer.display_image(replace(frame, camera=camera))
@@ -202,7 +196,7 @@ class Flow:
             write_frames(self.out / "walk.mp4", shown, draw, effort.film, effort.film_fps, self.progress)
 
     def compare(self, scene: Scene) -> None:
-        """Compare one view by three methods: in motion (`rings`), at rest (`qmc`), and path traced."""
+        """Compare one view in motion, at rest, and path traced."""
         from lambent.bake.reference.path_traced import (
             render_reference,  # imports Mitsuba, whose variant is set by the bake
         )
@@ -210,7 +204,8 @@ class Flow:
         effort, renderer, camera = self.effort, self._renderer, scene.cameras[0]
         state = FrameState(camera, *effort.compared)
         with self._timed("frame at rest"):
-            rest = renderer.converged(state, effort.qmc_spp, self.progress)
+            settings = Settings(*effort.compared, samples=effort.rest_spp)
+            rest = images(Store.open(self.store_path), settings).radiance(camera, self.progress)
         with self._timed("frame in motion"):
             moving = renderer.still_radiance(state, effort.moving_frames)
         with self._timed("path tracing"):
@@ -220,9 +215,9 @@ class Flow:
             write_image(folder / f"{name}.exr", image)
         self.report["compare"] = {"camera": camera.name, "spp": effort.path_spp}
         for name, reference, test in (
-            ("sampling", rest, moving),  # error of few, filtered samples
-            ("total", truth, rest),  # error of probes, parallax and light map
-            ("moving_total", truth, moving),
+            ("change", rest, moving),  # between motion and rest
+            ("rest", truth, rest),
+            ("moving", truth, moving),
         ):
             self.report["compare"][name], difference = compare(reference, test, radiance=True)
             write_image(folder / f"{name}.png", srgb_decode(difference))
