@@ -181,17 +181,3 @@ def test_a_click_on_a_disc_keeps_the_selection(state, geometry, field):
     state.fields.points_on = False
     walk.clicked(x, y)
     assert state.selection.name is None
-
-
-def test_the_choice_of_points_is_not_refined(renderer, screen):
-    """At rest the picture stays that of the chosen integrator: the mean of two points' colours is that of none."""
-    state = WalkState.of(renderer.scene.record, "walk", screen)
-    state.navigation.camera, screen.pace.adaptive = CAMERA, False
-    counts = {}
-    for look_up in ("light_field-choice", "light_field"):
-        state.look.lookup = look_up
-        pictures = Pictures(renderer, state)
-        for _ in range(4):
-            drawn(pictures, state, SIZE)
-        counts[look_up] = pictures.shown[0].samples
-    assert counts["light_field-choice"] == 0 < counts["light_field"]

@@ -67,12 +67,12 @@ def test_figures_and_maps():
     comparison.mode = "error map"
     b = np.random.default_rng(5).random((32, 32, 3)).astype(np.float32)
     assert comparison.due("here", 1)
-    comparison.compare(1.2 * b, b, "linear", 0.0, 1, 8)
-    assert not comparison.due("here", 1) and comparison.due("here", 2)
+    comparison.compare(1.2 * b, b, "linear", 0.0, (0, 8))
+    assert not comparison.due("here", 15) and comparison.due("here", 16)
     comparison._work.wait()
     comparison.tick()
     figures = comparison.figures
-    assert figures.of == figures.flip_of == 8 and figures.difference_percent > 5
+    assert figures.of == figures.flip_of == (0, 8) and figures.difference_percent > 5
     assert 10 < figures.psnr_db < 40 and 0 < figures.flip_mean < 1
     by_difference = comparison.map
     assert by_difference.shape == (32, 32, 4) and (by_difference[..., 3] == 255).all()
@@ -147,14 +147,14 @@ class Bright:
     """A renderer of a world that is 1000 cd/m2 everywhere."""
 
     def still_radiance(self, state, supersamples):
-        assert state.show == "full" and state.accumulate is None and state.width == state.height
+        assert state.show == "full" and state.width == state.height
         self.drawn = [*getattr(self, "drawn", []), state.camera]
         return np.full((state.height, state.width, 3), 1000 / LM_PER_W, np.float32)
 
 
 def test_glare_is_drawn_face_by_face():
     meter, renderer = GlareMeter(wanted=True), Bright()
-    drawing, frame = GlareDrawing(meter), FrameState(CAMERA, 320, 200, show="diffuse", accumulate=4)
+    drawing, frame = GlareDrawing(meter), FrameState(CAMERA, 320, 200, show="diffuse")
     steps = 0
     while drawing.busy:
         drawing.step(renderer, frame)

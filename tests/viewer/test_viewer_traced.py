@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lambent.bake.again import bake_again, copy_beside
 from lambent.bake.bake import bake
 from lambent.core.camera import CameraPath
 from lambent.core.images import read_image
@@ -13,9 +14,12 @@ from lambent.realtime.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.scenes import load_scene
 from lambent.store.store import Store
+from lambent.traced.picture import ENDED, TracedPicture
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.modes.walk.traced import FADE_S, STILL_S
+from lambent.viewer.modes.walk.tracing import Wish
+from lambent.viewer.modes.walk.tracing_worker import Rooms
 from lambent.viewer.screen import Rect
 from lambent.viewer.work import POLL_S
 from tests.bake.small_scenes import TINY
@@ -227,6 +231,26 @@ def test_beside_a_traced_b_the_picture_a_is_drawn(pictures, state):
     assert pictures.shown[0] is pictures._a and b.drawing[0] == "traced"
     until(pictures, state, lambda: state.comparison.figures is not None)
     assert state.comparison.figures.of[0] == 0 < state.comparison.figures.of[1]
+
+
+def test_rebaked_light_is_that_of_the_copy(renderer, store, state):
+    """In the diffuse light, which drawing shows as well, in other materials than the store's."""
+    red = {name: one.model_copy(update={"kd": (0.7, 0.1, 0.1)}) for name, one in state.scene.materials.items()}
+    bake_again(store, copy_beside(store), red, quality=TINY).close()
+    state.look.show, camera = "diffuse", state.navigation.camera
+    frame = state.look.frame(camera, SIZE, red)
+    truth = Renderer(renderer.device, Store.open(copy_beside(store))).image(frame)
+    rooms, found = Rooms(store, 0.0, ()), {}
+    for rebaked in (True, False):
+        wish = Wish(1, ("traced",), materials=red, rebaked=rebaked)
+        picture = TracedPicture(rooms.of("traced", wish).tracer, camera, SIZE, part="diffuse")
+        while picture.samples < ENDED:
+            picture.sample()
+        found[rebaked] = picture.mean()
+    walls = slice(2, None)  # above them is the lamp, which only drawing shows
+    exact, estimated, truth = (tiles(one)[walls] for one in (found[True], found[False], truth))
+    np.testing.assert_allclose(exact, truth, rtol=0.1, atol=0.02 * truth.mean())
+    assert np.abs(estimated - truth).mean() > 0.15 * truth.mean(), "the store's light is that of its own materials"
 
 
 def test_a_film_is_traced_frame_by_frame(pictures, state, tmp_path):
