@@ -47,7 +47,7 @@ def main(demo: Path) -> None:
     for name, number in (("room", 1), ("sphere", 5), ("screen", 8)):
         save(f"{name}.jpg", shown(demo / f"walk_{number}.png"), width=1120)
     views = [radiance(demo / "compare" / f"{name}.exr") for name in ("moving", "path")]
-    save("compare.jpg", np.concatenate([*views, shown(demo / "compare" / "moving_total.png")], axis=1), width=1680)
+    save("compare.jpg", np.concatenate([*views, shown(demo / "compare" / "moving.png")], axis=1), width=1680)
     save("fit.jpg", shown(demo / "materials" / "brushed_aluminium_polar.png"), width=1400)
 
 
