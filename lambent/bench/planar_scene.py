@@ -25,18 +25,16 @@ from lambent.store.contract import ReflectorPart, ReflectorRecord
 
 FLOOR, PAINT, REACH = "floor", "paint", 4.0
 SKY: Triple = (0.25, 0.3, 0.4)
-LAMP: Triple = (12.0, 10.0, 8.0)
+LAMP: Triple = (12.0, 10.0, 8.0)  # radiance of a black ball
 CAMERA = Camera(name="front", position=(0.5, 1.55, 4.2), target=(0.0, 0.35, 0.0), fov_y_deg=42.0)
 COLOURS: Mapping[str, Triple] = {
     "wall": (0.75, 0.7, 0.6), "cube": (0.8, 0.25, 0.15), "cylinder": (0.2, 0.5, 0.75), "ball": (0.3, 0.7, 0.3),
     "pole": (0.1, 0.1, 0.12),
 }  # fmt: skip
-Lamps = Mapping[str, tuple[Mesh, Triple]]  # black shapes and their radiance, by name
-LAMPS: Lamps = {"lamp": (placed(sphere(0.12, 32, 16), (-0.25, 1.35, 0.2)), LAMP)}
 TILE_TEXELS = 256  # of the light map, for each object
 
 
-def meshes(lamps: Lamps = LAMPS) -> dict[str, Mesh]:
+def meshes() -> dict[str, Mesh]:
     """All shapes; the floor is the plane y = 0."""
     return {
         "wall": patch((-REACH, 0, -2), (2 * REACH, 0, 0), (0, 3.2, 0)),
@@ -44,7 +42,7 @@ def meshes(lamps: Lamps = LAMPS) -> dict[str, Mesh]:
         "cylinder": placed(cylinder(0.3, 1.1, 64), (0.15, 0.0, -0.7)),
         "ball": placed(sphere(0.36, 64, 32), (0.95, 0.36, 0.35)),
         "pole": placed(cylinder(0.025, 2.2, 24), (0.45, 0.0, 0.75)),
-        **{name: mesh for name, (mesh, _) in lamps.items()},
+        "lamp": placed(sphere(0.12, 32, 16), (-0.25, 1.35, 0.2)),
         FLOOR: patch((-REACH, 0, REACH), (2 * REACH, 0, 0), (0, 0, -2 * REACH)),
     }
 
@@ -55,13 +53,12 @@ def floor_state(lobe: Lobe, width: int, height: int) -> FrameState:
     return FrameState(CAMERA, width, height, show="specular", antialias=False, materials=materials)
 
 
-def planar_scene(lobe: Lobe, lamps: Lamps = LAMPS) -> BakedScene:
+def planar_scene(lobe: Lobe) -> BakedScene:
     """The scene with a floor of one lobe."""
-    shapes = meshes(lamps)
+    shapes = meshes()
     sky = np.tile(np.array(SKY, np.float32), (6, 4, 4, 1))
     scene = unbaked_scene(shapes, Material(name=PAINT, kd=(1, 1, 1)), sky, name="planar bench")
-    changes: dict[str, dict[str, object]] = {FLOOR: {"material": FLOOR}}
-    changes.update({name: {"emission": emission} for name, (_, emission) in lamps.items()})
+    changes: dict[str, dict[str, object]] = {FLOOR: {"material": FLOOR}, "lamp": {"emission": LAMP}}
     objects = tuple(o.model_copy(update=changes.get(o.name, {})) for o in scene.record.objects)
     outline = ((-REACH, 0, -REACH), (-REACH, 0, REACH), (REACH, 0, REACH), (REACH, 0, -REACH))
     part = ReflectorPart(object=FLOOR, faces=(0, 1), area_m2=4 * REACH * REACH)
@@ -93,7 +90,7 @@ def light_map_places(shapes: Mapping[str, Mesh]) -> dict[str, Floats]:
 
 
 def exact_reflection(
-    lobe: Lobe, camera: Camera, width: int, height: int, spp: int, progress: Progress = silent, lamps: Lamps = LAMPS
+    lobe: Lobe, camera: Camera, width: int, height: int, spp: int, progress: Progress = silent
 ) -> tuple[Floats, Flags]:
     """Radiance (height, width, 3) of the floor by ray casting, and the floor's pixels (height, width) bool.
 
@@ -104,8 +101,8 @@ def exact_reflection(
     engine()
     from lambent.bake.reference.planar_reflection import ReflectionTracer
 
-    shapes, dark = meshes(lamps), (0.0, 0.0, 0.0)
-    objects = tuple(SceneObject(n, mesh, PAINT, lamps[n][1] if n in lamps else dark) for n, mesh in shapes.items())
+    shapes, dark = meshes(), (0.0, 0.0, 0.0)
+    objects = tuple(SceneObject(n, mesh, PAINT, LAMP if n == "lamp" else dark) for n, mesh in shapes.items())
     scene = Scene("planar bench", objects, {PAINT: Material(name=PAINT, kd=(1, 1, 1))})
     tracer = ReflectionTracer(scene, light_map_places(shapes), light_map(shapes), FLOOR, SKY)
 

@@ -67,12 +67,12 @@ def smooth_chain(cube: Floats) -> list[Floats]:
     return [first, *(blurred(level) for level in rest)]
 
 
-def blurred(cube: Floats, kernel: tuple[float, ...] = BLUR) -> Floats:
-    """(6, n, n, C) convolved with `kernel` along rows and columns."""
-    n, reach = cube.shape[1], len(kernel) // 2
+def blurred(cube: Floats) -> Floats:
+    """(6, n, n, C) convolved with `BLUR` along rows and columns."""
+    n, reach = cube.shape[1], len(BLUR) // 2
     wide: Any = _with_border(cube, reach)
-    rows: Any = sum(weight * wide[:, k : k + n] for k, weight in enumerate(kernel))
-    return np.asarray(sum(weight * rows[:, :, k : k + n] for k, weight in enumerate(kernel)), np.float32)
+    rows: Any = sum(weight * wide[:, k : k + n] for k, weight in enumerate(BLUR))
+    return np.asarray(sum(weight * rows[:, :, k : k + n] for k, weight in enumerate(BLUR)), np.float32)
 
 
 def _with_border(cube: Floats, by: int) -> Floats:

@@ -20,18 +20,16 @@ from lambent.realtime.targets import DEPTH_FORMAT
 
 
 class SolidDepths:
-    """Draws the objects of `resources`, a `SceneResources`, except some materials or names; depth 0 is farthest."""
+    """Draws the objects of `resources`, a `SceneResources`, except those of some materials; depth 0 is farthest."""
 
-    def __init__(
-        self, layouts: Layouts, resources: Any, materials: Collection[str] = (), names: Collection[str] = ()
-    ) -> None:
+    def __init__(self, layouts: Layouts, resources: Any, materials: Collection[str] = ()) -> None:
         self._layouts, self._resources = layouts, resources
         device, groups = layouts.device, [layouts.frame, layouts.material]
         whole, masked = (device.create_shader_module(code=assemble(name)) for name in ("vertex.wgsl", "mask.wgsl"))
         self._whole = pipeline(device, whole, "", groups[:1], (), compare="greater", writes_depth=True)
         self._masked = pipeline(device, masked, "mask_main", groups, (), compare="greater", writes_depth=True)
         records = (item.record for item in resources.objects)
-        self._records = [r for r in records if r.material not in materials and r.name not in names]
+        self._records = [r for r in records if r.material not in materials]
         self._ranges = merged(
             ((r.first_face, r.first_face + r.face_count) for r in self._records if r.name not in resources.masked),
             gap=1,
