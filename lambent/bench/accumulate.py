@@ -1,119 +1,98 @@
-"""Convergence for a still camera: the error of the mean of 1, 2, 4 ... 256 `qmc` frames.
+"""`accumulate`: the window's picture at rest, by error and time.
 
-The truth is a longer series for the image shifted by one pixel: every place gets another pixel's rotation of the
-sequence. The bench counts frames, not seconds, because the adapter decides how many fit into a second.
+Rows are scene x time: the denoised picture that the window has after so many seconds, from the first ray to the
+denoised picture, as processor time over all cores; a device with memory of its own counts seconds. Kernels are compiled
+and the scene is loaded before. `ended` samples take the light of the first diffuse surface from the light map,
+`gathered` ones that of the next (`traced.picture`).
+
+The truth is path traced in four independent pictures, or given by finished ones of the first camera (`--reference`),
+which set the size of the rows. `reference_flip` is the FLIP between its halves. `bar` is the FLIP of the first two
+pictures, each with a quarter of the truth's samples, and `bar_worst_tile` its worst tile: what path tracing without a
+denoiser differs by from itself.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from lambent.bench.quality_inputs import MATERIALS, OWN_ENVIRONMENTS
-from lambent.bench.reference import Reference
-from lambent.bench.specular_scene import sphere_and_torus
+from lambent.bench.reference import Truth, compile_kernels, finished, path_traced_parts
+from lambent.bench.views import first_camera, given_or_baked
 from lambent.core.arrays import Floats
+from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
-from lambent.materials.document import Lobe
-from lambent.realtime.device import open_device
-from lambent.realtime.frame_state import QMC_N, FrameState
-from lambent.realtime.renderer import Renderer
-from lambent.realtime.unbaked import CAMERA, unbaked_scene
+from lambent.store.contract import scene_record
+from lambent.store.source import scene_of
+from lambent.store.store import Store
+from lambent.traced.picture import ENDED, TracedPicture
+from lambent.traced.room import room_of_paths, room_of_store
 
 NAME = "accumulate"
-TRUTH_N = 64  # samples per frame of the truth
-LOBES = tuple(material.lobes[0] for material in MATERIALS if material.name in ("satin .1", "rough .4", "miro .013/.12"))
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Pixels along each side, samples per pixel of the truth, and the cases."""
+    """Pixels, samples of the truth, seconds of processor time of the pictures; the scene if no store is given."""
 
-    size_px: int = 64
-    truth_spp: int = 65536
-    frames: tuple[int, ...] = (1, 2, 4, 8, 16, 32, 64, 128, 256)
-    lobes: tuple[Lobe, ...] = LOBES
-    environments: Mapping[str, Callable[[], Floats]] = field(default_factory=lambda: OWN_ENVIRONMENTS)
-
-
-FULL, QUICK = Effort(), Effort(32, 16384)
+    width: int = 960
+    height: int = 540
+    truth_spp: int = 2048
+    seconds: tuple[float, ...] = (2.0, 5.0, 10.0, 20.0)
+    scene: str = "builtin:room"
 
 
-def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
-    """Rows environment x lobe x frames; the summary has the slope and the last PSNR per case."""
-    device, base = open_device(), MATERIALS[0].model_copy(update={"name": "shown"})
-    meshes, size = sphere_and_torus(detail=48), effort.size_px
-    state = FrameState(CAMERA, size, size, show="specular", lookup="plain", antialias=False, integrator="qmc")
-    rows: list[dict[str, Any]] = []
-    cases = [(name, lobe) for name in effort.environments for lobe in effort.lobes]
-    renderers = {
-        name: Renderer(device, unbaked_scene(meshes, base, make())) for name, make in effort.environments.items()
-    }
-    for done, (name, lobe) in enumerate(cases):
-        shown = replace(state, materials={"shown": base.model_copy(update={"lobes": (lobe,)})})
-        about = {"environment": name, "mx": lobe.mx, "my": lobe.my}
-        rows += [about | row for row in errors_of(renderers[name], shown, effort)]
-        progress(done + 1, len(cases), f"{name} {lobe.mx:g}")
-    return {"rows": rows, "summary": summary(rows)}
+FULL, QUICK = Effort(), Effort(240, 135, 128, (0.5, 1.0, 2.0), "builtin:box")
 
 
-def errors_of(renderer: Renderer, state: FrameState, effort: Effort) -> list[dict[str, Any]]:
-    """One row per number of frames: the error of the mean so far.
+def run(
+    effort: Effort, inputs: Sequence[Path] = (), reference: Sequence[Path] = (), progress: Progress = silent
+) -> dict[str, Any]:
+    """Rows of the inputs, which are baked stores; without inputs, of a scene baked here in `preview`.
 
-    mse is relative to the truth's mean square. bias is the mean difference relative to the mean; its standard error
-    comes from the differences of pixels, whose samples are rotated independently.
+    `reference`: at least two finished pictures of the only input's first camera, of equal samples, different seeds.
     """
-    shifted = renderer.converged(replace(state, n=TRUTH_N, jitter_px=(1.0, 0.0)), effort.truth_spp)
-    truth = np.roll(shifted, 1, axis=1)
-    first = renderer.image(replace(state, accumulate=0))
-    shown = (truth.max(axis=-1) > 0) & (
-        first.max(axis=-1) > 0
-    )  # the shift can move a silhouette across a pixel's centre
-    shown[:, 0] = False  # rolled in from the other side
-    reference, rows = Reference.of(truth, shown), []
-    for frames, image in _series(renderer, state, effort.frames):
-        difference = (image - truth)[shown].astype(np.float64).mean(axis=-1)
-        error = float(difference.std(ddof=1) / np.sqrt(difference.size))
-        rows.append(
-            {
-                "frames": frames,
-                "samples": frames * QMC_N,
-                "mse": float(np.mean((image - truth)[shown] ** 2) / np.mean(truth[shown] ** 2)),
-                "psnr": reference.errors(image)["psnr"],
-                "bias_percent": round(100 * float(difference.mean()) / float(truth[shown].mean()), 4),
-                "bias_z": round(float(difference.mean()) / max(error, 1e-12), 2),
-            }
-        )
-    return rows
+    pictures = finished(reference, inputs)
+    if len(pictures) == 1:
+        raise UserError("a single reference has no noise", field="--reference", expected="at least two, of other seeds")
+    with given_or_baked(inputs, effort.scene, progress) as stores:
+        rows = [row for store in stores for row in rows_of(store, effort, progress, pictures)]
+    last = {row["scene"]: row for row in rows}
+    summary = {name: {key: row[key] for key in ("flip", "bar", "flip_worst_tile")} for name, row in last.items()}
+    return {"rows": rows, "summary": summary}
 
 
-def _series(renderer: Renderer, state: FrameState, wanted: tuple[int, ...]) -> Iterator[tuple[int, Floats]]:
-    """The mean of the first n frames, for each n of `wanted`."""
-    for index in range(wanted[-1]):
-        now = replace(state, accumulate=index)
-        if index + 1 in wanted:
-            yield index + 1, renderer.image(now)
-        else:
-            renderer.draw(now)
-
-
-def slope_of(rows: list[dict[str, Any]]) -> float:
-    """Exponent of mse against frames: -1 for independent samples, lower for a low-discrepancy sequence."""
-    frames, mse = ([row[key] for row in rows] for key in ("frames", "mse"))
-    return float(np.polyfit(np.log(frames), np.log(mse), 1)[0])
-
-
-def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Slope, and PSNR and bias of the last mean, per case."""
-    cases: dict[str, list[dict[str, Any]]] = defaultdict(list)
-    for row in rows:
-        cases[f"{row['environment']} {row['mx']:g}/{row['my']:g}"].append(row)
-    return {
-        "slope": {name: round(slope_of(series), 2) for name, series in cases.items()},
-        "psnr": {name: series[-1]["psnr"] for name, series in cases.items()},
-        "bias_z_max": max(abs(series[-1]["bias_z"]) for series in cases.values()),
-    }
+def rows_of(
+    store: Store, effort: Effort, progress: Progress = silent, pictures: Sequence[Floats] = ()
+) -> Iterator[dict[str, Any]]:
+    """Rows of a store's first camera; `pictures` (H, W, 3) are finished references of it."""
+    if pictures:
+        effort = replace(effort, width=pictures[0].shape[1], height=pictures[0].shape[0])
+    camera, size = first_camera(store, scene_record(store)), (effort.width, effort.height)
+    scene = scene_of(store)
+    parts = pictures or path_traced_parts(room_of_paths(scene).tracer, camera, size, effort.truth_spp, 4, progress)
+    truth = Truth.of(parts)
+    apart = replace(truth, encoded=truth.shown(parts[0])).errors(parts[1])
+    bar = {"bar": apart["flip"], "bar_worst_tile": apart["flip_worst_tile"]}
+    tracer = room_of_store(store, scene).tracer
+    compile_kernels(tracer, camera, path=False)
+    picture, begun = TracedPicture(tracer, camera, size), time.process_time()
+    picture.guides()
+    tracing = time.process_time() - begun
+    denoising = 0.0
+    for seconds in effort.seconds:
+        while not picture.samples or tracing + denoising < seconds:
+            begun = time.process_time()
+            picture.sample()
+            tracing += time.process_time() - begun
+        begun = time.process_time()
+        image = picture.denoised()
+        denoising = time.process_time() - begun
+        ended = min(picture.samples, ENDED)
+        yield {
+            "scene": store.folder.name, "seconds": round(tracing + denoising, 2), "denoising_s": round(denoising, 2),
+            "ended": ended, "gathered": picture.samples - ended, **truth.errors(image), **bar,
+        }  # fmt: skip
+        progress(seconds, effort.seconds[-1], f"{store.folder.name} at rest")

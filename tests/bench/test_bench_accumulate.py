@@ -1,27 +1,69 @@
-"""Accumulated frames: the error falls at least as fast as their number grows, and towards the truth."""
+"""Pictures at rest and of edited rooms: errors fall with time, edits show, and what stays unedited is counted."""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from lambent.bench import accumulate
-from lambent.scenes.environments import dusk
-
-pytestmark = pytest.mark.usefixtures("adapter")
-
-
-def test_frames_add_up_without_bias() -> None:
-    lobes, frames = accumulate.LOBES[:1], (1, 4, 16, 60)
-    effort = replace(accumulate.QUICK, truth_spp=4096, frames=frames, lobes=lobes, environments={"dusk": dusk})
-    report = accumulate.run(effort)
-    assert [row["samples"] for row in report["rows"]] == [8 * n for n in frames]
-    assert all(slope < -1 for slope in report["summary"]["slope"].values())
-    assert all(abs(row["bias_z"]) < 4 for row in report["rows"])
-    assert all(psnr > 40 for psnr in report["summary"]["psnr"].values())
+from lambent.bake.bake import bake
+from lambent.bake.quality import quality_named
+from lambent.bench import accumulate, edits
+from lambent.bench.registry import run_bench
+from lambent.core.errors import UserError
+from lambent.core.images import write_image
+from lambent.scenes import load_scene
+from lambent.store.store import Store
+from lambent.traced.room import TracedRoom
 
 
-def test_the_slope_of_independent_samples_is_minus_one() -> None:
-    rows = [{"frames": n, "mse": 0.3 / n} for n in (1, 2, 4, 64)]
-    assert accumulate.slope_of(rows) == pytest.approx(-1)
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A coarse box with light groups."""
+    path = tmp_path_factory.mktemp("baked") / "box.store"
+    coarse = quality_named("preview").changed("coarse", geometry={"texels": 64}, environment={"texels": 32})
+    bake(load_scene("builtin:box"), path, quality=coarse, light_groups="scene")
+    return path
+
+
+def test_pictures_at_rest_come_below_path_tracing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ticks = itertools.count()  # a second for each step
+    monkeypatch.setattr(accumulate, "time", SimpleNamespace(process_time=lambda: float(next(ticks))))
+    effort = replace(accumulate.QUICK, width=96, height=64, truth_spp=512, seconds=(1.0, 14.0))
+    report = accumulate.run(effort, inputs=[folder])
+    first, last = report["rows"]
+    assert (first["ended"], first["gathered"]) == (1, 0) and last["ended"] == 16 and last["gathered"] > 16
+    assert (first["seconds"], last["seconds"], last["denoising_s"]) == (3.0, 14.0, 1.0)
+    assert last["flip"] < first["flip"] and last["psnr"] > first["psnr"]
+    assert last["flip"] < last["bar"], "two path traced pictures differ by more"
+    assert last["bar"] > last["reference_flip"] > 0, "halves have more samples than quarters"
+    assert report["summary"]["box.store"] == {key: last[key] for key in ("flip", "bar", "flip_worst_tile")}
+
+
+def test_a_single_reference_is_refused(folder: Path, tmp_path: Path) -> None:
+    write_image(tmp_path / "one.exr", np.ones((4, 6, 3), np.float32))
+    with pytest.raises(UserError, match=r"--reference: a single reference has no noise; expected at least two"):
+        run_bench("accumulate", "quick", inputs=[folder], reference=[tmp_path / "one.exr"])
+
+
+def test_edits_of_all_kinds_show(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    effort = replace(edits.QUICK, width=96, height=64, samples=32, truth_spp=256)
+    report = edits.run(effort, inputs=[folder])
+    baked, *edited = report["rows"]
+    assert baked["edit"] == "as baked" and baked["unedited_flip"] == pytest.approx(baked["flip"], rel=0.05)
+    colour, look, lamp, again = edited
+    assert colour["edit"].endswith("blue") and " as " in look["edit"] and lamp["edit"] == "lamp warm"
+    assert again["edit"].endswith("light")
+    for row in edited:
+        assert row["flip"] < row["unedited_flip"] and row["left_unedited"] == 0, row
+        assert row["flip"] < 2 * baked["flip"] and row["relative_error"] < 0.1, row
+    wear = TracedRoom.wear
+    monkeypatch.setattr(
+        TracedRoom, "wear", lambda room, *worn: wear(room, *(worn if room._light is None else ({}, {})))
+    )
+    stays = list(edits.rows_of(Store.open(folder), replace(effort, edits=1)))[1]
+    assert stays["flip"] > colour["flip"] and stays["left_unedited"] > 0.05
