@@ -23,7 +23,7 @@ def command(
     reference: Annotated[
         list[Path] | None,
         typer.Option(
-            help="Benches equal-time and rest: path traced .exr of the input's first camera, equal in samples."
+            help="Benches equal-time, accumulate: path traced .exr of the input's first camera, equal in samples."
         ),
     ] = None,
     json: Json = False,
