@@ -43,6 +43,7 @@ class TracedRoom:
         self._looks: Mapping[str, Look] = {}
         self._materials: Mapping[str, Material] = {}
         self._factors: Factors = {}
+        self._follows = True
         self._tracer: Tracer | None = None
 
     @property
@@ -62,6 +63,11 @@ class TracedRoom:
         self._traced = self._given.dressed(replace(
             scene, materials={**scene.materials, **materials}, textures=prepared(textures_worn(scene.textures, looks))
         ))  # fmt: skip
+
+    def follow(self, on: bool) -> None:
+        """Let light between surfaces follow edited materials, if the room `answers`, or stay as baked."""
+        if on != self._follows:
+            self._follows, self._tracer = on, None
 
     def mix(self, factors: Factors) -> None:
         """Show a mix of light groups by name; those left out are as baked.
@@ -92,7 +98,8 @@ class TracedRoom:
 
         if self._tracer is None and self._light is not None:
             worn = {name: worn_by(name, look, self._given.scene.textures) for name, look in self._looks.items()}
-            self._tracer = Tracer.of_baked(self._traced, self._light.of(self._materials, worn, self._factors))
+            edits = (self._materials, worn) if self._follows else ({}, {})
+            self._tracer = Tracer.of_baked(self._traced, self._light.of(*edits, self._factors))
         elif self._tracer is None:
             self._tracer = Tracer.of_paths(self._traced, self._factors_by_group())
         return self._tracer

@@ -27,7 +27,7 @@ LONGEST_S = 60.0
 def test_wishes_keep_what_they_say_and_the_newest_stands():
     wish = Wish(
         3, ("traced", "path"), FRONT, (5, 7), MATERIALS, {"brass": ImageTexture("a.png")}, {"lamp": (0.5, 0.0, 1.0)},
-        "specular", True, 16, True,
+        "specular", False, True, 16, True,
     )  # fmt: skip
     assert Wish.of(json.loads(json.dumps(wish.said()))) == wish and Wish.of(Wish(4).said()) == Wish(4)
     assert wish.numbered(5) == Wish.of({**wish.said(), "number": 5})

@@ -26,7 +26,7 @@ from lambent.viewer.modes.walk.metering import read
 from lambent.viewer.modes.walk.outlining import Outlining
 from lambent.viewer.modes.walk.rebaking import RebakedLight
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.modes.walk.traced import SOON_S, AtRest, TracedPicture, is_traceable
+from lambent.viewer.modes.walk.traced import SOON_S, AtRest, TracedPicture, Worn, is_traceable
 from lambent.viewer.modes.walk.tracing import ALL_LIGHT, Kind
 from lambent.viewer.picture import Pair, Picture, Shown, size_px
 from lambent.viewer.screen import Rect, least
@@ -113,7 +113,7 @@ class Pictures(Pair):
         self._outlining.update(wanted, state.selection.record)
         filming, before = state.films.under_way is not None, self.shown[0].view
         kinds = self._traced_kinds(wanted)
-        self._at_rest.update(wanted, self._lane.textures, kinds, rebaked=self._is_copied, before=before)
+        self._at_rest.update(wanted, self._worn, kinds, before)
         if state.states.split and not filming:
             self._compare_states(wanted)
         elif state.comparison.on and not filming:
@@ -141,9 +141,10 @@ class Pictures(Pair):
     # at rest
 
     @property
-    def _is_copied(self) -> bool:
-        """Whether the copy beside the store has the light of the room."""
-        return self._rebaked is not None and self._rebaked.is_copied(self._lane.room)
+    def _worn(self) -> Worn:
+        """What the room wears."""
+        lane, answers = self._lane, self._lane.shown.on and self._lane.shown.possible
+        return Worn(lane.textures, answers, self._rebaked is not None and self._rebaked.is_copied(lane.room))
 
     def _traced_kinds(self, wanted: FrameState) -> tuple[Kind, ...]:
         """Kinds of traced pictures that the window shows at rest."""
@@ -366,5 +367,5 @@ class Pictures(Pair):
         light = None if track is None else lambda time_s: self._state.lights.known(track.factors_at(time_s))
         samples, traced = QUALITIES[films.quality], None
         if samples:
-            traced = self._at_rest.frames(frame, self._lane.textures, samples, rebaked=self._is_copied)
+            traced = self._at_rest.frames(frame, self._worn, samples)
         return Filming(self._film_renderer, file, path, frame, films.fps, traced, light)

@@ -6,7 +6,7 @@ The picture at rest is traced against the baked light. A comparison's B can be t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,23 @@ COARSE_SCALE = 0.5  # a drawn picture of this share of the width and height is r
 TRACEABLE = (ALL_LIGHT, "diffuse", "specular")
 NO_SCENE = "there is no scene file to trace"
 Textures = Mapping[str, str | ImageTexture]
+
+
+@dataclass(frozen=True)
+class Worn:
+    """What a frame does not say of its room.
+
+    Attributes
+    ----------
+    textures : mapping
+        Textures in place of materials' own.
+    answers, rebaked : bool
+        Whether light follows edited materials, and whether the copy beside the store has it.
+    """
+
+    textures: Textures
+    answers: bool
+    rebaked: bool
 
 
 class TracedPicture:
@@ -149,14 +166,13 @@ class TracedPicture:
 class TracedFrames:
     """Single pictures of a number of samples, one after the other."""
 
-    def __init__(self, tracing: Tracing, given: Given, textures: Textures, samples: int, *, rebaked: bool) -> None:
-        self._tracing, self._given, self._textures = tracing, given, dict(textures)
-        self._samples, self._rebaked = samples, rebaked
+    def __init__(self, tracing: Tracing, given: Given, worn: Worn, samples: int) -> None:
+        self._tracing, self._given, self._worn, self._samples = tracing, given, worn, samples
 
     def ask(self, frame: FrameState) -> None:
         """Request the picture of a frame."""
-        wish = _wish_of(frame, self._textures)
-        self._tracing.ask(replace(wish, kinds=("traced",), rebaked=self._rebaked, samples=self._samples))
+        wish = replace(_wish_of(frame, self._worn), kinds=("traced",), samples=self._samples)
+        self._tracing.ask(replace(wish, rebaked=self._worn.rebaked))
 
     @property
     def radiance(self) -> Floats | None:
@@ -232,7 +248,7 @@ class AtRest:
         waits = tracing is not None and not tracing.ready and not self.fault and self._of is not None and self._of[1]
         return f"tracing at rest: {tracing.what}" if waits and tracing is not None else ""
 
-    def frames(self, frame: FrameState, textures: Textures, samples: int, *, rebaked: bool) -> TracedFrames:
+    def frames(self, frame: FrameState, worn: Worn, samples: int) -> TracedFrames:
         """Single pictures like a frame, of a number of samples.
 
         Raises
@@ -245,7 +261,7 @@ class AtRest:
         if not is_traceable(frame):
             raise UserError("this picture is drawn, not traced", hint="choose the quality as in motion")
         self._tracing.start()
-        return TracedFrames(self._tracing, self._make(), textures, samples, rebaked=rebaked)
+        return TracedFrames(self._tracing, self._make(), worn, samples)
 
     def start(self) -> None:
         """Start the process."""
@@ -261,13 +277,10 @@ class AtRest:
             return f"{name}: at rest" if self.coming or self._tracing is None else f"{name}: {self._tracing.what}"
         return f"{name}, {found.counted}"
 
-    def update(
-        self, wanted: FrameState, textures: Textures, kinds: tuple[Kind, ...], *, rebaked: bool, before: Any
-    ) -> None:
+    def update(self, wanted: FrameState, worn: Worn, kinds: tuple[Kind, ...], before: Any) -> None:
         """Request a view in these kinds once it stands still, and show its present pictures.
 
-        `textures` replace textures of materials. `rebaked`: the copy beside the store has the light of these
-        materials. The first picture is blended from the view `before`.
+        The first picture is blended from the view `before`.
         """
         tracing, now_s = self._tracing, self._screen.clock()
         if tracing is None:
@@ -276,7 +289,7 @@ class AtRest:
         frame = _drawn(wanted)
         if frame != self._frame:
             self._frame, self._changed_s = frame, now_s
-        of = _wish_of(wanted, textures), kinds
+        of = _wish_of(wanted, worn), kinds
         if of != self._of:
             self._of = of
             if self._wish is not None:
@@ -284,7 +297,7 @@ class AtRest:
             self._wish = None
             for picture in self._pictures.values():
                 picture.show(None, wanted, None)
-        wish = replace(of[0], kinds=kinds, rebaked=rebaked)
+        wish = replace(of[0], kinds=kinds, rebaked=worn.rebaked)
         if kinds and self.still and wish != self._wish and tracing.ready:
             self._wish = wish
             tracing.ask(replace(wish, coarse=self._screen.statistics.scale <= COARSE_SCALE))
@@ -330,9 +343,9 @@ def _drawn(frame: FrameState) -> FrameState:
     return replace(frame, exposure_ev=0.0, view_transform="linear", scale=Range(), maps=0, mixed=0)
 
 
-def _wish_of(frame: FrameState, textures: Textures) -> Wish:
-    """What pictures of a frame depend on, without their kinds."""
+def _wish_of(frame: FrameState, worn: Worn) -> Wish:
+    """What pictures of a frame depend on, without their kinds and without where their light is."""
     return Wish(
-        0, (), frame.camera, frame.size, dict(frame.materials), dict(textures), dict(frame.light),
-        frame.show if frame.show in TRACEABLE else ALL_LIGHT,
+        0, (), frame.camera, frame.size, dict(frame.materials), dict(worn.textures), dict(frame.light),
+        frame.show if frame.show in TRACEABLE else ALL_LIGHT, worn.answers,
     )  # fmt: skip

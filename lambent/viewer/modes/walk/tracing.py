@@ -37,6 +37,8 @@ class Wish:
         Factors of light groups; groups left out are as baked.
     show : str
         Part of the light: full, diffuse or specular.
+    answers : bool
+        Whether light between surfaces follows edited materials, in pictures against the baked light.
     rebaked : bool
         Whether the copy beside the store has the light of these materials and textures.
     samples : int
@@ -53,6 +55,7 @@ class Wish:
     textures: Mapping[str, str | ImageTexture] = field(default_factory=dict)
     light: Factors = field(default_factory=dict)
     show: str = ALL_LIGHT
+    answers: bool = True
     rebaked: bool = False
     samples: int = 0
     coarse: bool = False
@@ -65,7 +68,8 @@ class Wish:
         """As a JSON object."""
         room = RoomState(materials=dict(self.materials), textures=dict(self.textures))
         plain = {
-            name: getattr(self, name) for name in ("number", "kinds", "size", "show", "rebaked", "samples", "coarse")
+            name: getattr(self, name)
+            for name in ("number", "kinds", "size", "show", "answers", "rebaked", "samples", "coarse")
         }
         return {
             **plain, "camera": asdict(self.camera), "room": room.model_dump(mode="json"),
@@ -80,7 +84,8 @@ class Wish:
         return cls(
             int(said["number"]), tuple(said["kinds"]), Camera(**{**camera, **places}),
             (int(said["size"][0]), int(said["size"][1])), room.materials, room.textures,
-            {name: triple(factor) for name, factor in said["light"].items()}, str(said["show"]), bool(said["rebaked"]),
+            {name: triple(factor) for name, factor in said["light"].items()}, str(said["show"]),
+            bool(said["answers"]), bool(said["rebaked"]),
             int(said["samples"]), bool(said["coarse"]),
         )  # fmt: skip
 

@@ -15,7 +15,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -23,6 +23,7 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
+from lambent.materials.document import Material
 from lambent.scenes.replacement import parse_replacements
 from lambent.scenes.scene import Look
 from lambent.store.source import SOURCE, scene_of
@@ -82,13 +83,19 @@ class Rooms:
         self._by_kind: dict[Kind, TracedRoom] = {}
         self._rebaked: tuple[object, TracedRoom] | None = None
 
+    @property
+    def materials(self) -> Mapping[str, Material]:
+        """The scene's materials, by name."""
+        return self._scene.materials
+
     def of(self, kind: Kind, wish: Wish) -> TracedRoom:
         """The room of a kind in the state of a wish."""
         if wish.rebaked and kind == "traced":
             room = self._baked_again((wish.materials, wish.textures))
         else:
-            room, given = self.as_baked(kind), self._scene.materials
+            room, given = self.as_baked(kind), self.materials
             room.wear({name: Look(given[name], of) for name, of in wish.textures.items()}, wish.materials)
+            room.follow(wish.answers)
         room.mix(wish.light)
         return room
 
@@ -189,14 +196,16 @@ def main(folder: Path, sky_turn_deg: float, replaced: Sequence[str], wishes: Wis
 
 
 def warm_up(rooms: Rooms) -> None:
-    """Compile what pictures against the baked light need, by a small one."""
+    """Compile what pictures against the baked light need, also of edited materials, by small ones."""
     from lambent.traced.picture import ENDED, TracedPicture
 
-    camera = Wish(0).camera
-    picture = TracedPicture(rooms.as_baked("traced").tracer, camera, (8, 8))
-    while picture.samples <= ENDED:
-        picture.sample()
-    picture.denoised(fast=True)
+    room = rooms.as_baked("traced")
+    for materials in (dict(list(rooms.materials.items())[:1]), {}):
+        room.wear({}, materials)
+        picture = TracedPicture(room.tracer, Wish(0).camera, (8, 8))
+        while picture.samples <= ENDED:
+            picture.sample()
+        picture.denoised(fast=True)
 
 
 def trace(rooms: Rooms, wish: Wish, wishes: Wishes, out: BinaryIO) -> None:
