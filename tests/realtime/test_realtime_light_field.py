@@ -113,7 +113,7 @@ def test_the_light_field_of_a_store_is_rendered(tmp_path: Path, renderer: Render
     drawn = {}
     for name in ("auto", "light_field-bn", "plain"):
         picture = tmp_path / f"{name}.exr"
-        still(store.folder, picture, settings=Settings(SIZE, SIZE, samples=1, show="specular", lookup=name))
+        still(store.folder, picture, settings=Settings(SIZE, SIZE, "lamps", samples=1, show="specular", lookup=name))
         drawn[name] = read_image(picture)
     expected = renderer.still_radiance(replace(STATE, lookup="light_field"))
     np.testing.assert_allclose(drawn["auto"], expected, rtol=0.01, atol=0.01)
@@ -123,7 +123,7 @@ def test_the_light_field_of_a_store_is_rendered(tmp_path: Path, renderer: Render
 def test_an_unknown_look_up_is_refused(tmp_path: Path, field: LightField) -> None:
     store = put_ball(tmp_path / "ball.store", field)
     with pytest.raises(UserError, match="--lookup"):
-        still(store.folder, tmp_path / "a.png", settings=Settings(8, 8, lookup="light"))
+        still(store.folder, tmp_path / "a.png", settings=Settings(8, 8, "lamps", lookup="light"))
 
 
 def test_blocks_in_a_store_and_on_the_adapter(

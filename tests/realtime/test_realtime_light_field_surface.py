@@ -100,5 +100,5 @@ def test_a_store_that_cannot_serve_is_a_line(tmp_path: Path) -> None:
         (ball.folder, "light_field-surface", "levels = 1"),
     ):
         with pytest.raises(UserError, match="--lookup") as fault:
-            still(folder, tmp_path / "a.png", settings=Settings(8, 8, lookup=look_up))
+            still(folder, tmp_path / "a.png", settings=Settings(8, 8, "lamps", lookup=look_up))
         assert said in str(fault.value) and "\n" not in str(fault.value)

@@ -23,7 +23,7 @@ PIXELS = np.zeros((2, 2, 3), np.uint8)
 Filmed = Callable[[CameraPath, int], list[Camera]]
 
 
-@pytest.fixture(params=["render", "window", "window, refined"])
+@pytest.fixture(params=["render", "window", "window, traced"])
 def filmed(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Filmed:
     """Cameras of the frames that a film along a path writes, at a number of frames per second."""
     cameras: list[Camera] = []
@@ -42,13 +42,16 @@ def filmed(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.M
         return film(store, tmp_path / f"{path.name}-{fps}-#.png", path, Settings(2, 2), fps=fps).frames
 
     def in_the_window(path: CameraPath, fps: int) -> int:
-        def ignore(*_: object) -> None:
-            """Parts of a refined frame that are not yet the image."""
-
-        renderer = SimpleNamespace(draw=ignore, finish=ignore, display_image=lambda view: draw(view.camera))
-        quality = 64 if request.param == "window, refined" else 0
+        renderer = SimpleNamespace(display_image=lambda view: draw(view.camera))
+        asked: list[FrameState] = []
+        traced = SimpleNamespace(ask=asked.append, radiance=PIXELS, display=lambda light, view: draw(view.camera))
         under_way = Filming(
-            renderer, tmp_path / f"{path.name}-{fps}-#.png", path, FrameState(START, 2, 2), fps, quality
+            renderer,
+            tmp_path / f"{path.name}-{fps}-#.png",
+            path,
+            FrameState(START, 2, 2),
+            fps,
+            traced if request.param == "window, traced" else None,
         )
         while not under_way.step():
             pass
