@@ -230,13 +230,14 @@ def command(
         recolour=parse_recolours(recolour or ()), textures=parse_textures(texture or ()),
         replacements=parse_replacements(replace or ()), variant=variant,
     )  # fmt: skip
+    if edit is not None:
+        _check_edit(context, edit)
     settings.check()
     for option in ("false_range", "linear"):
         if _is_said(context, option) and not settings.is_false_coloured:
             name = "--range" if option == "false_range" else "--linear"
             raise UserError("applies to false colours only", field=name, hint="add --view false-colour")
     if edit is not None:
-        _check_edit(context, edit)
         check_output(output, WRITABLE, force=force)
         done = render.edited_still(store, edit, output, settings, parse_surfaces(surfaces or "1:99"))
         show(asdict(done), f"{output}: {done.width}x{done.height}, edited, {done.seconds:.1f} s", json)

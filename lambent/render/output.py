@@ -233,12 +233,12 @@ def images(
     mix = _mix_of_variant(settings, store)
     if settings.light is None and mix.groups:
         settings = _lit(settings, store, MixTrack.of(mix), "of the variant", note)
-    if settings.integrator == TRACED and settings.show not in (LIGHT_MAP, LIGHT_MAP_NOISE):
-        if why := why_untraceable(store):
-            note(f"drawn by {DRAWN}, not traced: {why}")
-            settings = drawn_instead(settings)
-    elif settings.integrator == TRACED:
+    if settings.integrator == TRACED and settings.show in (LIGHT_MAP, LIGHT_MAP_NOISE):
         settings = drawn_instead(settings)
+    if settings.integrator == TRACED and (why := why_untraceable(store)):
+        drawn = images(store, drawn_instead(settings), moving=moving, scene=scene, note=note)
+        note(f"drawn by {DRAWN}, not traced: {why}")
+        return drawn
     if settings.projection is not Projection.perspective:
         return Projected(images(store, faces_settings(settings), moving=moving, scene=scene, note=note), settings)
     if settings.is_traced:
