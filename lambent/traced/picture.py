@@ -7,6 +7,7 @@ and hardly any error. The shown mean contains both, until the first are outnumbe
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -90,11 +91,8 @@ class TracedPicture:
             return self._then, int(self._sums[self._then].count.sum())
         return self._first, first
 
-    def mean(self) -> Image:
-        """Mean radiance (H, W, 3)."""
-        return self._mean((0, 1))
-
-    def _mean(self, halves: tuple[int, ...]) -> Image:
+    def mean(self, halves: Sequence[int] = (0, 1)) -> Image:
+        """Mean radiance (H, W, 3) of all samples, or of those in one of the two halves."""
         chosen = list(halves)
         first, then = self._sums[self._first], self._sums[self._then]
         light, count = then.light[chosen].sum(axis=0), float(then.count[chosen].sum())
@@ -123,7 +121,7 @@ class TracedPicture:
         """
         if not all(sums.count.all() for sums in self._sums.values() if sums.count.any()) or not self.samples:
             return np.inf
-        halves = [self._mean((half,)) for half in (0, 1)]
+        halves = [self.mean((half,)) for half in (0, 1)]
         floor = DARK * float(luminance(np.mean(halves, axis=0)).mean())
         if floor <= 0:
             return 0.0

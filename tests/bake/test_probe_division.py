@@ -12,7 +12,7 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.engine import engine
 from lambent.bake.sight import Sight
-from lambent.bake.tracing.solids import is_closed
+from lambent.bake.tracing.solids import closed
 from lambent.core.camera import Camera
 from lambent.core.cubemap import texel_solid_angles
 from lambent.core.geometry import triangle_areas
@@ -101,7 +101,7 @@ def test_parts_of_a_solid_are_solid() -> None:
     scene = two_rooms()
     cut = split(scene, {"bar": [((-1.0, 0.0, 0.0, 0.3),), ((1.0, 0.0, 0.0, -0.3),)]})
     assert cut.object("bar.part1").mesh.bounds[1][0] == cut.object("bar.part2").mesh.bounds[0][0] == np.float32(0.3)
-    assert not is_closed(cut.object("bar.part1").mesh)
+    assert not closed([cut.object("bar.part1").mesh])[0]
     wholes = whole_objects(object_records(cut))
     assert [o.name for o in wholes] == [o.name for o in scene.objects]
     parts = sum(len(o.mesh.faces) for o in cut.objects if o.name.startswith("bar."))

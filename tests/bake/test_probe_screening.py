@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.surfaces.cutting import cut_across
-from lambent.bake.tracing.solids import closed, is_closed
+from lambent.bake.tracing.solids import closed
 from lambent.core.geometry import triangle_areas
 from lambent.scenes.geometry import box, merge, patch, placed, signed_volume, sphere
 from lambent.scenes.scene import Mesh, Scene, SceneObject
@@ -96,7 +96,7 @@ def test_no_face_has_two_sides_of_a_plane_after_a_cut(mesh: Mesh, plane: tuple[f
     assert (height.min(axis=1) * height.max(axis=1)).min() > -1e-5
     assert triangle_areas(cut.corners).sum() == pytest.approx(triangle_areas(mesh.corners).sum(), rel=1e-5)
     assert signed_volume(cut) == pytest.approx(signed_volume(mesh), rel=1e-5, abs=1e-9)
-    assert is_closed(cut) == is_closed(mesh)
+    assert closed([cut])[0] == closed([mesh])[0]
     assert np.linalg.norm(cut.normals, axis=1) == pytest.approx(1, abs=1e-4)
 
 

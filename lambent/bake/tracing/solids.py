@@ -53,11 +53,6 @@ def _closed_at_once(meshes: Sequence[Mesh]) -> Flags:
     return found
 
 
-def is_closed(mesh: Mesh) -> bool:
-    """`closed` of one mesh."""
-    return bool(closed([mesh])[0])
-
-
 def _closed(scene: Scene) -> set[str]:
     """Names of closed objects; parts count as closed if their whole is."""
     wholes: dict[str, list[SceneObject]] = {}

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 END_DEG = 90.0
 LEAST_DEG = 0.05  # shortest range of angles: two knots of a curve
-MOST_DECADES = 30.0
 MARGIN = 4.0  # a drag may reach this many plot sizes beyond the edge
 
 

@@ -41,7 +41,6 @@ double-click: show all angles and values
 T A D: translate, amplify, draw;  L: log;  F: fit;  Esc: cancel the drag"""
 ON = (0.24, 0.42, 0.66, 1.0)
 GROUP_PX = 14.0  # between groups of buttons
-PRESETS_PER_ROW = 4
 
 
 class _Flow:
