@@ -6,14 +6,14 @@ Light adds up, so the picture of any mix is exact: E = sum over groups g of s_g 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
 from lambent.core.colour import XYZ_TO_RGB, luminance, srgb_decode
-from lambent.core.errors import UserError
+from lambent.core.errors import UserError, did_you_mean
 from lambent.core.plain import Triple, triple
 
 WHITE: Triple = (1.0, 1.0, 1.0)
@@ -117,6 +117,15 @@ class MixTrack:
             times, factors = [key[0] for key in keys], np.array([mix.factor for _, mix in keys])
             found[name] = triple(np.interp(time_s, times, channel) for channel in factors.T)
         return {name: factor for name, factor in found.items() if factor != WHITE}
+
+
+def factors_of(names: Sequence[str], light: Factors) -> np.ndarray:
+    """Factors (n, 3) float32 of the groups of these names in a mix; `UserError` for an unknown group."""
+    for name in light:
+        if name not in names:
+            hint, expected = did_you_mean(name, names), ", ".join(names)
+            raise UserError("unknown light group", field="light", got=name, expected=expected, hint=hint)
+    return np.array([light.get(name, WHITE) for name in names], np.float32)
 
 
 def black_body(temperature_k: float) -> np.ndarray:

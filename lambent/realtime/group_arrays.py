@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
-from lambent.core.errors import UserError, did_you_mean
-from lambent.core.light_mix import WHITE, Factors
+from lambent.core.light_mix import Factors, factors_of
 from lambent.realtime.lit_texels import LitTexels
 from lambent.store import contract
 from lambent.store.contract import SIDES
@@ -67,13 +66,7 @@ class GroupArrays:
 
     def factors(self, light: Factors) -> Floats:
         """Factors (n, 3) of a mix; `UserError` for an unknown group."""
-        names = [record.name for record in self.records]
-        for name in light:
-            if name not in names:
-                hint = did_you_mean(name, names)
-                expected = ", ".join(names)
-                raise UserError("unknown light group", field="light", got=name, expected=expected, hint=hint)
-        return np.array([light.get(name, WHITE) for name in names], np.float32)
+        return factors_of([record.name for record in self.records], light)
 
 
 def groups_in(store: Store, unit: float) -> GroupArrays | None:

@@ -8,11 +8,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from lambent.bake.engine import engine
-from lambent.core.errors import UserError, did_you_mean
-from lambent.core.light_mix import WHITE, Factors
+from lambent.core.errors import UserError
+from lambent.core.light_mix import Factors, factors_of
 from lambent.materials.document import Material
 from lambent.scenes.replacement import Replacement, with_replacements
 from lambent.scenes.scene import Look, Scene
@@ -85,11 +83,12 @@ class TracedRoom:
         """Raise `UserError` if a group of a mix is missing."""
         if self._light is not None:
             self._light.check(factors)
-        elif factors:
-            names = [group.name for group in self._given.sorted_lights.groups]
-            for name in (one for one in factors if one not in names):
-                hint, expected = did_you_mean(name, names), ", ".join(names)
-                raise UserError("unknown light group", field="light", got=name, expected=expected, hint=hint)
+        else:
+            factors_of(self._names, factors)
+
+    @property
+    def _names(self) -> list[str]:
+        return [group.name for group in self._given.sorted_lights.groups]
 
     @property
     def tracer(self) -> Tracer:
@@ -101,14 +100,9 @@ class TracedRoom:
             edits = (self._materials, worn) if self._follows else ({}, {})
             self._tracer = Tracer.of_baked(self._traced, self._light.of(*edits, self._factors))
         elif self._tracer is None:
-            self._tracer = Tracer.of_paths(self._traced, self._factors_by_group())
+            factors = factors_of(self._names, self._factors) if self._factors else None
+            self._tracer = Tracer.of_paths(self._traced, factors)
         return self._tracer
-
-    def _factors_by_group(self) -> np.ndarray | None:
-        if not self._factors:
-            return None
-        groups = self._given.sorted_lights.groups
-        return np.array([self._factors.get(group.name, WHITE) for group in groups], np.float32)
 
 
 def room_of_store(

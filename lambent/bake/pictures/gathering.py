@@ -22,7 +22,7 @@ from lambent.core.arrays import Floats
 from lambent.core.geometry import triangle_areas
 from lambent.materials.bsdf import coupling
 
-MAX_DEPTH = 16  # surfaces on a gathering path, mirrors included
+MAX_DEPTH = 16  # surfaces on the longest path of a picture, mirrors included
 NEAR_TEXELS = 3.0  # a surface that a gathering path meets within this many of its own texels gathers once more
 
 

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lambent.bake.bsdfs.material_plugin import DIFFUSE_ATTRIBUTE, NORMAL_ATTRIBUTE, SPECULAR_ATTRIBUTE
 from lambent.bake.light.cache import LightMapCache
-from lambent.bake.pictures.gathering import Gathering
+from lambent.bake.pictures.gathering import MAX_DEPTH, Gathering
 from lambent.bake.tiles import slices
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.rays import block_sums, has_holes, intersect
@@ -34,7 +34,6 @@ from lambent.materials.document import Material
 from lambent.materials.factored.albedo import term_albedo
 from lambent.materials.factored.terms import Editable
 
-MAX_DEPTH = 16  # surfaces on the longest path
 RAYS_AT_ONCE = 1 << 21
 Image = NDArray[np.float32]
 

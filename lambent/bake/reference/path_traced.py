@@ -10,7 +10,8 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.pictures.tracer import MAX_DEPTH, Tracer, camera_rays
+from lambent.bake.pictures.gathering import MAX_DEPTH
+from lambent.bake.pictures.tracer import Tracer, camera_rays
 from lambent.bake.tiles import seed_of
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.emitters import balance_emitters
