@@ -1,6 +1,6 @@
 """Frustum culling on the CPU, by bounding boxes of clusters of neighbouring triangles.
 
-A software adapter spends a third of a small frame on vertices (docs/decisions.md).
+A software adapter spends a third of a small frame on vertices.
 """
 
 from __future__ import annotations

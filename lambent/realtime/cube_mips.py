@@ -5,7 +5,8 @@ every level. Faces meet without a seam because the GPU filters cube maps across 
 
 Interpolation between texels of a plain level shows the texels: a small lamp looks square, and brightest at the centre
 of a texel. Smooth levels are blurred once more, over `SMOOTH_AREA` times the area, and the look-up reads a level finer
-by the same factor: the blur keeps its size and is nearly round. Measured gain: 2.5 dB (docs/decisions.md).
+by the same factor: the blur keeps its size and is nearly round. It gains 2.5 dB
+(docs/decisions/samples-of-a-lobe.md).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Scatter from a measured table without a model: reflect, transmit or absorb (thesis M, 3.1), then draw a direction.
 
-Two samplers of the direction, compared in `docs/decisions.md`:
+Two samplers of the direction:
 
 - `Rejection`, the thesis's 3.2: uniform low-discrepancy candidates, accepted with p / (largest p of the row). It
   samples the table itself, whatever its shape, and needs 2 pi p_max / r candidates per sample: 3 for white paper, 20
