@@ -20,12 +20,12 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 # A room may import rooms of a lower floor, and itself.
 FLOOR = {
     "core": 0, "materials": 1, "scenes": 2, "store": 3, "bake": 4, "realtime": 4, "editing": 4, "traced": 5,
-    "viewer": 6, "render": 7, "report": 8, "bench": 8, "demo": 8, "cli": 9,
+    "viewer": 6, "render": 7, "published": 7, "report": 8, "bench": 8, "demo": 8, "cli": 9,
 }  # fmt: skip
 # Libraries that only some rooms may import.
 ONLY_IN = {
-    "mitsuba": {"bake"},
-    "drjit": {"bake"},
+    "mitsuba": {"bake", "published"},
+    "drjit": {"bake", "published"},
     "pyoidn": {"bake"},
     "xatlas": {"bake"},
     "wgpu": {"realtime", "viewer"},
@@ -105,6 +105,11 @@ def module_graph() -> dict[str, set[str]]:
         found |= {package for module in found for package in _packages(module)}
         graph[name] = {module for module in found if not f"{name}.".startswith(f"{module}.")}
     return graph
+
+
+def test_only_benches_import_published_methods() -> None:
+    importers = {room_of(path) for path in MODULES for _, name in imports_of(path) if "lambent.published" in name}
+    assert importers == {"bench"}
 
 
 def test_no_modules_import_each_other() -> None:

@@ -50,9 +50,9 @@ def _rows(name: str, count: int, effort: Effort) -> list[dict[str, Any]]:
 
     engine()
     from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.transport.coherence.predicted import VARIANTS, Predicted, predicted_visibility
     from lambent.bake.transport.view_points import view_points
     from lambent.bake.transport.visibility import visibility
+    from lambent.published.visibility import VARIANTS, Predicted, predicted_visibility
 
     case, size = CASES[name], effort.size
     builder, lights = SceneBuilder(case.scene()), case.lights(count)

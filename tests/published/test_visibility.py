@@ -1,4 +1,4 @@
-"""Visibility by coherence: its order, its cells, and its predictions against brute force."""
+"""Visibility by coherence (Ben-Artzi 2007, chapter 8): order, cells, and predictions against brute force."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.transport.coherence.light_cells import CellTable, neighbours
-from lambent.bake.transport.coherence.order import OUTSIDE, grid, scanline
 from lambent.core.arrays import Flags
 from lambent.core.camera import Camera
 from lambent.core.directions import normalize
@@ -19,31 +17,39 @@ from lambent.scenes.scene import Scene, SceneObject
 from lambent.scenes.triangle_lights import TriangleLights, environment_triangles
 from tests.bake.small_scenes import GREY
 
+OUTSIDE = -1
+
 SIZE = 65
 # Most per cent of wrong predictions, and of rays traced, where 65 pixels show a ball and a box on a floor.
 LIMITS = {
-    "SWB": (0.005, 50), "GWB": (0.1, 33), "GNB": (0.15, 33), "GWU": (0.02, 28), "GNU": (0.01, 28), "OPT": (0.01, 20),
+    "SWB": (0.005, 50), "GWB": (0.1, 33), "GNB": (0.15, 33), "GWU": (0.02, 28), "GNU": (0.01, 28),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("order", [grid, scanline])
+@pytest.fixture(scope="module")
+def method(mi: Any) -> Any:
+    from lambent.published import visibility
+
+    return visibility
+
+
+@pytest.mark.parametrize("order", ["grid", "scanline"])
 @pytest.mark.parametrize(("width", "height"), [(65, 33), (50, 37), (3, 40), (1, 1)])
-def test_every_pixel_is_evaluated_once_after_its_informers(order: Any, width: int, height: int) -> None:
+def test_every_pixel_is_evaluated_once_after_its_informers(method: Any, order: str, width: int, height: int) -> None:
     done = np.zeros(width * height, int)
-    for step in order(width, height):
+    for step in getattr(method, order)(width, height):
         inside = step.informers[step.informers != OUTSIDE]
         assert done[inside].all()
         at, of = (np.stack(np.divmod(pixels, width)) for pixels in (step.pixels, step.informers))
-        if width == 65 and order is grid and step.informers.size:
+        if width == 65 and order == "grid" and step.informers.size:
             middle = (step.informers != OUTSIDE).all(axis=1)
             assert (of[:, middle].mean(axis=-1) == at[:, middle]).all()
         done[step.pixels] += 1
     assert (done == 1).all()
 
 
-def test_the_finest_grid_has_half_of_the_pixels() -> None:
-    steps = list(grid(65, 65))
-    assert [step.finest for step in steps] == [False] * (len(steps) - 1) + [True]
+def test_the_finest_grid_has_half_of_the_pixels(method: Any) -> None:
+    steps = list(method.grid(65, 65))
     assert len(steps[-1].pixels) == 65 * 65 // 2
     assert len(steps[0].pixels) == 25 and steps[0].informers.shape == (25, 0)
 
@@ -52,10 +58,10 @@ def some_directions(count: int) -> np.ndarray:
     return normalize(np.random.default_rng(3).normal(size=(count, 3)))
 
 
-def test_neighbours_are_the_cells_that_touch() -> None:
+def test_neighbours_are_the_cells_that_touch(method: Any) -> None:
     """A triangulation of a sphere has 3 M - 6 edges; cells side by side in the table are joined by one of them."""
     directions = some_directions(80)
-    table, cells = neighbours(directions), CellTable(directions)
+    table, cells = method.neighbours(directions), method.CellTable(directions)
     joined = np.zeros((80, 80), bool)
     joined[np.arange(80)[:, None], table] = True
     assert (joined == joined.T).all()
@@ -70,10 +76,10 @@ def test_neighbours_are_the_cells_that_touch() -> None:
     assert ((touching | touching.T) & joined).sum() > 0.97 * joined.sum()  # others share less than a texel
 
 
-def test_cells_are_those_of_the_nearest_light() -> None:
+def test_cells_are_those_of_the_nearest_light(method: Any) -> None:
     directions, w = some_directions(80), some_directions(5000)
     nearest = np.argmax(w @ directions.T, axis=1)
-    assert (CellTable(directions).at(w) == nearest).mean() > 0.97
+    assert (method.CellTable(directions).at(w) == nearest).mean() > 0.97
 
 
 def ball_and_box() -> Scene:
@@ -86,11 +92,8 @@ def ball_and_box() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def view() -> tuple[Any, Any, TriangleLights, Flags]:
+def view(mi: Any) -> tuple[Any, Any, TriangleLights, Flags]:
     """The traced scene, the points of its view, whose corners show no surface, the lights, and which are seen."""
-    from lambent.bake.engine import engine
-
-    engine()
     from lambent.bake.tracing.scene_builder import SceneBuilder
     from lambent.bake.transport.view_points import view_points
     from lambent.bake.transport.visibility import visibility
@@ -107,11 +110,9 @@ def view() -> tuple[Any, Any, TriangleLights, Flags]:
     return traced, points, lights, truth
 
 
-def test_rays_are_those_of_the_transport(view: Any) -> None:
-    from lambent.bake.transport.coherence.shadow_rays import ShadowRays
-
+def test_rays_are_those_of_the_transport(method: Any, view: Any) -> None:
     traced, points, lights, truth = view
-    rays = ShadowRays(traced, points, lights.centres)
+    rays = method.ShadowRays(traced, points, lights.centres)
     point, light = np.nonzero(rays.facing)
     blocked, place = rays.blockers(point, light)
     assert (blocked == ~truth[rays.facing]).all() and blocked.mean() > 0.05
@@ -125,11 +126,9 @@ def test_rays_are_those_of_the_transport(view: Any) -> None:
 
 
 @pytest.mark.parametrize("name", LIMITS)
-def test_predictions_are_wrong_no_more_often_than_stated(view: Any, name: str) -> None:
-    from lambent.bake.transport.coherence.predicted import VARIANTS, predicted_visibility
-
+def test_predictions_are_wrong_no_more_often_than_stated(method: Any, view: Any, name: str) -> None:
     traced, points, lights, truth = view
-    found = predicted_visibility(traced, points, lights.centres, SIZE, SIZE, VARIANTS[name])
+    found = method.predicted_visibility(traced, points, lights.centres, SIZE, SIZE, method.VARIANTS[name])
     most_wrong, most_traced = LIMITS[name]
     assert not (found.seen & ~found.facing).any()
     assert found.wrong_percent(truth) < most_wrong
@@ -138,71 +137,19 @@ def test_predictions_are_wrong_no_more_often_than_stated(view: Any, name: str) -
 
 
 @pytest.mark.parametrize("name", LIMITS)
-def test_where_no_pixel_informs_another_all_is_traced_and_exact(view: Any, name: str) -> None:
-    from lambent.bake.transport.coherence.predicted import VARIANTS, predicted_visibility
-
+def test_where_no_pixel_informs_another_all_is_traced_and_exact(method: Any, view: Any, name: str) -> None:
     traced, points, lights, truth = view
     alone = replace(points, object=np.arange(len(points)))
-    found = predicted_visibility(traced, alone, lights.centres, SIZE, SIZE, VARIANTS[name])
+    found = method.predicted_visibility(traced, alone, lights.centres, SIZE, SIZE, method.VARIANTS[name])
     assert (found.traced_percent, found.wrong_percent(truth)) == (100.0, 0.0)
 
 
-def test_sparing_saves_rays_and_flooding_finds_what_no_informer_knows(view: Any) -> None:
-    """With `sparing` fewer rays; without neighbours to go on to, fewer still, and more errors."""
-    from lambent.bake.transport.coherence import predicted
-    from lambent.bake.transport.coherence.predicted import VARIANTS, predicted_visibility
-
-    traced, points, lights, truth = view
-
-    def of(name: str) -> Any:
-        return predicted_visibility(traced, points, lights.centres, SIZE, SIZE, VARIANTS[name])
-
-    full, sparing = of("GNU"), of("OPT")
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(predicted, "neighbours", lambda w: np.arange(len(w))[:, None])
-        stopped = of("GNU")
-    assert stopped.traced < sparing.traced < full.traced
-    assert full.wrong_percent(truth) < sparing.wrong_percent(truth) < stopped.wrong_percent(truth)
-
-
-def test_slivers_of_light_between_shadows_are_found_whole() -> None:
-    """Between dominos nearly all errors of sparing tracing are strips of light that the coarse grid steps over."""
-    from lambent.bake.engine import engine
-
-    engine()
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.transport.coherence import predicted
-    from lambent.bake.transport.view_points import view_points
-    from lambent.bake.transport.visibility import visibility
-    from lambent.bench.visibility import unpacked
-    from lambent.bench.visibility_scenes import CASES
-
-    case, size = CASES["dominos"], 129
-    builder, lights = SceneBuilder(case.scene()), case.lights(50)
-    traced = builder.build()
-    points = view_points(builder, traced, case.camera, size, size)
-    truth = unpacked(visibility(traced, points, lights), len(lights))
-
-    def of_opt() -> Any:
-        return predicted.predicted_visibility(traced, points, lights.centres, size, size, predicted.VARIANTS["OPT"])
-
-    found = of_opt()
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(predicted._Run, "sweep", lambda run, step: None)
-        before = of_opt()
-    assert before.wrong_percent(truth) > 0.08
-    assert found.wrong_percent(truth) < 0.02
-    assert before.traced < found.traced < 1.02 * before.traced
-
-
-def test_warped_blockers_stand_where_the_next_point_sees_them() -> None:
+def test_warped_blockers_stand_where_the_next_point_sees_them(method: Any) -> None:
     """A blocker one metre above a point is at 45 degrees for a point one metre aside."""
-    from lambent.bake.transport.coherence.votes import Warped
-
     directions = normalize(np.array([[0, 1, 0], [-1, 1, 0], [1, 1, 0], [0, -1, 0], [0, 0.3, 1], [0, 0.3, -1.0]]))
     p = np.array([[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 0, 0]], np.float32)
     seen, facing = np.ones((4, 6), bool), np.ones((4, 6), bool)
-    warped = Warped(p, directions)
+    warped = method.Warped(p, directions)
     warped.keep(np.array([0]), np.array([0]), np.array([[0, 1, 0]], np.float32))
     seen[0, 0] = False
     votes, voters = warped.count(seen, facing, np.array([1, 2, 3]), np.array([[0, 3], [0, OUTSIDE], [0, 0]]))

@@ -1,0 +1,1 @@
+"""Published methods that only benches compare with, one per file; nothing but `bench` imports this package."""
