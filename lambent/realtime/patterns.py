@@ -223,7 +223,7 @@ def border(lobe: Lobe) -> Floats:
 def automatic_n(material: Material, roughness: float = 1.0, without_lamps: bool = False) -> int:
     """Samples per lobe for a material; grows with the width of its widest lobe times `roughness`.
 
-    Fewer suffice with `without_lamps`, for light that holds no lamps (docs/performance.md).
+    Fewer suffice with `without_lamps`, for light that holds no lamps (docs/decisions/lamps-in-closed-form.md).
     """
     m = roughness * max((max(lobe.mx, lobe.my) for lobe in material.lobes), default=0.0)
     steps = ((0.004, 1), (0.015, 3), (0.04, 5), (0.1, 7), (0.2, 11), (0.35, 15))
