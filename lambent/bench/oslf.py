@@ -26,6 +26,7 @@ from lambent.core.light_field_blocks import in_blocks
 from lambent.core.light_field_lookup import March, Place
 from lambent.core.light_field_maps import radiance_along
 from lambent.core.progress import Progress, part_of, silent
+from lambent.published.distance_impostors import fixed_point
 from lambent.scenes import load_scene
 
 NAME = "oslf"
@@ -108,7 +109,7 @@ def methods(field: LightField, single: LightField, place: Place, view: LightFiel
         yield Method(f"B_r {power}", 4, partial(blend, "reflection", power))
     for power in POWERS:
         yield Method(f"B_n {power}", 4, partial(blend, "normal", power))
-    yield Method("fixed point", 28, lambda: look.fixed_point(field, place, w, edges=view.sky).radiance)
+    yield Method("fixed point", 28, lambda: fixed_point(field, place, w, edges=view.sky).radiance)
     for name, rule in (("march 1", ONE), ("march 4", FOUR)):
         count = rule.candidates * PER_POINT
         yield Method(name, count, partial(_marched, field, place, w, rule, None, view.sky))

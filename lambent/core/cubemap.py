@@ -46,7 +46,7 @@ def texel_solid_angles(n: int) -> Floats:
 def sample(cube: Floats, w: Floats) -> Floats:
     """Bilinear look-up, clamped within each face: (..., C) of cube (6, n, n, C) at directions w (..., 3)."""
     n = cube.shape[1]
-    face, s, t = _on_face(w)
+    face, s, t = on_face(w)
     column, row = ((np.stack([s, t]) + 1) / 2 * n - 0.5).clip(0, n - 1)
     c0, r0 = np.floor(column).astype(int), np.floor(row).astype(int)
     c1, r1 = np.minimum(c0 + 1, n - 1), np.minimum(r0 + 1, n - 1)
@@ -56,14 +56,7 @@ def sample(cube: Floats, w: Floats) -> Floats:
     return np.asarray(top * (1 - fr) + bottom * fr)
 
 
-def face_places(w: Floats, n: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Face, column and row (...) of the first of the 2 x 2 texels that `sample` reads along w (..., 3), of n a side."""
-    face, s, t = _on_face(w)
-    column, row = np.floor(((np.stack([s, t]) + 1) / 2 * n - 0.5).clip(0, n - 2)).astype(np.int64)
-    return face.astype(np.int64), column, row
-
-
-def _on_face(w: Floats) -> tuple[NDArray[np.int64], Floats, Floats]:
+def on_face(w: Floats) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Face (...) and face coordinates s, t (...) of directions w (..., 3)."""
     x, y, z = w[..., 0], w[..., 1], w[..., 2]
     axis = np.argmax(np.abs(w), axis=-1)

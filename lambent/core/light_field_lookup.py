@@ -123,24 +123,6 @@ def blended(
     return np.asarray(np.einsum("kj,kjc->kc", basis_weights(field, place, w, basis, power), seen))
 
 
-def fixed_point(field: LightField, place: Place, w: Floats, rounds: int = 4, edges: Sky | None = None) -> Marched:
-    """`marched`, with the iteration t = d(x + t w) in place of the search: cheaper, but blind to occluders in front."""
-    offset, point, known = place.offsets(field), place.named(), place.known
-    direction = np.broadcast_to(w[:, None], offset.shape)
-    along = np.einsum("kjc,kjc->kj", offset, direction)
-    height = np.maximum(np.einsum("kjc,kjc->kj", offset, offset) - along**2, 0)
-    q = direction
-    for _ in range(rounds):
-        d = 1 / np.maximum(nearness_along(field, point, q), 1e-9)
-        t = np.sqrt(np.maximum(d**2 - height, 0)) - along  # where the ray leaves the sphere of that radius
-        q = offset + np.maximum(t, 1e-9)[..., None] * direction
-    rule = March()
-    nearness = nearness_along(field, point, q)
-    met = known & (np.abs(np.linalg.norm(q, axis=-1) * nearness - 1) < rule.tolerance) & (t > 0)
-    open_sky = known & (nearness_along(field, point, direction) == 0) & ~met
-    return _answered(field, place, w, rule, q, np.where(met, t, np.inf), open_sky, None, edges)
-
-
 def marched(
     field: LightField, place: Place, w: Floats, rule: March | None = None, sky: Sky | None = None,
     edges: Sky | None = None,
@@ -154,7 +136,7 @@ def marched(
     """
     rule = rule or March()
     q, t, open_sky = _searched(field, place, w, rule)
-    return _answered(field, place, w, rule, q, t, open_sky, sky, edges or sky)
+    return combined(field, place, w, rule, q, t, open_sky, sky, edges or sky)
 
 
 def _searched(field: LightField, place: Place, w: Floats, rule: March) -> tuple[Floats, Floats, Flags]:
@@ -201,11 +183,11 @@ def _searched(field: LightField, place: Place, w: Floats, rule: March) -> tuple[
     return q, np.where(met, t, np.inf), open_sky
 
 
-def _answered(
+def combined(
     field: LightField, place: Place, w: Floats, rule: March, q: Floats, t: Floats, open_sky: Flags, sky: Sky | None,
     edges: Sky | None,
 ) -> Marched:  # fmt: skip
-    """Combine the hits of all points."""
+    """The answer of all points, from what `_searched` gives of each; sky and edges as for `marched`."""
     count = t.shape[1]
     known = place.known[:, :count]
     first = t.min(axis=1)

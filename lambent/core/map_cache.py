@@ -2,17 +2,15 @@
 
 Each read names one map. `LeastRecent` is the thesis's policy (R, section 4.3); rows of pixels that need more maps than
 there is room for defeat it, since it evicts the map that the next row needs first. `ReadLast` expects maps to be read
-again as regularly as before. `Adaptive` follows the better of both. `fewest_misses` is the lower bound for any policy.
+again as regularly as before. `Adaptive` follows the better of both.
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Sequence
-from heapq import heappop, heappush
 from typing import Protocol
 
-NEVER = 1 << 62
 NEIGHBOURS = 8  # maps that neighbouring pixels read together: four points each, at most half of the cache
 REMEMBERED = 8  # times the capacity: maps whose intervals are kept
 USUAL = 1 / 16  # weight of the latest interval in their mean, which maps without an own interval use
@@ -140,41 +138,9 @@ class Adaptive:
         return self._maps.keys()
 
 
-class KnownFuture:
-    """Evicts the map that is read again last: the optimal policy, which knows all `reads` in order (Belady 1966)."""
-
-    def __init__(self, reads: Sequence[int], capacity: int) -> None:
-        self.capacity = capacity
-        self._following, seen = [NEVER] * len(reads), dict[int, int]()
-        for at in range(len(reads) - 1, -1, -1):
-            self._following[at] = seen.get(reads[at], NEVER)
-            seen[reads[at]] = at
-        self._at, self._maps, self._queue = 0, dict[int, int](), list[tuple[int, int]]()
-
-    def read(self, name: int, keep: Collection[int] = ()) -> bool:
-        there = name in self._maps
-        while not there and len(self._maps) >= self.capacity:
-            when, last = heappop(self._queue)
-            if self._maps.get(last) == -when:
-                del self._maps[last]
-        self._maps[name] = self._following[self._at]
-        heappush(self._queue, (-self._maps[name], name))
-        self._at += 1
-        return there
-
-    @property
-    def held(self) -> Collection[int]:
-        return self._maps.keys()
-
-
 def misses(reads: Sequence[int], cache: MapCache) -> int:
     """Number of `reads` that miss when run through `cache` in order."""
     return sum(not cache.read(name) for name in reads)
-
-
-def fewest_misses(reads: Sequence[int], capacity: int) -> int:
-    """Misses of the optimal policy."""
-    return misses(reads, KnownFuture(reads, capacity))
 
 
 LEAST_RECENT = "least-recent"

@@ -11,10 +11,8 @@ import numpy as np
 import pytest
 
 from lambent.bench import oslf
-from lambent.bench.light_field_caches import partial_misses
 from lambent.bench.light_field_view import Compared, LightFieldView
 from lambent.core.light_field_lookup import surface
-from lambent.core.map_cache import KnownFuture, LeastRecent
 from lambent.scenes import load_scene
 
 TEXELS = 48
@@ -69,21 +67,6 @@ def test_errors_are_those_of_the_object_alone() -> None:
     assert same["flip"] == 0 and same["rmse_lab"] == [0, 0, 0] and same["psnr"] == float("inf")
     off = compared.errors(truth * 0.8)
     assert off["flip"] > 0.01 and min(off["rmse_rgb"]) > 0.01
-
-
-def test_reads_on_demand_miss_what_was_not_read_of_an_item() -> None:
-    reads = [(1, 3), (1, 2), (1, 4), (2, 0), (3, 0), (2, 0), (1, 0)]
-    assert partial_misses(reads, LeastRecent(2)) == 5 and partial_misses(reads, LeastRecent(3)) == 4
-    items = [item for item, _ in reads]
-    assert partial_misses(reads, KnownFuture(items, 2)) == 5 and partial_misses(reads, KnownFuture(items, 3)) == 4
-
-
-def test_the_optimum_of_faces_in_part_is_below_the_least_recent() -> None:
-    """Three faces in turn, and room for two: of the three, all miss; the optimum keeps one of them each time."""
-    items = [1, 2, 3] * 20
-    reads = [(item, 0) for item in items]
-    assert partial_misses(reads, LeastRecent(2)) == 60
-    assert partial_misses(reads, KnownFuture(items, 2)) < 35
 
 
 def test_the_whole_run_is_json(mi: Any) -> None:

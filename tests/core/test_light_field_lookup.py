@@ -10,7 +10,7 @@ import pytest
 from lambent.core import light_field_maps
 from lambent.core.directions import normalize
 from lambent.core.light_field import NO_POINT, LightField
-from lambent.core.light_field_lookup import March, Place, basis_weights, blended, fixed_point, marched, surface
+from lambent.core.light_field_lookup import March, Place, basis_weights, blended, marched, surface
 from lambent.core.light_field_maps import nearest_points, nearness_along, radiance_along
 from lambent.core.octahedral import bordered, texel_directions, to_square
 from tests.core.analytic_light_field import BALL, OWN, ball_field, errors, on_ball, places, seen, sky_light
@@ -92,9 +92,9 @@ def test_constant_surroundings_are_what_every_method_returns(field: LightField) 
     place, w = places(field)
     for basis in BASES:
         np.testing.assert_allclose(blended(constant, place, w, basis), 0.75, rtol=1e-12)  # type: ignore[arg-type]
-    for answer in (marched(constant, place, w), fixed_point(constant, place, w)):
-        np.testing.assert_allclose(answer.radiance, 0.75, rtol=1e-12)
-        assert answer.sky.all() and not answer.met.any()
+    answer = marched(constant, place, w)
+    np.testing.assert_allclose(answer.radiance, 0.75, rtol=1e-12)
+    assert answer.sky.all() and not answer.met.any()
 
 
 def test_a_march_meets_the_walls_where_the_ray_does(field: LightField) -> None:
@@ -109,8 +109,6 @@ def test_a_march_meets_the_walls_where_the_ray_does(field: LightField) -> None:
         error = errors(answer.radiance, place, w)
         assert np.median(error) < 0.03 * np.median(uncorrected)
         assert np.sqrt((error**2).mean()) < (0.9 if count == 1 else 0.5) * np.sqrt((uncorrected**2).mean())
-    by_rounds = errors(fixed_point(field, place, w).radiance, place, w)
-    assert np.median(by_rounds) < 0.03 * np.median(uncorrected)
 
 
 def test_the_march_errs_by_texels_and_a_blend_by_the_spacing_of_points(field: LightField) -> None:

@@ -1,4 +1,4 @@
-"""Caches of maps: answers by hand, room never exceeded, nothing better than knowing the future."""
+"""Caches of maps: answers by hand, room never exceeded, the adaptive one near the better of its two."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from lambent.core.map_cache import POLICIES, Adaptive, LeastRecent, ReadLast, fewest_misses, misses
+from lambent.core.map_cache import POLICIES, Adaptive, LeastRecent, ReadLast, misses
 
 
 def test_least_recent_by_hand() -> None:
@@ -48,43 +48,16 @@ def test_maps_to_keep_are_kept(policy: str) -> None:
             assert set(wanted) <= set(cache.held) and len(cache.held) <= capacity
 
 
-def test_the_future_is_known_by_exhaustion() -> None:
-    """Against all choices of what to drop, for short reads."""
-    rng = np.random.default_rng(2)
-    for _ in range(40):
-        reads, capacity = rng.integers(0, 5, 9).tolist(), int(rng.integers(1, 4))
-        assert fewest_misses(reads, capacity) == _least(reads, frozenset(), capacity)
-
-
-def _least(reads: list[int], held: frozenset[int], capacity: int) -> int:
-    if not reads:
-        return 0
-    name, rest = reads[0], reads[1:]
-    if name in held:
-        return _least(rest, held, capacity)
-    if len(held) < capacity:
-        return 1 + _least(rest, held | {name}, capacity)
-    return 1 + min(_least(rest, (held - {out}) | {name}, capacity) for out in held)
-
-
-@pytest.mark.parametrize("policy", ALL)
-def test_nothing_is_better_than_knowing_the_future(policy: str) -> None:
-    reads = (np.random.default_rng(3).zipf(1.2, 4000) % 200).tolist()
-    for capacity in (1, 3, 20, 150):
-        assert misses(reads, ALL[policy](capacity)) >= fewest_misses(reads, capacity) >= len(set(reads))
-
-
 def rows_of(maps: int, rows: int, shift: int) -> list[int]:
     """Reads of `rows` rows, each of `maps` maps that two pixels read; rows move on by one map every `shift` rows."""
     return [row // shift + column for row in range(rows) for column in range(maps) for _ in range(2)]
 
 
 def test_rows_longer_than_the_cache_defeat_the_least_recent_policy_alone() -> None:
-    """48 maps a row, room for 32: least-recent finds none of the row before; the others come near the optimum."""
+    """48 maps a row, room for 32: least-recent finds none of the row before; the optimal cache misses a third."""
     reads = rows_of(48, 120, 4)
-    fewest, all_maps = fewest_misses(reads, 32), len(reads) // 2
-    assert misses(reads, LeastRecent(32)) == all_maps
-    assert misses(reads, ReadLast(32)) < 1.4 * fewest and misses(reads, Adaptive(32)) < 1.4 * fewest < 0.6 * all_maps
+    assert misses(reads, LeastRecent(32)) == len(reads) // 2
+    assert max(misses(reads, ReadLast(32)), misses(reads, Adaptive(32))) < 0.6 * len(reads) // 2
 
 
 def test_the_adaptive_policy_is_near_the_better_one() -> None:

@@ -1,0 +1,22 @@
+"""Fixed-point iteration through a light field finds the walls of a room that is known by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from lambent.core.light_field_lookup import blended
+from lambent.published.distance_impostors import fixed_point
+from tests.core.analytic_light_field import ball_field, errors, places
+
+
+def test_iteration_finds_the_walls() -> None:
+    field = ball_field()
+    place, w = places(field)
+    by_rounds, uncorrected = fixed_point(field, place, w).radiance, blended(field, place, w)
+    assert np.median(errors(by_rounds, place, w)) < 0.03 * np.median(errors(uncorrected, place, w))
+    constant = replace(field, radiance=np.full_like(field.radiance, 0.75), inverse_distance=0 * field.inverse_distance)
+    answer = fixed_point(constant, place, w)
+    np.testing.assert_allclose(answer.radiance, 0.75, rtol=1e-12)
+    assert answer.sky.all() and not answer.met.any()
