@@ -1,6 +1,6 @@
 """What becomes of Mitsuba's BSDFs, against Mitsuba itself: albedos, the L1 of f cos, peaks, widths.
 
-The bounds are what was measured, rounded up: the table of docs/scenes.md says the same.
+The bounds are what was measured, rounded up: docs/scenes.md has the largest of each kind.
 """
 
 from __future__ import annotations
