@@ -46,7 +46,7 @@ class Gathering:
 
     def _gathered(self, si: Any, sampler: Any, active: Any, cache: path_tracer.Cache) -> Any:
         reflected, transmitted, coupled = self.cache.colours(si, active)
-        brightness = [dr.mean(colour) for colour in (reflected, transmitted)]
+        brightness = [dr.sum(colour) for colour in (reflected, transmitted)]  # dr.mean compiles for every width
         share = brightness[1] / dr.maximum(brightness[0] + brightness[1], 1e-9)
         active = active & (brightness[0] + brightness[1] > 0)
         across = sampler.next_1d(active) < share
