@@ -47,7 +47,7 @@ class Kind(Enum):
 
 
 class Part(Enum):
-    """Part of the light at the surface that the eye sees: diffuse, by lobes, or full, with emission and sky."""
+    """Part of the light at the surface that the eye sees: diffuse and emitted, by lobes, or full, with the sky."""
 
     full = "full"
     diffuse = "diffuse"
@@ -119,10 +119,8 @@ class Tracer:
         if gathers:
             si = intersect(self._scene, ray, mi.Bool(True), has_holes(self._scene))
             diffuse = self._gathering.radiance(si, sampler, si.is_valid())
-            if part is Part.diffuse:
-                return diffuse
         tally = Shown(self._tally, part, cached_first=not gathers)
-        depth = 1 if part is Part.diffuse else self._max_depth
+        depth = self._max_depth if part is not Part.diffuse else 0 if gathers else 1
         return diffuse + path_tracer.radiance_sums(self._scene, sampler, start, depth, self._cache, tally)[0]
 
     def guides(self, camera: Camera, size: tuple[int, int], samples: int, seed: int) -> tuple[Image, Image]:
@@ -167,7 +165,8 @@ class Shown:
 
     def emitted(self, sums: list[Any], light: Any, emitter: Any, w: Any, factor: Any, first: Any) -> list[Any]:
         if self._part is Part.diffuse:
-            return sums
+            of_surface = first & ~mi.has_flag(emitter.flags(), mi.EmitterFlags.Infinite)
+            light, factor = dr.select(of_surface, light, 0.0), dr.select(of_surface, factor, 0.0)
         if self._part is Part.specular:
             light, factor = dr.select(first, 0.0, light), dr.select(first, 0.0, factor)
         return self._tally.emitted(sums, light, emitter, w, factor, first)
