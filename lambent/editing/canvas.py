@@ -18,6 +18,8 @@ from lambent.editing.products import Halves, HostProducts, Pixels, Products
 from lambent.editing.rows import PairTransport
 from lambent.materials.factored.curve import END_RAD, KNOTS, Curve
 
+ONE = np.ones((3, 1), np.float32)  # multiplier of all pixels
+
 
 class Layer(Protocol):
     """One term of one material: products of its transport, and their factors."""
@@ -35,8 +37,8 @@ class Layer(Protocol):
 class Canvas(Protocol):
     """The picture (H, W) of all layers."""
 
-    def layer(self, pixel: Indices, theta_o: Floats, texture: Floats | None) -> Layer:
-        """A new layer over pixels (P,), with the viewer's angles (P,) and an optional texture (P, 3)."""
+    def layer(self, pixel: Indices, theta_o: Floats) -> Layer:
+        """A new layer over pixels (P,), with the viewer's angles (P,)."""
 
     def compose(self, shown: Sequence[tuple[Layer, NDArray[np.float32]]]) -> None:
         """Draw the sum of layers, each with its scale (3,)."""
@@ -50,11 +52,8 @@ class HostLayer:
 
     products: HostProducts
 
-    def __init__(self, pixel: Indices, theta_o: Floats, texture: Floats | None) -> None:
-        self.pixel = pixel
-        self._texture = np.ascontiguousarray(np.ones((3, 1)) if texture is None else texture.T, np.float32)
-        self._theta_o = np.asarray(theta_o, np.float32)
-        self.multiplier = self._texture
+    def __init__(self, pixel: Indices, theta_o: Floats) -> None:
+        self.pixel, self._theta_o, self.multiplier = pixel, np.asarray(theta_o, np.float32), ONE
 
     def hold(self, transport: Halves) -> Products:
         self.products = HostProducts(transport)
@@ -65,7 +64,7 @@ class HostLayer:
         return self.hold(rows.values), rows.unit
 
     def view(self, curve: Curve | None) -> None:
-        self.multiplier = self._texture if curve is None else viewed(self._texture, self._theta_o, curve)
+        self.multiplier = ONE if curve is None else viewed(self._theta_o, curve)
 
 
 class HostCanvas:
@@ -75,8 +74,8 @@ class HostCanvas:
         self._background = np.array(background, np.float32)
         self._image = self._background.copy()
 
-    def layer(self, pixel: Indices, theta_o: Floats, texture: Floats | None) -> HostLayer:
-        return HostLayer(pixel, theta_o, texture)
+    def layer(self, pixel: Indices, theta_o: Floats) -> HostLayer:
+        return HostLayer(pixel, theta_o)
 
     def compose(self, shown: Sequence[tuple[Layer, NDArray[np.float32]]]) -> None:
         self._image = self._background.copy()
@@ -88,21 +87,19 @@ class HostCanvas:
         return self._image
 
 
-def viewed(texture: Pixels, theta_o: NDArray[np.float32], viewer: Curve) -> Pixels:
-    """(3, P): a texture (3, P), or (3, 1), times f_o(theta_o)."""
-    texture = np.ascontiguousarray(np.broadcast_to(texture, (3, len(theta_o))))
-    return np.asarray(_times_curve(texture, theta_o * np.float32(KNOTS / END_RAD), viewer.values.astype(np.float32)))
+def viewed(theta_o: NDArray[np.float32], viewer: Curve) -> Pixels:
+    """(3, P) values f_o(theta_o) of the viewer's curve."""
+    return np.asarray(_looked_up(theta_o * np.float32(KNOTS / END_RAD), viewer.values.astype(np.float32)))
 
 
 @numba.njit(parallel=True, cache=True, nogil=True)
-def _times_curve(texture, step, values):  # type: ignore[no-untyped-def]
-    out = np.empty_like(texture)
-    last = len(values) - 2
+def _looked_up(step, values):  # type: ignore[no-untyped-def]
+    out, last = np.empty((3, len(step)), np.float32), len(values) - 2
     for p in numba.prange(len(step)):
         k = min(max(int(step[p]), 0), last)
         share = min(max(step[p] - k, np.float32(0)), np.float32(1))
-        for c in range(len(texture)):
-            out[c, p] = texture[c, p] * (values[k, c] + share * (values[k + 1, c] - values[k, c]))
+        for c in range(3):
+            out[c, p] = values[k, c] + share * (values[k + 1, c] - values[k, c])
     return out
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.plain import triple
-from lambent.core.progress import Progress, silent
 from lambent.editing.as_table import EditedTable, part_of
 from lambent.editing.document import OfDocument, OfModel, OfTable
 from lambent.editing.session import Session
@@ -28,6 +27,7 @@ from lambent.materials.models.lambert import Lambert
 
 SAME = 1e-9  # relative difference up to which curves count as multiples of each other
 COMPARED = 60_000  # tuples, at most
+METRIC = "cuberoot"  # that lobes are fitted by
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,12 @@ def export(
     name: str,
     *,
     lobes: int | Literal["auto"] = "auto",
-    metric: str = "cuberoot",
     distribution: Literal["beckmann", "ggx", "best"] = "best",
-    progress: Progress = silent,
 ) -> ExportedMaterial:
     """Convert a material of a session, as edited now, to a document.
 
     Diffuse terms and lobes whose curves are a document's, or multiples of them, are kept. Lobes and a diffuse term are
-    fitted to the sum of the others; `lobes`, `metric` and `distribution` are as in `fitting.fit`.
+    fitted to the sum of the others; `lobes` and `distribution` are as in `fitting.fit`.
     """
     edited, start = session.editable(name), session.original(name)
     document = _document(session.document.materials[name].source)
@@ -83,10 +81,7 @@ def export(
         table = EditedTable(part_of(edited, rest), name)
         samples = table.samples()
         if samples.f.any():
-            found = fit(
-                samples, lobes=lobes, metric=metric, distribution=distribution, coupled=kept.kd_coupled,
-                progress=progress,
-            )  # fmt: skip
+            found = fit(samples, lobes=lobes, metric=METRIC, distribution=distribution, coupled=kept.kd_coupled)
             kept, warnings = _sum(kept, found.material), found.warnings
     fitted = tuple(term.name for term in edited.terms if term.name in rest)
     samples = EditedTable(edited, name).samples(COMPARED)
@@ -94,7 +89,7 @@ def export(
     errors, shares = errors_and_shares(samples, model)
     light = light_ratios(samples, model)
     verdict = verdict_of(shares, light)
-    provenance = _provenance(session, name, fitted, errors, samples, metric, (str(verdict), *warnings))
+    provenance = _provenance(session, name, fitted, errors, samples, (str(verdict), *warnings))
     material = kept.model_copy(update={"name": name, "provenance": provenance})
     return ExportedMaterial(material, fitted, errors, shares, light, verdict, warnings)
 
@@ -175,7 +170,6 @@ def _provenance(
     fitted: tuple[str, ...],
     errors: dict[str, float],
     samples: MeasuredSamples,
-    metric: str,
     notes: tuple[str, ...],
 ) -> Provenance:
     one = session.document.materials[name]
@@ -190,7 +184,7 @@ def _provenance(
         source_sha256=before.source_sha256 if before and before.source else sha256,
         source_format=before.source_format if before and before.source else kind,
         method=method,
-        metric=metric if fitted else None,
+        metric=METRIC if fitted else None,
         errors=errors,
         samples=samples.counts,
         notes=notes + (tuple(f"before the edits: {note}" for note in before.notes) if before else ()),

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.editing.products import Halves, HostProducts, Pixels, Products
+from lambent.editing.products import Pixels, Products
 
 TERMS = 30  # per frame
 RENEWED_IN = 64  # frames until every pixel has been recomputed
@@ -22,8 +22,8 @@ class IncrementalPicture:
 
     Parameters
     ----------
-    transport
-        (J, C, P) float16, by bands or, better, by wavelets (`core.wavelets`); or products stored elsewhere.
+    products
+        Of its transport by bands or, better, by wavelets (`core.wavelets`).
 
     Attributes
     ----------
@@ -31,9 +31,9 @@ class IncrementalPicture:
         Target coefficients of the curve, and those that `picture` shows.
     """
 
-    def __init__(self, transport: Halves | Products) -> None:
-        self._products = HostProducts(transport) if isinstance(transport, np.ndarray) else transport
-        bands, channels, self._pixels = self._products.shape
+    def __init__(self, products: Products) -> None:
+        self._products = products
+        bands, channels, self._pixels = products.shape
         self.wanted: Floats = np.zeros((bands, channels))
         self.effective: Floats = np.zeros((bands, channels))
         self._next_block = 0
@@ -63,11 +63,6 @@ class IncrementalPicture:
         self.effective[rows] = self.wanted[rows]  # effective + change, without rounding
         self._renew(self._next_block, RENEWED_IN)
         self._next_block = (self._next_block + 1) % RENEWED_IN
-
-    def clear(self) -> None:
-        """Set the effective coefficients to 0 and show nothing."""
-        self.effective[:] = 0
-        self._renew(0, 1)
 
     def draw(self) -> None:
         """Draw the exact picture at once, from every coefficient."""

@@ -1,8 +1,8 @@
 """The edited picture of a view: every term of every material as an incremental picture, over the unedited part.
 
-    radiance = sum over terms of  f_q f_o(theta_o) texture  sum over j of  c_j T_j        (Ben-Artzi 2007, eqs 3.1, 4.6)
+    radiance = sum over terms of  f_q f_o(theta_o)  sum over j of  c_j T_j        (Ben-Artzi 2007, eqs 3.1, 4.6)
 
-Scales, textures and curves of the viewer multiply whole pixels, so their edits are exact at once.
+Scales and curves of the viewer multiply whole pixels, so their edits are exact at once.
 """
 
 from __future__ import annotations
@@ -37,21 +37,17 @@ class Part:
     theta_o : (P,)
         Angle between the viewer and the normal, in radians.
     transport : tuple
-        For each term of `start`. `Rows` of a term with two curves are valid for the other curve as it is in `start`.
-    diffuse, specular : (P, 3), optional
-        Textures that multiply diffuse and other terms; None if there are none, or if transport includes them.
+        For each term of `start`: pairs for one with two curves, otherwise rows. Textures are part of it.
     """
 
     start: Editable
     pixel: Indices
     theta_o: Floats
     transport: tuple[Rows | PairTransport, ...]
-    diffuse: Floats | None = None
-    specular: Floats | None = None
 
 
 class TransportNeeded(Exception):
-    """Transport of a material cannot show an edit: another quotient, or a second curve without its matrix.
+    """Transport of a material cannot show an edit that changes a quotient.
 
     Attributes
     ----------
@@ -118,9 +114,6 @@ class EditedPicture:
             before = {term.name: (term.quotient, term.factors, term.side) for term in part.start.terms}
             new = [t.name for t in edited.terms if before.get(t.name) != (t.quotient, t.factors, t.side)]
             raise TransportNeeded(material, tuple(new or (term.name for term in edited.terms)))
-        missing = tuple(term.name for term in terms if not term.serves(edited.curves))
-        if missing:
-            raise TransportNeeded(material, missing)
         for term, now in zip(terms, edited.terms, strict=True):
             term.show(edited.curves, now)
 
@@ -179,15 +172,15 @@ class _TermPicture:
     """One term: its incremental picture over the active curve, and its factors."""
 
     def __init__(self, term: Term, transport: Rows | PairTransport, part: Part, canvas: Canvas) -> None:
-        self.name, self._factors, self._start = term.name, term.factors, part.start.curves
-        self._transport = transport
-        self._counts = _counts(transport, len(term.factors))
-        texture = part.diffuse if term.is_diffuse else part.specular
-        self.layer = canvas.layer(part.pixel, part.theta_o, texture)
+        self._factors = term.factors
+        self._pairs = None if isinstance(transport, Rows) else transport
+        self._counts = (len(transport.values),) if isinstance(transport, Rows) else transport.counts
+        assert self._pairs is None or len(term.factors) == 2, "pairs are of two curves"
+        self.layer = canvas.layer(part.pixel, part.theta_o)
         self._viewer: Curve | None = None
-        self._shown, self._colour = self._start, term.scale
+        self._shown, self._colour = part.start.curves, term.scale
         self._to_renew = 0  # blocks of pixels not recomputed since the last edit
-        self._active = transport.over if isinstance(transport, Rows) else 0
+        self._active = 0
         if isinstance(transport, Rows):
             self._use(self.layer.hold(transport.values), transport.unit)
         else:
@@ -196,13 +189,6 @@ class _TermPicture:
     @property
     def is_settled(self) -> bool:
         return self.picture.is_exact and self._to_renew <= 0
-
-    def serves(self, curves: Mapping[str, Curve]) -> bool:
-        """Whether this transport can show the curves."""
-        if len(self._factors) < 2 or not isinstance(self._transport, Rows):
-            return True
-        idle = self._factors[1 - self._active].curve
-        return curves[idle] is self._start[idle] or np.array_equal(curves[idle].values, self._start[idle].values)
 
     def show(self, curves: Mapping[str, Curve], term: Term) -> None:
         """Set curves, and the scale of `term`, as the target."""
@@ -238,10 +224,6 @@ class _TermPicture:
         self.picture.draw()
         self._to_renew = 0
 
-    @property
-    def _pairs(self) -> PairTransport | None:
-        return None if isinstance(self._transport, Rows) else self._transport
-
     def _want(self) -> None:
         wanted = self._coefficients(self._shown, self._active) if self._factors else np.ones((1, 3))
         if not np.array_equal(wanted, self.picture.wanted):
@@ -272,12 +254,3 @@ class _TermPicture:
     def _changed(self, before: Mapping[str, Curve], factor: int) -> bool:
         then, now = self._coefficients(before, factor), self._coefficients(self._shown, factor)
         return then is not now and not np.array_equal(then, now)
-
-
-def _counts(transport: Rows | PairTransport, factors: int) -> dict[int, int]:
-    """Number of wavelets, by index of the factor."""
-    if not isinstance(transport, Rows):
-        assert factors == 2, "a matrix of transport is for a term with two curves"
-        return dict(enumerate(transport.counts))
-    assert transport.over < max(factors, 1), "rows are over a curve that the term has"
-    return {transport.over: len(transport.values)}

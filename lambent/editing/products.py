@@ -113,21 +113,10 @@ class Products(Protocol):
         """
 
 
-class Summable(Protocol):
-    """Rows with another storage format."""
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """(J, C, P) of the transport."""
-
-    def add_to(self, picture: Pixels, rows: NDArray[np.integer], weights: Floats, part: slice = slice(None)) -> None:
-        """Like the function `add_rows`."""
-
-
 class HostProducts:
-    """`Products` of transport (J, C, P) float16 in memory, or of `Summable` rows, summed on all cores."""
+    """`Products` of transport (J, C, P) float16 in memory, summed on all cores."""
 
-    def __init__(self, transport: Halves | Summable) -> None:
+    def __init__(self, transport: Halves) -> None:
         self._transport = transport
         self.shape = transport.shape
         self.picture: Pixels = np.zeros(transport.shape[1:], np.float32)
@@ -137,7 +126,4 @@ class HostProducts:
     ) -> None:
         if anew:
             self.picture[:, part] = 0
-        if isinstance(self._transport, np.ndarray):
-            add_rows(self.picture, self._transport, rows, weights, part)
-        else:
-            self._transport.add_to(self.picture, rows, weights, part)
+        add_rows(self.picture, self._transport, rows, weights, part)

@@ -1,4 +1,7 @@
-"""A baked view under an environment that rotates or is replaced, with fixed materials (store.contract, relighting)."""
+"""A baked view under an environment that rotates or is replaced, with fixed materials (store.contract, relighting).
+
+picture = sum over wavelets of light of  coefficient * row        (Ben-Artzi 2007, section 7.3)
+"""
 
 from __future__ import annotations
 
@@ -7,16 +10,12 @@ import numpy as np
 from lambent.core.arrays import Image
 from lambent.core.camera import Camera, pixel_rays
 from lambent.core.errors import UserError
-from lambent.editing.incremental import TERMS
-from lambent.editing.relighting import RelitPicture
 from lambent.editing.sparse_rows import SparseRows
 from lambent.scenes.environment_images import environment_picture, orientation, seen_at
 from lambent.scenes.scene import Environment, ImageEnvironment
 from lambent.scenes.triangle_wavelets import CHILDREN, FACES, TriangleTree, TurningLight
 from lambent.store.contract import ViewRecord, baked_views, view_artefact_name
 from lambent.store.store import Store
-
-TERMS_OF_LIGHT = 10 * TERMS  # per frame: rows are short, and a rotation changes most of them
 
 
 class RelitView:
@@ -52,30 +51,23 @@ class RelitView:
         left_out, whole = store.read(name("errors")).astype(float).sum(axis=0)
         self.error = float(np.sqrt(left_out / max(whole, 1e-300)))
         self._tree = TriangleTree(_depth(spans.shape[1] - 1))
-        rows = SparseRows(
+        self._rows = SparseRows(
             spans, store.read(name("points"))[:, 0], store.read(name("values")),
             int(store.artefact(name("spans")).meta["block"]), len(self._pixel),
         )  # fmt: skip
         self._rays, self._shape = pixel_rays(camera, width, height).reshape(-1, 3), (height, width, 3)
-        self._picture = RelitPicture(self._tree, rows)
         self._baked = TurningLight(self._tree, fine)
         self.light(None)
         self.draw()
 
-    @property
-    def is_exact(self) -> bool:
-        """Whether the picture shows the light exactly."""
-        return self._picture.is_exact
-
     def turn(self, rotation_deg: float) -> None:
-        """Set as the target the environment rotated about +y, relative to the bake or to the last `light`."""
+        """Light the next `draw` by the environment rotated about +y, relative to the bake or to the last `light`."""
         angle = np.radians(rotation_deg % 360)
         c, s = np.cos(angle), np.sin(angle)
         self._turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) @ self._laid
-        self._picture.light(self._light.radiance(None if self._is_upright else self._turn))
 
     def light(self, environment: Environment | None) -> None:
-        """Set another environment as the target, or that of the bake (None).
+        """Light the next `draw` by another environment, or by that of the bake (None).
 
         Raises
         ------
@@ -87,13 +79,10 @@ class RelitView:
         self._laid = orientation(environment) if isinstance(environment, ImageEnvironment) else np.eye(3)
         self.turn(0.0)
 
-    def step(self, terms: int = TERMS_OF_LIGHT) -> None:
-        """One frame: per level of wavelets, add the largest changes or redraw, whichever has the smaller error."""
-        self._picture.step(terms)
-
     def draw(self) -> None:
-        """Draw the exact picture at once."""
-        self._picture.draw()
+        """Sum the picture under the light as set."""
+        radiance = self._light.radiance(None if self._is_upright else self._turn)
+        self._picture = self._rows.summed(self._tree.of_radiance(radiance))
 
     def image(self) -> Image:
         """(H, W, 3) float32, linear radiance."""
@@ -105,7 +94,7 @@ class RelitView:
             image[around] = seen_at(self._around, w)
         elif not self._is_upright:
             image[around] = self._light.seen(w)
-        image[self._pixel] += self._picture.picture.T + self._lamps
+        image[self._pixel] += self._picture.T + self._lamps
         return image.reshape(self._shape)
 
     @property

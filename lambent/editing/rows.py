@@ -14,7 +14,7 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.wavelets import transformed
-from lambent.editing.products import Halves, Pixels
+from lambent.editing.products import Halves
 from lambent.materials.factored.curve import Curve
 
 NOTHING = 1e-12  # of the largest wavelet; squares of smaller ones, in a narrow curve's tail, underflow
@@ -31,25 +31,10 @@ class Rows:
         By wavelets of the curve, J a power of two; J = 1 for a term without a curve.
     unit : float
         W/(sr m^2) of value 1. Half floats end at 65504; the sun's light exceeds that.
-    over : int
-        Index of the curve among the term's factors.
     """
 
     values: Halves
     unit: float = 1.0
-    over: int = 0
-
-    @classmethod
-    def of_wavelets(cls, transport: Pixels, over: int = 0) -> Rows:
-        """Rows of transport (J, 3, P) in W/(sr m^2), scaled by a power of two to fit half floats."""
-        largest = float(max(transport.max(initial=0.0), -transport.min(initial=0.0)))
-        unit = 2.0 ** np.ceil(np.log2(max(largest, 1e-30) / LARGEST))
-        return cls((transport / np.float32(unit)).astype(np.float16), float(unit), over)
-
-    @classmethod
-    def of_bands(cls, transport: Pixels, over: int = 0) -> Rows:
-        """Rows of transport (J, 3, P) by nodes, in W/(sr m^2)."""
-        return cls.of_wavelets(np.asarray(transformed(transport), np.float32), over)
 
 
 class PairTransport(Protocol):
@@ -61,21 +46,6 @@ class PairTransport(Protocol):
 
     def fold(self, curve_index: int, values: Floats) -> Rows:
         """Rows over the other curve, with curve `curve_index`, 0 or 1, folded in by its values (K, 3) at the nodes."""
-
-
-@dataclass(frozen=True)
-class DensePairs:
-    """Transport `bands` (J, K, 3, P) float32, W/(sr m^2), over all pairs of nodes of two curves."""
-
-    bands: Pixels
-
-    @property
-    def counts(self) -> tuple[int, int]:
-        return self.bands.shape[0], self.bands.shape[1]
-
-    def fold(self, curve_index: int, values: Floats) -> Rows:
-        sums = "jkcp,jc->kcp" if curve_index == 0 else "jkcp,kc->jcp"
-        return Rows.of_bands(np.einsum(sums, self.bands, np.asarray(values, np.float32)), 1 - curve_index)
 
 
 @lru_cache(maxsize=256)

@@ -42,22 +42,14 @@ class StoredPairs:
         """Rows over the other curve, see `rows.PairTransport`."""
         edited = 1 - curve_index
         rows, scale = folded(self.spans, self.steps, self.values, node_values, edited, self.counts[edited])
-        return Rows(rows, self.unit * scale, edited)
+        return Rows(rows, self.unit * scale)
 
 
-def edited_picture(
-    store: Store, session: Session, lights: int | None = None, canvas: Callable[[Image], Canvas] = HostCanvas
-) -> EditedPicture:
-    """The picture of a session's view, drawn exactly as edited.
+def edited_picture(store: Store, session: Session, canvas: Callable[[Image], Canvas] = HostCanvas) -> EditedPicture:
+    """The picture of a session's view, drawn exactly as edited, on a `canvas` as for `EditedPicture`.
 
-    Materials of the view that the session does not edit are drawn as in the scene.
-
-    Parameters
-    ----------
-    lights
-        Number of lights of the stored transport to use; by default the largest.
-    canvas
-        As for `EditedPicture`.
+    Materials of the view that the session does not edit are drawn as in the scene. Of several numbers of lights that
+    the transport has, the largest is used.
 
     Raises
     ------
@@ -68,15 +60,10 @@ def edited_picture(
         If the session names materials that the scene does not have, or the store cannot be read.
     """
     view = session.document
-    counts = transport_lights(store, view.camera, *view.size)
-    lights = max(counts, default=None) if lights is None else lights
-    if lights is None or lights not in counts:
-        found = ", ".join(map(str, counts)) or "none"
+    lights = max(transport_lights(store, view.camera, *view.size), default=0)
+    if not lights:
         what = f"no transport for camera {view.camera.name}, {view.size[0]} x {view.size[1]}"
-        raise NotBaked(
-            what, file=store.folder, field="lights", got=lights or found, expected=found if counts else None,
-            hint="bake the view for editing first",
-        )  # fmt: skip
+        raise NotBaked(what, file=store.folder, hint="bake the view for editing first")
     _check_environment(store, session, lights)
     scene = {name: of_material(material) for name, material in scene_record(store).materials.items()}
     parts = parts_of(store, session, {**scene, **{name: session.original(name) for name in view.materials}}, lights)

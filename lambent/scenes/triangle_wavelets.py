@@ -52,12 +52,6 @@ class TriangleTree:
         """(N,) solid angles; their sum is 4 pi."""
         return solid_angles(self.corners)
 
-    @cached_property
-    def levels(self) -> Indices:
-        """(N,) level of each coefficient: 0 for the 20 faces, then 1, 2, ... for the details, coarse to fine."""
-        counts = [FACES, *(3 * FACES * CHILDREN**level for level in range(self.depth))]
-        return np.repeat(np.arange(self.depth + 1), counts)
-
     def of_radiance(self, radiance: Floats) -> Floats:
         """Coefficients (N, ...) of radiance (N, ...) by triangle."""
         return self._transformed(_scaled(radiance, np.sqrt(self.areas_sr)))

@@ -43,8 +43,8 @@ class _ShadedLayer(GpuLayer):
 class ShadedCanvas(GpuCanvas):
     """Canvas of compute shaders, which draw into `texture`."""
 
-    def layer(self, pixel: Indices, theta_o: Floats, texture: Floats | None) -> _ShadedLayer:
-        return _ShadedLayer(self._commands, self._texels(pixel), theta_o, texture, self._image)
+    def layer(self, pixel: Indices, theta_o: Floats) -> _ShadedLayer:
+        return _ShadedLayer(self._commands, self._texels(pixel), theta_o, self._image)
 
 
 class SentCanvas(HostCanvas):

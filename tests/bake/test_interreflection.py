@@ -14,7 +14,7 @@ from lambent.bake.view import View
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.shared_exponent import unpacked_rgb
-from lambent.editing.interreflection.powers import bands_of, second_coefficients
+from lambent.editing.interreflection.powers import bands_of
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo
 from lambent.materials.factored.curve import KNOTS, Curve
@@ -25,6 +25,7 @@ from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.store import Store
 from lambent.store.tails import FIXED, Tails
 from tests.bake.small_scenes import turned_inwards
+from tests.editing.dense_rows import second_coefficients
 from tests.tools.z_test import assert_same_image
 
 SIZE = 12
@@ -64,7 +65,7 @@ def picture(
     """(P, 3) interreflections with other curves, by plain sums over the stored tiles."""
     tails = Tails.of(store.artefact(view.name("interreflection", "tails")).meta["tails"])
     albedos = np.array([np.ones(3) if side == FIXED else albedo(materials[name], side) for name, side in tails.slots])
-    weights = tails.weights(albedos, second_coefficients(tails, materials) if tails.second else None)
+    weights = tails.weights(albedos, second_coefficients(tails, materials))
     if hits is not None:
         weights[tails.hits != hits] = 0
     number = store.read(view.name("view_points", "object"))

@@ -1,11 +1,11 @@
-"""Daubechies' wavelets: the published taps, orthonormality, inverse, vanishing moments."""
+"""Daubechies' wavelets: the published taps, orthonormality, vanishing moments."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from lambent.core.wavelets import TAPS, levels, restored, transformed
+from lambent.core.wavelets import TAPS, transformed
 
 
 def test_taps_are_the_published_ones() -> None:
@@ -13,11 +13,9 @@ def test_taps_are_the_published_ones() -> None:
 
 
 @pytest.mark.parametrize("length", [1, 2, 4, 8, 32, 256])
-def test_transform_is_orthonormal_and_inverted(length: int) -> None:
+def test_transform_is_orthonormal(length: int) -> None:
     matrix = transformed(np.eye(length))
     assert np.allclose(matrix @ matrix.T, np.eye(length), atol=1e-13)
-    values = np.random.default_rng(1).normal(size=(length, 3, 5))
-    assert np.allclose(restored(transformed(values)), values, atol=1e-13)
 
 
 def test_first_step_by_hand() -> None:
@@ -29,19 +27,10 @@ def test_first_step_by_hand() -> None:
     assert np.allclose(transformed(np.eye(4)[3]), [mean, detail, *high])
 
 
-def test_dot_products_stay() -> None:
-    c, t = np.random.default_rng(2).normal(size=(2, 64))
-    assert transformed(c) @ transformed(t) == pytest.approx(c @ t)
-
-
 def test_straight_lines_have_no_fine_details_away_from_the_wrap() -> None:
     finest = transformed(np.arange(64.0))[32:]
     assert np.allclose(finest[:-1], 0, atol=1e-12)
     assert abs(finest[-1]) > 1
-
-
-def test_levels_count_the_details() -> None:
-    assert levels(16).tolist() == [0, 1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4]
 
 
 def test_other_lengths_are_refused() -> None:

@@ -9,6 +9,7 @@ from lambent.core.shared_exponent import packed_rgb, unpacked_rgb
 from lambent.core.wavelets import transformed
 from lambent.editing.folding import folded
 from lambent.editing.incremental import IncrementalPicture
+from lambent.editing.products import HostProducts
 
 Sparse = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -56,7 +57,7 @@ def test_pictures_do_not_depend_on_the_curve_that_is_edited() -> None:
     pictures = []
     for edited in (0, 1):
         rows, scale = folded(*transport, curves[1 - edited], edited, bands[edited])
-        incremental = IncrementalPicture(rows)
+        incremental = IncrementalPicture(HostProducts(rows))
         incremental.want(transformed(curves[edited] * scale))
         incremental.draw()
         pictures.append(incremental.picture)

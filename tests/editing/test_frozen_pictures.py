@@ -16,11 +16,11 @@ from lambent.editing.canvas import HostCanvas
 from lambent.editing.interreflection.entries import TermLight
 from lambent.editing.interreflection.noise import light_of, noise
 from lambent.editing.interreflection.picture import FrozenPicture
-from lambent.editing.interreflection.powers import bands_of, powers, second_coefficients
+from lambent.editing.interreflection.powers import bands_of, powers
 from lambent.editing.interreflection.stored import Interreflections, PartLight, interreflections
 from lambent.editing.interreflection.whole import WholePicture
 from lambent.editing.picture import EditedPicture, Part
-from lambent.editing.rows import DensePairs, Rows
+from lambent.editing.rows import Rows
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo, term_albedo
 from lambent.materials.factored.curve import KNOTS, Curve
@@ -29,6 +29,7 @@ from lambent.materials.factored.terms import Editable, Term
 from lambent.store.contract import view_artefact_name
 from lambent.store.store import Store
 from lambent.store.tails import FIXED, SecondBands, Tails
+from tests.editing.dense_rows import DensePairs, second_coefficients
 
 SIZE = (7, 5)
 CANVAS = HostCanvas(np.zeros((*SIZE, 3), np.float32))
@@ -71,7 +72,7 @@ def expected(whole: Interreflections, materials: dict[str, Editable], hits: tupl
     """(H, W, 3) by the sum over everything, entry by entry."""
     tails = whole.tails
     albedos = np.array([np.ones(3) if side == FIXED else albedo(materials[name], side) for name, side in tails.slots])
-    weights = tails.weights(albedos, second_coefficients(tails, materials) if tails.second else None)
+    weights = tails.weights(albedos, second_coefficients(tails, materials))
     weights[(tails.hits < hits[0]) | (tails.hits > hits[1])] = 0
     image = np.zeros((SIZE[0] * SIZE[1], 3))
     for name, part in whole.parts.items():
@@ -195,11 +196,6 @@ def test_bands_wider_than_a_peak_reflect_its_light(m: float) -> None:
     stepped = {"highlight": Curve(np.vstack([bands, bands[-1:]])), "fresnel": Curve.constant()}
     found = term_albedo(flat, stepped) / albedo(shiny, "reflection")
     assert np.abs(found - 1).max() < 0.1, found
-
-
-def test_the_faintest_light_stays_finite() -> None:
-    rows = Rows.of_wavelets(np.full((1, 3, 2), 1e-42, np.float32))
-    assert np.isfinite(rows.values).all() and np.isfinite(rows.unit)
 
 
 def until_exact(whole: WholePicture) -> None:

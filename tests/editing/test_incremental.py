@@ -7,7 +7,7 @@ import pytest
 
 from lambent.core.wavelets import transformed
 from lambent.editing.incremental import IncrementalPicture
-from lambent.editing.products import add_rows
+from lambent.editing.products import HostProducts, add_rows
 
 
 def random_transport(bands: int = 64, pixels: int = 5000) -> np.ndarray:
@@ -22,7 +22,7 @@ def dense(transport: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
 def test_the_published_example() -> None:
     """Ben-Artzi 2007, table 7.1: T = (3, 5, 2), one multiplication a frame."""
     transport = np.array([3, 5, 2], np.float16).reshape(3, 1, 1)
-    picture = IncrementalPicture(transport)
+    picture = IncrementalPicture(HostProducts(transport))
     shown, perfect = [], []
     for curve in ([4, 2, 1], [4, 3, 1], [4, 2, 0]):
         picture.want(np.array(curve, float)[:, None])
@@ -46,7 +46,7 @@ def test_sum_of_rows_is_numpys(pixels: int) -> None:
 
 def test_frames_finish_a_large_edit() -> None:
     transport = random_transport()
-    picture = IncrementalPicture(transport)
+    picture = IncrementalPicture(HostProducts(transport))
     picture.want(np.random.default_rng(5).normal(size=(64, 3)))
     errors = []
     for _ in range(3):
@@ -60,7 +60,7 @@ def test_frames_finish_a_large_edit() -> None:
 
 def test_incremental_picture_is_the_dense_one() -> None:
     transport = random_transport()
-    incremental, whole = IncrementalPicture(transport), IncrementalPicture(transport)
+    incremental, whole = IncrementalPicture(HostProducts(transport)), IncrementalPicture(HostProducts(transport))
     curve = np.random.default_rng(6).random((64, 3))
     incremental.want(curve)
     while not incremental.is_exact:
@@ -81,7 +81,7 @@ def test_wavelets_draw_the_picture_of_the_bands() -> None:
 
 def test_ten_thousand_edits_do_not_drift() -> None:
     transport = random_transport(32, 300)
-    picture, rng = IncrementalPicture(transport), np.random.default_rng(8)
+    picture, rng = IncrementalPicture(HostProducts(transport)), np.random.default_rng(8)
     curve = rng.random((32, 3))
     for _ in range(10_000):
         curve[rng.integers(32)] = rng.random(3) * 10.0 ** rng.integers(-2, 3)
@@ -94,7 +94,7 @@ def test_ten_thousand_edits_do_not_drift() -> None:
 
 
 def test_no_edit_is_no_work() -> None:
-    picture = IncrementalPicture(random_transport())
+    picture = IncrementalPicture(HostProducts(random_transport()))
     picture.step()
     assert picture.is_exact
     assert not picture.picture.any()

@@ -13,7 +13,7 @@ from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.editing.operators import Region
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
-from lambent.editing.rows import DensePairs, Rows
+from lambent.editing.rows import Rows
 from lambent.editing.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.curve import Curve
@@ -22,6 +22,7 @@ from lambent.materials.factored.of_models import editable
 from lambent.materials.factored.quotients import One
 from lambent.materials.factored.terms import Editable, Factor, Term
 from lambent.materials.models import model_named
+from tests.editing.dense_rows import DensePairs, rows_of
 
 HEIGHT, WIDTH, BANDS = 12, 20, 16
 LOW = Region(a=-0.2, b=0.0, c=0.3, d=0.9)
@@ -36,12 +37,11 @@ def bands_of(term: Term, pixels: int, seed: int) -> np.ndarray:
 def part_of(start: Editable, pixel: np.ndarray, seed: int) -> tuple[Part, dict[str, np.ndarray]]:
     rng = np.random.default_rng(seed)
     bands = {term.name: bands_of(term, len(pixel), seed + n) for n, term in enumerate(start.terms)}
-    textures = rng.random((2, len(pixel), 3))
-    return Part(start, pixel, rng.uniform(0, 1.5, len(pixel)), stored(bands.values()), *textures), bands
+    return Part(start, pixel, rng.uniform(0, 1.5, len(pixel)), stored(bands.values())), bands
 
 
 def stored(bands: Iterable[np.ndarray]) -> tuple[Rows | DensePairs, ...]:
-    return tuple(DensePairs(one) if one.shape[1] > 1 else Rows.of_bands(one[:, 0]) for one in bands)
+    return tuple(DensePairs(one) if one.shape[1] > 1 else rows_of(one[:, 0]) for one in bands)
 
 
 def direct(part: Part, bands: dict[str, np.ndarray], material: Editable) -> np.ndarray:
@@ -55,7 +55,7 @@ def direct(part: Part, bands: dict[str, np.ndarray], material: Editable) -> np.n
         means += [np.ones((1, 3))] * (2 - len(means))
         light = np.einsum("jkcp,jc,kc->pc", bands[term.name].astype(float), *means)
         viewer = material.curves[term.viewer].at(part.theta_o) if term.viewer else 1.0
-        total += np.array(term.scale) * (part.diffuse if term.is_diffuse else part.specular) * viewer * light
+        total += np.array(term.scale) * viewer * light
     return total
 
 
@@ -73,17 +73,16 @@ def tray() -> Editable:
 
 
 def test_by_hand() -> None:
-    """One pixel, one term of two bands: 2 (3 x 0.5 + 5 x 4) = 43 in red, textures, viewer and emission included."""
+    """One pixel, one term of two bands: 2 (3 x 0.5 + 5 x 4) = 43 in red, emission included."""
     step = Curve(np.where(np.arange(4097)[:, None] < 2048, 0.5, 4.0) * np.ones(3))
     start = Editable("hand", (Term("t", One(), (2.0, 1.0, 0.5), (Factor("c", "theta_h"),)),), {"c": step})
     transport = np.array([[3, 3, 3], [5, 5, 5]], np.float32)[..., None]
-    white = np.ones((1, 3))
-    part = Part(start, np.array([2]), np.zeros(1), (Rows.of_bands(transport),), 0 * white, white * [1, 2, 4])
+    part = Part(start, np.array([2]), np.zeros(1), (rows_of(transport),))
     background = np.arange(12, dtype=np.float32).reshape(2, 2, 3)
     picture = EditedPicture(background, {"hand": part})
     image = picture.image()
     # half a step at one knot: the mean of the curve's first half is .5 + 3.5 / 4096
-    assert np.allclose(image[1, 0] - background[1, 0], [43, 43, 43], rtol=1e-3)
+    assert np.allclose(image[1, 0] - background[1, 0], [43, 21.5, 10.75], rtol=1e-3)
     assert np.array_equal(image.reshape(-1, 3)[[0, 1, 3]], background.reshape(-1, 3)[[0, 1, 3]])
     assert image.dtype == np.float32
     assert background[1, 0, 0] == 6
@@ -199,17 +198,14 @@ def test_what_the_transport_does_not_serve_is_said_and_changes_nothing() -> None
     model = model_named("ggx")
     start = editable(model(alpha_x=0.3, alpha_y=0.3))
     part, bands = part_of(start, np.arange(80), 5)
-    only = DensePairs(bands["specular"]).fold(1, start.curves["fresnel"].node_values(BANDS // 2, 2))
-    part = replace(part, transport=(only,))
     picture = EditedPicture(np.zeros((HEIGHT, WIDTH, 3), np.float32), {"it": part})
     before = picture.image()
     assert close(pixels_of(before, part), direct(part, bands, start))
-    for edited in (editable(model(alpha_x=0.3, alpha_y=0.3, f0=0.9)), editable(model(alpha_x=0.1, alpha_y=0.3))):
-        with pytest.raises(TransportNeeded) as caught:
-            picture.show("it", edited)
-        assert caught.value.terms == ("specular",)
-        assert picture.is_settled
-        assert np.array_equal(picture.image(), before)
+    with pytest.raises(TransportNeeded) as caught:
+        picture.show("it", editable(model(alpha_x=0.1, alpha_y=0.3)))
+    assert caught.value.terms == ("specular",)
+    assert picture.is_settled
+    assert np.array_equal(picture.image(), before)
     edited = start.with_curve("highlight", Curve.constant(2.0))
     picture.show("it", edited)
     picture.draw()
@@ -269,14 +265,6 @@ def test_no_edit_is_no_work(tray: Editable, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("lambent.editing.products.add_rows", None)
     picture.step()
     assert picture.is_settled
-
-
-def test_without_textures_nothing_multiplies(tray: Editable) -> None:
-    part, bands = part_of(tray, np.arange(40), 5)
-    plain, white = replace(part, diffuse=None, specular=None), np.ones((40, 3))
-    picture = EditedPicture(np.zeros((HEIGHT, WIDTH, 3), np.float32), {"tray": plain})
-    expected = direct(replace(part, diffuse=white, specular=white), bands, tray)
-    assert close(pixels_of(picture.image(), part), expected)
 
 
 @pytest.mark.slow

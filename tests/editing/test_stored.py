@@ -112,8 +112,6 @@ def test_the_picture_is_the_sum_of_what_is_stored(store: Store) -> None:
 
 
 def test_what_the_store_does_not_have_is_said(store: Store) -> None:
-    with pytest.raises(UserError, match="200"):
-        edited_picture(store, new_session(), lights=400)
     other = Session.new("room", CAMERA, {}, size=(9, 9))
     with pytest.raises(UserError, match="no transport for camera view, 9 x 9"):
         edited_picture(store, other)

@@ -11,6 +11,7 @@ from lambent.core.arrays import Image
 from lambent.editing.canvas import HostCanvas
 from lambent.editing.folding import folded
 from lambent.editing.incremental import RENEWED_IN, IncrementalPicture
+from lambent.editing.products import HostProducts
 from lambent.materials.factored.curve import Curve
 from lambent.realtime.edited import commands, products
 from lambent.realtime.edited.canvas import FORMAT, GpuCanvas
@@ -23,7 +24,7 @@ BLACK = np.zeros((4, 8, 3), np.float32)
 
 
 def layer_of(canvas: GpuCanvas, count: int) -> GpuLayer:
-    return canvas.layer(np.arange(count), np.zeros(count), None)
+    return canvas.layer(np.arange(count), np.zeros(count))
 
 
 def wide(count: int) -> Image:
@@ -57,7 +58,7 @@ def test_frames_add_up_as_in_memory(device: Any, monkeypatch: pytest.MonkeyPatch
     """With more terms than bands, fewer, and through all blocks that are drawn anew; in one piece and in many."""
     transport, rng = random_transport(bands, count), np.random.default_rng(5)
     light = np.abs(transport.astype(float)).sum(axis=0).max(initial=0)  # without its cancellations
-    host = IncrementalPicture(transport)
+    host = IncrementalPicture(HostProducts(transport))
     whole = IncrementalPicture(layer_of(GpuCanvas(device, wide(count)), count).hold(transport))
     layer = layer_of(GpuCanvas(device, wide(count)), count)
     monkeypatch.setattr(commands.Commands, "largest", max(bands, 2) * 12 * 150)  # bytes of 300 pixels
@@ -75,7 +76,8 @@ def test_frames_add_up_as_in_memory(device: Any, monkeypatch: pytest.MonkeyPatch
         picture.draw()
     assert np.abs(whole.picture - host.picture).max(initial=0) <= 1e-6 * light
     assert np.array_equal(whole.picture, pieces.picture)
-    whole.clear()
+    whole.want(np.zeros((bands, 3)))
+    whole.draw()
     assert not whole.picture.any()
 
 
@@ -83,7 +85,10 @@ def test_many_rows_take_several_dispatches(device: Any, monkeypatch: pytest.Monk
     monkeypatch.setattr(products, "ROWS_AT_ONCE", 10)
     monkeypatch.setattr(commands, "ROOM", 1024)
     transport = random_transport(32, 33)
-    pictures = [IncrementalPicture(t) for t in (transport, layer_of(GpuCanvas(device, wide(33)), 33).hold(transport))]
+    pictures = [
+        IncrementalPicture(p)
+        for p in (HostProducts(transport), layer_of(GpuCanvas(device, wide(33)), 33).hold(transport))
+    ]
     for seed in range(3):
         for picture in pictures:
             picture.want(np.random.default_rng(seed).normal(size=(32, 3)))
@@ -131,15 +136,15 @@ def test_folding_is_as_in_memory(
 
 
 def test_pictures_are_composed_as_in_memory(device: Any) -> None:
-    """Odd sizes, textures, the viewer's curve, two layers on the same pixels, and what is not edited."""
+    """Odd sizes, the viewer's curve, two layers on the same pixels, and what is not edited."""
     rng = np.random.default_rng(0)
     background, pixel = rng.random((5, 19, 3)).astype(np.float32), np.sort(rng.permutation(95)[:41])
-    theta_o, texture = rng.uniform(0, 1.65, 41), rng.random((41, 3))
+    theta_o = rng.uniform(0, 1.65, 41)
     curve, images = Curve.of(lambda x: np.stack([np.cos(x), x, 1 + x * x], axis=1)), []
     for canvas in (HostCanvas(background), GpuCanvas(device, background)):
         shown: list[Any] = []
-        for k, given in enumerate((texture, None)):
-            layer: Any = canvas.layer(pixel, theta_o, given)
+        for k in range(2):
+            layer: Any = canvas.layer(pixel, theta_o)
             layer.view(curve)
             layer.view(None if k else curve)
             layer.hold(random_transport(4, 41)).add_rows(np.arange(4), np.ones((4, 3)))

@@ -11,7 +11,7 @@ import pytest
 import wgpu
 
 from lambent.editing.picture import EditedPicture, Part
-from lambent.editing.rows import DensePairs, PairTransport, Rows
+from lambent.editing.rows import PairTransport, Rows
 from lambent.editing.stored import StoredPairs
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_models import editable
@@ -21,6 +21,7 @@ from lambent.realtime.device import AdapterInfo, open_device
 from lambent.realtime.targets import pixels
 from lambent.viewer import edited
 from lambent.viewer.edited import Backend, SentCanvas, ShadedCanvas, backend, on_device, texture_of
+from tests.editing.dense_rows import DensePairs, rows_of
 from tests.editing.test_folding import sparse
 
 PIXEL = np.sort(np.random.default_rng(0).permutation(200)[:71])
@@ -38,12 +39,12 @@ def part_of(start: Editable, seed: int, *, stored: bool = True) -> Part:
     transport: list[Rows | PairTransport] = []
     for term in start.terms:
         if len(term.factors) < 2:
-            transport.append(Rows.of_bands(rng.random((16, 3, len(PIXEL))).astype(np.float32)))
+            transport.append(rows_of(rng.random((16, 3, len(PIXEL))).astype(np.float32)))
         elif stored:
             transport.append(StoredPairs(*sparse(len(PIXEL), (32, 16), 90, seed), 0.25, (32, 16)))
         else:
             transport.append(DensePairs(rng.random((8, 4, 3, len(PIXEL))).astype(np.float32)))
-    return Part(start, PIXEL, rng.uniform(0, 1.5, len(PIXEL)), tuple(transport), *rng.random((2, len(PIXEL), 3)))
+    return Part(start, PIXEL, rng.uniform(0, 1.5, len(PIXEL)), tuple(transport))
 
 
 def assert_close(found: np.ndarray, expected: np.ndarray) -> None:

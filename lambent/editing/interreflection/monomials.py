@@ -35,7 +35,7 @@ class MonomialPicture:
 
     def __init__(self, transport: Halves, power: int, rows: Indices, part: PartLight, canvas: Canvas) -> None:
         self.power, self._rows, self.pixels = power, rows, transport.shape[-1]
-        self.layer = canvas.layer(part.pixel, part.theta_o, None)
+        self.layer = canvas.layer(part.pixel, part.theta_o)
         self._picture = IncrementalPicture(self.layer.hold(transport.reshape(-1, *transport.shape[2:])))
         self._to_renew = 0
 

@@ -182,7 +182,7 @@ def frozen_light(part: PartLight, material: Editable, power: Powers, cells: Cell
     for term, light in zip(material.terms, part.terms, strict=True):
         scale = np.asarray(term.scale, np.float32)[:, None]
         if term.viewer:
-            scale = scale * viewed(np.ones((3, 1), np.float32), part.theta_o, material.curves[term.viewer])
+            scale = scale * viewed(part.theta_o, material.curves[term.viewer])
         add_pixels(total, light, bands_of(term.factors, light.counts, material), power.weight, cells, scale)
     return total
 

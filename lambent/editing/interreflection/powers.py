@@ -112,11 +112,6 @@ def _albedos(tails: Tails, materials: Mapping[str, Editable]) -> Floats:
     return found
 
 
-def second_coefficients(tails: Tails, materials: Mapping[str, Editable]) -> Floats:
-    """(W, 3) coefficients of the bands of second surfaces; 1 for materials that are not in `materials`."""
-    return np.concatenate([_coefficients(one, materials) for one in tails.second] or [np.ones((1, 3))])
-
-
 def _coefficients(one: SecondBands, materials: Mapping[str, Editable]) -> Floats:
     if one.material not in materials:
         return np.ones((one.size, 3))

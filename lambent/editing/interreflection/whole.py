@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 
 from lambent.core.arrays import Image
-from lambent.editing.canvas import Canvas, HostCanvas
 from lambent.editing.incremental import TERMS
 from lambent.editing.interreflection.picture import BEYOND_DIRECT, FrozenPicture, Shown, changed
 from lambent.editing.interreflection.stored import Interreflections, interreflections, samples_of
@@ -26,18 +26,12 @@ from lambent.store.store import Store
 ALL_HITS = (1, BEYOND_DIRECT[1])
 
 
-def whole_picture(
-    store: Store,
-    session: Session,
-    lights: int | None = None,
-    canvas: Callable[[Image], Canvas] = HostCanvas,
-    hits: tuple[int, int] = ALL_HITS,
-) -> WholePicture:
+def whole_picture(store: Store, session: Session, hits: tuple[int, int] = ALL_HITS) -> WholePicture:
     """The picture of a session's view with the stored interreflections, drawn exactly.
 
     Parameters and errors are those of `editing.stored.edited_picture`; `hits` as in `WholePicture`.
     """
-    whole, view = WholePicture(edited_picture(store, session, lights, canvas)), session.document
+    whole, view = WholePicture(edited_picture(store, session)), session.document
     whole.see(hits)
     if samples_of(store, session):
         scene = {name: of_material(material) for name, material in scene_record(store).materials.items()}
@@ -181,7 +175,7 @@ class WholePicture:
     def _is_current(self) -> bool:
         return self._work is None and self._wanted is None
 
-    def _freezing(self) -> _Freezing | None:
+    def _freezing(self) -> Callable[[], FrozenPicture] | None:
         """The work to do; None if the stored interreflections belong to other terms than a material has now."""
         assert self._wanted is not None
         (material, active), light = self._wanted, self._light
@@ -189,7 +183,8 @@ class WholePicture:
         if light is None or any(not same_quotients(part.start, self._now[name]) for name, part in light.parts.items()):
             self._frozen = None
             return None
-        return _Freezing(light, dict(self._now), material, active, self.hits, self.direct)
+        canvas, hits = self.direct.canvas, _beyond_direct(self.hits)
+        return partial(FrozenPicture, light, dict(self._now), material, canvas, active, hits)
 
     def _take(self, frozen: FrozenPicture) -> None:
         """Switch to a polynomial; apply later edits to it, or compute it again."""
@@ -204,24 +199,6 @@ class WholePicture:
                 self._wanted = self._wanted or (name, changed(made, now))
         if frozen.hits != _beyond_direct(self.hits):
             self._wanted = self._wanted or (frozen.edited, self._active)
-
-
-class _Freezing:
-    """Computes a `FrozenPicture` of the current target."""
-
-    def __init__(
-        self,
-        light: Interreflections,
-        materials: dict[str, Editable],
-        edited: str,
-        active: frozenset[str],
-        hits: tuple[int, int],
-        direct: EditedPicture,
-    ) -> None:
-        self._given = light, materials, edited, direct.canvas, active, _beyond_direct(hits)
-
-    def __call__(self) -> FrozenPicture:
-        return FrozenPicture(*self._given)
 
 
 def _beyond_direct(hits: tuple[int, int]) -> tuple[int, int]:

@@ -47,9 +47,9 @@ class GpuCanvas:
         usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST | wgpu.TextureUsage.COPY_SRC
         self.texture = device.create_texture(size=(self._width, height, 1), format=FORMAT, usage=usage)
 
-    def layer(self, pixel: Indices, theta_o: Floats, texture: Floats | None) -> GpuLayer:
-        """A new layer over pixels (P,), with the viewer's angle (P,), rad, and a texture (P, 3) or None."""
-        return GpuLayer(self._commands, self._texels(pixel), theta_o, texture, self._image)
+    def layer(self, pixel: Indices, theta_o: Floats) -> GpuLayer:
+        """A new layer over pixels (P,), with the viewer's angle (P,), rad."""
+        return GpuLayer(self._commands, self._texels(pixel), theta_o, self._image)
 
     def compose(self, shown: Sequence[tuple[Any, NDArray[np.float32]]]) -> None:
         """Add layers of this canvas, each times its scale (3,), to the background in the texture; one submission."""

@@ -25,7 +25,7 @@ ALIGNED = 256  # bytes; alignment of dynamic offsets in WebGPU's default limits
 BINDINGS = {
     "sum": ("uniform", "storage", "written storage"),
     "fold": ("uniform", "storage", "storage", "storage", "written storage"),
-    "compose": ("uniform", "storage", "storage", "storage", "storage", "written storage"),
+    "compose": ("uniform", "storage", "storage", "storage", "written storage"),
 }
 
 

@@ -16,7 +16,6 @@ from lambent.realtime.edited.products import GpuProducts, Halves, Piece, new_pie
 POINTS_AT_ONCE = 2 * 65535  # points of one fold: two per workgroup
 PAIR_BYTES = 4  # bytes of a pair's value; its step is one byte in another buffer
 MOST_BANDS = 256  # limit of the shader
-TEXTURE, CURVE = 1, 2
 
 
 class GpuLayer:
@@ -28,22 +27,18 @@ class GpuLayer:
         Texels of `image`, each once.
     theta_o : (P,)
         Angle of the viewer, rad.
-    texture : (P, 3) or None
     image
         Buffer of texels; layers are added to it.
     """
 
     products: GpuProducts
 
-    def __init__(
-        self, commands: Commands, places: NDArray[np.uint32], theta_o: Floats, texture: Floats | None, image: Any
-    ) -> None:
+    def __init__(self, commands: Commands, places: NDArray[np.uint32], theta_o: Floats, image: Any) -> None:
         self._commands, self._image = commands, image
         steps = np.asarray(theta_o, np.float32) * np.float32(KNOTS / END_RAD)
         self._places = np.stack([places, steps.view(np.uint32)], axis=1)
-        self._texture = None if texture is None else np.ascontiguousarray(texture.T, np.float32)
         self._curve = commands.empty((KNOTS + 1) * 16)
-        self._kinds = 0 if texture is None else TEXTURE
+        self._viewed = False
         self._composed: list[tuple[Any, int]] = []  # bind group and pixels, by piece
         self._folds: list[tuple[Any, int]] = []
         self._pieces: list[Piece] = []
@@ -87,7 +82,7 @@ class GpuLayer:
 
     def view(self, curve: Curve | None) -> None:
         """Multiply by the curve of the viewer's angle."""
-        self._kinds = (self._kinds & TEXTURE) | (CURVE if curve is not None else 0)
+        self._viewed = curve is not None
         if curve is not None:
             table = np.zeros((KNOTS + 1, 4), np.float32)
             table[:, :3] = curve.values
@@ -95,7 +90,7 @@ class GpuLayer:
 
     def compose(self, scale: NDArray[np.float32]) -> None:
         """Record the addition of the products, times `scale` (3,), to the image."""
-        parameters = np.asarray(scale, np.float32).tobytes() + np.uint32(self._kinds).tobytes()
+        parameters = np.asarray(scale, np.float32).tobytes() + np.uint32(self._viewed).tobytes()
         self._commands.dispatch("compose", parameters, [(g, -(-pixels // GROUP), 1) for g, pixels in self._composed])
 
     def _show(self, shape: tuple[int, int, int]) -> GpuProducts:
@@ -114,8 +109,7 @@ class GpuLayer:
         self._pieces, self._composed, self._folds = [], [], []
         for first, pixels in parts:
             piece, part = new_piece(commands, first, pixels, rows), slice(first, first + pixels)
-            texture = np.zeros(4, np.float32) if self._texture is None else self._texture[:, part]
-            buffers = piece.about, piece.picture, commands.buffer(self._places[part]), commands.buffer(texture)
+            buffers = piece.about, piece.picture, commands.buffer(self._places[part])
             self._pieces.append(piece)
             self._composed.append((commands.group("compose", *buffers, self._curve, self._image), pixels))
 
