@@ -46,7 +46,7 @@ class AnswerShown:
             self._renderer.mixer.answer(groups)
             return
         resources = self._renderer.resources
-        self._answer.show(light, resources)
+        resources.show_light_map(list(self._answer.layers(light)))
         for name, baked in self._baked_probes.items():
             made = baked if light.is_baked else answered(baked, self._answer, name, light)
             for item in (resources.objects[k] for k in self._users[name]):

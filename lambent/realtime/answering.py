@@ -21,13 +21,11 @@ from lambent.core.arrays import Floats
 from lambent.core.irradiance import irradiance_of
 from lambent.materials.diffuse_albedos import albedos_of, changed_lobes, edited_albedos
 from lambent.materials.document import Material
-from lambent.realtime.answered.gpu_answer import TexelsOnGpu, Unsolved, gpu_answer
-from lambent.realtime.answered.stages import NoRoom
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.lit_texels import LitTexels, mix_into
-from lambent.realtime.resources import SceneResources, light_layers
+from lambent.realtime.resources import light_layers
 from lambent.realtime.texture_detail import Detail, TextureDetails, Textures, own_rows, placed_alike, with_own_albedos
 from lambent.store.answer import StoredAnswer
 
@@ -40,64 +38,31 @@ FAINT = 0.01  # of the mean indirect light: darker texels do not count in the es
 
 @dataclass(frozen=True, eq=False)
 class Lit:
-    """Light of the answering texels for materials with these albedos.
+    """Light of the answering texels for materials with these albedos: irradiance (G, T, 3) by light group, W/m^2.
 
-    `is_baked`: this is the baked light. `on_gpu`: the light in GPU memory, if a GPU computed it. `detail`: that of
-    exchanged textures. `lobes`: (M, 3) how much the lobes of materials scatter less or more than the baked ones.
+    `is_baked`: this is the baked light. `detail`: that of exchanged textures. `lobes`: (M, 3) how much the lobes of
+    materials scatter less or more than the baked ones.
     """
 
-    in_memory: NDArray[np.float32] | None
+    irradiance: NDArray[np.float32]
     reflected: Floats
     transmitted: Floats
     is_baked: bool
-    on_gpu: TexelsOnGpu | None = None
     detail: Detail | None = None
     lobes: Floats | None = None
 
-    @cached_property
-    def irradiance(self) -> NDArray[np.float32]:
-        """(G, T, 3) by light group, W/m^2; waits for the GPU and reads back if the light is in its memory."""
-        if self.in_memory is not None:
-            return self.in_memory
-        assert self.on_gpu is not None, "light is in memory or on a GPU"
-        return self.on_gpu.irradiance()
-
-
-class _Computed:
-    """Light of an answer, by a GPU with enough memory, otherwise by the CPU."""
-
-    def __init__(self, answer: Answer, reference: Floats, texels: NDArray[np.uint32], device: Any) -> None:
-        self._answer, self._reference = answer, reference
-        self._gpu = None if device is None else gpu_answer(device, answer, reference, texels)
-
-    def light(self, albedos: Albedos) -> tuple[NDArray[np.float32] | None, TexelsOnGpu | None]:
-        """The light (G, T, 3) of the texels, in memory or in the GPU's."""
-        if self._gpu is not None:
-            try:
-                return None, self._gpu.begin(albedos)
-            except NoRoom:  # something else took the memory in the meantime
-                self._gpu = None
-            except Unsolved:
-                pass  # the CPU computes this edit
-        return self._answer.irradiance(albedos, self._reference), None
-
 
 class AnsweredLight:
-    """Light of one baked scene for edited colours of its materials. Methods may run in any thread.
+    """Light of one baked scene for edited colours of its materials. Methods may run in any thread."""
 
-    With a `device`, shaders compute the light if its memory suffices; otherwise the CPU computes it.
-    """
-
-    def __init__(self, baked: BakedScene, stored: StoredAnswer, device: Any = None) -> None:
+    def __init__(self, baked: BakedScene, stored: StoredAnswer) -> None:
         self._baked, self._stored = baked, stored
         self._materials = [baked.record.materials[name] for name in stored.materials]
         self._details = TextureDetails(baked, stored)
         self._last: tuple[Textures, Detail | None] | None = None  # the last exchanged textures and their detail
         self._reference = stored.answer.reference()
         self._as_baked = Lit(stored.answer.baked, *_shown(self._materials), is_baked=True)
-        self._device = device
         self._seen: dict[str, tuple[NDArray[Any], ...]] = {}
-        self._by_material = _Computed(stored.answer, self._reference, stored.texels, device)
 
     @property
     def as_baked(self) -> Lit:
@@ -110,19 +75,18 @@ class AnsweredLight:
         detail, of_materials = self._detail(textures), edited_albedos(self._materials, now)
         if detail is None and of_materials.same_as(self._stored.answer.albedos):
             return self._as_baked
-        by, albedos = self._by_material, of_materials
+        answer, albedos = self._stored.answer, of_materials
         if detail is not None:
-            by, rows = self._by_point, own_rows(self._stored.answer)
+            rows, answer = own_rows(answer), self._by_point
             albedos = detail.albedos(Albedos(of_materials.reflected[rows], of_materials.transmitted[rows]))
-        in_memory, on_gpu = by.light(albedos)
         lobes = changed_lobes(self._materials, now)
-        return Lit(in_memory, *_shown(now), is_baked=False, on_gpu=on_gpu, detail=detail, lobes=lobes)
+        irradiance = answer.irradiance(albedos, self._reference)
+        return Lit(irradiance, *_shown(now), is_baked=False, detail=detail, lobes=lobes)
 
     @cached_property
-    def _by_point(self) -> _Computed:
-        """Light with an albedo for each point: made for the first exchanged texture, as it costs a quarter more."""
-        own = with_own_albedos(self._stored.answer)
-        return _Computed(own, self._reference, self._stored.texels, self._device)
+    def _by_point(self) -> Answer:
+        """The answer with an albedo for each point, made for the first exchanged texture: it costs a quarter more."""
+        return with_own_albedos(self._stored.answer)
 
     def _detail(self, textures: Textures) -> Detail | None:
         """The detail of exchanged textures; that of the last ones is kept, for drags of colours."""
@@ -131,14 +95,6 @@ class AnsweredLight:
         if last is None or not same or not all(placed_alike(last[0][name], one) for name, one in textures.items()):
             self._last = last = dict(textures), self._details.of(textures)
         return last[1]
-
-    def show(self, light: Lit, resources: SceneResources) -> None:
-        """Show light of one group in a renderer's light map; light in GPU memory is not read back."""
-        if light.on_gpu is None:
-            resources.show_light_map(list(self.layers(light)))
-            return
-        base, draw = self._layers_as_baked, light.on_gpu.draw
-        resources.draw_light_map(base, lambda texture: draw(texture, len(base), 1 / self._baked.unit))
 
     def maps(self, light: Lit) -> tuple[Floats | None, Floats | None]:
         """Light maps (H, W, 3) of front and back in the scene's units; texels that do not answer are as baked."""

@@ -26,9 +26,6 @@ KINDS: dict[str, dict[str, Any]] = {
     "number layers": {"texture": {"sample_type": "uint", "view_dimension": "2d-array"}},
     "depth layers": {"texture": {"sample_type": "depth", "view_dimension": "2d-array"}},
     "exact layers": {"texture": {**_UNFILTERED, "view_dimension": "2d-array"}},
-    "written half layers": {
-        "storage_texture": {"access": "write-only", "format": "rgba16float", "view_dimension": "2d-array"}
-    },
 }
 
 

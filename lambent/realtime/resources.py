@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache, cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-import wgpu
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
@@ -27,12 +26,10 @@ from lambent.realtime.structs import OBJECT_DTYPE
 from lambent.realtime.sun import SunLight, sun_light
 from lambent.realtime.sun_disc import without_sun
 from lambent.realtime.textures import TextureCache
-from lambent.realtime.uploads import half, layers_of, upload, with_alpha
+from lambent.realtime.uploads import half, upload, with_alpha
 from lambent.scenes.scene import ImageTexture, Look
 from lambent.scenes.variants import worn_by
 from lambent.store.contract import MOST_BORDERS, ObjectRecord
-
-LIGHT_MAP_USAGE = wgpu.TextureUsage.STORAGE_BINDING | wgpu.TextureUsage.COPY_SRC  # in addition to the usual ones
 
 EVEN_NICHES = 9  # index, in a shader object's `irradiance`, of the flag for `Probe.even_niches`
 
@@ -103,8 +100,8 @@ class SceneResources:
         self.vertices = layouts.buffer("VERTEX", np.nan_to_num(vertices).astype(np.float32))
         self.indices = layouts.buffer("INDEX", scene.faces.astype(np.uint32))
         layers = light_layers(scene.irradiance, scene.irradiance_back, scene.dominant_direction, scene.probe_share)
-        self._light_layers, self._drawn_over = list(layers), None  # type: list[NDArray[np.float16]], Any
-        self._light_texture = upload(device, [layers], "rgba16float", LIGHT_MAP_USAGE)
+        self.light_layers = list(layers)  # (H, W, 4) each, as shown
+        self._light_texture = upload(device, [layers], "rgba16float")
         self.light_view = self._light_texture.create_view(dimension="2d-array")
         self.light_version = 0  # grows when light answers edited materials, and when textures change
         sky = scene.far_light or DARK
@@ -175,36 +172,14 @@ class SceneResources:
 
         A third map is the dominant direction, a fourth holds the shares of probes' light.
         """
-        replaced = sum(texels is not None for texels in sides[:2])
-        if self._drawn_over is not None and replaced == len(self._drawn_over):
-            self._drawn_over = None  # the GPU's drawing is overwritten: nothing to read back
-        layers = self.light_layers
         for layer, texels in enumerate(sides):
             if texels is not None:
-                layers[layer] = texels
+                self.light_layers[layer] = texels
                 height, width = texels.shape[:2]
                 self._layouts.device.queue.write_texture(
                     {"texture": self._light_texture, "origin": (0, 0, layer)}, np.ascontiguousarray(texels),
                     {"bytes_per_row": width * 8, "rows_per_image": height}, (width, height, 1),
                 )  # fmt: skip
-
-    def draw_light_map(self, base: NDArray[np.float16], draw: Callable[[Any], None]) -> None:
-        """Let `draw` write texels into the light map's texture, over `base` (n, H, W, 4).
-
-        The same base is not uploaded again: `draw` must write the same texels each time.
-        """
-        if self._drawn_over is not base:
-            self.show_light_map(list(base))
-        draw(self._light_texture)
-        self._drawn_over = base
-
-    @property
-    def light_layers(self) -> list[NDArray[np.float16]]:
-        """Light maps (H, W, 4) as shown; read back if the GPU has drawn them."""
-        if self._drawn_over is not None:
-            self._light_layers = list(layers_of(self._layouts.device, self._light_texture))
-            self._drawn_over = None
-        return self._light_layers
 
     def light_of(self, name: str) -> ProbeLight:
         """The light of the object of this name, shared with other objects."""

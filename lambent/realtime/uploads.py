@@ -1,4 +1,4 @@
-"""Uploads of arrays to textures and buffers, and reading back."""
+"""Uploads of arrays to textures and buffers."""
 
 from __future__ import annotations
 
@@ -49,14 +49,6 @@ def upload(device: Any, levels: Sequence[NDArray[Any]], format: str, usage: int 
             (columns, rows, layers),
         )
     return texture
-
-
-def layers_of(device: Any, texture: Any) -> NDArray[np.float16]:
-    """Texels (layers, height, width, 4) of a half-float texture, read back; waits for the GPU."""
-    width, height, layers = texture.size
-    rows = {"bytes_per_row": 8 * width, "rows_per_image": height}
-    data = device.queue.read_texture({"texture": texture}, rows, (width, height, layers))
-    return np.frombuffer(data, np.float16).reshape(layers, height, width, 4)
 
 
 def cube_texture(device: Any, levels: Sequence[Floats], format: str = "rgba16float") -> Any:

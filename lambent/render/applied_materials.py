@@ -8,7 +8,6 @@ from functools import cached_property
 from lambent.core.plain import Triple
 from lambent.materials.document import Material
 from lambent.realtime.answer_shown import AnswerShown
-from lambent.realtime.answered.stages import computes
 from lambent.realtime.answering import AnsweredLight
 from lambent.realtime.group_arrays import FIELDS_FOLLOW
 from lambent.realtime.renderer import Renderer
@@ -65,8 +64,7 @@ class AppliedMaterials:
 
     @cached_property
     def _shown(self) -> tuple[AnsweredLight, AnswerShown]:
-        device = self._renderer.device
-        answer = AnsweredLight(self._renderer.scene, read_answer(self._store), device if computes(device) else None)
+        answer = AnsweredLight(self._renderer.scene, read_answer(self._store))
         return answer, AnswerShown(self._renderer, answer)
 
     def _note_limits(self, materials: Mapping[str, Material]) -> None:

@@ -14,7 +14,6 @@ from lambent.bake.bake import bake
 from lambent.core.arrays import Floats
 from lambent.realtime.answering import AnsweredLight
 from lambent.realtime.baked import BakedScene, read_baked
-from lambent.realtime.device import open_device
 from lambent.realtime.texture_detail import Textures, filtered, with_own_albedos, without_uv
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import box, patch, placed, sphere
@@ -106,13 +105,6 @@ def test_an_even_texture_is_another_colour(baked: BakedScene, stored: StoredAnsw
     change = answer.probe_change("ball", dark)
     assert np.abs(change).max() > 0.05
     assert np.allclose(answer.probe_change("ball", textured), change, atol=0.02 * np.abs(change).max())
-
-
-def test_a_gpu_and_the_cores_agree_on_a_texture(baked: BakedScene, stored: StoredAnswer, store: Store) -> None:
-    halves = {"paper": with_image(None, ImageTexture(str(Path(store.folder).parent / "halves.png")))}
-    on_gpu = AnsweredLight(baked, stored, open_device()).lit({}, halves)
-    cores = AnsweredLight(baked, stored).lit({}, halves)
-    assert on_gpu.on_gpu is not None and np.allclose(on_gpu.irradiance, cores.irradiance, rtol=3e-3, atol=1e-5)
 
 
 def test_a_half_black_picture_is_dark_beside_its_black_half(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,10 +11,8 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.core.answer import Albedos
 from lambent.core.camera import Camera
 from lambent.realtime.answer_shown import answered
-from lambent.realtime.answered.gpu_answer import GpuAnswer, TexelsOnGpu
 from lambent.realtime.answering import answered_scene
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
@@ -46,22 +43,6 @@ def settled(light: AnsweringLight, edited: dict) -> None:
         light.update(edited)
 
 
-@pytest.fixture(params=["cores", "shaders"])
-def computed_by(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Whatever the adapter is."""
-    begin, begun = GpuAnswer.begin, list[Albedos]()
-
-    def counted(self: GpuAnswer, albedos: Albedos) -> TexelsOnGpu:
-        begun.append(albedos)
-        return begin(self, albedos)
-
-    monkeypatch.setattr(GpuAnswer, "begin", counted)
-    monkeypatch.setattr(answering, "computes", lambda _: request.param == "shaders")
-    yield
-    assert bool(begun) == (request.param == "shaders")
-
-
-@pytest.mark.usefixtures("computed_by")
 def test_light_follows_an_edit_and_comes_back(tmp_path: Path) -> None:
     store = bake(room_with_step(), tmp_path / "s", quality=TINY)
     renderer, shown = Renderer(open_device(), store), Answering()
@@ -84,7 +65,6 @@ def test_a_store_without_an_answer_is_named(tmp_path: Path) -> None:
     assert not shown.possible and shown.note == WITHOUT
 
 
-@pytest.mark.usefixtures("computed_by")
 def test_an_edit_drops_the_probes_of_the_one_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first edit's probes are given up after the one under way, and made where the edit comes back."""
     second = SceneObject("other ball", placed(sphere(0.3, 16, 8), (0.8, 1.2, -0.8)), "mirror")
@@ -115,7 +95,6 @@ def test_an_edit_drops_the_probes_of_the_one_before(tmp_path: Path, monkeypatch:
     assert np.allclose(shown, fresh.image(VIEW), rtol=0.02, atol=0.01 * shown.mean())
 
 
-@pytest.mark.usefixtures("computed_by")
 def test_a_store_with_light_groups_answers_in_its_mix(tmp_path: Path) -> None:
     store = bake(room_with_step(), tmp_path / "s", quality=TINY, light_groups="scene")
     renderer, shown = Renderer(open_device(), store), Answering()

@@ -1,8 +1,7 @@
 """Light that follows edited materials while the camera moves: computed in a thread, shown as soon as it is ready.
 
 The light map comes first, then the probes one by one. A new edit drops the probes of the previous one, so that the
-light map lags by at most one computation. On a hardware GPU, shaders compute the light map in its texture, and the
-thread reads it back only for the probes and for the error estimate.
+light map lags by at most one computation.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from lambent.core.errors import UserError
 from lambent.core.progress import Progress
 from lambent.materials.document import Material
 from lambent.realtime.answer_shown import answered, users_of
-from lambent.realtime.answered.stages import computes
 from lambent.realtime.answering import AnsweredLight, Lit
 from lambent.realtime.device import adapter_info
 from lambent.realtime.group_arrays import GroupArrays
@@ -65,21 +63,13 @@ class Wanted(NamedTuple):
 class _Maps:
     """Light maps of edited materials.
 
-    `groups` are for the light mixer, if the store has light groups; else probes follow. `layers` are the light maps;
-    None for light that is already on the GPU, whose error is estimated later, with its probes.
+    `groups` are for the light mixer, if the store has light groups; else `layers` are the light maps, and probes
+    follow.
     """
 
     light: Lit
     layers: NDArray[np.float16] | None
     groups: GroupArrays | None
-    likely_error: float | None
-
-
-@dataclass(frozen=True, eq=False)
-class _Probes:
-    """Light of probes by object, and the likely error of the light that they show."""
-
-    lights: dict[str, ProbeLight]
     likely_error: float | None
 
 
@@ -153,35 +143,22 @@ class AnsweringLight:
 
     def _computed_maps(self, wanted: Wanted) -> _Maps:
         if self._answer is None:
-            device = self._renderer.device
-            stored, shaders = read_answer(self._store), device if computes(device) else None
-            self._answer = AnsweredLight(self._renderer.scene, stored, shaders)
+            self._answer = AnsweredLight(self._renderer.scene, read_answer(self._store))
         scene = self._renderer.scene
         looks = {name: Look(scene.record.materials[name], of) for name, of in wanted.textures.items()}
         worn = {name: worn_by(name, look, scene.textures) for name, look in looks.items()}
         light = self._answer.lit(wanted.materials, worn)
         groups = self._answer.groups(light)
-        if groups is None and light.on_gpu is not None:
-            return _Maps(light, None, None, None)
-        return _Maps(light, None if groups else self._answer.layers(light), groups, self._likely_error(light))
-
-    def _likely_error(self, light: Lit) -> float | None:
-        """Estimate the error of light that is not as baked; runs in the thread."""
-        assert self._answer is not None, "light comes from an answer"
-        return None if light.is_baked else self._answer.likely_error(light, self._renderer.mixer.factors)
+        off = None if light.is_baked else self._answer.likely_error(light, self._renderer.mixer.factors)
+        return _Maps(light, None if groups else self._answer.layers(light), groups, off)
 
     def _show_maps(self, maps: _Maps) -> None:
         self._shown.said = AS_BAKED if maps.light.is_baked else ESTIMATED
         self._shown.likely_error = maps.likely_error
         if maps.groups is not None:  # the mixer makes light maps and probes from them
             self._renderer.mixer.answer(maps.groups)
-        else:
-            resources = self._renderer.resources
-            if maps.layers is not None:
-                resources.show_light_map(list(maps.layers))
-            else:
-                assert self._answer is not None, "light comes from an answer"
-                self._answer.show(maps.light, resources)
+        elif maps.layers is not None:
+            self._renderer.resources.show_light_map(list(maps.layers))
             self._probes_of = maps.light
         self._renderer.resources.light_version += 1
 
@@ -194,18 +171,16 @@ class AnsweringLight:
             self._users = users_of(self._first, self._as_baked)
         baked = self._as_baked
 
-        def run(progress: Progress) -> _Probes:
-            off = self._likely_error(light) if light.on_gpu is not None else self._shown.likely_error
+        def run(progress: Progress) -> dict[str, ProbeLight]:
             found = {}
             for number, name in enumerate(answer.probes):
                 progress(number, len(answer.probes), "probes")
                 with beside_frames(self._is_software):
                     found[name] = baked[name] if light.is_baked else answered(baked[name], answer, name, light)
-            return _Probes(found, off)
+            return found
 
-        def show(found: _Probes) -> None:
-            self._shown.likely_error = found.likely_error
-            for name, made in found.lights.items():
+        def show(found: dict[str, ProbeLight]) -> None:
+            for name, made in found.items():
                 for item in (resources.objects[k] for k in self._users[name]):
                     item.relight(made, item.emission)
             resources.light_version += 1

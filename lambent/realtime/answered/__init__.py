@@ -1,1 +1,0 @@
-"""Light that answers edited colours, on a GPU: compute shaders for `lambent.core.answer`."""
