@@ -62,13 +62,13 @@ def test_dark_corners_are_solved_as_well_as_bright_ones() -> None:
     direct = np.zeros((1, count, 3), np.float32)
     direct[0, 0] = 1
     room = Patches(np.zeros(count, int), np.arange(count), direct, chain)
-    found = solved(room, Albedos(np.full((1, 3), 0.5), np.zeros((1, 3))))
+    found = solved(room, grey(0.5))
     assert np.allclose(found.irradiance[0, :, 0], 0.005 ** np.arange(count), rtol=1e-3)
 
 
 def test_a_solution_that_does_not_come_to_an_end_says_so() -> None:
     room = Patches(np.zeros(2, int), np.arange(2), np.ones((1, 2, 3), np.float32), np.full((2, 2), 0.5, np.float32))
-    assert not solved(room, Albedos(np.full((1, 3), 1.0), np.zeros((1, 3)))).converged
+    assert not solved(room, grey(1.0)).converged
 
 
 def test_light_that_would_grow_without_end_is_bounded() -> None:
@@ -76,7 +76,7 @@ def test_light_that_would_grow_without_end_is_bounded() -> None:
     direct, numbers = np.ones((1, 2, 3), np.float32), np.arange(2)
     pair = Patches(np.zeros(2, int), numbers, direct, np.array([[0, 3.5], [3.5, 0]], np.float32))
     for albedo, share in ((0.2, MOST_SHARES), (0.85, 1.0)):
-        found = solved(pair, Albedos(np.full((1, 3), albedo), np.zeros((1, 3))), tolerance=1e-6)
+        found = solved(pair, grey(albedo), tolerance=1e-6)
         assert found.converged and found.irradiance == pytest.approx(1 / (1 - share * albedo), rel=1e-4)
 
 
@@ -148,18 +148,32 @@ def test_points_send_the_light_of_both_their_sides() -> None:
     assert np.allclose(halved[:, 0, 0], 0.75 * as_baked[:, 0, 0]), "but gets darker"
 
 
-def test_two_points_in_a_furnace_have_the_light_of_its_series() -> None:
-    """Direct light 1 everywhere, albedo a, every ray ends on a point: all light is 1 / (1 - a)."""
+def grey(albedo: float) -> Albedos:
+    return Albedos(np.full((1, 3), albedo), np.zeros((1, 3)))
+
+
+def furnace(light: float) -> Answer:
+    """Two points of albedo .5, direct light 1 and all light `light`; every ray ends on one of them."""
     direct, rays = np.ones((1, 2, 3), np.float32), packed_rays(np.tile([0, 1], (2, 8)), np.ones((2, 16)))
     room = Patches(np.zeros(2, int), np.arange(2), direct, np.full((2, 2), 0.5, np.float32))
-    points = Points(np.arange(2), np.zeros(2, int), np.arange(2), direct, 2 * direct)
-    near = Neighbours(np.array([[0], [1]], np.uint32), np.full((2, 1), 255, np.uint8))
-    answer = Answer(
-        room, points, Rays.of(rays), near, near, direct, 2 * direct, Albedos(np.full((1, 3), 0.5), np.zeros((1, 3)))
+    points = Points(np.arange(2), np.zeros(2, int), np.arange(2), direct, light * direct)
+    near = alone(2)
+    return Answer(room, points, Rays.of(rays), near, near, direct, light * direct, grey(0.5))
+
+
+@pytest.mark.parametrize("albedo", [0.0, 0.25, 0.8])
+def test_two_points_in_a_furnace_have_the_light_of_its_series(albedo: float) -> None:
+    """All light is 1 / (1 - a)."""
+    answer = furnace(2.0)
+    assert np.allclose(answer.irradiance(grey(albedo), answer.reference()), 1 / (1 - albedo), rtol=0.01)
+
+
+def test_points_brighten_no_more_than_what_their_rays_gather() -> None:
+    """Of 10 indirect W/m^2, rays gather 11/2: 1.25 times that grows, so I = a (11 - 1.25 11/2 + 1.25 I)."""
+    grown = MOST_EXCESS * 11 / 2
+    assert np.allclose(
+        furnace(11.0).indirect(grey(0.55))[..., :3], 0.55 * (11 - grown) / (1 - 0.55 * MOST_EXCESS), rtol=0.02
     )
-    for albedo in (0.0, 0.25, 0.8):
-        found = answer.irradiance(Albedos(np.full((1, 3), albedo), np.zeros((1, 3))), answer.reference())
-        assert np.allclose(found, 1 / (1 - albedo), rtol=0.01)
 
 
 def test_light_in_a_gap_that_patches_do_not_resolve_is_reflected_many_times() -> None:
@@ -169,9 +183,6 @@ def test_light_in_a_gap_that_patches_do_not_resolve_is_reflected_many_times() ->
 
     def gap(albedo: float) -> float:
         return albedo / (8 - 7 * albedo)
-
-    def grey(albedo: float) -> Albedos:
-        return Albedos(np.full((1, 3), albedo), np.zeros((1, 3)))
 
     direct, light = np.zeros((1, 8, 3), np.float32), np.full((1, 8, 3), gap(0.2), np.float32)
     direct[:, 0] = light[:, 0] = 1

@@ -11,7 +11,7 @@ from lambent.core import light_field_maps
 from lambent.core.directions import normalize
 from lambent.core.light_field import NO_POINT, LightField
 from lambent.core.light_field_lookup import March, Place, basis_weights, blended, marched, surface
-from lambent.core.light_field_maps import nearest_points, nearness_along, radiance_along
+from lambent.core.light_field_maps import nearest_points, nearness_along, radiance_along, whole_texels
 from lambent.core.octahedral import bordered, texel_directions, to_square
 from tests.core.analytic_light_field import BALL, OWN, ball_field, errors, on_ball, places, seen, sky_light
 
@@ -39,6 +39,20 @@ def test_texels_are_interpolated_over_the_edges_of_the_map(field: LightField) ->
     upper = wide[point, row, column] * (1 - u) + wide[point, row, column + 1] * u
     lower = wide[point, row + 1, column] * (1 - u) + wide[point, row + 1, column + 1] * u
     np.testing.assert_allclose(radiance_along(field, point, 5 * w), upper * (1 - v) + lower * v, rtol=1e-6)
+
+
+def test_the_sky_has_its_share_of_texels_that_show_both() -> None:
+    """By the quarters that surfaces cover; none of them is a texel of the sky itself."""
+    field = replace(
+        ball_field(1, 4), radiance=np.full((1, 4, 4, 3), 2.0), cover=np.arange(16, dtype=np.uint8).reshape(1, 4, 4)
+    )
+    share = np.array([0, 3, 3, 2, 3, 2, 2, 1, 3, 2, 2, 1, 2, 1, 1, 0]) / 4
+    expected = np.repeat(2 + share[:, None] * (10 - 2), 3, axis=1)
+    w = texel_directions(4).reshape(-1, 3)
+    found = radiance_along(field, np.zeros(16, int), w, lambda w: np.full(w.shape, 10.0))
+    np.testing.assert_allclose(found, expected)
+    whole = whole_texels(field.radiance, field.cover, lambda w: np.full(w.shape, 10.0))
+    np.testing.assert_allclose(whole.reshape(16, 3), expected)
 
 
 def test_distances_are_those_of_the_nearest_texel(field: LightField) -> None:
