@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+RECORDS = sorted({*(ROOT / "docs/decisions").glob("*.md")} - {ROOT / "docs/decisions/README.md"})
+WORDS, RECORD_WORDS, MOST_RECORDS = 35_000, 150, 40  # of all pages together, of a decision's record, and their number
 COMMAND = re.compile(r"(?:^ {4,}|`|lambent )lambent ([a-z]+)([^`\n]*)", re.MULTILINE)
 
 
@@ -46,3 +49,35 @@ def anchors(page: Path) -> set[str]:
 def test_anchors_are_headings(page):
     links = re.findall(r"\]\((?!https?://)([^)#]*)#([^)]+)\)", page.read_text("utf-8"))
     assert not [f"{path}#{name}" for path, name in links if name not in anchors(page.parent / path if path else page)]
+
+
+def words(page: Path) -> int:
+    return len(page.read_text("utf-8").split())
+
+
+def test_the_docs_stay_short():
+    assert sum(map(words, PAGES)) <= WORDS
+
+
+def test_decisions_are_short_records_that_the_index_lists():
+    assert len(RECORDS) <= MOST_RECORDS
+    assert not {record.name: words(record) for record in RECORDS if words(record) > RECORD_WORDS}
+    index = (ROOT / "docs/decisions/README.md").read_text("utf-8")
+    titles = {record.name: record.read_text("utf-8").splitlines()[0].removeprefix("# ") for record in RECORDS}
+    assert {file: title for title, file in re.findall(r"^- \[(.+)\]\((.+)\)$", index, re.MULTILINE)} == titles
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_files_that_pages_name_exist(page):
+    """In backticks, from the package or the root of the repository."""
+    named = re.findall(r"`((?:\w+/)+[\w.-]*(?:\.py|\.wgsl|/))`", page.read_text("utf-8"))
+    assert not [name for name in named if not any((root / name).exists() for root in (ROOT, ROOT / "lambent"))]
+
+
+def test_the_picture_of_the_packages_shows_their_imports():
+    """If not: .venv/bin/python docs/data_flow.py"""
+    spec = importlib.util.spec_from_file_location("data_flow", ROOT / "docs/data_flow.py")
+    data_flow = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(data_flow)
+    drawn = re.findall(r"<title>(\w+) to (\w+)</title>", data_flow.PICTURE.read_text("utf-8"))
+    assert set(drawn) == data_flow.direct(data_flow.imports())
