@@ -16,9 +16,11 @@ from lambent.bake.answering.points import (
     refined_points,
     seeing,
 )
-from lambent.bake.answering.spots import Spots
+from lambent.bake.answering.spots import LEAST, Spots
 from lambent.bake.answering.transfer import AROUND, chosen_rays, sender_means, texels_around, transfer_of
 from lambent.core.answer_rays import BYTE, Rays, packed_rays
+from lambent.materials.document import Material
+from lambent.scenes.scene import Scene
 
 SIZE = 32
 
@@ -33,6 +35,19 @@ def plane() -> Spots:
     up = np.tile([0.0, 1.0, 0.0], (count, 1))
     position = np.stack([column, 0.0 * row, row], axis=-1).astype(float)
     return Spots(lit, lit, light, light, light[0], np.ones(count), whole, whole, whole, position, up, np.arange(count))
+
+
+def test_both_sides_send_light_and_let_it_through() -> None:
+    """Two materials, the second of which is black: it counts as if it reflected LEAST."""
+    spots, half = plane(), np.arange(SIZE * SIZE) % 2
+    light = np.array([[3.0, 7.0], [0.5, 0.0]], np.float32)  # by group and side
+    irradiance = np.broadcast_to(light[..., None, None], (2, 2, SIZE * SIZE, 3))
+    sheet = Material(kd=(0.5, 0.5, 0.5), kt_d=(0.25, 0.25, 0.25))
+    scene = Scene("sheets", (), {"sheet": sheet, "black": Material()})
+    found = replace(spots, irradiance=irradiance, material=half).exitance(scene)
+    through = (0.5 + LEAST) * light + 0.25 * light[:, ::-1]
+    assert np.allclose(found[..., half == 0], through[..., None]) and found.shape == (2, 2, SIZE * SIZE)
+    assert np.allclose(found[..., half == 1], LEAST * light[..., None])
 
 
 def test_a_block_has_one_point_in_its_middle() -> None:

@@ -40,6 +40,19 @@ def kernel_of(texels: Texels, area: np.ndarray) -> Kernel:
     return Kernel(area, texels, np.ones(len(texels.index)))
 
 
+def test_light_reaches_a_part_of_some_texels() -> None:
+    """Half of the strip's texels lie in a solid, others by a share: uniform light stays uniform in the rest."""
+    texels, area = strip()
+    rng = np.random.default_rng(2)
+    share = rng.uniform(0.3, 1, len(texels.index)) * (rng.random(len(texels.index)) < 0.5)
+    kernel, lit = Kernel(area, texels, share), np.zeros(SIDE * SIDE)
+    lit[texels.index] = share
+    flux = area * lit.reshape(SIDE, SIDE)
+    assert kernel.area.sum() == pytest.approx(flux.sum())
+    assert kernel.known.sum() > 0.45 * (area > 0).sum() and not kernel.known[lit.reshape(SIDE, SIDE) == 0].any()
+    assert np.allclose(kernel.irradiance(np.repeat(flux[..., None], 3, 2))[kernel.known], 1, rtol=1e-5)
+
+
 def test_energy_and_uniform_light_stay() -> None:
     texels, area = strip()
     kernel = kernel_of(texels, area)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -39,6 +40,23 @@ def areas(store: Store) -> np.ndarray:
 def flux(store: Store) -> np.ndarray:
     """(BATCHES, 3) W in all texels of the normal's side."""
     return store.read("light_map/photons")[:, 0].astype(float).sum(axis=(1, 2))
+
+
+def test_photons_are_counted_by_side_and_texel_in_whole_units(mi: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    import drjit as dr
+
+    from lambent.bake.photons import shooting
+
+    monkeypatch.setattr(shooting, "light_map_texel", lambda texel, width, height, active: texel)
+    texel, far = mi.UInt32(0, 5, 5, 3, 4), mi.Bool(False, False, False, True, False)
+    active = mi.Bool(True, True, True, True, False)
+    power = mi.Color3f([0.4, 1.0, 2.0, 7.0, 9.0], [0.6, 2.0, 2.0, 7.0, 9.0], [1.5, 3.0, 2.0, 7.0, 9.0])
+    for sides in (1, 2):
+        sums = dr.zeros(mi.UInt64, sides * 18)
+        shooting._count(sums, (sides, 2, 3), texel, power, far, active)
+        expected = np.zeros((2, 6, 3))
+        expected[0, [0, 5]], expected[1, 3] = [[0, 1, 2], [3, 4, 5]], 7
+        assert np.array_equal(np.array(sums).reshape(sides, 6, 3), expected[:sides])
 
 
 def test_areas_add_up_to_the_surface(tmp_path: Path) -> None:

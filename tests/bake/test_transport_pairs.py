@@ -84,6 +84,23 @@ def test_small_entries_move_along_the_second_curve_alone(outdoors: View) -> None
     assert np.sqrt(np.mean((moved - shown)[lit] ** 2)) < 1e-3 * np.sqrt(np.mean(shown[lit] ** 2))
 
 
+def test_small_entries_join_the_large_one_before_them_or_the_first(mi: Any) -> None:
+    """Two bands of five entries; a tenth of a band's light is large."""
+    import drjit as dr
+
+    from lambent.bake.transport.bands import _merge
+
+    before = np.array([[0.5, 0.25, 6, 0.5, 4], [3, 0.5, 0.25, 9, 0.125]])
+    after = [[0, 0, 7.25, 0, 4], [3.75, 0, 0, 9.125, 0]]
+    row = dr.alloc_local(mi.Float, 30)
+    for at, light in enumerate(before.ravel()):
+        for channel in range(3):
+            row[3 * at + channel] = mi.Float(light * (channel + 1))
+    _merge(row, mi.Bool(True), 0.1, mi.UInt32(5), mi.UInt32(10))
+    found = mi.TensorXf(dr.concat([row[k] for k in range(30)]), (2, 5, 3))
+    assert np.allclose(found, np.multiply.outer(after, [1, 2, 3]))
+
+
 @pytest.mark.parametrize("points", [1, 15, 16, 17, 16_384, 40_001])
 def test_every_point_has_one_thread(outdoors: View, points: int) -> None:
     from lambent.bake.transport.bands import _threads
