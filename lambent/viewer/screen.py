@@ -82,6 +82,7 @@ class Screen:
     close_wanted: bool = False  # whether a key asked to close the window
     asks_to_close: bool = False  # whether the question about unsaved work is shown
     closes: bool = False  # whether the question was answered and the window closes
+    wake: Callable[[], None] = lambda: None  # draws a frame soon; any thread may call it
 
     def say(self, text: str) -> None:
         """Show a message for `MESSAGE_S` seconds."""

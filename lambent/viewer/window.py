@@ -64,6 +64,7 @@ class Window:
         self._wake_at_s: float | None = None
         self._error: Exception | None = None
         self.canvas.add_event_handler(self._on_event, *EVENTS, order=BEFORE_IMGUI)
+        self.screen.wake = self.canvas.request_draw  # sets a flag that the canvas reads sixty times a second
         self._take_dropped_files()
         self._take_the_close_button()
 
@@ -77,9 +78,15 @@ class Window:
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """Close at the first error, which `run` raises; the event loop would only log it."""
+        """Close at the first error, which `run` raises; the event loop would only log it.
+
+        A frame for which the display has no image in time is skipped by the canvas, and drawn again.
+        """
         try:
             yield
+        except wgpu.DrawCancelled:
+            self.canvas.request_draw()
+            raise
         except Exception as error:  # noqa: BLE001
             self._error = self._error or error
             loop.call_soon(self.canvas.close)

@@ -16,7 +16,7 @@ class Work:
     """One task in a separate thread; `poll` reports its end in the window's thread.
 
     `run` gets a `Progress`, which raises `Cancelled` after `cancel`; `done` gets the result, `failed` a `UserError` of
-    `run`. `poll` raises other errors.
+    `run`. `poll` raises other errors. `wake` is called in the thread once there is an end to report.
     """
 
     def __init__(
@@ -24,11 +24,12 @@ class Work:
         run: Callable[[Progress], Any],
         done: Callable[[Any], None],
         failed: Callable[[UserError], None] | None = None,
+        wake: Callable[[], None] = lambda: None,
     ) -> None:
-        self._run, self._done, self._failed = run, done, failed
+        self._run, self._done, self._failed, self._wake = run, done, failed, wake
         self._result: Any = None
         self._error: Exception | None = None
-        self._cancelled = threading.Event()
+        self._cancelled, self._ended = threading.Event(), threading.Event()
         self.share, self.what = 0.0, "starting"
         self._thread = threading.Thread(target=self._work, daemon=True)
         self._thread.start()
@@ -43,7 +44,7 @@ class Work:
 
     def poll(self) -> bool:
         """Whether the task has ended. Reports the end once: do not call it again after True."""
-        if self._thread.is_alive():
+        if not self._ended.is_set():
             return False
         if self._error is None:
             self._done(self._result)
@@ -62,6 +63,8 @@ class Work:
             self._result = self._run(self._progress)
         except Exception as error:  # noqa: BLE001 reported by poll, in the thread that can show it
             self._error = error
+        self._ended.set()
+        self._wake()
 
     def _progress(self, done: float, total: float, what: str) -> None:
         if self._cancelled.is_set():

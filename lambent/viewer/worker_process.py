@@ -30,19 +30,24 @@ class WorkerProcess:
     name : str
         Name of its task, for error lines.
     take : callable
-        Called in the thread with each line and its stream; bytes may follow a line. A line with "error" is not passed
-        on: it ends the process and becomes its `error`.
+        Called in the thread with each line and its stream; bytes may follow a line, fewer than the line says if the
+        process ends. A line with "error" is not passed on: it ends the process and becomes its `error`.
     ends : bool
         Whether the worker ends by itself when it is done; if not, its end is an error.
+    wake : callable
+        Called in the thread after `take`, and when there is an end to handle.
     """
 
-    def __init__(self, module: str, words: Sequence[str], name: str, take: Take, *, ends: bool) -> None:
+    def __init__(
+        self, module: str, words: Sequence[str], name: str, take: Take, *, ends: bool,
+        wake: Callable[[], None] = lambda: None,
+    ) -> None:  # fmt: skip
         self.error = ""  # reason of a failure, in one line; else empty
-        self._name, self._take, self._ends = name, take, ends
+        self._name, self._take, self._ends, self._wake = name, take, ends, wake
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
         command = [sys.executable, "-m", module, *words]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log)
-        self._work: Work | None = Work(self._listen, lambda _: None, self._failed)
+        self._work: Work | None = Work(self._listen, lambda _: None, self._failed, wake)
 
     @property
     def running(self) -> bool:
@@ -78,10 +83,13 @@ class WorkerProcess:
         try:
             for line in iter(process.stdout.readline, b""):
                 progress(0, 1, "")
+                if not line.endswith(b"\n"):
+                    break  # the process ended while it wrote
                 said = json.loads(line)
                 if "error" in said:
                     raise UserError(str(said["error"]))
                 self._take(said, process.stdout)
+                self._wake()
             code = process.wait()
         finally:
             process.kill()

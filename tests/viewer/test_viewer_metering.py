@@ -1,5 +1,7 @@
 """The meter, the comparison and the marks: numbers that can be worked out by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -152,22 +154,57 @@ class Bright:
         return np.full((state.height, state.width, 3), 1000 / LM_PER_W, np.float32)
 
 
+class Traced:
+    """Faces that are half as bright, traced one after the other until the process ends."""
+
+    def __init__(self, faces):
+        self._left, self.asked, self._radiance = faces, [], None
+
+    def ask(self, frame):
+        self.asked.append(frame.camera)
+        self._radiance = np.full((frame.height, frame.width, 3), 500 / LM_PER_W, np.float32)
+
+    @property
+    def radiance(self):
+        if self._left == 0:
+            raise UserError("the process ended")
+        self._left, found, self._radiance = self._left - (self._radiance is not None), self._radiance, None
+        return found
+
+
+def rated(drawing, meter, renderer, traced=None):
+    """Steps until the glare is rated."""
+    steps, frame = 0, FrameState(CAMERA, 320, 200, show="diffuse")
+    while drawing.busy:
+        drawing.step(frame, lambda: renderer, lambda _: traced)
+        steps += 1
+        assert (meter.share is None) == (not drawing.busy) and steps < 12
+    return steps
+
+
 def test_glare_is_drawn_face_by_face():
     meter, renderer = GlareMeter(wanted=True), Bright()
-    drawing, frame = GlareDrawing(meter), FrameState(CAMERA, 320, 200, show="diffuse")
-    steps = 0
-    while drawing.busy:
-        drawing.step(renderer, frame)
-        steps += 1
-        assert (meter.share is None) == (not drawing.busy) and steps < 9
-    assert steps == 5 == len(renderer.drawn)  # what is behind the eye is not drawn
-    assert meter.found.illuminance_lx == pytest.approx(1000 * np.pi, rel=5e-3) and meter.camera == CAMERA
-    assert meter.found.sources == ()
-    drawing.step(renderer, frame)
+    drawing, frame = GlareDrawing(meter), FrameState(CAMERA, 320, 200)
+    assert rated(drawing, meter, renderer) == 5 == len(renderer.drawn)  # what is behind the eye is not drawn
+    assert meter.found.illuminance_lx == pytest.approx(1000 * np.pi, rel=5e-3) and meter.made == "drawn"
+    assert meter.found.sources == () and not meter.is_old
+    drawing.step(frame, lambda: renderer, lambda _: None)
     assert len(renderer.drawn) == 5
+    drawing.step(replace(frame, light={"lamp": (0.0, 0.0, 0.0)}), lambda: renderer, lambda _: None)
+    assert meter.is_old, "of another state"
     meter.wanted = True
-    drawing.step(renderer, frame)
-    drawing.step(renderer, frame)
+    for _ in range(2):
+        drawing.step(frame, lambda: renderer, lambda _: None)
     meter.wanted = True  # again, before it is done
-    drawing.step(renderer, frame)
+    drawing.step(frame, lambda: renderer, lambda _: None)
     assert meter.share == pytest.approx(1 / 5)
+
+
+def test_glare_is_traced_or_drawn_but_not_mixed():
+    meter, renderer, traced = GlareMeter(wanted=True), Bright(), Traced(9)
+    drawing = GlareDrawing(meter)
+    assert rated(drawing, meter, renderer, traced) == 5 == len(set(traced.asked))
+    assert meter.found.illuminance_lx == pytest.approx(500 * np.pi, rel=5e-3) and "traced" in meter.made
+    meter.wanted = True
+    assert rated(drawing, meter, renderer, Traced(3)) == 3 + 1 + 5 == 4 + len(renderer.drawn)
+    assert meter.found.illuminance_lx == pytest.approx(1000 * np.pi, rel=5e-3) and meter.made == "drawn"

@@ -10,6 +10,7 @@ from lambent.bake.again import bake_again, copy_beside
 from lambent.bake.bake import bake
 from lambent.core.camera import CameraPath
 from lambent.core.images import read_image
+from lambent.core.light_mix import GroupMix, LightMix
 from lambent.realtime.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.scenes import load_scene
@@ -34,7 +35,8 @@ BLACK = {"kd": (0.0, 0.0, 0.0), "lobes": ()}
 @pytest.fixture(scope="module")
 def store(mi, tmp_path_factory):
     folder = tmp_path_factory.mktemp("traced") / "box.store"
-    with bake(load_scene("builtin:box"), folder, quality=TINY, only={"geometry", "environment", "light_map", "answer"}):
+    kinds = {"geometry", "environment", "light_map", "answer"}
+    with bake(load_scene("builtin:box"), folder, quality=TINY, only=kinds, light_groups="scene"):
         return folder
 
 
@@ -126,8 +128,10 @@ def test_the_picture_at_rest_is_traced_and_movement_draws_at_once(pictures, stat
     assert a.version == versions, "nothing is drawn meanwhile"
     state.navigation.camera = replace(state.navigation.camera, fov_y_deg=30.0)
     pictures.update(PLACE, 1.0)
-    assert pictures.shown[0] is a and a.version == versions + 1 and not pictures._at_rest._tracing.busy
-    assert state.screen.at_rest == ""
+    assert pictures.shown[0] is a and a.version == versions + 1 and pictures._at_rest._tracing._wish.kinds == ()
+    assert state.screen.at_rest == "" and pictures.wait_s() == pytest.approx(STILL_S)
+    state.screen.clock.now_s += 2 * STILL_S  # a slow frame
+    assert pictures.wait_s() == 0
     again = traced(pictures, state)
     assert np.abs(tiles(again.read()) - tiles(mean)).max() > 0.1 * mean.mean(), "another view"
 
@@ -193,6 +197,43 @@ def test_the_meter_reads_the_traced_picture(pictures, state):
     assert state.meter.reading is not None and pictures.shown[0] is found
 
 
+def test_glare_is_rated_in_traced_pictures_at_rest(pictures, state):
+    """The shown picture stays meanwhile, and until one with as many samples replaces it."""
+    found, glare = traced(pictures, state, 24), state.meter.glare
+    drawn(pictures, state, SIZE)
+    shown, glare.wanted = found.taken, True
+    drawn(pictures, state, SIZE)
+    assert pictures._glare.waits and pictures.wait_s() is None and glare.share is None
+    until(pictures, state, lambda: glare.found is not None)
+    assert glare.made == "traced, 16 samples" and not glare.is_old and not pictures._glare.busy
+    assert pictures.shown[0] is found and found.taken is shown
+    until(pictures, state, lambda: found.taken is not shown)
+    assert found.samples >= shown.samples
+    rated = glare.found.illuminance_lx
+    state.screen.pace.traces, glare.wanted = False, True
+    until(pictures, state, lambda: not pictures._glare.busy)
+    assert glare.made == "drawn" and glare.found.illuminance_lx == pytest.approx(rated, rel=0.1)
+    state.navigation.camera = replace(state.navigation.camera, fov_y_deg=41.0)
+    drawn(pictures, state, SIZE)
+    assert glare.is_old
+
+
+def test_light_that_is_mixed_while_the_picture_is_traced_lets_the_window_sleep(pictures, state):
+    traced(pictures, state)
+    state.lights.groups = pictures._renderer.scene.groups.records
+    (group,) = (one.name for one in state.lights.groups)
+    state.materials.edits.mix(LightMix({group: GroupMix(intensity=0.5)}))
+    before = pictures.shown[0].read().mean()
+    pictures.update(PLACE, 1.0)
+    assert pictures.shown == (pictures._a,)
+    assert traced(pictures, state).read().mean() == pytest.approx(0.5 * before, rel=0.1)
+    mixer = pictures._renderer.mixer
+    until(pictures, state, lambda: not mixer.busy)
+    assert not mixer.lags and pictures.shown[0].samples > 0
+    drawn(pictures, state, SIZE)
+    assert pictures.wait_s() is None
+
+
 @pytest.mark.parametrize("how", [{"near_m": 1.0}, {"show": "light-map"}, {"lookup": "light_field-choice"}])
 def test_what_paths_do_not_show_stays_drawn(pictures, state, how):
     for name, value in how.items():
@@ -234,7 +275,7 @@ def test_beside_a_traced_b_the_picture_a_is_drawn(pictures, state):
 
 
 def test_light_follows_edits_as_baked_estimated_or_rebaked(renderer, store, state):
-    """In the diffuse light, which drawing shows as well, in other materials than the store's."""
+    """In the diffuse light and the lamp's, which drawing shows as well, in other materials than the store's."""
     red = {name: one.model_copy(update={"kd": (0.7, 0.1, 0.1)}) for name, one in state.scene.materials.items()}
     bake_again(store, copy_beside(store), red, quality=TINY).close()
     state.look.show, camera = "diffuse", state.navigation.camera
@@ -247,8 +288,7 @@ def test_light_follows_edits_as_baked_estimated_or_rebaked(renderer, store, stat
         while picture.samples < ENDED:
             picture.sample()
         found.append(picture.mean())
-    walls = slice(2, None)  # above them is the lamp, which only drawing shows
-    exact, estimated, as_baked, truth = (tiles(one)[walls] for one in (*found, truth))
+    exact, estimated, as_baked, truth = (tiles(one) for one in (*found, truth))
     np.testing.assert_allclose(exact, truth, rtol=0.1, atol=0.02 * truth.mean())
     assert np.abs(estimated - truth).mean() < 0.1 * truth.mean()
     assert np.abs(as_baked - truth).mean() > 0.15 * truth.mean(), "the light of the store's own materials"
@@ -260,7 +300,7 @@ def test_a_film_is_traced_frame_by_frame(pictures, state, tmp_path):
     until(pictures, state, lambda: pictures._at_rest._tracing.ready)
     state.films.wanted = CameraPath(name="short", keys=(camera, replace(camera, fov_y_deg=30.0)), seconds=0.04)
     drawn(pictures, state, SIZE)
-    assert state.films.under_way.waits and pictures.wait_s() > 0
+    assert state.films.under_way.waits and pictures.wait_s() is None, "the process wakes the window"
     until(pictures, state, lambda: state.films.under_way is None)
     assert "2 frames" in state.screen.messages[-1].text
     first, last = (read_image(tmp_path / f"a-0{number}.exr") for number in (1, 2))

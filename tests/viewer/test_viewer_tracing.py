@@ -4,6 +4,7 @@ import itertools
 import json
 import queue
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,11 +15,13 @@ from lambent.scenes.scene import ImageTexture
 from lambent.store.store import Store
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.modes.walk.tracing import Wish
+from lambent.viewer.modes.walk.tracing import Tracing, Wish
 from lambent.viewer.modes.walk.tracing_worker import GROWTH, PICTURE_S, Converging, Wishes
 from lambent.viewer.work import POLL_S
 from tests.viewer.drawn_frames import drawn
+from tests.viewer.dying_worker import HEIGHT, WIDTH
 from tests.viewer.small_store import FRONT, MATERIALS, SIDE, write_small_store
+from tests.viewer.window_session import ROOT
 
 SIZE = (48, 32)
 LONGEST_S = 60.0
@@ -101,6 +104,30 @@ def test_the_first_picture_has_one_sample_and_later_ones_are_worth_their_time(cl
 def test_a_picture_of_a_number_of_samples_is_sent_once(clock):
     found, fast = sent(clock, 16)
     assert [samples for _, samples in found] == [16] and fast == [False]
+
+
+def reports(tracing, woken):
+    """Wait until the process reports, and take what it has said."""
+    woken.get(timeout=LONGEST_S)
+    tracing.tick()
+
+
+def test_a_process_that_is_killed_while_it_writes_is_a_line(monkeypatch):
+    """Every report wakes the window, the end as well, and none counts before the next `tick`."""
+    monkeypatch.setattr("lambent.viewer.modes.walk.tracing.WORKER", "tests.viewer.dying_worker")
+    monkeypatch.chdir(ROOT)
+    woken = queue.SimpleQueue()
+    tracing = Tracing(Path("none.store"), 0.0, (), lambda: woken.put(None))
+    tracing.start()
+    tracing.ask(Wish(0, ("traced",)))
+    tracing._process._work.wait()  # all is said, nothing is taken
+    assert not tracing.ready and tracing.last("traced") is None and tracing.error == ""
+    assert woken.qsize() == 4
+    reports(tracing, woken)
+    assert tracing.ready and "tracing was killed by SIGKILL" in tracing.error
+    found = tracing.last("traced")
+    assert found.samples == 1 and found.radiance.shape == (HEIGHT, WIDTH, 3) and (found.radiance == 1).all()
+    tracing.close()
 
 
 def test_a_store_without_a_scene_is_a_line(adapter, screen, tmp_path):

@@ -222,7 +222,7 @@ def panels(state: WalkState) -> tuple[Panel, ...]:
         ),
         Panel(
             "Light meter",
-            partial(metering.draw, state.meter, state.look, state.navigation),
+            partial(metering.draw, state.meter, state.look),
             "luminance of the picture in numbers, and glare",
         ),
         Panel("Compare", partial(compare.draw, state.comparison), "the picture compared with another"),

@@ -19,14 +19,14 @@ from lambent.viewer.mode import Divider
 from lambent.viewer.modes.walk.answering import AnsweringLight
 from lambent.viewer.modes.walk.comparison import AS_A
 from lambent.viewer.modes.walk.filming import QUALITIES, SIZES, Filming, film_file
-from lambent.viewer.modes.walk.glare import GlareDrawing
+from lambent.viewer.modes.walk.glare import SAMPLES, GlareDrawing
 from lambent.viewer.modes.walk.lanes import Lane
 from lambent.viewer.modes.walk.light_fields import FieldDrawing
 from lambent.viewer.modes.walk.metering import read
 from lambent.viewer.modes.walk.outlining import Outlining
 from lambent.viewer.modes.walk.rebaking import RebakedLight
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.modes.walk.traced import SOON_S, AtRest, TracedPicture, Worn, is_traceable
+from lambent.viewer.modes.walk.traced import AtRest, TracedFrames, TracedPicture, Worn, is_traceable
 from lambent.viewer.modes.walk.tracing import ALL_LIGHT, Kind
 from lambent.viewer.picture import Pair, Picture, Shown, size_px
 from lambent.viewer.screen import Rect, least
@@ -113,7 +113,8 @@ class Pictures(Pair):
         self._outlining.update(wanted, state.selection.record)
         filming, before = state.films.under_way is not None, self.shown[0].view
         kinds = self._traced_kinds(wanted)
-        self._at_rest.update(wanted, self._worn, kinds, before)
+        self._glare.step(wanted, self._renderer_of_glare, self._traced_glare)
+        self._at_rest.update(wanted, self._worn, kinds, before, paused=self._glare.waits)
         if state.states.split and not filming:
             self._compare_states(wanted)
         elif state.comparison.on and not filming:
@@ -129,9 +130,6 @@ class Pictures(Pair):
         state.fields.follow(state.selected_parts)
         self._fields.update(wanted, look.display_transform, exposure_ev, pixel_ratio)
         self._meter()
-        if self._glare.busy:
-            self._glare_renderer = self._glare_renderer or self._another_renderer()
-            self._glare.step(self._glare_renderer, wanted)
 
     def _frame(self, size: tuple[int, int]) -> FrameState:
         state = self._state
@@ -163,6 +161,7 @@ class Pictures(Pair):
         a, traces = self._a, self._state.screen.pace.traces and self._state.comparison.traced_kind != "traced"
         traced = self._at_rest.picture("traced") if traces and self._at_rest.still else None
         if traced is not None:
+            self._renderer.mixer.follow(wanted.light, waits=False)  # as a frame would
             a.stand_in(traced.texture, wanted)
             return traced
         a.update(wanted, sharpen=not (traces and self._at_rest.coming), share=share)
@@ -181,14 +180,18 @@ class Pictures(Pair):
 
     def wait_s(self) -> float | None:
         film = self._state.films.under_way
-        if film is not None or self._glare.busy:
-            return SOON_S if film is not None and film.waits else 0.0
-        loading = POLL_S if self._renderer.streaming.busy else None
+        if (film is not None and not film.waits) or (self._glare.busy and not self._glare.waits):
+            return 0.0
+        draws = any(isinstance(one, Picture) for one in self.shown)
+        loading = POLL_S if draws and self._renderer.streaming.busy else None
+        light = self._lane.wait_s()
+        if light is not None and not draws:
+            light = POLL_S  # it is not shown
         beside = self._beside.wait_s() if self._beside is not None and self._state.states.split else None
         compares = POLL_S if len(self.shown) == 2 and self._state.comparison.busy else None
         rebakes = None if self._rebaked is None else self._rebaked.wait_s()
         resting = self._at_rest.wait_s()
-        return least(super().wait_s(), loading, self._lane.wait_s(), beside, compares, rebakes, resting)
+        return least(super().wait_s(), loading, light, beside, compares, rebakes, resting)
 
     def save(self) -> None:
         """Write the picture A, and a shown error map."""
@@ -300,6 +303,16 @@ class Pictures(Pair):
         comparison.tick()
 
     # readings
+
+    def _renderer_of_glare(self) -> Renderer:
+        self._glare_renderer = self._glare_renderer or self._another_renderer()
+        return self._glare_renderer
+
+    def _traced_glare(self, frame: FrameState) -> TracedFrames | None:
+        """Makes the faces that glare is rated in; None if they are drawn."""
+        if not (self._state.screen.pace.traces and self._at_rest.ready and is_traceable(frame)):
+            return None
+        return self._at_rest.frames(frame, self._worn, SAMPLES)
 
     def _meter(self) -> None:
         meter, look, now_s, a = self._state.meter, self._state.look, self._state.screen.clock(), self.shown[0]

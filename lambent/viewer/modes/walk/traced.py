@@ -24,10 +24,8 @@ from lambent.viewer.modes.walk.light_fields import shows_choice
 from lambent.viewer.modes.walk.tracing import ALL_LIGHT, MOST_SAMPLES, Kind, Traced, Tracing, Wish
 from lambent.viewer.picture import write_picture
 from lambent.viewer.screen import Screen
-from lambent.viewer.work import POLL_S
 
 STILL_S = 0.1  # time without a change before pictures are requested
-SOON_S = 0.02  # interval of polling for the first picture
 FADE_S, FADE_STEP_S = 0.2, 1 / 30  # duration and steps of the blend from one picture to the next
 COARSE_SCALE = 0.5  # a drawn picture of this share of the width and height is replaced by one of half of them first
 TRACEABLE = (ALL_LIGHT, "diffuse", "specular")
@@ -204,12 +202,15 @@ class AtRest:
         replaced: tuple[str, ...],
     ) -> None:  # fmt: skip
         self._make, self._screen = given, screen
-        self._tracing = None if store is None else Tracing(store, sky_turn_deg, replaced)
+        self._tracing = None if store is None else Tracing(store, sky_turn_deg, replaced, lambda: screen.wake())
         self._pictures: dict[Kind, TracedPicture] = {}
         self._frame: FrameState | None = None  # what is drawn, without its display
         self._of: tuple[Wish, tuple[Kind, ...]] | None = None  # what pictures depend on
         self._wish: Wish | None = None  # the request
+        self._shown: Wish | None = None  # the request whose pictures are shown
+        self._least: dict[Kind, int] = {}  # samples of shown pictures that are being traced again
         self._changed_s = 0.0
+        self.still = False  # whether the view had not changed for a moment at the last `update`
 
     @property
     def fault(self) -> str:
@@ -217,15 +218,14 @@ class AtRest:
         return NO_SCENE if self._tracing is None else self._tracing.error
 
     @property
-    def still(self) -> bool:
-        """Whether the view has not changed for a moment."""
-        return self._screen.clock() - self._changed_s >= STILL_S
+    def ready(self) -> bool:
+        """Whether the process can be asked for pictures."""
+        return not self.fault and self._tracing is not None and self._tracing.ready
 
     @property
     def coming(self) -> bool:
         """Whether there are pictures of the view, or will be soon."""
-        asks = self._of is not None and bool(self._of[1])
-        return asks and not self.fault and self._tracing is not None and self._tracing.ready
+        return self._of is not None and bool(self._of[1]) and self.ready
 
     def held(self, kind: Kind) -> TracedPicture:
         """The place of a kind's pictures, at times without one."""
@@ -277,10 +277,13 @@ class AtRest:
             return f"{name}: at rest" if self.coming or self._tracing is None else f"{name}: {self._tracing.what}"
         return f"{name}, {found.counted}"
 
-    def update(self, wanted: FrameState, worn: Worn, kinds: tuple[Kind, ...], before: Any) -> None:
+    def update(
+        self, wanted: FrameState, worn: Worn, kinds: tuple[Kind, ...], before: Any, *, paused: bool = False
+    ) -> None:
         """Request a view in these kinds once it stands still, and show its present pictures.
 
-        The first picture is blended from the view `before`.
+        The first picture is blended from the view `before`. While `paused`, because single pictures are traced,
+        nothing is requested; then the view is traced again, and shown once it has as many samples as before.
         """
         tracing, now_s = self._tracing, self._screen.clock()
         if tracing is None:
@@ -289,36 +292,40 @@ class AtRest:
         frame = _drawn(wanted)
         if frame != self._frame:
             self._frame, self._changed_s = frame, now_s
+        self.still = now_s - self._changed_s >= STILL_S
         of = _wish_of(wanted, worn), kinds
         if of != self._of:
             self._of = of
             if self._wish is not None:
                 tracing.ask(None)
-            self._wish = None
+            self._wish = self._shown = None
             for picture in self._pictures.values():
                 picture.show(None, wanted, None)
         wish = replace(of[0], kinds=kinds, rebaked=worn.rebaked)
-        if kinds and self.still and wish != self._wish and tracing.ready:
-            self._wish = wish
-            tracing.ask(replace(wish, coarse=self._screen.statistics.scale <= COARSE_SCALE))
+        if paused:
+            self._wish = None
+        elif kinds and self.still and wish != self._wish and tracing.ready:
+            self._ask(wish)
         for kind in kinds:
             found = tracing.last(kind) if self._wish is not None else None
+            if found is not None and found.samples < self._least.get(kind, 0):
+                found = None
             picture = self.held(kind)
             if found is not None or picture.readable:
                 picture.show(found or picture.taken, wanted, picture.view or before)
 
+    def _ask(self, wish: Wish) -> None:
+        assert self._tracing is not None, "there is a process to ask"
+        again = wish == self._shown
+        self._least = {kind: self.held(kind).samples for kind in wish.kinds} if again else {}
+        self._wish = self._shown = wish
+        coarse = not again and self._screen.statistics.scale <= COARSE_SCALE
+        self._tracing.ask(replace(wish, coarse=coarse))
+
     def wait_s(self) -> float | None:
-        """Seconds until something may have changed; None: never."""
-        tracing = self._tracing
-        if tracing is None or tracing.error or self._of is None or not self._of[1]:
-            return None
-        if not tracing.ready:
-            return POLL_S
-        if not self.still:
-            return max(0.0, self._changed_s + STILL_S - self._screen.clock())
-        if self._wish is not None and any(tracing.last(kind) is None for kind in self._wish.kinds):
-            return SOON_S
-        return POLL_S if tracing.busy else None
+        """Seconds until a request is due; None: never. The process wakes the window by itself."""
+        asks = self._of is not None and bool(self._of[1]) and not self.still
+        return max(0.0, self._changed_s + STILL_S - self._screen.clock()) if asks else None
 
     def close(self) -> None:
         """End the process."""

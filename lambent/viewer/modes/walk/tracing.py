@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import IO, Any, Literal, get_args
@@ -105,7 +106,9 @@ class Traced:
 
 
 class Tracing:
-    """The process, from `start` to `close`.
+    """The process, from `start` to `close`; what it reports counts from the next `tick` on.
+
+    `wake` is called in another thread when there is something for `tick`.
 
     Attributes
     ----------
@@ -113,9 +116,12 @@ class Tracing:
         Step of the process before it is `ready` for wishes.
     """
 
-    def __init__(self, store: Path, sky_turn_deg: float, replaced: Sequence[str] = ()) -> None:
-        self._words = (str(store), str(sky_turn_deg), *replaced)
+    def __init__(
+        self, store: Path, sky_turn_deg: float, replaced: Sequence[str] = (), wake: Callable[[], None] = lambda: None
+    ) -> None:
+        self._words, self._wake = (str(store), str(sky_turn_deg), *replaced), wake
         self._last: dict[Kind, Traced] = {}
+        self._reports: deque[Traced | tuple[str, bool]] = deque()  # pictures, and steps with whether it is ready
         self.what, self.ready = "starting", False
         self._wish = Wish(0)
         self._process: WorkerProcess | None = None
@@ -130,22 +136,21 @@ class Tracing:
         found = self._last.get(kind)
         return found if found is not None and found.number == self._wish.number else None
 
-    @property
-    def busy(self) -> bool:
-        """Whether another picture of the present wish will come."""
-        runs = self._process is not None and self._process.running
-        last = [self.last(kind) for kind in self._wish.kinds]
-        return runs and any(one is None or one.samples < MOST_SAMPLES for one in last)
-
     def start(self) -> None:
         """Start the process, which loads the room; once."""
         if self._process is None:
-            self._process = WorkerProcess(WORKER, self._words, "tracing", self._take, ends=False)
+            self._process = WorkerProcess(WORKER, self._words, "tracing", self._take, ends=False, wake=self._wake)
 
     def tick(self) -> None:
-        """Handle the end of the process."""
+        """Take what the process has reported, and its end."""
         if self._process is not None:
             _ = self._process.running
+        while self._reports:
+            report = self._reports.popleft()
+            if isinstance(report, Traced):
+                self._last[report.kind] = report
+            else:
+                self.what, self.ready = report
 
     def ask(self, wish: Wish | None) -> None:
         """Trace a wish, whose number is replaced, from now on; None: stop tracing."""
@@ -159,9 +164,12 @@ class Tracing:
             self._process.close()
 
     def _take(self, said: Mapping[str, Any], stream: IO[bytes]) -> None:
+        """Handle a line of the process; runs in its thread."""
         if "what" in said:
-            self.what, self.ready = str(said["what"]), bool(said["ready"])
+            self._reports.append((str(said["what"]), bool(said["ready"])))
             return
         height, width, kind = int(said["height"]), int(said["width"]), said["kind"]
-        radiance = np.frombuffer(stream.read(height * width * 12), np.float32).reshape(height, width, 3)
-        self._last[kind] = Traced(int(said["number"]), kind, int(said["samples"]), said["noise"], radiance)
+        data = stream.read(height * width * 12)
+        if len(data) == height * width * 12:  # less if the process has ended meanwhile
+            radiance = np.frombuffer(data, np.float32).reshape(height, width, 3)
+            self._reports.append(Traced(int(said["number"]), kind, int(said["samples"]), said["noise"], radiance))

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from imgui_bundle import imgui
 
-from lambent.core.camera import Camera
 from lambent.core.exposure import ev100_of
 from lambent.core.false_colour import number
 from lambent.core.photometry import photometric
 from lambent.viewer.look import Look
 from lambent.viewer.modes.walk.glare import GlareMeter
 from lambent.viewer.modes.walk.metering import Meter
-from lambent.viewer.navigation import Navigation
 from lambent.viewer.panels.overlay import SHADE
 from lambent.viewer.panels.widgets import explain, press, rows
 from lambent.viewer.screen import Rect
@@ -22,8 +18,8 @@ from lambent.viewer.screen import Rect
 GRAPH_PX = 90
 
 
-def draw(meter: Meter, look: Look, navigation: Navigation) -> None:
-    _glare(meter.glare, navigation.camera)
+def draw(meter: Meter, look: Look) -> None:
+    _glare(meter.glare)
     meter.wanted = True
     reading, unit = meter.reading, look.quantity.unit
     if reading is None:
@@ -46,8 +42,8 @@ def draw(meter: Meter, look: Look, navigation: Navigation) -> None:
     explain("histogram of luminance on a logarithmic axis, without black pixels")
 
 
-def _glare(meter: GlareMeter, camera: Camera) -> None:
-    """Draw button and ratings; ratings of an earlier position are dim."""
+def _glare(meter: GlareMeter) -> None:
+    """Draw button and ratings; ratings of an earlier view or state are dim."""
     if press("Glare at the eye", "rates the glare for a person at this place and direction of view: DGP and UGR"):
         meter.wanted = True
     if meter.share is not None:
@@ -55,15 +51,14 @@ def _glare(meter: GlareMeter, camera: Camera) -> None:
         imgui.text_disabled(f"{meter.share:.0%}")
     if (found := meter.found) is None:
         return
-    here = meter.camera is not None and replace(meter.camera, name="") == replace(camera, name="")
-    imgui.push_style_color(
-        imgui.Col_.text, imgui.get_style_color_vec4(imgui.Col_.text if here else imgui.Col_.text_disabled)
-    )
+    colour = imgui.Col_.text_disabled if meter.is_old else imgui.Col_.text
+    imgui.push_style_color(imgui.Col_.text, imgui.get_style_color_vec4(colour))
     table = [
         ("DGP", f"{found.dgp:.2f}, {found.comfort}"),
         ("UGR", f"{found.ugr:.0f}"),
         ("at the eye", f"{number(found.illuminance_lx)} lx"),
         ("glare sources", str(len(found.sources))),
+        ("picture", meter.made),
     ]
     rows(table, "glare")
     imgui.pop_style_color()
