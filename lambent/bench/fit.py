@@ -4,8 +4,8 @@ Without inputs it fits tables synthesised from the thesis's fitted materials (ta
 known, and retro-reflective tapes, with and without a retro lobe. With inputs it fits the given measured files; each fit
 is judged by the metric it minimised, relative to the best Lambertian fit's error. Published parameters
 (`--against FILE.fit`) are judged on the same tuples. Files with readings below zero are generated too, and their fits
-compared with those of the clean files. Both methods fit one lobe alternately, five times; the other rows are least
-squares alone.
+compared with those of the clean files. Least squares and the thesis's grid search fit one lobe alternately, five times;
+the other rows are least squares alone.
 """
 
 from __future__ import annotations
@@ -26,15 +26,18 @@ from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled, Progress, silent
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
+from lambent.materials.fitting import gradient
 from lambent.materials.fitting.account import lambertian_errors
-from lambent.materials.fitting.fit import METHODS, FitResult, Method, fit
+from lambent.materials.fitting.fit import FitResult, Search, fit
 from lambent.materials.measured.metrics import errors_of
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 from lambent.materials.measured.registry import load
 from lambent.materials.measured.synthetic import synthesise
-from lambent.materials.models.published import Published, read_fits
+from lambent.published import grid_search
+from lambent.published.merl_fits import Published, read_fits
 
 NAME = "fit"
+METHODS: dict[str, Search] = {"grid": grid_search.fit_lobes, "gradient": gradient.fit_lobes}
 ALBEDO_THETA_DEG = 30.0
 KNOWN_METRIC = "l1"  # the thesis's
 RETRO_METHODS = ("gradient, no retro lobe", "gradient, retro lobe")
@@ -51,7 +54,7 @@ class Effort:
 
     tuples: int | None = None
     known_tuples: int | None = None
-    methods: tuple[Method, ...] = METHODS
+    methods: tuple[str, ...] = tuple(METHODS)
     runs: int = 5
     known: tuple[Material, ...] = tuple(KNOWN.values())
     below_zero: bool = True  # whether to fit tables with readings below zero
@@ -147,8 +150,8 @@ def _below_zero_rows(effort: Effort) -> Iterator[dict[str, Any]]:
                 }
 
 
-def _fitted(case: Case, method: Method, metric: str, distribution: Any, lobes: int) -> FitResult:
-    result = fit(case.samples, lobes=lobes, method=method, metric=metric, distribution=distribution)
+def _fitted(case: Case, method: str, metric: str, distribution: Any, lobes: int) -> FitResult:
+    result = fit(case.samples, lobes=lobes, search=METHODS[method], metric=metric, distribution=distribution)
     if result.partial:
         raise Cancelled
     return result

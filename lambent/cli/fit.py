@@ -27,10 +27,6 @@ def command(
             help="Lobes per side: 1 to 4, or auto, which adds lobes as long as each cuts the error by --gain."
         ),
     ] = "1",
-    method: Annotated[
-        Literal["gradient", "grid"],
-        typer.Option(help="Least squares from several starts, or the hierarchical grid search (slower)."),
-    ] = "gradient",
     metric: Annotated[str, typer.Option(help="Error to minimise: l1, l2_ngan, cuberoot or log.")] = "cuberoot",
     distribution: Annotated[
         DistributionChoice, typer.Option(help="Microfacet distribution: ggx has long tails; best tries both.")
@@ -46,8 +42,6 @@ def command(
         typer.Option("--retro/--no-retro", help="Fit a retro-reflective lobe; by default where the table shows one."),
     ] = None,
     gain: Annotated[float, typer.Option(help="Least share of the error that another lobe must remove (auto).")] = 0.05,
-    grid_n: Annotated[int, typer.Option(min=3, max=30, help="Grid search: values per parameter and level.")] = 9,
-    grid_levels: Annotated[int, typer.Option(min=1, max=12, help="Grid search: levels.")] = 5,
     fix: Annotated[list[str] | None, typer.Option(help="Fix a parameter: r0=.05 or kd=.1,.2,.3. Repeatable.")] = None,
     range_: Annotated[
         list[str] | None, typer.Option("--range", help="Bound a parameter to lo:hi, as in mx=.05:.3. Repeatable.")
@@ -76,7 +70,6 @@ def command(
     from lambent.materials import measured
     from lambent.materials.fitting.account import below_zero
     from lambent.materials.fitting.fit import fit
-    from lambent.materials.fitting.grid import Schedule
     from lambent.materials.fitting.parameters import parse_fix, parse_ranges
     from lambent.materials.fitting.plot import plot_files, save_plots
     from lambent.materials.measured.metrics import METRICS
@@ -93,9 +86,9 @@ def command(
     samples = measurement.samples()
     with progress_bar() as progress:
         result = fit(
-            samples, lobes=count, method=method, metric=metric, distribution=distribution, coupled=coupled,
-            retro=retro, gain=gain, schedule=Schedule(grid_n, grid_levels), fix=fixed, ranges=ranges, seed=seed,
-            source=file, progress=progress, whole=measurement, keep_albedo=keep_albedo,
+            samples, lobes=count, metric=metric, distribution=distribution, coupled=coupled, retro=retro, gain=gain,
+            fix=fixed, ranges=ranges, seed=seed, source=file, progress=progress, whole=measurement,
+            keep_albedo=keep_albedo,
         )  # fmt: skip
     if output is not None:
         result.material.save(output)

@@ -36,14 +36,6 @@ def conductor(cos_d: Floats, n: Floats | float, k: Floats | float) -> Floats:
     return np.asarray(perpendicular * (1 + (sum_ - difference) / (sum_ + difference)) / 2)
 
 
-def dielectric(cos_d: Floats, eta: float) -> Floats:
-    """Reflectance of unpolarised light at the real relative index eta, as Cook and Torrance 1982 write it; eta >= 1."""
-    g = np.sqrt(np.maximum(eta**2 + cos_d**2 - 1, 0.0))
-    a = (g - cos_d) / (g + cos_d)
-    b = (cos_d * (g + cos_d) - 1) / (cos_d * (g - cos_d) + 1)
-    return np.asarray(0.5 * a * a * (1 + b * b))
-
-
 def r0_of(ior: float) -> float:
     """Reflectance at normal incidence of a dielectric of this index in air."""
     return ((ior - 1) / (ior + 1)) ** 2

@@ -57,7 +57,3 @@ def test_the_albedo_is_in_the_summary_and_can_be_kept(lambent, measured):
     facts = lambent("fit", measured, "--keep-albedo", "--json").json
     assert facts["albedos"][0]["side"] == "reflection"
     assert "albedo kept" in facts["material"]["provenance"]["method"]
-
-
-def test_the_grid_cannot_keep_the_albedo(refused, measured):
-    assert "gradient" in refused("fit", measured, "--keep-albedo", "--method", "grid")

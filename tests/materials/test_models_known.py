@@ -8,7 +8,7 @@ import pytest
 from lambent.core.directions import direction
 from lambent.materials.fresnel import conductor
 from lambent.materials.models import model_named
-from lambent.materials.models.published import MERL_CHANNELS, Published
+from lambent.published.merl_fits import MERL_CHANNELS, Published
 
 N = direction(0.0, 0.0)
 

@@ -21,7 +21,7 @@ from lambent.core.images import read_encoded, read_image
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material, Provenance, load_material
 from lambent.materials.measured import inspection, load
-from lambent.materials.models.published import read_fits
+from lambent.published.merl_fits import read_fits
 from lambent.scenes import load_scene, sample_path, validate
 from lambent.scenes.environments import from_lat_long
 from lambent.scenes.loaders.load import formats

@@ -28,7 +28,7 @@ from lambent.core.images import read_encoded, read_image
 from lambent.core.inputs import open_input, parse_json, read_bytes, read_head, sha256_of
 from lambent.materials.document import load_material
 from lambent.materials.measured.registry import load
-from lambent.materials.models.published import read_fits
+from lambent.published.merl_fits import read_fits
 from lambent.scenes import load_scene
 from lambent.scenes.loaders.gltf.container import read as read_gltf
 from lambent.store.session import read_session

@@ -164,7 +164,7 @@ def test_a_fit_comes_as_one_step_and_keeps_what_is_fixed(editor, brass_file, sai
 
 def test_a_cancelled_fit_leaves_the_material(editor, brass_file, said):
     editor.show_measurement(read_measurement(brass_file))
-    editor.fit.lobes, editor.fit.method = "3", "grid"
+    editor.fit.lobes = "4"
     editor.fit.start(editor.measurement, editor.metric)
     editor.fit.stop(keep=False)
     until(editor, lambda: editor.fit.work is None)
@@ -305,7 +305,6 @@ def test_the_editor_fits_as_the_command_line_does(screen):
     made = Editor(MaterialEdits({"m": Material(name="m")}), "m", screen).fit
     for function in (fit, command):
         assert signature(function).parameters["distribution"].default == made.distribution
-        assert signature(function).parameters["method"].default == made.method
     assert str(signature(command).parameters["lobes"].default) == made.lobes
 
 

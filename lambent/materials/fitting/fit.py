@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -17,20 +17,19 @@ from lambent.core.inputs import sha256_of
 from lambent.core.plain import Triple, triple
 from lambent.core.progress import Cancelled, Progress, silent
 from lambent.materials.document import Distribution, Kind, Lobe, Material, Provenance, Side
-from lambent.materials.fitting import account, albedos, gradient, grid, parameters
+from lambent.materials.fitting import account, albedos, gradient, parameters
 from lambent.materials.fitting.albedos import Comparison, Curve
 from lambent.materials.fitting.choices import DISTRIBUTION, DistributionChoice
 from lambent.materials.fitting.diffuse import diffuse_mode
-from lambent.materials.fitting.grid import Schedule
 from lambent.materials.fitting.least_squares import Bounds
 from lambent.materials.fitting.parameters import BOUNDS, RETRO_BOUNDS, SHAPE, Box, Fixed, Ranges, parameter
-from lambent.materials.fitting.problem import Candidate, Found, Mixture, problem_of
+from lambent.materials.fitting.problem import Candidate, Found, Mixture, Problem, problem_of
 from lambent.materials.measured.metrics import Metric, errors_of, metric_named
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 from lambent.materials.measured.retro import towards_light
 
-Method = Literal["grid", "gradient"]
-METHODS: tuple[Method, ...] = ("grid", "gradient")
+Search = Callable[[Problem, Bounds, Floats, Progress, int], Iterator[Mixture]]
+"""A search for the model with one lobe, two, ...; arguments as in `gradient.fit_lobes`."""
 DISTRIBUTIONS: dict[str, tuple[Distribution, ...]] = {
     "beckmann": ("beckmann",),
     "ggx": ("ggx",),
@@ -81,13 +80,12 @@ class Task:
 
     lobes: int
     gain: float  # share of E that another lobe must remove; 0 for a fixed number of lobes
-    method: Method
+    search: Search
     metric: Metric
     distributions: tuple[Distribution, ...]
     coupled: bool
     fix: Fixed
     ranges: Ranges
-    schedule: Schedule
     seed: int
     kept: dict[Side, Curve]  # albedos that the model must match
     retro: bool | None = None
@@ -97,7 +95,6 @@ def fit(
     table: MeasuredSamples | MeasuredTable,
     *,
     lobes: int | Literal["auto"] = 1,
-    method: Method = "gradient",
     metric: str = "cuberoot",
     distribution: DistributionChoice = DISTRIBUTION,
     coupled: bool = False,
@@ -107,7 +104,7 @@ def fit(
     gain: float = GAIN,
     whole: MeasuredTable | None = None,
     keep_albedo: bool = False,
-    schedule: Schedule | None = None,
+    search: Search = gradient.fit_lobes,
     seed: int = 0,
     source: Path | None = None,
     progress: Progress = silent,
@@ -120,9 +117,6 @@ def fit(
     table : MeasuredSamples or MeasuredTable
     lobes : int or "auto"
         1 to 4 per side; "auto" adds lobes while each removes at least the share `gain` of the error.
-    method : "gradient" or "grid"
-        Least squares from several starts, all lobes and the diffuse term jointly; or the thesis's hierarchical search,
-        lobe by lobe, with kd and kt_d from the histogram (3.4.1).
     metric : str
         The metric to minimise, one of `METRICS`; the result has E under all of them.
     distribution : "beckmann", "ggx" or "best"
@@ -141,8 +135,8 @@ def fit(
         The table of the tuples, for its albedos; by default `table`, if that is a MeasuredTable.
     keep_albedo : bool
         Whether the albedo over theta_i must match the table's, per channel (`albedos.KEEP`).
-    schedule : Schedule, optional
-        Values per parameter and number of levels of the grid.
+    search : callable
+        The method; by default least squares from several starts, all lobes and the diffuse term jointly.
     seed : int
         Seed for choosing tuples; the same seed gives the same material.
     source : Path, optional
@@ -153,22 +147,22 @@ def fit(
     Raises
     ------
     UserError
-        Unknown method, metric, distribution or parameter; invalid value; number of lobes out of range; a transmission
-        parameter for a table without transmission; `keep_albedo` without a table, or with the grid method.
+        Unknown metric, distribution or parameter; invalid value; number of lobes out of range; a transmission
+        parameter for a table without transmission; `keep_albedo` without a table.
     """
     began = time.perf_counter()
     count, fix, ranges = MAX_LOBES if lobes == "auto" else lobes, fix or {}, ranges or {}
     whole = table if isinstance(table, MeasuredTable) else whole
-    _check(count, gain, method, distribution)
-    if keep_albedo and (whole is None or method == "grid"):
-        raise UserError("needs the method gradient and a whole table", field="keep_albedo", got=method)
+    _check(count, gain, distribution)
+    if keep_albedo and whole is None:
+        raise UserError("needs a whole table", field="keep_albedo", got="tuples")
     parameters.check(fix, ranges, count)
     share = gain if lobes == "auto" else 0.0
     kinds = DISTRIBUTIONS[distribution]
     samples = table if isinstance(table, MeasuredSamples) else table.samples()
     curves = albedos.curves_of(whole, samples) if whole is not None else {}
-    plan, kept = schedule or Schedule(), curves if keep_albedo else {}
-    task = Task(count, share, method, metric_named(metric), kinds, coupled, fix, ranges, plan, seed, kept, retro)
+    kept = curves if keep_albedo else {}
+    task = Task(count, share, search, metric_named(metric), kinds, coupled, fix, ranges, seed, kept, retro)
     far = [name for name in [*fix, *ranges] if name.startswith(("t_", "kt"))]
     if far and not samples.transmitted.any():
         raise UserError("the table does not transmit", file=samples.info.file, field=far[0])
@@ -206,11 +200,12 @@ def fit(
     )
     if partial:
         warnings = ("cancelled: best result so far", *warnings)
+    how = "gradient" if search is gradient.fit_lobes else "another search"
     provenance = Provenance(
         source=samples.info.file,
         source_sha256=sha256_of(source) if source is not None else None,
         source_format=samples.info.format,
-        method=f"{method}, {lobes} lobe(s) per side, seed {seed}" + (", albedo kept" if keep_albedo else ""),
+        method=f"{how}, {lobes} lobe(s) per side, seed {seed}" + (", albedo kept" if keep_albedo else ""),
         metric=task.metric.name,
         errors=errors,
         samples=samples.counts,
@@ -229,8 +224,7 @@ def fit(
     return FitResult(material, errors, lambertian, seconds, warnings, partial, tuple(tried), compared)
 
 
-def _check(lobes: int, gain: float, method: str, distribution: str) -> None:
-    known("method", method, METHODS, field="method")
+def _check(lobes: int, gain: float, distribution: str) -> None:
     known("distribution", distribution, DISTRIBUTIONS, field="distribution")
     if not 0 < gain < 1:
         raise UserError("share out of range", field="gain", got=gain, expected="between 0 and 1")
@@ -288,13 +282,9 @@ def _fit_side(
         def report(done: float, total: float, what: str, number: int = number) -> None:
             progress(done / total + number, len(task.distributions), f"{side}: {what}")
 
-        if task.method == "grid":
-            models = grid.fit_lobes(one.problem, boxes, diffuse, report, task.seed, task.schedule)
-        else:
-            bounds = Bounds(boxes, ("kd" if side == "reflection" else "kt_d") not in task.fix)
-            models = gradient.fit_lobes(one.problem, bounds, diffuse, report, task.seed)
+        bounds = Bounds(boxes, ("kd" if side == "reflection" else "kt_d") not in task.fix)
         error = np.inf
-        for model in models:
+        for model in task.search(one.problem, bounds, diffuse, report, task.seed):
             reached = one.problem.remaining(model)
             if reached >= error * (1 - task.gain) ** task.metric.power:
                 break
@@ -329,7 +319,7 @@ def _diffuse_rgb(side: Side, samples: MeasuredSamples, task: Task, found: dict[S
     """kd or kt_d of the fitted model, or of the histogram if the fit has none."""
     if side in found and found[side].models:
         diffuse = found[side].models[-1].diffuse
-        return _rgb(np.where(diffuse < DARK, 0.0, diffuse) if task.method == "gradient" else diffuse)
+        return _rgb(np.where(diffuse < DARK, 0.0, diffuse))
     return _rgb(_diffuse(samples, side, task.fix))
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Literal, get_args
+from typing import Any
 
 from lambent.core.progress import Progress
 from lambent.materials.fitting.choices import DISTRIBUTION, DistributionChoice
@@ -20,9 +20,7 @@ from lambent.viewer.edits import MaterialEdits
 from lambent.viewer.screen import Screen
 from lambent.viewer.work import Work, pending
 
-Method = Literal["gradient", "grid"]
 LOBES = ("auto", "1", "2", "3", "4")
-METHODS: tuple[Method, ...] = get_args(Method)
 
 
 class Fit:
@@ -31,7 +29,6 @@ class Fit:
     def __init__(self, subject: Subject, screen: Screen) -> None:
         self._subject, self._screen = subject, screen
         self.lobes = LOBES[1]
-        self.method: Method = METHODS[0]
         self.distribution: DistributionChoice = DISTRIBUTION
         self.work: Work | None = None
         self.warnings: tuple[str, ...] = ()
@@ -46,15 +43,14 @@ class Fit:
         fix, ranges, unknown = self._subject.restrictions.for_fit(material, most)
         if unknown:
             say(f"left out of the fit: {', '.join(unknown)}")
-        self._keep, method, distribution = False, self.method, self.distribution
+        self._keep, distribution = False, self.distribution
 
         def run(progress: Progress) -> Any:
             from lambent.materials.fitting.fit import fit  # loads SciPy
 
             return fit(
-                measurement.samples, lobes="auto" if automatic else most, method=method, metric=metric,
-                distribution=distribution, coupled=material.kd_coupled, fix=fix, ranges=ranges,
-                source=measurement.path, progress=progress,
+                measurement.samples, lobes="auto" if automatic else most, metric=metric, distribution=distribution,
+                coupled=material.kd_coupled, fix=fix, ranges=ranges, source=measurement.path, progress=progress,
             )  # fmt: skip
 
         self.work = Work(run, partial(self._take, metric), lambda error: say(f"not fitted: {error}"))

@@ -13,7 +13,7 @@ from lambent.materials.document import KINDS, Lobe, Material
 from lambent.materials.fitting.choices import DISTRIBUTION_CHOICES
 from lambent.materials.measured.metrics import METRICS
 from lambent.materials.models.model import Parameter
-from lambent.viewer.editor.editor import LOBES, METHODS, Editor
+from lambent.viewer.editor.editor import LOBES, Editor
 from lambent.viewer.editor.restrictions import DIFFUSE, lobe_names
 from lambent.viewer.editor.subject import REFERENCES
 from lambent.viewer.panels import parameters
@@ -228,8 +228,6 @@ def draw_fit(editor: Editor) -> None:
     fit.lobes = choice("lobes", fit.lobes, LOBES, meaning)
     meaning = "microfacet distribution; best tries both"
     fit.distribution = choice("distribution", fit.distribution, DISTRIBUTION_CHOICES, meaning)
-    meaning = "gradient: least squares from several starts; grid: hierarchical grid search, slower"
-    fit.method = choice("method", fit.method, METHODS, meaning)
     restrictions = editor.subject.restrictions
     words = [*sorted(restrictions.fixed)]
     words += [f"{name} {low:.3g}..{high:.3g}" for name, (low, high) in sorted(restrictions.ranges.items())]

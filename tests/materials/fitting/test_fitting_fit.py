@@ -8,9 +8,7 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.fit import fit
-from lambent.materials.fitting.grid import Schedule
 from lambent.materials.measured.metrics import METRICS, errors_of
 from lambent.materials.measured.registry import load
 from tests.materials.fitting.known_answers import FEW, FOIL, ISOTROPIC, KNOWN, PAINT, TWO_LOBES, grey, setup_of
@@ -117,18 +115,6 @@ def test_fit_cancelled_before_it_began_is_diffuse(paint):
     assert result.material.kd[0] == pytest.approx(0.2, rel=0.03)
 
 
-@pytest.mark.parametrize("lobes", [1, 2])
-def test_gradient_is_no_worse_than_grid(paint, lobes):
-    grid = fit(paint, lobes=lobes, method="grid", schedule=Schedule(5, 4))
-    assert fit(paint, lobes=lobes).errors["cuberoot"] <= grid.errors["cuberoot"]
-
-
-def test_the_grid_keeps_the_histograms_kd(paint):
-    result = fit(paint, method="grid", schedule=Schedule(5, 3))
-    weight = paint.weight * np.abs(paint.wo[:, 2])
-    assert result.material.kd[0] == diffuse_mode(paint.f[:, 0], weight)
-
-
 def test_the_number_of_lobes_is_found(paint):
     assert len(fit(paint, lobes="auto").material.lobes) == 1
     assert len(fit(grey(TWO_LOBES, FEW), lobes="auto").material.lobes) == 2
@@ -193,7 +179,7 @@ def test_a_coupled_diffuse_term_is_recovered():
 
 
 def test_impossible_requests(paint):
-    impossible = [{"method": "gird"}, {"metric": "l3"}, {"distribution": "ggxx"}, {"lobes": 0}, {"lobes": 5}]
+    impossible = [{"metric": "l3"}, {"distribution": "ggxx"}, {"lobes": 0}, {"lobes": 5}]
     impossible += [{"gain": 0.0}, {"gain": 1.0}, {"fix": {"mxx": 1.0}}, {"fix": {"t_mx": 0.1}}]
     for options in impossible:
         with pytest.raises(UserError):

@@ -14,7 +14,7 @@ from lambent.materials.fitting.fit import fit
 from lambent.materials.measured.metrics import errors_of
 from lambent.materials.measured.protocol import MeasuredSamples
 from lambent.materials.measured.registry import load
-from lambent.materials.models.published import read_fits
+from lambent.published.merl_fits import read_fits
 
 pytestmark = pytest.mark.slow
 MATERIALS = (

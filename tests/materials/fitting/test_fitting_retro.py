@@ -13,7 +13,6 @@ from lambent.core.errors import UserError
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.fit import fit
-from lambent.materials.fitting.grid import Schedule
 from lambent.materials.fitting.parameters import box_of, check, to_search
 from lambent.materials.fitting.problem import Candidate, Mixture, problem_of
 from lambent.materials.fitting.slices import slices
@@ -68,11 +67,6 @@ def test_tapes_of_other_shape_keep_their_peak(tape):
         wi = direction(np.radians(theta), 0.0)
         assert MaterialBSDF(with_it.material).eval(wi, wi)[0] == pytest.approx(tape.eval(wi, wi)[0], rel=tolerance)
     assert any("removes" in note and "(added)" in note for note in with_it.material.provenance.notes)
-
-
-def test_the_grid_search_fits_it_too(beads):
-    retro = fit(beads, method="grid", schedule=Schedule(5, 3)).material.lobes[-1]
-    assert retro.retro and retro.mx == pytest.approx(0.03, rel=0.4)
 
 
 def test_it_is_not_tried_where_nothing_is_brighter_near_the_light():

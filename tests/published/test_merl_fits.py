@@ -9,7 +9,7 @@ import pytest
 
 from lambent.core.directions import direction
 from lambent.core.errors import UserError
-from lambent.materials.models.published import MERL_CHANNELS, Published, read_fits
+from lambent.published.merl_fits import MERL_CHANNELS, Published, read_fits
 
 WARD = "a-b = Aggregate(Lambertian(albedo = [.1, 0.2, 3e-1]), NganWard(albedo = [0.01, 0.02, 0.03], roughness = 0.1))"
 COOK = "c = Aggregate(Lambertian(albedo = [0, 0, 0]), NganCookTorrance(albedo = [1, 1, 1], eta = .04, roughness = .2))"

@@ -1,13 +1,19 @@
+"""The hierarchical search tries the values it says, finds known lobes, and does not beat least squares."""
+
 from __future__ import annotations
+
+from functools import partial
 
 import numpy as np
 import pytest
 
 from lambent.core.progress import silent
-from lambent.materials.fitting.grid import Schedule, search
+from lambent.materials.fitting.diffuse import diffuse_mode
+from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.parameters import box_of, to_search
 from lambent.materials.fitting.problem import Mixture, problem_of
 from lambent.materials.measured.metrics import METRICS
+from lambent.published.grid_search import Schedule, fit_lobes, search
 from tests.materials.fitting.known_answers import FEW, PAINT, grey
 
 
@@ -56,3 +62,12 @@ def test_finished_levels_survive_an_interruption(problem):
         search(problem, Mixture(np.array([0.2])), box, stop_at_level_3, finished, 0, Schedule())
     assert len(finished) == 2
     assert np.abs(finished[-1].coordinates - to_search(np.array([0.15, 0.15, 0.06, 0.3])))[0] < 0.5
+
+
+@pytest.mark.parametrize("lobes", [1, 2])
+def test_least_squares_are_no_worse(lobes):
+    paint = grey(PAINT, FEW)
+    grid = fit(paint, lobes=lobes, search=partial(fit_lobes, schedule=Schedule(5, 4)))
+    assert fit(paint, lobes=lobes).errors["cuberoot"] <= grid.errors["cuberoot"]
+    if lobes == 1:
+        assert grid.material.kd[0] == diffuse_mode(paint.f[:, 0], paint.weight * np.abs(paint.wo[:, 2]))

@@ -1,4 +1,4 @@
-"""Published fits of measured materials: a parser of .fit files, and the three models their parameters belong to.
+"""Published fits of MERL materials: a parser of .fit files, and the three models their parameters belong to.
 
 A .fit file is text, one material per line:
 
@@ -32,7 +32,7 @@ from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.inputs import read_bytes
 from lambent.core.plain import Triple, triple
-from lambent.materials.fresnel import dielectric, schlick_weight
+from lambent.materials.fresnel import conductor, schlick_weight
 
 MERL_CHANNELS = np.array([1.0, 1.15, 1.66])
 """Factors that convert Ngan's coefficients to f as read by MERL's readers."""
@@ -95,7 +95,7 @@ class Published:
         assert self.eta is not None
         if self.model == "NganCookTorrance":
             return np.asarray(self.eta + (1 - self.eta) * schlick_weight(cos_d))
-        return dielectric(cos_d, self.eta)
+        return conductor(cos_d, self.eta, 0.0)
 
 
 def read_fits(path: Path) -> dict[str, Published]:

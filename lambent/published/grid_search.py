@@ -1,16 +1,16 @@
-"""The hierarchical search (thesis 3.4.1), in the logarithms of mx, my and r0 and in alpha.
+"""The hierarchical search of a fit (thesis 3.4.1), in the logarithms of mx, my and r0 and in alpha.
 
 Several lobes: fit one, subtract, clamp at 0, fit the next, and refit in turn. One lobe: evaluate all combinations of n
 equidistant values per free parameter, keep the best, and shrink every interval around it to 1/(n - 1) of its extent;
 repeat for a given number of levels. Each candidate's coefficient is solved, not searched. A table with more than
 `VALUES` measured values is thinned by importance sampling.
 
-The box can lose the global optimum, as the thesis states: `gradient` is never worse and far faster.
+The box can lose the global optimum, as the thesis states: `materials.fitting.gradient` is never worse and far faster.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import product
 
@@ -18,6 +18,7 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.progress import Progress
+from lambent.materials.fitting.least_squares import Bounds
 from lambent.materials.fitting.parameters import Box
 from lambent.materials.fitting.problem import ALPHA, MU, NU, R0, Candidate, Mixture, Problem
 from lambent.materials.fitting.scale import Channel, solve_coefficients, solve_scale
@@ -38,9 +39,10 @@ class Schedule:
 
 
 def fit_lobes(
-    problem: Problem, boxes: Sequence[Box], diffuse: Floats, progress: Progress, seed: int, schedule: Schedule
+    problem: Problem, bounds: Bounds, diffuse: Floats, progress: Progress, seed: int, schedule: Schedule | None = None
 ) -> Iterator[Mixture]:
-    """The model with one lobe, with two, ... one per box; see `gradient.fit_lobes`."""
+    """The model with one lobe, with two, ... one per box; a `search` of `materials.fitting.fit`."""
+    boxes, schedule = bounds.boxes, schedule or Schedule()
 
     def refit(model: Mixture, index: int, finished: list[Candidate]) -> Mixture:
         """The model with lobe `index` fitted (again) to the remainder of the others."""
