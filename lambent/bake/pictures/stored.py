@@ -16,6 +16,8 @@ from lambent.store.consistency import read_geometry
 from lambent.store.contract import SceneRecord, scene_record, sun_beside
 from lambent.store.store import Store
 
+GUIDING = 0.25  # effort of the sky's guide: 1 has .8 % less noise, and takes 1.3 s longer on one core
+
 
 def stored_scene(store: Store, scene: Scene, replacements: Sequence[Replacement] = ()) -> TracedScene:
     """A store's scene with the objects of its bake, divided into parts, and their light map coordinates.
@@ -32,12 +34,12 @@ def stored_scene(store: Store, scene: Scene, replacements: Sequence[Replacement]
     atlas = Atlas(scene, uv2, width, height)
     own = merged(atlas) if unmapped else arrays
     has_sun = sun_beside(store) is not None
-    return TracedScene(atlas, own, [False] * len(objects), sun_beside=has_sun, unmapped=unmapped)
+    return TracedScene(atlas, own, [False] * len(objects), sun_beside=has_sun, unmapped=unmapped, effort=GUIDING)
 
 
 def scene_alone(scene: Scene) -> TracedScene:
     """A scene with its own objects, without a light map, for whole paths."""
-    return TracedScene(Atlas(scene, {}, 1, 1), {}, [False] * len(scene.objects))
+    return TracedScene(Atlas(scene, {}, 1, 1), {}, [False] * len(scene.objects), effort=GUIDING)
 
 
 def _objects(record: SceneRecord, arrays: dict[str, Floats]) -> tuple[tuple[SceneObject, ...], dict[str, Floats]]:

@@ -84,10 +84,17 @@ class SkyBins:
 
 
 class _Alias:
-    """Alias tables of many distributions, concatenated in one array."""
+    """Alias tables of many distributions, concatenated in one array: those of each group (B, K) in turn."""
 
     def __init__(self, groups: list[Floats]) -> None:
-        tables = [alias_tables(shares) for shares in groups]
+        sizes = np.array([group.shape[1] for group in groups])
+        tables: list[Any] = [None] * len(groups)
+        for size in set(sizes.tolist()):  # all of one size at once
+            same = np.flatnonzero(sizes == size)
+            ends = np.cumsum([len(groups[i]) for i in same])[:-1]
+            found = alias_tables(np.concatenate([groups[i] for i in same]))
+            for i, *table in zip(same.tolist(), *(np.split(side, ends) for side in found), strict=True):
+                tables[i] = table
         self._keep = mi.Float(np.concatenate([keep.ravel() for keep, _ in tables]))
         self._other = mi.UInt32(np.concatenate([other.ravel() for _, other in tables]))
 

@@ -116,29 +116,31 @@ class SkyGuide:
         return dr.gather(mi.Float, self._share, table * BINS + number, active) * density
 
 
-def learn(scene: Scene, whole: Any, sky: Any, *, keep_open: bool = False, panes: bool = False) -> SkyGuide | None:
+def learn(
+    scene: Scene, whole: Any, sky: Any, *, keep_open: bool = False, panes: bool = False, effort: float = 1.0
+) -> SkyGuide | None:
     """Learn the guide of a scene; None if no group needs a table. Deterministic.
 
     `whole` is the traced scene (mi.Scene), `sky` its environment (mi.Emitter). With `keep_open`, groups that see most
-    of their sky have tables too; with `panes`, clear glass transmits the sky undeviated.
+    of their sky have tables too; with `panes`, clear glass transmits the sky undeviated. `effort` scales RAYS and
+    LEAST.
     """
     bins = SkyBins(sky)
     if not bins.luminance.any():
         return None
-    size_m = CELL_M
-    while True:
-        groups = groups_of(scene, size_m)
-        pre_pass = _PrePass(whole, bins, _both_sides(whole, *_points_and_normals(scene, SURFACE_POINTS)), groups, panes)
-        if len(pre_pass.group) <= 4 * MOST_TABLES:
-            break
-        size_m = groups.size_m * 1.5
+    position, normal, crossed = _both_sides(whole, *_points_and_normals(scene, SURFACE_POINTS))
+    at, facing, groups = vectors(mi.Point3f, position), vectors(mi.Vector3f, normal), groups_of(scene)
+    while len(np.unique(number := np.array(groups.of(at, facing)))) > 4 * MOST_TABLES:
+        groups = groups_of(scene, groups.size_m * 1.5)
+    pre_pass = _PrePass(whole, bins, (position, normal, crossed), number, panes)
     first = pre_pass.brought(np.arange(len(pre_pass.group)), np.full(BINS, KEPT if keep_open else FIRST), "first")
     lit = (first[0] > 0).any(axis=1)
     wanted = np.flatnonzero(lit & (keep_open | ~pre_pass.sees_most(first[0])))[:MOST_TABLES]
     if len(wanted) <= FEW * lit.sum():
         return None
     light = bins.luminance / bins.luminance.sum()
-    more = pre_pass.brought(wanted, np.ceil(np.maximum(LEAST, RAYS * light)).astype(int), "more")
+    counts = np.ceil(effort * np.maximum(LEAST, RAYS * light)).astype(int)
+    more = pre_pass.brought(wanted, counts, "more")
     squares = np.where(more[1] > 0, more[1], first[1][wanted] * FIRST / RAYS)
     shares = _spread(np.sqrt(squares)) * bins.luminance
     plain = light * (1 - EVERYWHERE) + EVERYWHERE / BINS
@@ -152,14 +154,13 @@ def learn(scene: Scene, whole: Any, sky: Any, *, keep_open: bool = False, panes:
 
 
 class _PrePass:
-    """Points by group, and rays from them."""
+    """Points by group, whose `number` (n,) is given, and rays from them."""
 
     def __init__(
-        self, whole: Any, bins: SkyBins, points: tuple[Floats, Floats, Flags], groups: Groups, panes: bool
+        self, whole: Any, bins: SkyBins, points: tuple[Floats, Floats, Flags], number: Indices, panes: bool
     ) -> None:
         self._whole, self._bins, self._holes, self._panes = whole, bins, rays.has_holes(whole), panes
         position, normal, crossed = points
-        number = np.array(groups.of(vectors(mi.Point3f, position), vectors(mi.Vector3f, normal)))
         order = np.argsort(number, kind="stable")
         self.group, start, count = np.unique(number[order], return_index=True, return_counts=True)
         which = start[:, None] + np.arange(POINTS) * count[:, None] // POINTS
@@ -167,38 +168,48 @@ class _PrePass:
         self._position, self._normal, self._crossed = position[chosen], normal[chosen], crossed[chosen]
 
     def brought(self, which: Indices, counts: Indices, what: str) -> tuple[Floats, Floats]:
-        """Means (n, BINS) over `counts` (BINS,) rays of the cosine where the sky is visible, and of its square."""
+        """(n, BINS) mean cosine where the sky is visible, and mean square, over `counts` (BINS,) rays or more."""
+        block = int(counts.min())  # rays that are summed on the device
+        blocks = -(-counts // block)
         means, squares = np.zeros((2, len(which), BINS))
-        number = np.repeat(np.arange(BINS), counts)
-        first = np.cumsum(counts) - counts
-        turn = np.arange(len(number)) - first[number]  # index of a ray among those of its bin
-        point = (turn * POINTS // np.maximum(counts[number], POINTS) + turn + 7 * number) % POINTS
+        number = np.repeat(np.arange(BINS), blocks * block)
+        first = np.cumsum(blocks) - blocks
+        turn = np.arange(len(number)) - block * first[number]  # index of a ray among those of its bin
+        point = (turn * POINTS // np.maximum(block * blocks[number], POINTS) + turn + 7 * number) % POINTS
         at_once = max(1, RAYS_AT_ONCE // len(number))
         for mine in slices(len(which), at_once):
-            cosine = self._cosines(which[mine], number, point, seed_of(0, "sky guide", what, mine.start))
-            means[mine] = np.add.reduceat(cosine, first, axis=1) / counts
-            squares[mine] = np.add.reduceat(cosine**2, first, axis=1) / counts
+            seed = seed_of(0, "sky guide", what, mine.start)
+            for found, sums in zip((means, squares), self._sums(which[mine], number, point, block, seed), strict=True):
+                found[mine] = np.add.reduceat(sums, first, axis=1) / (block * blocks)
         return means, squares
 
-    def _cosines(self, which: Indices, number: Indices, point: Indices, seed: int) -> Floats:
-        """(n, rays) cosines of rays in bins `number` from the groups' `point`s; 0 where the sky is hidden."""
+    def _sums(self, which: Indices, number: Indices, point: Indices, block: int, seed: int) -> tuple[Floats, Floats]:
+        """Sums (n, rays / block) over blocks of rays in bins `number` from the groups' `point`s.
+
+        They are of the cosine, 0 where the sky is hidden, and of its square.
+        """
         count, width = len(number), len(which) * len(number)
         sampler = independent(seed, width)
-        thread = dr.arange(mi.UInt32, width)
-        place = thread // count * POINTS + dr.gather(mi.UInt32, mi.UInt32(point.astype(np.uint32)), thread % count)
-        bins = dr.gather(mi.UInt32, mi.UInt32(number.astype(np.uint32)), thread % count)
+        thread, each = dr.arange(mi.UInt32, width), dr.opaque(mi.UInt32, count)
+        group = thread // each
+        ray_number = thread - group * each
+        place = group * POINTS + dr.gather(mi.UInt32, mi.UInt32(point.astype(np.uint32)), ray_number)
+        bins = dr.gather(mi.UInt32, mi.UInt32(number.astype(np.uint32)), ray_number)
         w = self._bins.direction(bins, sampler.next_2d())
         p = dr.gather(mi.Point3f, vectors(mi.Point3f, self._position[which]), place)
         n = dr.gather(mi.Vector3f, vectors(mi.Vector3f, self._normal[which]), place)
-        ray = rays.leaving(self._whole, p, n, w)
-        if self._panes:
-            seen = mi.luminance(rays.passed(self._whole, ray, mi.Bool(True)))
-        else:
-            seen = dr.select(rays.in_shadow(self._whole, ray, mi.Bool(True), self._holes), 0.0, 1.0)
-        crossed = dr.gather(mi.Bool, mi.Bool(self._crossed[which].ravel()), place)
         cosine = dr.dot(w, n)
+        crossed = dr.gather(mi.Bool, mi.Bool(self._crossed[which].ravel()), place)
         cosine = dr.select(crossed, dr.abs(cosine), dr.maximum(cosine, 0.0))
-        return np.array(seen * cosine).reshape(len(which), count)
+        ray, ahead = rays.leaving(self._whole, p, n, w), cosine > 0
+        if self._panes:
+            seen = mi.luminance(rays.passed(self._whole, ray, ahead))
+        else:
+            seen = dr.select(rays.in_shadow(self._whole, ray, ahead, self._holes), 0.0, 1.0)
+        brought = seen * cosine
+        dr.eval(brought)
+        sums, squares = (dr.block_sum(one, block) for one in (brought, brought * brought))
+        return np.array(sums).reshape(len(which), -1), np.array(squares).reshape(len(which), -1)
 
     def sees_most(self, brought: Floats) -> Flags:
         """Groups that see most of the light of the hemisphere they face."""

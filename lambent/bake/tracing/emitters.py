@@ -26,14 +26,15 @@ POINTS, SAMPLES = 8192, 16
 FLOOR = 0.1  # relative to the mean weight: light missed by the pre-pass costs noise, but is not lost
 
 
-def balance_emitters(builder: SceneBuilder) -> None:
+def balance_emitters(builder: SceneBuilder, effort: float = 1.0) -> None:
     """Set the sampling weights of a builder's emitters, for all scenes it builds from now on. Deterministic.
 
-    The environment is guided first (`sky.guide`), because its contribution depends on its sampling.
+    The environment is guided first (`sky.guide.learn`, with this effort), because its contribution depends on its
+    sampling.
     """
     if builder.environment is not None:
         whole = builder.build()
-        guide = learn(builder.scene, whole, builder.environment)
+        guide = learn(builder.scene, whole, builder.environment, effort=effort)
         if guide is not None:
             builder.environment = guided_sky(builder.environment, guide, whole.bbox())
     emitters = builder.emitters()

@@ -41,10 +41,10 @@ class FirstLight:
         return self.scene.pdf_emitter_direction(si, ds, active)
 
 
-def sky_without(found: FoundSun, builder: SceneBuilder, whole: Any) -> Any:
+def sky_without(found: FoundSun, builder: SceneBuilder, whole: Any, effort: float = 1.0) -> Any:
     """mi.Emitter of a builder's environment without its sun, with its own guide; None without an environment.
 
-    The guide sees the sky through the panes that the sun passes.
+    The guide, learnt with `effort`, sees the sky through the panes that the sun passes.
     """
     environment = builder.environment
     same = found.picture is None and not found.record.panes
@@ -55,7 +55,7 @@ def sky_without(found: FoundSun, builder: SceneBuilder, whole: Any) -> Any:
     if found.picture is not None:
         _take_out(picture[..., :3], found.picture, float(description["scale"]))
     sky = mi.load_dict(description | {"bitmap": mi.Bitmap(picture)})
-    guide = learn(builder.scene, whole, sky, panes=bool(found.record.panes))
+    guide = learn(builder.scene, whole, sky, panes=bool(found.record.panes), effort=effort)
     if guide is not None:
         sky = guided_sky(sky, guide, whole.bbox())
     parameters, own = mi.traverse(sky), mi.traverse(environment)

@@ -107,8 +107,9 @@ class SceneBuilder:
         self._shapes = Shapes(scene.objects, worn, uv2 or {})
         self.meshes = self._shapes.meshes
         self.lights = [emitter_of(light) for light in scene.lights]
-        self.environment: Any = _emitter_of(scene.environment, COARSE if coarse_sky else 1)
-        if sampling is not None:
+        if sampling is None:
+            self.environment: Any = _emitter_of(scene.environment, COARSE if coarse_sky else 1)
+        else:
             self.environment = sampling.environment
             self.weigh_emitters(sampling.weights)
 

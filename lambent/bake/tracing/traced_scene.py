@@ -42,15 +42,16 @@ class TracedScene:
     """Shared by the artefacts of a bake. `merged` is the concatenated geometry of the atlas, as from `atlas.merged`.
 
     `two_sided` flags each object whose back has a light map too: because light crosses it, or viewers see it. The
-    light map leaves out the scene's sun unless `sun_beside` is false. Objects in `unmapped` have no texels in it.
+    light map leaves out the scene's sun unless `sun_beside` is false. Objects in `unmapped` have no texels in it. The
+    sky is guided with `effort` (`sky.guide.learn`).
     """
 
     def __init__(
         self, atlas: Atlas, merged: dict[str, Floats], two_sided: list[bool], progress: Progress = silent, *,
-        sun_beside: bool = True, unmapped: Collection[str] = (),
+        sun_beside: bool = True, unmapped: Collection[str] = (), effort: float = 1.0,
     ) -> None:  # fmt: skip
         self.atlas, self.scene, self.merged, self.progress = atlas, atlas.scene, merged, progress
-        self.two_sided, self._sun_beside, self._unmapped = two_sided, sun_beside, unmapped
+        self.two_sided, self._sun_beside, self._unmapped, self._effort = two_sided, sun_beside, unmapped, effort
         counts = [len(o.mesh.faces) for o in self.scene.objects]
         self._two_sided, self._crossed = np.repeat(two_sided, counts), np.repeat(crossed_by_light(self.scene), counts)
         self._builder: tuple[tuple[bool, bool], SceneBuilder] | None = None
@@ -75,7 +76,7 @@ class TracedScene:
                 unmapped=self._unmapped,
             )  # fmt: skip
             if self._sampling is None:
-                balance_emitters(builder)
+                balance_emitters(builder, self._effort)
                 self._sampling = builder.sampling()
             self._builder = kind, builder
         return self._builder[1]
@@ -112,7 +113,7 @@ class TracedScene:
             return None
         builder, whole = self.builder(diffuse=diffuse), self.whole(diffuse=diffuse)
         if self._sky_without is None:
-            self._sky_without = (sky_without(self._found_sun, builder, whole),)
+            self._sky_without = (sky_without(self._found_sun, builder, whole, self._effort),)
         return Sun(self._found_sun, FirstLight(builder, whole, self._found_sun, *self._sky_without))
 
     def cache(self, irradiance: Floats, irradiance_back: Floats | None, factor_of_sun: Triple = WHITE) -> LightMapCache:
@@ -144,7 +145,7 @@ class TracedScene:
         mine = replace(self.scene, materials=scene.materials, textures=scene.textures)
         found = TracedScene(
             replace(self.atlas, scene=mine), self.merged, self.two_sided, self.progress,
-            sun_beside=self._sun_beside, unmapped=self._unmapped,
+            sun_beside=self._sun_beside, unmapped=self._unmapped, effort=self._effort,
         )  # fmt: skip
         found._sampling, found._sky_without = self._sampling, self._sky_without
         if self._found_sun is not None:
