@@ -48,7 +48,7 @@ def command(
         str,
         typer.Option(
             help="traced (against the baked light), path (whole paths), or drawn as in motion: lamps, rings, "
-            "lobe-4.24, lobe-4.25, fis, split-sum, qmc, oslf, oslf-points, diffuse."
+            "lobe-4.24, lobe-4.25, fis, split-sum, qmc, diffuse."
         ),
     ] = "traced",
     samples: Annotated[
@@ -102,8 +102,7 @@ def command(
         str,
         typer.Option(
             help="Look-up of reflected light: auto; in probes: planes, distance, plain; in light fields: light_field, "
-            "light_field-1, -bn, -br, -average, -angle, -nearest, -surface (shows the object itself too), -choice "
-            "(shows which point is used)."
+            "light_field-choice (shows which point is used)."
         ),
     ] = "auto",
     light_field_mb: Annotated[

@@ -33,7 +33,6 @@ class Integrator:
     cube: Cube = "smooth"  # cube map of the probe; level 0 is the same for all kinds except prefiltered
     specular: bool = True
     progressive: bool = False  # unbiased: frames of few samples may be averaged
-    spp: int = 256  # samples per pixel of a progressive still
     lamps: str | None = None  # shader for a probe with lamps smaller than a lobe, which leave the cube map
 
 
@@ -46,8 +45,6 @@ INTEGRATORS: dict[str, Integrator] = {
     "fis": Integrator("quadrature.wgsl", patterns.fis_table, cube="box"),
     "split-sum": Integrator("split_sum.wgsl", lambda lobe, n: albedo_table(lobe), rows=TABLE_ROWS, cube="prefiltered"),
     "qmc": Integrator("qmc.wgsl", constants=SUN_SAMPLED, progressive=True),
-    "oslf": Integrator("oslf.wgsl", constants=SUN_SAMPLED, progressive=True, spp=100),  # as qmc, by thesis R's numbers
-    "oslf-points": Integrator("oslf.wgsl", constants={"BY_POINTS": 1, **SUN_SAMPLED}, progressive=True, spp=100),
     "diffuse": Integrator("diffuse.wgsl", specular=False),
 }
 

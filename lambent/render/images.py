@@ -54,8 +54,8 @@ class Settings:
         "traced" against the baked light, "path" for whole paths, or one of `realtime.integrators.INTEGRATORS`, which
         draw.
     samples : int, optional
-        Per pixel for converging integrators ("traced": as many as `noise` needs, in a film 8, "path": 64, "qmc": 256,
-        "oslf": 100), otherwise per lobe (by default chosen from each material's roughness).
+        Per pixel for converging integrators ("traced": as many as `noise` needs, in a film 8, "path": 64, "qmc": 256),
+        otherwise per lobe (by default chosen from each material's roughness).
     noise : float, optional
         For traced pictures: the relative standard error (`traced.picture.TracedPicture.noise`) that ends them. By
         default a still ends at .02 or at 48 samples.

@@ -37,6 +37,7 @@ from lambent.store.states import variants_of
 from lambent.store.store import Store
 
 METERED_PX = 256  # longer side of the picture for metering
+QMC_SAMPLES = 256  # per pixel of a still by a progressive integrator
 FILM_SUPERSAMPLES = 4  # per pixel in image sequences of radiance
 
 
@@ -111,9 +112,7 @@ class RealTime(Images):
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
         if self._progressive:
-            return self._renderer.converged(
-                self._state(camera), self.settings.samples or integrator(self.settings.integrator).spp, progress
-            )
+            return self._renderer.converged(self._state(camera), self.settings.samples or QMC_SAMPLES, progress)
         return self._renderer.still_radiance(self._state(camera), FILM_SUPERSAMPLES if self._moving else SUPERSAMPLES)
 
     def displayed(self, camera: Camera, progress: Progress = silent) -> NDArray[np.uint8]:

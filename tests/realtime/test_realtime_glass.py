@@ -10,7 +10,7 @@ import pytest
 
 from lambent.core.cubemap import sample
 from lambent.core.light_field import NO_EXIT, Glass, LightField
-from lambent.core.light_field_lookup import March, Place, blended, marched
+from lambent.core.light_field_lookup import March, Place, marched
 from lambent.core.octahedral import texel_directions
 from lambent.core.thin_glass import exits_beside, mirrored_back, sideways, through_glass
 from lambent.materials.bsdf import under_fresnel
@@ -103,20 +103,16 @@ def room_light(x: np.ndarray, w: np.ndarray) -> np.ndarray:
     return np.asarray(1.5 + np.sin(12 * (x + t[..., None] * w)))
 
 
-@pytest.mark.parametrize("name", ["light_field", "light_field-bn"])
 @pytest.mark.parametrize("glass", [pane(), lens()], ids=["pane", "lens"])
-def test_shader_and_numpy_agree(device: Any, field: LightField, glass: Glass, name: str) -> None:
+def test_shader_and_numpy_agree(device: Any, field: LightField, glass: Glass) -> None:
     place, w, inside, uv2 = views(field)
     x, leaving, passed, back = seen_through(field, glass, w, place, uv2)
     up = w * [1, -1, 1]
     beyond, sky = Place(x, place.n, place.points), cube_of(smooth_light)
-    if name == "light_field":
-        light = marched(field, beyond, leaving, March(), lambda w: sample(sky, w)).radiance
-        mirror = marched(field, place, up, March(), lambda w: sample(sky, w)).radiance
-    else:
-        light, mirror = blended(field, beyond, leaving), blended(field, place, up)
+    light = marched(field, beyond, leaving, March(), lambda w: sample(sky, w)).radiance
+    mirror = marched(field, place, up, March(), lambda w: sample(sky, w)).radiance
     scene = plate_scene(replace(field, glass=glass), CLEAR)
-    got = Renderer(device, scene).image(replace(STATE, lookup=name)).reshape(-1, 3)
+    got = Renderer(device, scene).image(STATE).reshape(-1, 3)
     error = np.abs(got - passed * light - back * mirror)[inside].max(axis=1)
     assert inside.sum() > 2000
     assert np.quantile(error, 0.5) < 4e-3 and np.quantile(error, 0.97) < 0.04, np.quantile(error, [0.5, 0.9, 0.97])

@@ -1,4 +1,4 @@
-"""Every method of a light field: the shader draws what numpy's look-up says."""
+"""The march through a light field: the shader draws what numpy's look-up says."""
 
 from __future__ import annotations
 
@@ -16,17 +16,13 @@ from lambent.materials.document import Lobe, Material
 from lambent.realtime import light_field_atlas
 from lambent.realtime.device import BLOCKS
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.incident.light_field import CHOSEN, LOOK_UPS, MARCHED, filled
+from lambent.realtime.incident.light_field import filled
 from lambent.realtime.renderer import Renderer
 from tests.realtime.lit_plate import CAMERA, mirrored, plate_field, plate_scene
 from tests.realtime.lit_wall import cube_of, smooth_light
 
 SIZE = 128
 STATE = FrameState(CAMERA, SIZE, SIZE, n=1, antialias=False, show="specular", integrator="rings")
-BASES: dict[str, Any] = {
-    "light_field-nearest": "nearest", "light_field-angle": "angle", "light_field-average": "average",
-    "light_field-br": "reflection", "light_field-bn": "normal",
-}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -39,20 +35,15 @@ def renderer(device: Any, field: LightField) -> Renderer:
     return Renderer(device, plate_scene(field))
 
 
-@pytest.mark.parametrize("one", [one for one in LOOK_UPS if one.METHOD != CHOSEN], ids=lambda one: one.NAME)
-def test_shader_and_numpy_agree(renderer: Renderer, field: LightField, one: Any) -> None:
+def test_shader_and_numpy_agree(renderer: Renderer, field: LightField) -> None:
     """But for pixels at which rounding decides between texels, points or surfaces."""
     place, w, inside = mirrored(field, SIZE)
     sky = cube_of(smooth_light)
-    if one.METHOD == MARCHED:
-        march = numpy_twin.marched(field, place, w, one.RULE, lambda w: sample(sky, w))
-        expected = march.radiance
-        assert march.met[inside].mean() > 0.2 and march.sky[inside].mean() > 0.02, "the scene asks for all answers"
-        assert (~march.met & ~march.sky)[inside].any()
-    else:
-        expected = numpy_twin.blended(field, place, w, BASES[one.NAME])
-    got = renderer.image(replace(STATE, lookup=one.NAME)).reshape(-1, 3)
-    error = np.abs(got - expected)[inside].max(axis=1)
+    march = numpy_twin.marched(field, place, w, sky=lambda w: sample(sky, w))
+    assert march.met[inside].mean() > 0.2 and march.sky[inside].mean() > 0.02, "the scene asks for all answers"
+    assert (~march.met & ~march.sky)[inside].any()
+    got = renderer.image(replace(STATE, lookup="light_field")).reshape(-1, 3)
+    error = np.abs(got - march.radiance)[inside].max(axis=1)
     assert inside.sum() > 4000
     assert np.quantile(error, 0.5) < 3e-3 and np.quantile(error, 0.98) < 0.03, np.quantile(error, [0.5, 0.9, 0.98, 1])
 
@@ -71,10 +62,7 @@ def test_shader_and_numpy_agree_on_quarters_of_texels(device: Any, field: LightF
     assert np.quantile(error, 0.5) < 0.01 and np.quantile(error, 0.9) < 0.05, np.quantile(error, [0.5, 0.9, 0.98, 1])
 
 
-@pytest.mark.parametrize("look_up", ["light_field", "light_field-bn"])
-def test_shader_and_numpy_agree_on_blocks(
-    device: Any, field: LightField, monkeypatch: pytest.MonkeyPatch, look_up: str
-) -> None:
+def test_shader_and_numpy_agree_on_blocks(device: Any, field: LightField, monkeypatch: pytest.MonkeyPatch) -> None:
     """Quarters in patches, as at edges, and everywhere, so that the pool is too small for all mixed blocks."""
     if BLOCKS not in device.features:
         pytest.skip("the adapter has no textures in blocks")
@@ -85,11 +73,8 @@ def test_shader_and_numpy_agree_on_blocks(
     stored = in_blocks(replace(field, cover=cover))
     place, w, inside = mirrored(stored, SIZE)
     cube = cube_of(smooth_light)
-    if look_up == "light_field":
-        expected = numpy_twin.marched(stored, place, w, sky=lambda w: sample(cube, w)).radiance
-    else:
-        expected = numpy_twin.blended(stored, place, w, "normal", sky=lambda w: sample(cube, w))
-    got = Renderer(device, plate_scene(stored)).image(replace(STATE, lookup=look_up)).reshape(-1, 3)
+    expected = numpy_twin.marched(stored, place, w, sky=lambda w: sample(cube, w)).radiance
+    got = Renderer(device, plate_scene(stored)).image(replace(STATE, lookup="light_field")).reshape(-1, 3)
     error = np.abs(got - expected)[inside].max(axis=1)
     assert np.quantile(error, 0.5) < 0.01 and np.quantile(error, 0.9) < 0.05, np.quantile(error, [0.5, 0.9, 0.98, 1])
 
@@ -115,22 +100,9 @@ def rough(device: Any, field: LightField) -> Renderer:
     return Renderer(device, plate_scene(field, ROUGH))
 
 
-def test_both_loop_orders_agree_where_weights_do_not_follow_the_samples(rough: Renderer) -> None:
-    """B_n weights points by the normal alone: sample for sample the same (5.12). B_r and the march differ."""
-    pictures = {
-        (name, order): rough.converged(replace(STATE, lookup=name, integrator=order), 64)
-        for name in ("light_field-bn", "light_field-br", "light_field")
-        for order in ("oslf", "oslf-points")
-    }
-    by = {name: [pictures[name, order] for order in ("oslf", "oslf-points")] for name, _ in pictures}
-    np.testing.assert_allclose(*by["light_field-bn"], atol=2e-3)
-    assert np.abs(by["light_field-br"][0] - by["light_field-br"][1]).max() > 0.02
-    np.testing.assert_array_equal(by["light_field"][1], by["light_field-bn"][1])  # no single point marches
-
-
 def test_filtered_samples_come_near_many(rough: Renderer, field: LightField) -> None:
     """Levels of the maps follow the solid angles of samples, as those of a probe."""
-    many = rough.converged(replace(STATE, integrator="oslf"), 200)
+    many = rough.converged(replace(STATE, integrator="qmc"), 200)
     inside = mirrored(field, SIZE)[2].reshape(SIZE, SIZE)
     few = {n: rough.image(replace(STATE, n=n)) for n in (7, 19)}
     errors = {n: float(np.sqrt(np.mean((image - many)[inside] ** 2)) / many[inside].mean()) for n, image in few.items()}

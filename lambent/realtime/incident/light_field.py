@@ -1,11 +1,11 @@
-"""Offset surface light fields: light recorded at points just above the object; look-ups read the nearest points.
+"""Offset surface light fields: light recorded at points just above the object, through whose maps rays march.
 
-Source: thesis R, "Offset surface light fields"; methods as in `core.light_field_lookup`.
+Source: thesis R, "Offset surface light fields"; the march is that of `core.light_field_lookup`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,56 +15,41 @@ from lambent.core.arrays import Floats
 from lambent.core.cubemap import sample
 from lambent.core.errors import UserError
 from lambent.core.light_field import NO_POINT
-from lambent.core.light_field_lookup import EDGE_STEEPNESS, POWER, March
-from lambent.realtime.baked import DARK, BakedScene, Probe
+from lambent.core.light_field_lookup import EDGE_STEEPNESS, March
+from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import finite, mip_chain
 from lambent.realtime.light_field_atlas import Atlas, coding
 from lambent.realtime.resident_maps import ResidentMaps, filled
 from lambent.realtime.structs import LIGHT_FIELD_DTYPE, Record
 from lambent.realtime.uploads import cube_texture, upload
 
-# Methods to blend or find the light of the points, by the shader's numbers.
-NEAREST, ANGLE, AVERAGE, TOWARDS_RAY, TOWARDS_NORMAL, MARCHED, CHOSEN = range(7)
-
 
 @dataclass(frozen=True)
 class LightFieldLookUp:
-    """One method; `incident.LookUp` describes the members."""
+    """The march, or with `CHOICE` a picture of the points that it uses; `incident.LookUp` describes the members."""
 
     NAME: str
-    METHOD: int
     COST: int
-    PREFERENCE: int = -1
-    RULE: March = field(default_factory=March)
-    POWER: int = POWER  # exponent of the cosines that weight points
-    SURFACE: bool = False  # whether points also replace the object's light map
+    PREFERENCE: int
+    CHOICE: bool = False
     BINDINGS: tuple[str, ...] = ("uniform", "exact", "layers", "number layers", "numbers", "cube")
     __file__: str = __file__
 
     def serves(self, probe: Probe) -> bool:
-        field = probe.light_field
-        if field is None or (self.SURFACE and not field.own_diffuse):
-            return False
-        return bool((field.sample_map != NO_POINT).any())
+        return probe.light_field is not None and bool((probe.light_field.sample_map != NO_POINT).any())
 
     def distances(self, probe: Probe, w: Floats) -> Floats:
         return np.full(len(w), np.inf)
 
     def constants(self, device: Any, probe: Probe) -> dict[str, float]:
-        light_field = probe.light_field
-        maps = {
+        rule, light_field = March(), probe.light_field
+        return {
+            "CHOICE": self.CHOICE, "STEPS": rule.steps, "SECANTS": rule.secants, "FIRST": rule.first,
+            "LAST": rule.last, "TOLERANCE": rule.tolerance, "ALIKE": rule.alike, "STEEPNESS": EDGE_STEEPNESS,
+            "HAS_SKY": probe.sky is not None,
             "GLASS": light_field is not None and light_field.glass is not None,
             "QUARTERS": light_field is not None and light_field.cover is not None,
             "BLOCKS": coding(device).block > 1,
-        }
-        if self.METHOD < MARCHED:
-            return {"METHOD": self.METHOD, "POWER": self.POWER, **maps}
-        rule = self.RULE
-        return {
-            "METHOD": self.METHOD, "POWER": self.POWER, "MARCHES": rule.candidates, "STEPS": rule.steps,
-            "SECANTS": rule.secants, "FIRST": rule.first, "LAST": rule.last, "TOLERANCE": rule.tolerance,
-            "ALIKE": rule.alike, "STEEPNESS": EDGE_STEEPNESS, "HAS_SKY": probe.sky is not None, "SURFACE": self.SURFACE,
-            **maps,
         }  # fmt: skip
 
     def resources(self, device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
@@ -105,26 +90,13 @@ def _put_layout(record: Record, atlas: Atlas) -> None:
 
 
 LOOK_UPS = (
-    LightFieldLookUp("light_field", MARCHED, 20, PREFERENCE=3),
-    LightFieldLookUp("light_field-1", MARCHED, 19, RULE=March(candidates=1)),
-    LightFieldLookUp("light_field-nearest", NEAREST, 10),
-    LightFieldLookUp("light_field-angle", ANGLE, 11),
-    LightFieldLookUp("light_field-average", AVERAGE, 12),
-    LightFieldLookUp("light_field-br", TOWARDS_RAY, 13),
-    LightFieldLookUp("light_field-bn", TOWARDS_NORMAL, 14),
-    LightFieldLookUp("light_field-choice", CHOSEN, 21),
-    LightFieldLookUp("light_field-surface", MARCHED, 22, SURFACE=True),
-)
+    LightFieldLookUp("light_field", 20, PREFERENCE=3), LightFieldLookUp("light_field-choice", 21, -1, CHOICE=True)
+)  # fmt: skip
 
 
 def check_serves(scene: BakedScene, wanted: str, store: str) -> None:
-    """Raise `UserError` if the wanted look-up is one of light fields and serves no object of the scene."""
+    """Raise `UserError` if the wanted look-up is one of light fields and the scene has none."""
     look_up = next((one for one in LOOK_UPS if wanted == one.NAME), None)
-    if look_up is None:
-        return
-    if not scene.light_fields:
+    if look_up is not None and not scene.light_fields:
         hint = f"`lambent bake SCENE -o {store} --light-fields NAME,...` makes some"
         raise UserError("the store has no light field", field="--lookup", got=wanted, hint=hint)
-    if not any(look_up.serves(replace(DARK, light_field=one)) for one in scene.light_fields.values()):
-        hint = "give the object `light_field = { levels = 1 }` in the scene, and bake"
-        raise UserError("no light field has its object's own maps", field="--lookup", got=wanted, hint=hint)

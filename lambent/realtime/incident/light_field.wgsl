@@ -1,5 +1,5 @@
 // Offset surface light fields: the points nearest to a pixel, by the sample map, each with a map of light and inverse
-// distance. Methods as in core/light_field_lookup.py. Positions are in world space.
+// distance, through which rays march, as in core/light_field_lookup.py. Positions are in world space.
 
 #include "frame.wgsl"
 #include "light_field_record.wgsl"
@@ -14,29 +14,18 @@
 @group(2) @binding(7) var sample_map: texture_2d<u32>;
 @group(2) @binding(8) var sky_cube: texture_cube<f32>;
 
-override METHOD: u32 = 5u;
-override POWER: f32 = 4.0;
-override MARCHES: u32 = 4u; // points to march through; see March of light_field_lookup.py
-override STEPS: u32 = 8u;
+override CHOICE: bool = false; // shows which points are used
+override STEPS: u32 = 8u; // see March of light_field_lookup.py
 override SECANTS: u32 = 3u;
 override FIRST: f32 = 0.15;
 override LAST: f32 = 1.0;
 override TOLERANCE: f32 = 0.15;
 override ALIKE: f32 = 0.15;
 override STEEPNESS: f32 = 3.0;
-override SURFACE: bool = false; // points also show the surface itself
 override HAS_SKY: bool = true; // a separate sky; else the maps hold the sky
 
 override RELIT: bool = false; // the cube map holds the ratio of the light to the light in the maps
 override GLASS: bool = false; // transmitted light is refracted; the lower half of the sample map holds the exits
-
-const NEAREST = 0u;
-const ANGLE = 1u;
-const AVERAGE = 2u;
-const TOWARDS_RAY = 3u;
-const TOWARDS_NORMAL = 4u;
-const MARCHED = 5u;
-const CHOSEN = 6u;
 
 const NO_POINT = 0xffffu;
 
@@ -75,36 +64,29 @@ fn change_along(s: Surface, r: vec3f, u: f32, half_log2_omega: f32) -> vec3f {
     return min(here, around);
 }
 
-// Cosine between an axis and the direction from x to a point; -2 without a point.
-fn cosine_to(point: u32, axis: vec3f, x: vec3f) -> f32 {
+// Cosine between the normal and the direction from x to a point; -2 without a point.
+fn cosine_to(point: u32, n: vec3f, x: vec3f) -> f32 {
     let to = place_of_point(min(point, NO_POINT - 1u)) - x;
-    return select(dot(axis, to) * inverseSqrt(max(dot(to, to), 1e-30)), -2.0, point == NO_POINT);
-}
-
-// cosine_to for all four points. Written out, like all code for four points: software adapters are slow at arrays.
-fn cosines_to(axis: vec3f, s: Surface) -> vec4f {
-    let x = s.x + object.centre.xyz;
-    let p = s.points;
-    return vec4f(cosine_to(p.x, axis, x), cosine_to(p.y, axis, x), cosine_to(p.z, axis, x), cosine_to(p.w, axis, x));
+    return select(dot(n, to) * inverseSqrt(max(dot(to, to), 1e-30)), -2.0, point == NO_POINT);
 }
 
 fn largest_of(v: vec4f) -> f32 {
     return max(max(v.x, v.y), max(v.z, v.w));
 }
 
-// Weights of the points by the cosines between the directions to them and an axis, relative to the largest; equal if
-// all points are behind.
-fn weights_about(axis: vec3f, s: Surface) -> vec4f {
-    let cosines = max(cosines_to(axis, s), vec4f(0.0));
+// Weights B_n (4.9) of the points: the fourth power of the cosines between the directions to them and the normal,
+// relative to the largest; equal if all points are behind. Written out, like all code for four points: software adapters
+// are slow at arrays.
+fn point_weights(s: Surface) -> vec4f {
+    let x = s.x + object.centre.xyz;
+    let p = s.points;
+    let cosines = max(
+        vec4f(cosine_to(p.x, s.n, x), cosine_to(p.y, s.n, x), cosine_to(p.z, s.n, x), cosine_to(p.w, s.n, x)), vec4f(0.0)
+    );
     let largest = largest_of(cosines);
-    if (largest <= 0.0) { return known_points(s); }
+    if (largest <= 0.0) { return select(vec4f(1.0), vec4f(0.0), p == vec4u(NO_POINT)); }
     let relative = cosines / largest;
-    if (POWER == 4.0) { return relative * relative * relative * relative; } // cheaper in software
-    return pow(relative, vec4f(POWER));
-}
-
-fn known_points(s: Surface) -> vec4f {
-    return select(vec4f(1.0), vec4f(0.0), s.points == vec4u(NO_POINT));
+    return relative * relative * relative * relative;
 }
 
 // 1 for the first largest of four scores, 0 for the others.
@@ -112,17 +94,6 @@ fn first_largest(scores: vec4f) -> vec4f {
     let largest = vec4<bool>(scores == vec4f(largest_of(scores)));
     let before = vec4<bool>(false, largest.x, largest.x || largest.y, largest.x || largest.y || largest.z);
     return select(vec4f(0.0), vec4f(1.0), largest & !before);
-}
-
-fn weights_of(method: u32, s: Surface, r: vec3f) -> vec4f {
-    let known = known_points(s);
-    switch method {
-        case AVERAGE: { return known; }
-        case TOWARDS_RAY: { return weights_about(r, s); }
-        case TOWARDS_NORMAL: { return weights_about(s.n, s); }
-        case NEAREST: { return known * first_largest(known); }
-        default: { return known * first_largest(cosines_to(r, s)); }
-    }
 }
 
 // Weighted light of the points along w[j] = r + u[j] (x - p_j); u is 0 without parallax. Rays with one weight leave the
@@ -153,12 +124,6 @@ fn weighted(s: Surface, r: vec3f, u: vec4f, weights: vec4f, half_log2_omega: f32
     }
     let lone = select(vec3f(0.0), weight_of_largest * (largest - second), second >= vec3f(0.0));
     return (light.rgb - select(vec3f(0.0), lone, focused)) / light.a;
-}
-
-// Without parallax: the light of the points in the ray's own direction.
-fn blended(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
-    let light = weighted(s, r, vec4f(0.0), weights_of(METHOD, s, r), half_log2_omega, false);
-    return light * change_along(s, r, 0.0, half_log2_omega);
 }
 
 const SHARP = -20.0; // half the log2 of a solid angle smaller than any texel
@@ -224,7 +189,7 @@ fn marched(point: u32, o: vec3f, r: vec3f) -> MarchEnd {
 fn found_by_points(s: Surface, r: vec3f) -> Found {
     let x = s.x + object.centre.xyz;
     var found = Found(vec4f(MISSED), false);
-    for (var j = 0u; j < MARCHES; j++) {
+    for (var j = 0u; j < 4u; j++) {
         if (s.points[j] == NO_POINT) { continue; }
         let hit = marched(s.points[j], x - place_of_point(s.points[j]), r);
         found.u[j] = hit.u;
@@ -236,8 +201,8 @@ fn found_by_points(s: Surface, r: vec3f) -> Found {
 // Whether rays without a found surface end in the sky: for narrow bundles, if one point sees the sky; for wide bundles,
 // whose edges lie beside the ray, if all points do.
 fn is_sky(s: Surface, found: vec4f, half_log2_omega: f32) -> bool {
-    let asked = (vec4u(0u, 1u, 2u, 3u) < vec4u(MARCHES)) & (s.points != vec4u(NO_POINT));
-    return largest_of(found) == SKY && (is_narrow(half_log2_omega) || all(!asked | (found == vec4f(SKY))));
+    let none = s.points == vec4u(NO_POINT);
+    return largest_of(found) == SKY && (is_narrow(half_log2_omega) || all(none | (found == vec4f(SKY))));
 }
 
 // Whether a bundle of rays is narrower than a texel.
@@ -251,7 +216,7 @@ fn edge_at(s: Surface, x: vec3f, weights: vec4f) -> vec4f {
     var light = vec3f(0.0);
     var shows = 1e-20;
     var sum = vec2f(0.0, 1e-9); // of shares, and number of points
-    for (var j = 0u; j < MARCHES; j++) {
+    for (var j = 0u; j < 4u; j++) {
         if (s.points[j] == NO_POINT) { continue; }
         let q = x - place_of_point(s.points[j]);
         let edge = edge_along(map_of(s.points[j]), q);
@@ -274,7 +239,7 @@ fn marched_light(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
     let is_sharp = nearest > 0.0 && is_narrow(half_log2_omega);
     let weights = weights_of_found(s, found.u);
     let hits = max(found.u, vec4f(0.0));
-    var light = vec4f(weighted(s, r, hits, weights, half_log2_omega, is_sharp && MARCHES > 1u), 1.0);
+    var light = vec4f(weighted(s, r, hits, weights, half_log2_omega, is_sharp), 1.0);
     // a loop, which software adapters leave before its first turn where they would take both sides of a branch
     var at_edge = HAS_SKY && QUARTERS && found.at_edge && is_sharp;
     for (; at_edge; at_edge = false) {
@@ -287,7 +252,7 @@ fn marched_light(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
 fn weights_of_found(s: Surface, found: vec4f) -> vec4f {
     let nearest = largest_of(found);
     let agree = (found > vec4f(0.0)) & (found * (1.0 + ALIKE) >= vec4f(nearest));
-    let weights = weights_about(s.n, s);
+    let weights = point_weights(s);
     return select(weights, select(vec4f(0.0), max(weights, vec4f(1e-6)), agree), nearest > 0.0);
 }
 
@@ -302,34 +267,6 @@ fn chosen(s: Surface, r: vec3f) -> vec3f {
         colour = 0.2 + 0.6 * fract(point * vec3f(0.618034, 0.754878, 0.569840));
     }
     return 0.3 * colour / frame.exposure;
-}
-
-const CONES = vec2f(0.42261826, 0.25881905); // cosines of 65 and 75 degrees
-const SURFACE_TOLERANCE = 0.15;
-const UNSEEN = 3.0;
-
-// Rank of a point for the surface at x, lower is better: the number of cones about n that it is outside of; UNSEEN if
-// its map shows another surface in place of x.
-fn rank_of(point: u32, x: vec3f, n: vec3f) -> f32 {
-    if (point == NO_POINT) { return UNSEEN; }
-    let q = x - place_of_point(point);
-    let away = length(q);
-    let cosine = -dot(q, n) / max(away, 1e-12);
-    let sees = abs(away * texel_along(map_of(point), select(-n, q, away > 0.0)).inverse - 1.0) < SURFACE_TOLERANCE;
-    return select(UNSEEN, dot(select(vec2f(0.0), vec2f(1.0), vec2f(cosine) < CONES), vec2f(1.0)), sees);
-}
-
-// Light of the surface, read from the nearest point in the narrowest cone that sees it (3.11).
-fn own_light(s: Surface, of_light_map: vec3f) -> vec3f {
-    if (!SURFACE || RELIT) { return of_light_map; } // the light map follows changes of light
-    let x = s.x + object.centre.xyz;
-    let p = s.points;
-    let ranks = vec4f(rank_of(p.x, x, s.n), rank_of(p.y, x, s.n), rank_of(p.z, x, s.n), rank_of(p.w, x, s.n));
-    let least = -largest_of(-ranks);
-    if (least >= UNSEEN) { return of_light_map; }
-    let point = u32(dot(first_largest(-ranks), vec4f(p)));
-    let q = x - place_of_point(point);
-    return light_of(point, select(-s.n, q, dot(q, q) > 0.0), SHARP);
 }
 
 // Light through the glass, from the exits of rays, and light that its further faces reflect.
@@ -351,9 +288,8 @@ fn incident_along(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
 }
 
 fn light_along(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
-    if (METHOD == CHOSEN) { return chosen(s, r); }
-    if (METHOD == MARCHED) { return marched_light(s, r, half_log2_omega); }
-    return blended(s, r, half_log2_omega);
+    if (CHOICE) { return chosen(s, r); }
+    return marched_light(s, r, half_log2_omega);
 }
 
 fn incident(s: Surface, w: vec3f, half_log2_omega: f32) -> vec3f {
@@ -367,16 +303,6 @@ fn incident_at_level(s: Surface, w: vec3f, level: f32) -> vec3f {
 
 fn incident_ray(s: Surface, w: vec3f) -> vec3f {
     return incident(s, w, SHARP);
-}
-
-fn point_weights(s: Surface, mirror: vec3f) -> vec4f {
-    let weights = weights_of(select(METHOD, TOWARDS_NORMAL, METHOD == MARCHED), s, mirror);
-    return weights / dot(weights, vec4f(1.0));
-}
-
-fn ray_of_point(s: Surface, point: u32, w: vec3f) -> vec3f {
-    let r = to_world(s, w);
-    return light_of(s.points[point], r, SHARP) * change_along(s, r, 0.0, SHARP);
 }
 
 fn incident_look_up(x: vec3f, w: vec3f) -> LookUp {

@@ -25,20 +25,6 @@ fn incident_at_level(s: Surface, w: vec3f, level: f32) -> vec3f {
     return s.niche + arriving(s, along) * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
 }
 
-// Weights of a light field's points for a mirror direction, and light seen from one point; none here.
-fn point_weights(s: Surface, mirror: vec3f) -> vec4f {
-    return vec4f(1.0, 0.0, 0.0, 0.0);
-}
-
-fn ray_of_point(s: Surface, point: u32, w: vec3f) -> vec3f {
-    return incident_ray(s, w);
-}
-
-// Light of the surface without its lobes: the light map's, unless a look-up has a better one.
-fn own_light(s: Surface, of_light_map: vec3f) -> vec3f {
-    return of_light_map;
-}
-
 // Light from local direction w without a filter.
 fn incident_ray(s: Surface, w: vec3f) -> vec3f {
     let along = to_world(s, w);

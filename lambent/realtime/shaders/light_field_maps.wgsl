@@ -88,31 +88,11 @@ fn light_of(point: u32, w: vec3f, half_log2_omega: f32) -> vec3f {
     let map = map_of(point);
     let place = map_place(w);
     var light = light_on_level(map, place, finer);
-    if (QUARTERS && METHOD < MARCHED && finer == 0u) { light += edge_sky(map, place, w); }
     let coarser = min(finer + 1u, field.levels - 1u);
     let bounds = vec2f(vec2u(side_of(finer) * side_of(finer), side_of(coarser) * side_of(coarser)));
     let share = (texels * bounds.x - 1.0) / max(bounds.x / bounds.y - 1.0, 1e-6);
     if (share > 0.0) { light = mix(light, light_on_level(map, place, coarser), min(share, 1.0)); }
     return light;
-}
-
-// Correction of the finest level for the sky: its texels hold surfaces only, even if they also show the sky, because a
-// march that hits a surface needs its light alone. Coarser levels hold both.
-fn edge_sky(map: Map, place: vec2f, w: vec3f) -> vec3f {
-    let at = place * f32(field.side) - 0.5;
-    let low = floor(at);
-    var found = vec3f(0.0);
-    for (var k = 0u; k < 4u; k++) {
-        let beside = vec2f(f32(k & 1u), f32(k >> 1u));
-        let weights = abs(1.0 - beside - (at - low));
-        let texel = vec2u(vec2i(low + beside) + 1);
-        let quarters = countOneBits(texel_of(map, texel).cover);
-        if (quarters == 0u || quarters == 4u) { continue; }
-        let share = weights.x * weights.y * (1.0 - 0.25 * f32(quarters));
-        let own = textureLoad(atlas, light_corner(map, 0u) + texel, map.layer, 0).rgb;
-        found += share * (light_of_sky(w, SHARP) - own);
-    }
-    return found;
 }
 
 // Surfaces before the sky, between texels: radiance of those that show surfaces, times their share of the interpolation,

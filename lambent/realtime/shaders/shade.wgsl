@@ -102,7 +102,7 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
     if (LOBES > 0u) { s = with_shares(s, light_maps, v.uv2, front, e_bent); } // light without the sun, as in probes
     e_bent += sun_cos * direct;
     e_here += max(facing, 0.0) * direct;
-    let diffuse = own_light(s, diffuse_light(wo.z, e_bent, e_beyond, s.painted));
+    let diffuse = diffuse_light(wo.z, e_bent, e_beyond, s.painted);
     let emitted = select(vec3f(0.0), object.emission.rgb, front);
 
     let specular = specular_light(wo, s);
