@@ -17,7 +17,6 @@ Hazard: 1 - cos(theta_h) cancels in float32; elevations use atan2 and sin^2(thet
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any, ClassVar
@@ -28,7 +27,6 @@ from lambent.core.arrays import Floats
 from lambent.materials.lobes import COS_MIN, NUMPY, ArrayOps, Vector, dot, half_vector, reflect, sample_cosine
 
 DIFFUSE = 0.1  # share of cosine-distributed samples
-MARGIN = 1.2  # factor on the peak, tabulated at nodes and cell centres: f cos can be higher between them
 LAST_VIEWER_DEG = 89.0  # beyond it, f of the last viewer is used
 
 
@@ -97,8 +95,8 @@ class HalfVectorGrid:
         Density of the half vector in 1/sr.
     across : (faces, viewers) flat float32
         Probability of a transmitted sample.
-    albedo, peak : (faces, kinds, viewers) flat float32
-        Integral of f cos(theta_i) over the side, and its largest value in 1/sr; means over the channels.
+    albedo : (faces, kinds, viewers) flat float32
+        Integral of f cos(theta_i) over the side, mean over the channels.
     about_light : bool
         Whether the cells are those of back vectors: of half vectors with wi mirrored about n (Belcour et al. 2014).
     """
@@ -114,7 +112,6 @@ class HalfVectorGrid:
     density: Any
     across: Any
     albedo: Any = None
-    peak: Any = None
     about_light: bool = False
 
     @property
@@ -204,19 +201,6 @@ class HalfVectorGrid:
         """Interpolate a table (faces, viewers) between the viewer nodes."""
         viewers = viewers or self._viewers(wo, ops)
         return viewers.blend(table, viewers.face * self.shape.viewers, ops)
-
-    def albedo_of(self, wo: Vector, across: Any, ops: ArrayOps = NUMPY) -> Any:
-        """Share of the light that is reflected or transmitted, mean over the channels, between the viewer nodes."""
-        viewers = self._viewers(wo, ops)
-        albedo = viewers.blend(self.albedo, self._page(viewers, across, ops), ops)
-        return ops.select(across & (self.kinds == 1), 0.0, albedo)
-
-    def peak_of(self, wo: Vector, across: Any, ops: ArrayOps = NUMPY) -> Any:
-        """Upper bound of f cos(theta_i), mean over the channels, in 1/sr."""
-        viewers = self._viewers(wo, ops)
-        page = self._page(viewers, across, ops)
-        peaks = [ops.gather(self.peak, page + node) for node, _ in viewers.nodes]
-        return ops.select(across & (self.kinds == 1), 0.0, MARGIN * functools.reduce(ops.maximum, peaks))
 
     def cell_borders(self) -> Floats:
         """(N, 4) ranges of z and phi of the half vectors' cells, sorted; mirrored to z < 0 for transmission."""

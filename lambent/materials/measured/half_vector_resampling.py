@@ -21,7 +21,7 @@ from lambent.materials.measured.half_vector_grid import (
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.two_sided import TwoSided
 
-_FLAT = (*HalfVectorGrid.ARRAYS, "albedo", "peak")
+_FLAT = (*HalfVectorGrid.ARRAYS, "albedo")
 _LOWEST_COSINE = 0.02  # cells with wi below use f at this height, so that blending meets no edge at the horizon
 
 
@@ -39,7 +39,7 @@ def grid_of(
     sheet = table if isinstance(table, TwoSided) else TwoSided(table)
     faces, kinds = 2 if sheet.has_a_back else 1, 2 if table.info.transmits and part != "light" else 1
     values = np.zeros((faces, kinds, shape.viewer_theta, shape.viewer_phi, shape.cells, 3), np.float32)
-    weights, peak = np.zeros(values.shape[:-1]), np.zeros(values.shape[:-2], np.float32)
+    weights = np.zeros(values.shape[:-1])
     viewers, h = _viewer_nodes(shape), _cell_centres(shape)
     twins = _twins(sheet, shape)
     for a, ring in enumerate(viewers):
@@ -49,7 +49,6 @@ def grid_of(
             if twin != b:
                 values[..., a, b, :, :] = values[..., a, twin, cells, :]
                 weights[..., a, b, :] = weights[..., a, twin, cells]
-                peak[..., a, b] = peak[..., a, twin]
                 continue
             wo = np.broadcast_to(viewer, h.shape)
             wi = reflect(wo, h)
@@ -62,12 +61,10 @@ def grid_of(
                 wo_there, wi_there = (w * FLIP_Z if below else w for w, below in ((wo, face), (wi, face != kind)))
                 f = sheet.eval(wi_there, wo_there) * (share if kind == 0 else 1.0)
                 values[face, kind, a, b] = f
-                p = f.mean(axis=-1) * cos_i
-                weights[face, kind, a, b] = p * gain
-                peak[face, kind, a, b] = p.max()
+                weights[face, kind, a, b] = f.mean(axis=-1) * cos_i * gain
     progress(len(viewers), len(viewers), f"resampled {table.info.file}")
     sizes = (faces, kinds, shape.viewers, shape.cells)
-    found = _with_distributions(shape, values.reshape(*sizes, 3), weights.reshape(sizes), peak)
+    found = _with_distributions(shape, values.reshape(*sizes, 3), weights.reshape(sizes))
     return replace(found, about_light=part == "light")
 
 
@@ -128,7 +125,7 @@ def _cell_centres(shape: GridShape) -> Floats:
     return direction(theta[:, None], phi).reshape(-1, 3)
 
 
-def _with_distributions(shape: GridShape, values: Floats, weights: Floats, peak: Floats) -> HalfVectorGrid:
+def _with_distributions(shape: GridShape, values: Floats, weights: Floats) -> HalfVectorGrid:
     """The grid with the CDFs of weights (faces, kinds, viewers, cells), which are unnormalized densities.
 
     Cells and densities are derived from the stored float32 CDFs, so that both agree.
@@ -145,7 +142,7 @@ def _with_distributions(shape: GridShape, values: Floats, weights: Floats, peak:
     marginal, conditional = _cdf(rows), _cdf(mass)
     share = np.diff(marginal.astype(float), axis=-1, prepend=0.0)[..., None]
     density = share * np.diff(conditional.astype(float), axis=-1, prepend=0.0) / omega
-    flat = (a.astype(np.float32).ravel() for a in (values, marginal, conditional, density, across, total, peak))
+    flat = (a.astype(np.float32).ravel() for a in (values, marginal, conditional, density, across, total))
     arrays: dict[str, Any] = dict(zip(_FLAT, flat, strict=True))
     return HalfVectorGrid(shape, faces, kinds, **arrays)
 

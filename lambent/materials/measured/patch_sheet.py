@@ -67,8 +67,8 @@ class PatchSheet:
         Density of the light's direction over its cosine, in 1/sr.
     bounds : (faces, kinds, patches of the light, 6) flat float32
         sin^2 theta, cos^2 theta, each lower and upper, first phi and width, of directions to the light.
-    albedo, peak : (faces, kinds, patches of the viewer) flat float32
-        Integral of f cos(theta_i) over the side, and its least upper bound in 1/sr; means over the channels.
+    albedo : (faces, kinds, patches of the viewer) flat float32
+        Integral of f cos(theta_i) over the side, mean over the channels.
     """
 
     anisotropic: ClassVar[bool] = True  # patches turn with the sheet
@@ -89,7 +89,6 @@ class PatchSheet:
     density: Any
     bounds: Any
     albedo: Any
-    peak: Any = None
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -135,11 +134,8 @@ class PatchSheet:
 
     def albedo_of(self, wo: Vector, across: Any, ops: ArrayOps = NUMPY) -> Any:
         """Share of the light that is reflected or transmitted, mean over the channels."""
-        return self._of_viewer(self.albedo, wo, across, ops)
-
-    def peak_of(self, wo: Vector, across: Any, ops: ArrayOps = NUMPY) -> Any:
-        """Upper bound of f cos(theta_i), mean over the channels, in 1/sr."""
-        return self._of_viewer(self.peak, wo, across, ops)
+        row, inside = self._viewer_row(wo, self._page(wo, across, ops), ops)
+        return ops.select(inside & ~(across & (self.kinds == 1)), ops.gather(self.albedo, row), 0.0)
 
     def cell_borders(self, wo: Floats) -> Floats:
         """(N, 4) ranges of z and phi of the light's patches seen from wo (3,), sorted, over the whole sphere."""
@@ -150,10 +146,6 @@ class PatchSheet:
         other = _strips(pages[1]) if self.kinds == 2 else [(0.0, 1.0, 0.0, 2 * np.pi)]
         above, below = (reflected, other) if wo[2] > 0 else (other, reflected)
         return np.array(sorted([*above, *((-high, -low, a, b) for low, high, a, b in below)]))
-
-    def _of_viewer(self, table: Any, wo: Vector, across: Any, ops: ArrayOps) -> Any:
-        row, inside = self._viewer_row(wo, self._page(wo, across, ops), ops)
-        return ops.select(inside & ~(across & (self.kinds == 1)), ops.gather(table, row), 0.0)
 
     def _page(self, wo: Vector, across: Any, ops: ArrayOps) -> Any:
         face = ops.whole(ops.select((wo[2] < 0) & (self.faces == 2), 1.0, 0.0))
@@ -258,10 +250,7 @@ def _arrays(
     projected = np.ones(patches)
     projected[: light.count] = light.projected_sr
     density = np.diff(cdf.astype(float), axis=-1, prepend=0.0) / projected * (total > 0)[:, None]
-    highest_cos = np.repeat(np.cos(np.radians(light.edges_deg[:-1])), light.n_phis)
-    peak = np.zeros(patches)
-    peak[: viewer.count] = (mean * highest_cos).max(axis=-1)
-    found = {"values": values, "cdf": cdf, "density": density, "albedo": total, "peak": peak}
+    found = {"values": values, "cdf": cdf, "density": density, "albedo": total}
     edges, counts, starts = np.full((2, rings), BEYOND), np.zeros((2, rings)), np.zeros((2, rings))
     for role, basis in enumerate((viewer, light)):
         n = len(basis.n_phis)

@@ -50,10 +50,6 @@ class TwinGrid:
     def anisotropic(self) -> bool:
         return self.mirror.anisotropic
 
-    @property
-    def kinds(self) -> int:
-        return self.mirror.kinds
-
     def evaluate(self, wi: Vector, wo: Vector, ops: ArrayOps = NUMPY) -> Vector:
         """f in 1/sr per RGB channel, without the cosine."""
         parts = (grid.evaluate(wi, wo, ops) for grid in (self.mirror, self.light))
@@ -82,14 +78,6 @@ class TwinGrid:
     def share_across(self, wo: Vector, ops: ArrayOps = NUMPY) -> Any:
         """Probability of a transmitted sample."""
         return (1 - self.share_returned(wo, ops)) * self.mirror.share_across(wo, ops)
-
-    def albedo_of(self, wo: Vector, across: Any, ops: ArrayOps = NUMPY) -> Any:
-        """Share of the light that is reflected or transmitted, mean over the channels."""
-        return self.mirror.albedo_of(wo, across, ops) + self.light.albedo_of(wo, across, ops)
-
-    def peak_of(self, wo: Vector, across: Any, ops: ArrayOps = NUMPY) -> Any:
-        """Upper bound of f cos(theta_i), mean over the channels, in 1/sr."""
-        return self.mirror.peak_of(wo, across, ops) + self.light.peak_of(wo, across, ops)
 
 
 def twin_grid_of(

@@ -14,7 +14,7 @@ from lambent.materials.measured import load
 from lambent.materials.measured.klems import KLEMS_FULL, KLEMS_HALF, AngleBasis, PatchMatrix
 from lambent.materials.measured.lbnl_xml import LbnlTable
 from lambent.materials.measured.patch_sheet import lookup_of, patch_sheet_of
-from lambent.materials.measured.sampling import Rejection, TableBSDF, Tabulated
+from lambent.materials.measured.table_bsdf import TableBSDF
 
 ODD = AngleBasis("odd", (0.0, 11.0, 40.0, 62.0), (1, 5, 7))  # ends above the horizon; turns do not map it on itself
 DOWN = np.array([1, 1, -1])
@@ -120,20 +120,6 @@ def test_a_wrong_row_is_found():
             return super().sample(wo, u) * [-1, -1, 1]
 
     assert check_sampler(Turned(LbnlTable("full", TABLES["full"])), 50.0, 200.0, samples=100_000).p_value < 1e-6
-
-
-def test_photons_leave_by_the_tables_columns(table):
-    """By either sampler the light that leaves by each octant is the sum over the table's patches there."""
-    wi = direction(0.6 if ("reflection", 1) in table.parts else np.pi - 0.6, 4.0)
-    wo, n = anywhere(200_000, 5), 20_000
-    p = two_sided(table, np.broadcast_to(wi, wo.shape), wo).mean(axis=-1) * np.abs(wo[:, 2]) * 4 * np.pi * 0.999
-    octants = (wo > 0) @ [1, 2, 4]
-    expected = np.bincount(octants, weights=p, minlength=8) / len(wo)
-    for sampler in (Rejection(table), Tabulated(table)):
-        got = sampler.scatter(np.broadcast_to(wi, (n, 3)), seed=1)
-        left = np.bincount((got.wo > 0) @ [1, 2, 4], weights=got.weight.mean(axis=-1), minlength=8) / n
-        np.testing.assert_allclose(left, expected, atol=0.015)
-        assert got.exceeded == 0
 
 
 def test_other_tables_have_no_patches(files):
