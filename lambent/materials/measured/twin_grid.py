@@ -50,6 +50,10 @@ class TwinGrid:
     def anisotropic(self) -> bool:
         return self.mirror.anisotropic
 
+    @property
+    def kinds(self) -> int:
+        return self.mirror.kinds
+
     def evaluate(self, wi: Vector, wo: Vector, ops: ArrayOps = NUMPY) -> Vector:
         """f in 1/sr per RGB channel, without the cosine."""
         parts = (grid.evaluate(wi, wo, ops) for grid in (self.mirror, self.light))
