@@ -20,7 +20,7 @@ from lambent.scenes.scene import MaterialTextures
 from lambent.store import contract
 from lambent.store.consistency import numbers_of, read_geometry
 from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, SceneRecord, SunRecord, noise_name
-from lambent.store.light_fields import has_light_field, light_name, read_light_field
+from lambent.store.light_fields import BLOCKS, has_light_field, read_light_field
 from lambent.store.occlusion import has_even_niches, occlusion_gain, probe_shares
 from lambent.store.store import Store
 from lambent.store.sunlit import read_sunlit
@@ -124,7 +124,7 @@ class BakedScene:
 def _light_field(store: Store, name: str, unit: float) -> LightField:
     """The light field of an object, its light in units of `unit` W/(sr m^2)."""
     found = read_light_field(store, name)
-    own = contract.radiance_unit(store, light_name(store, name))
+    own = contract.radiance_unit(store, contract.light_field_name(name, BLOCKS))
     return (
         found
         if own == unit
@@ -149,7 +149,7 @@ def read_baked(
     around = record.objects if probes else ()
     cubes = [n for n in (ENVIRONMENT, *(contract.probe_name(o.name, "radiance") for o in around)) if n in store]
     fields = [o.name for o in around if has_light_field(store, o.name)]
-    lit = [*cubes, *(light_name(store, name) for name in fields)]
+    lit = [*cubes, *(contract.light_field_name(name, BLOCKS) for name in fields)]
     unit = max((contract.radiance_unit(store, name) for name in lit), default=1.0)
 
     def light(name: str, why: str | None) -> Floats | None:

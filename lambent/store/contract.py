@@ -32,11 +32,11 @@
     probe/OBJECT/planes                    (P, 4) float32, bounding planes (n, d): n.x + d = 0, n towards the centre
     answer/...                             from which indirect light follows edits of materials: store.answer
     light_field/OBJECT/points, normals     (P, 3) float32, see core.light_field
-    light_field/OBJECT/radiance            (P, E, E, 3) float16, octahedral maps (core.octahedral), units as above,
-                                           without the disc of meta["sun"] of light_map/irradiance
-    light_field/OBJECT/blocks              replaces radiance: (P, B, B, 4) uint32, BC6H: core.light_field_blocks
-    light_field/OBJECT/inverse_distance    (P, E, E) float16, 1/m, 0 if nothing is hit; cover, uint8, see there
-    light_field/OBJECT/distances           replaces both: (P, R, B, 2) uint32, core.distance_blocks. meta["texels"]: [E]
+    light_field/OBJECT/blocks              (P, B, B, 4) uint32: octahedral maps (core.octahedral) of radiance in BC6H
+                                           (core.light_field_blocks), units as above, without the disc of meta["sun"]
+                                           of light_map/irradiance
+    light_field/OBJECT/distances           (P, R, B, 2) uint32: inverse distances, 1/m, 0 if nothing is hit, and cover
+                                           (core.distance_blocks). meta["texels"]: [E] along a side of the maps
     light_field/OBJECT/sample_map          (h, w, 4) uint16; written last. meta["corner"] and meta["grid"] place it on
                                            the light map's uv2, meta["offset_m"] is the points' distance off the
                                            surface. meta["volume"]: points fill OBJECT's bounding box, maps leave it out
@@ -318,7 +318,7 @@ def probe_name(object_name: str, part: str) -> str:
 
 
 def light_field_name(object_name: str, part: str) -> str:
-    """Name of an array of an object's light field; `part` is a field of `core.light_field.LightField`, or blocks."""
+    """Name of an array of an object's light field; see above for `part`."""
     return f"light_field/{object_name}/{part}"
 
 

@@ -12,29 +12,25 @@ from lambent.store.consistency import numbers_of
 from lambent.store.contract import light_field_name
 from lambent.store.store import Store
 
-PARTS = ("points", "normals", "radiance", "inverse_distance", "sample_map")
-BLOCKS = "blocks"  # replaces radiance
-DISTANCES = "distances"  # blocks that replace inverse_distance and cover
+BLOCKS, DISTANCES = "blocks", "distances"  # light, and distances with cover
 EXITS = "exits"  # glass only
-COVER = "cover"  # of texels' quarters; absent from earlier versions' stores
+LAST = "sample_map"  # is written last
 
 
 def has_light_field(store: Store, object_name: str) -> bool:
     """Whether the store has the complete light field of an object, that is, its last array."""
-    name = light_field_name(object_name, PARTS[-1])
-    return name in store and store.artefact(name).complete
+    name = light_field_name(object_name, LAST)
+    return light_field_name(object_name, BLOCKS) in store and name in store and store.artefact(name).complete
 
 
 def read_light_field(store: Store, object_name: str) -> LightField:
     """The light field of an object; `UserError` if its arrays do not fit together."""
     points, normals, sample_map = (
-        store.read(light_field_name(object_name, part))
-        for part in PARTS
-        if part not in ("radiance", "inverse_distance")
+        store.read(light_field_name(object_name, part)) for part in ("points", "normals", LAST)
     )
     inverse_distance, cover, distances = _distances(store, object_name)
     radiance, blocks = _radiance(store, object_name, inverse_distance.shape[-1])
-    name = light_field_name(object_name, PARTS[-1])
+    name = light_field_name(object_name, LAST)
     corner, grid = (numbers_of(store, name, key, 2) for key in ("corner", "grid"))
     (offset_m,) = [float(x) for x in np.atleast_1d(store.artefact(name).meta.get("offset_m", np.nan))]
     count, side = len(points), radiance.shape[1] if len(radiance.shape) == 4 else 0
@@ -50,7 +46,7 @@ def read_light_field(store: Store, object_name: str) -> LightField:
         and np.isfinite([*corner, *grid, offset_m]).all()
     )
     if not fits:
-        shapes = {part: array.shape for part, array in zip(PARTS, (points, normals, radiance), strict=False)}
+        shapes = [array.shape for array in (points, normals, radiance)]
         raise UserError("broken store", file=store.folder, field=f"light_field/{object_name}", got=str(shapes))
     named = sample_map[sample_map != NO_POINT]
     if named.size and int(named.max()) >= count:
@@ -65,32 +61,18 @@ def read_light_field(store: Store, object_name: str) -> LightField:
     )  # fmt: skip
 
 
-def _distances(store: Store, object_name: str) -> tuple[Maps, Maps | None, NDArray[np.uint32] | None]:
-    """Inverse distances and cover, and their blocks if stored; they are decoded when read."""
-    name = light_field_name(object_name, DISTANCES)
-    if name not in store:
-        whole = store.read(light_field_name(object_name, "inverse_distance"))
-        return whole, _cover(store, object_name, whole.shape), None
+def _distances(store: Store, object_name: str) -> tuple[Maps, Maps | None, NDArray[np.uint32]]:
+    """Inverse distances and cover, decoded when they are read, and their blocks."""
     from lambent.core.light_field_blocks import distances_in_blocks  # imports numba
 
+    name = light_field_name(object_name, DISTANCES)
     blocks, (side,) = store.read(name), numbers_of(store, name, "texels", 1)
-    volume = store.artefact(light_field_name(object_name, PARTS[-1])).meta.get("volume") is True
+    volume = store.artefact(light_field_name(object_name, LAST)).meta.get("volume") is True
     try:
         inverse, cover = distances_in_blocks(blocks, int(side))
     except ValueError as error:
         raise UserError("broken store", file=store.folder, field=name, got=str(error)) from error
     return inverse, None if volume else cover, blocks
-
-
-def _cover(store: Store, object_name: str, shape: tuple[int, ...]) -> NDArray[np.uint8] | None:
-    """Flags of the texels' quarters that show surfaces; None if not stored."""
-    name = light_field_name(object_name, COVER)
-    if name not in store:
-        return None
-    cover = store.read(name)
-    if cover.shape != shape or cover.dtype != np.uint8:
-        raise UserError("broken store", file=store.folder, field=name, got=str(cover.shape), expected=str(shape))
-    return cover
 
 
 def _glass(store: Store, object_name: str, shape: tuple[int, ...]) -> Glass | None:
@@ -105,20 +87,12 @@ def _glass(store: Store, object_name: str, shape: tuple[int, ...]) -> Glass | No
     return Glass(exits, float(eta), triple(tint), float(power))
 
 
-def light_name(store: Store, object_name: str) -> str:
-    """Name of the array of a light field's radiance, blocks or maps."""
-    blocks = light_field_name(object_name, BLOCKS)
-    return blocks if blocks in store else light_field_name(object_name, "radiance")
-
-
-def _radiance(store: Store, object_name: str, side: int) -> tuple[Maps, NDArray[np.uint32] | None]:
-    """Maps, and their blocks if stored."""
-    name = light_name(store, object_name)
-    array = store.read(name)
-    if not name.endswith(BLOCKS):
-        return array, None
+def _radiance(store: Store, object_name: str, side: int) -> tuple[Maps, NDArray[np.uint32]]:
+    """Light, decoded when it is read, and its blocks."""
     from lambent.core.light_field_blocks import light_in_blocks  # imports numba
 
+    name = light_field_name(object_name, BLOCKS)
+    array = store.read(name)
     if array.ndim != 4 or array.shape[1] != array.shape[2] or array.shape[3] != 4 or array.dtype != np.uint32:
         raise UserError("broken store", file=store.folder, field=name, got=str(array.shape), expected="n x b x b x 4")
     try:

@@ -259,7 +259,6 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
         "strata": (3, FIELDS),
         "onward": (3, FIELDS),
         "levels": (1, FIELDS),
-        "blocks": (False, FIELDS),
     },
     "answer": {
         "patches": (8, ANSWER),

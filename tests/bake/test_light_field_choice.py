@@ -20,7 +20,7 @@ from lambent.core.directions import normalize
 from lambent.core.errors import UserError
 from lambent.scenes.geometry import box, placed
 from lambent.scenes.scene import LightFieldWish, Scene, SceneObject, SunSky
-from lambent.store.contract import light_field_name
+from lambent.store.light_fields import read_light_field
 from tests.bake.small_scenes import MIRROR, TINY, room_with_step
 
 MB = 64**2 * 8 / 1e6  # of a point with maps of 64 texels a side
@@ -180,13 +180,13 @@ def test_a_bake_chooses_and_keeps_its_choice(
 ) -> None:
     from lambent.bake.light_fields import choosing
 
-    quality = TINY.changed("tiny", light_field={"points": 12, "texels": 46, "strata": 1, "blocks": False})
+    quality = TINY.changed("tiny", light_field={"points": 12, "texels": 46, "strata": 1})
     store = bake(beside, tmp_path / "s", quality=quality, light_fields="auto")
     fields = {one["object"]: one for one in light_fields_of(store)}
     assert "ball" in fields
     for name, one in fields.items():
         assert one["error"] < (1 - WORTH) * one["probe_error"] and one["seconds"] > 0
-        side = store.read(light_field_name(name, "radiance")).shape[1]
+        side = read_light_field(store, name).radiance.shape[1]
         assert side in {option.texels for option in options_of(46)}
     keys, steps = {a.name: a.key for a in store.artefacts()}, list[str]()
     store = bake(beside, tmp_path / "s", quality=quality, progress=lambda done, total, what: steps.append(what))
@@ -201,7 +201,7 @@ def test_a_bake_chooses_and_keeps_its_choice(
 
 
 def test_an_error_that_is_asked_for_decides_how_many_points(beside: Scene, tmp_path: Path) -> None:
-    quality = TINY.changed("tiny", light_field={"points": 40, "texels": 8, "strata": 1, "blocks": False})
+    quality = TINY.changed("tiny", light_field={"points": 40, "texels": 8, "strata": 1})
     counts = []
     for error in (100.0, 1e-6):
         asked = replace(beside, light_fields={"ball": LightFieldWish(error=error)})
@@ -214,5 +214,5 @@ def test_what_stands_alone_under_the_sky_keeps_its_probe(tmp_path: Path) -> None
     objects = (SceneObject("box", box((0.4, 0.3, 0.2)), "mirror"),)
     eyes = (Camera("a", (1.0, 0.8, 1.2), (0, 0, 0)), Camera("b", (-1.2, -0.6, 0.7), (0, 0, 0)))
     scene = Scene("alone", objects, {"mirror": MIRROR}, environment=SunSky((0.39, 0.86, -0.32)), cameras=eyes)
-    quality = TINY.changed("tiny", light_field={"points": 12, "texels": 46, "strata": 1, "blocks": False})
+    quality = TINY.changed("tiny", light_field={"points": 12, "texels": 46, "strata": 1})
     assert light_fields_of(bake(scene, tmp_path / "s", quality=quality, light_fields="auto")) == []

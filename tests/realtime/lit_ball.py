@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from lambent.realtime.baked import BakedScene
 from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import sphere
 from lambent.store.contract import light_field_name, write_scene_record
-from lambent.store.light_fields import BLOCKS, DISTANCES, PARTS
+from lambent.store.light_fields import BLOCKS, DISTANCES
 from lambent.store.store import Store
 from tests.realtime.lit_wall import cube_of
 
@@ -98,7 +99,7 @@ def mirrored(width: int, height: int) -> tuple[Floats, NDArray[np.bool_]]:
     return seen(p, reflect(-w, n), ball=False)[0], root > 0
 
 
-def put_ball(folder: Path, field: LightField, *, in_blocks: bool = False) -> Store:
+def put_ball(folder: Path, field: LightField) -> Store:
     """A store of the ball, in units of 2 W/(sr m^2)."""
     scene = ball_scene(field=field)
     store = Store.create(folder, {})
@@ -112,19 +113,20 @@ def put_ball(folder: Path, field: LightField, *, in_blocks: bool = False) -> Sto
         key="k",
         meta={"centre": [0, 0, 0], "unit": 2},
     )
-    halves = replace(field, radiance=field.radiance / np.float16(2))
-    if in_blocks:
-        distances = distance_blocks_of(halves.inverse_distance, halves.cover)
-        halves = replace(halves, blocks=blocks_of(halves.radiance), distances=distances)
-    instead = {"radiance": BLOCKS, "inverse_distance": DISTANCES} if in_blocks else {}
-    for part in (instead.get(part, part) for part in PARTS):
-        places = {"corner": list(field.corner), "grid": list(field.grid), "offset_m": field.offset_m}
-        meta = {
-            "radiance": {"unit": 2.0},
-            BLOCKS: {"unit": 2.0},
-            "sample_map": places,
-            DISTANCES: {"texels": [field.radiance.shape[1]]},
-        }.get(part, {})
-        store.put(light_field_name("ball", part), "light_field", getattr(halves, part), key="k", meta=meta)
+    parts: dict[str, tuple[NDArray[Any], dict[str, Any]]] = {
+        "points": (field.points, {}),
+        "normals": (field.normals, {}),
+        BLOCKS: (blocks_of(field.radiance / np.float16(2)), {"unit": 2.0}),
+        DISTANCES: (
+            distance_blocks_of(field.inverse_distance, field.cover),
+            {"texels": [field.inverse_distance.shape[1]]},
+        ),
+        "sample_map": (
+            field.sample_map,
+            {"corner": list(field.corner), "grid": list(field.grid), "offset_m": field.offset_m},
+        ),
+    }
+    for part, (array, meta) in parts.items():
+        store.put(light_field_name("ball", part), "light_field", array, key="k", meta=meta)
     write_scene_record(store, scene.record.model_copy(update={"cameras": (CAMERA,)}))
     return store

@@ -26,7 +26,7 @@ from lambent.core.geometry import triangle_areas
 from lambent.core.progress import Progress, part_of
 from lambent.scenes.scene import LightFieldWish
 from lambent.store.contract import LIGHT_FIELD_CHOICE, light_field_name, needs_probe
-from lambent.store.light_fields import BLOCKS, COVER, DISTANCES, EXITS
+from lambent.store.light_fields import BLOCKS, DISTANCES, EXITS
 from lambent.store.store import Array
 
 if TYPE_CHECKING:
@@ -41,18 +41,17 @@ REVISION = 8
 MATTE = "%s: light_field is ignored: its material is purely diffuse"
 PATHS_OF_A_CHUNK = 1 << 21
 MIRROR_DEPTH = 6  # glossy surfaces in a row on paths of level 1, of objects without light fields
-BYTES_PER_TEXEL = {False: 9.0, True: 1.76}  # of light and distances, in blocks or not
+BYTES_PER_TEXEL = 1.76  # of light and distances
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Settings:
-    """`points` on each object, with maps of `texels` a side; `strata` x `strata` rays go through each texel.
+    """`points` on each object, with maps of `texels` a side, best 4 k - 2; `strata` x `strata` rays go through each.
 
     `onward` paths go on from each glossy surface that a ray meets: only there is there noise to speak of.
-    With `blocks`, light and distances are stored in blocks, which hold maps of 4 k - 2 texels best. Paths meet `levels`
-    glossy surfaces in a row. At 1, the objects that the scene gives light fields show each other and themselves their
-    diffuse light alone.
+    Paths meet `levels` glossy surfaces in a row. At 1, the objects that the scene gives light fields show each other
+    and themselves their diffuse light alone.
     """
 
     points: int
@@ -60,12 +59,6 @@ class Settings:
     strata: int = 2
     onward: int = 1
     levels: int = 6
-    blocks: bool = True
-
-    @property
-    def maps(self) -> tuple[str, ...]:
-        """The arrays of what points see, in the order in which they are written."""
-        return (BLOCKS, DISTANCES) if self.blocks else ("radiance", "inverse_distance", COVER)
 
 
 SETTINGS = {
@@ -99,7 +92,7 @@ def keys(context: BakeContext) -> dict[str, str]:
     found = dict[str, str]()
     for name, wish in wished(context).items():
         how = settings_of(context, wish)
-        inputs: list[Any] = [context.keys("light_map")["light_map/irradiance"], name, asdict(how)]
+        inputs: list[Any] = [context.keys("light_map")["light_map/irradiance"], name, _said(how)]
         inputs += [wish.offset_m, wish.error, context.seed, context.methods["probes"]]
         if not _cached(context):
             inputs.append(context.settings("light_map").max_depth)
@@ -112,7 +105,7 @@ def keys(context: BakeContext) -> dict[str, str]:
         if wish.patch_density is not None:
             inputs.append(wish.patch_density)
         found |= dict.fromkeys(
-            (light_field_name(name, part) for part in parts_of(how, wish)), key_of(KIND, REVISION, *inputs)
+            (light_field_name(name, part) for part in parts_of(wish)), key_of(KIND, REVISION, *inputs)
         )
     return found
 
@@ -122,7 +115,7 @@ def bake(context: BakeContext) -> None:
     left = {
         name: how.points * how.texels**2
         for name, how in ((name, settings_of(context, wish)) for name, wish in wishes.items())
-        if stale & {light_field_name(name, part) for part in parts_of(how, wishes[name])}
+        if stale & {light_field_name(name, part) for part in parts_of(wishes[name])}
     }
     done, total = 0, sum(left.values())
     for name, work in left.items():
@@ -150,11 +143,14 @@ def wished(context: BakeContext) -> dict[str, LightFieldWish]:
     } | asked
 
 
-def parts_of(how: Settings, wish: LightFieldWish) -> tuple[str, ...]:
+def parts_of(wish: LightFieldWish) -> tuple[str, ...]:
     """The arrays of an object's light field, in the order in which they are written."""
-    # maps of volumes give irradiance, too, and have what texels show altogether
-    maps = [part for part in how.maps if part != COVER or not wish.volume]
-    return "points", "normals", *maps, *((EXITS,) if wish.refracts else ()), "sample_map"
+    return "points", "normals", BLOCKS, DISTANCES, *((EXITS,) if wish.refracts else ()), "sample_map"
+
+
+def _said(how: Settings) -> dict[str, Any]:
+    """Settings as inputs of a key; maps were not always stored in blocks."""
+    return {**asdict(how), "blocks": True}
 
 
 def settings_of(context: BakeContext, wish: LightFieldWish) -> Settings:
@@ -186,7 +182,7 @@ def _choice(context: BakeContext) -> list[dict[str, Any]]:
     how, budget_mb = context.settings(KIND), float(context.methods[request.MEGABYTES])
     named = sorted(context.scene.light_fields)
     curved = [part for name in _shiny(context) for part in _patches(context, name)]
-    inputs = [context.keys("light_map"), context.keys("probe"), asdict(how), named, budget_mb, context.seed, *curved]
+    inputs = [context.keys("light_map"), context.keys("probe"), _said(how), named, budget_mb, context.seed, *curved]
     key = key_of(LIGHT_FIELD_CHOICE, 3, *inputs)
     said = context.store.documents.get(LIGHT_FIELD_CHOICE)
     if not isinstance(said, dict) or said.get("key") != key:
@@ -196,7 +192,7 @@ def _choice(context: BakeContext) -> list[dict[str, Any]]:
             others = [name for name in _shiny(context) if name not in named]
             trials = _chooser(context, _traced(context)).trials(others, context.progress)
             beside_mb = partial(_sample_map_mb, context)
-            found = chosen(trials, budget_mb, BYTES_PER_TEXEL[how.blocks], beside_mb)
+            found = chosen(trials, budget_mb, BYTES_PER_TEXEL, beside_mb)
         said = {"key": key, "chosen": [one.said() for one in found]}
         context.store.set_document(LIGHT_FIELD_CHOICE, said)
     return list(said["chosen"])
@@ -269,18 +265,9 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
         some = region[0]
         surface = None if wish.without_object else normals[some]  # what is beneath points is seen as well
         rays = seen, points[some], how.texels, how.strata, seed, how.onward, surface
+        # maps of volumes give irradiance, too, and have what texels show altogether
         light, shows = (radiance_maps(*rays), None) if wish.volume else covered_radiance_maps(*rays)
-        maps = halves(light, traced.unit)
-        return blocks_of(maps, shows) if how.blocks else maps
-
-    def inverse_distance(region: tuple[slice, ...], seed: int) -> Array:
-        some = points[region[0]]
-        if wish.volume:
-            return inverse_distances(seen.scene, some, how.texels)
-        return covered_distances(seen.scene, some, how.texels)[0]
-
-    def cover(region: tuple[slice, ...], seed: int) -> Array:
-        return covered_distances(seen.scene, points[region[0]], how.texels)[1]
+        return blocks_of(halves(light, traced.unit), shows)
 
     def distances(region: tuple[slice, ...], seed: int) -> Array:
         some = points[region[0]]
@@ -289,27 +276,16 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
         return distance_blocks_of(*covered_distances(seen.scene, some, how.texels))
 
     at_once = max(1, min(PATHS_OF_A_CHUNK // (how.texels * how.strata) ** 2, len(points)))
-    count, square = len(points), (how.texels, how.texels)
-    arrays: dict[str, tuple[tuple[int, ...], str, Callable[[tuple[slice, ...], int], Array], float, float]] = {
-        "radiance": ((count, *square, 3), "float16", radiance, 0.0, 0.9),
-        "inverse_distance": ((count, *square), "float16", inverse_distance, 0.9, 0.95),
-        COVER: ((count, *square), "uint8", cover, 0.95, 1.0),
-        BLOCKS: ((count, *blocks_shape(how.texels)), "uint32", radiance, 0.0, 0.9),
-        DISTANCES: ((count, *distance_blocks_shape(how.texels)), "uint32", distances, 0.9, 1.0),
-    }
-    notes: dict[str, dict[str, Any]] = {
-        "radiance": {"unit": traced.unit},
-        BLOCKS: {"unit": traced.unit},
-        DISTANCES: {"texels": [how.texels]},
-    }
-    for part in parts_of(how, wish):
-        if part not in arrays:
-            continue
-        at, (shape, dtype, tile, begin, end) = light_field_name(name, part), arrays[part]
-        key, note = context.keys(KIND)[at], context.provenance(**notes.get(part, {}))
-        chunks = (at_once, *shape[1:])  # an interrupted bake continues with the next points
-        writer = context.store.begin(at, KIND, shape, chunks, dtype, key=key, meta=note)
-        run_tiles(writer, tile, seed=context.seed, progress=part_of(progress, begin, end, at), what=at)
+    arrays: tuple[tuple[str, tuple[int, ...], Callable[[tuple[slice, ...], int], Array], dict[str, Any]], ...] = (
+        (BLOCKS, blocks_shape(how.texels), radiance, {"unit": traced.unit}),
+        (DISTANCES, distance_blocks_shape(how.texels), distances, {"texels": [how.texels]}),
+    )
+    for (part, shape, tile, note), share in zip(arrays, ((0.0, 0.9), (0.9, 1.0)), strict=True):
+        at = light_field_name(name, part)
+        key, meta = context.keys(KIND)[at], context.provenance(**note)
+        # an interrupted bake continues with the next points
+        writer = context.store.begin(at, KIND, (len(points), *shape), (at_once, *shape), "uint32", key=key, meta=meta)
+        run_tiles(writer, tile, seed=context.seed, progress=part_of(progress, *share, at), what=at)
         writer.finish()
     _sample_map(context, name, wish, traced, start)
 
