@@ -12,6 +12,7 @@ import pytest
 
 from lambent.core.directions import normalize
 from lambent.core.errors import UserError
+from lambent.core.geometry import triangle_normals
 from lambent.scenes.geometry import box, copies_under, sphere, transformed
 from lambent.scenes.loaders.meshes.creases import leaning_faces
 from lambent.scenes.mesh import areas_of, boxes_of, corners_of
@@ -57,12 +58,17 @@ def skinned(**more: Any) -> dict[str, Any]:
     return content
 
 
-def test_joints_place_a_skinned_mesh_and_its_node_does_not(tmp_path: Path) -> None:
-    scene = loaded(tmp_path, skinned())
-    mesh = scene.object("thing").mesh
+@pytest.mark.parametrize("x", [1, -1])
+def test_joints_place_a_skinned_mesh_and_its_node_does_not(tmp_path: Path, x: int) -> None:
+    """Mirroring joints leave the triangle wound as its normals point."""
+    content = skinned()
+    for joint in (1, 2):
+        content["nodes"][joint]["scale"] = [x, 1, 1]
+    mesh = loaded(tmp_path, content).object("thing").mesh
     # (x, y, z) turned by 90 degrees about y is (z, y, -x)
-    np.testing.assert_allclose(mesh.positions, [(0, 0, 0), (0.5, 1, -0.5), (0, 3, 0)], atol=1e-6)
+    np.testing.assert_allclose(mesh.positions, [(0, 0, 0), (0.5 * x, 1, -0.5 * x), (0, 3, 0)], atol=1e-6)
     np.testing.assert_allclose(mesh.normals[[0, 2]], [(0, 0, 1), (1, 0, 0)], atol=1e-6)
+    assert len(mesh.faces) == 1 and triangle_normals(mesh.corners)[0] @ mesh.normals.sum(axis=0) > 1
 
 
 def test_a_skin_whose_joints_are_not_in_the_scene_is_told(tmp_path: Path) -> None:

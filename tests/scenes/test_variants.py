@@ -78,7 +78,8 @@ def test_objects_of_one_material_that_part_ways_get_materials_of_their_own(tmp_p
 def test_a_material_keeps_its_textures_with_other_numbers_and_takes_those_of_another(tmp_path: Path) -> None:
     texture = MaterialTextures(diffuse=Texture(np.ones((2, 2, 3), np.float16)))
     objects = tuple(SceneObject(name, SQUARE, "grain") for name in ("left", "right"))
-    scene = Scene("s", objects, {"grain": GRAIN, "grey": GREY}, textures={"grain": texture})
+    tables = {"grain": Path("grain.txt"), "grey": Path("grey.txt")}
+    scene = Scene("s", objects, {"grain": GRAIN, "grey": GREY}, textures={"grain": texture}, measured=tables)
     darker, plain = Look(GRAIN.model_copy(update={"kd": (0.1, 0.1, 0.1)}), "grain"), Look(GREY)
     same = Look(GRAIN, "grain")
     found = with_variants(scene, [Dressed("dark", (darker, darker)), Dressed("half", (same, plain))])
@@ -88,6 +89,7 @@ def test_a_material_keeps_its_textures_with_other_numbers_and_takes_those_of_ano
     assert {*dark.looks} == {left, right} and {*half.looks} == {right}
     assert textures_worn(found.textures, dark.looks) == {left: texture, right: texture}
     assert textures_worn(found.textures, half.looks) == {left: texture}
+    assert {*dressed(found, dark).measured} == {"grey"} and {*dressed(found, half).measured} == {left, "grey"}
 
 
 def test_variants_that_change_nothing_part_no_materials() -> None:

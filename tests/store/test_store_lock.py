@@ -82,6 +82,12 @@ def test_a_second_process_is_told_who_writes_and_damages_nothing(tmp_path: Path)
     assert store.documents == {"timings": {"a": 1}} and store.availability("theirs") == ("partial", 0.25)
 
 
+def test_the_file_of_the_lock_holds_the_writers_number_alone(tmp_path: Path) -> None:
+    (tmp_path / FILE).write_text("1234567890, left by a process that died\n")
+    lock = WriterLock(tmp_path)
+    assert (tmp_path / FILE).read_text() == f"{os.getpid()}\n" and lock.held
+
+
 def test_the_right_to_write_ends_with_close_with_the_object_and_with_a_context(tmp_path: Path) -> None:
     store = Store.create(tmp_path / "s", {})
     assert refused_elsewhere(tmp_path / "s")
