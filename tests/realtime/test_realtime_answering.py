@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
 from lambent.core.camera import Camera
+from lambent.core.directions import normalize
+from lambent.core.irradiance import basis_of
 from lambent.materials.document import Lobe
 from lambent.materials.recolour import recoloured
 from lambent.realtime.answer_shown import AnswerShown, answered
@@ -34,6 +38,20 @@ def test_before_an_edit_arrays_are_those_of_the_store(store: Store) -> None:
     assert all(same.probes[name].radiance is probe.radiance for name, probe in baked.probes.items())
     light = AnsweredLight(baked, stored)
     assert not light.probe_change("ball", light.as_baked).any() and light.likely_error(light.as_baked) == 0
+
+
+def test_irradiance_of_a_probe_follows_its_radiance(store: Store) -> None:
+    """One unit of radiance more all around is pi units of irradiance at any normal."""
+    baked = read_baked(store)
+    probes = {
+        "ball": replace(baked.probes["ball"], irradiance=(3.0,) * 9),
+        "blind": replace(baked.probes["ball"], irradiance=()),
+    }
+    answer = AnsweredLight(replace(baked, unit=0.25, probes=probes), read_answer(store))
+    n = normalize(np.random.default_rng(0).normal(size=(20, 3)))
+    more = np.array(answer.probe_irradiance("ball", np.ones((6, 8, 8, 3)))) - 3
+    assert np.allclose(basis_of(n) @ more, 0.25 * np.pi, rtol=5e-3)
+    assert answer.probe_irradiance("blind", np.ones((6, 8, 8, 3))) == ()
 
 
 def test_red_walls_redden_the_room_and_its_reflection(store: Store) -> None:
