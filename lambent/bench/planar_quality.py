@@ -20,7 +20,6 @@ from lambent.realtime.renderer import Renderer
 NAME = "planar-quality"
 METHODS = {
     "marched": ("rings", "marched"),
-    "interleaved": ("rings", "interleaved"),
     "fixed": ("rings", "fixed"),
     "thesis": ("lobe-4.25", "thesis"),
 }

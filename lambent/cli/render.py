@@ -95,7 +95,7 @@ def command(
         str,
         typer.Option(
             help="How planar reflectors are drawn: auto, off (from their probes), or by a method of the integrator: "
-            "interleaved, marched or fixed (lamps, rings), thesis (lobe-4.24, lobe-4.25), fis."
+            "marched or fixed (lamps, rings), thesis (lobe-4.24, lobe-4.25), fis."
         ),
     ] = "auto",
     lookup: Annotated[

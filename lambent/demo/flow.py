@@ -185,8 +185,7 @@ class Flow:
             for number, view in enumerate(views):
                 part = part_of(self.progress, number / STILLS, (number + 1) / STILLS, "stills")
                 write_shown(self.out / f"walk_{number + 1}.png", traced.displayed(view, part))
-        planar = "interleaved" if adapter_info(renderer.device).is_software else "auto"  # takes half the time
-        frame = FrameState(views[0], *effort.film, exposure_ev=exposure_ev, planar=planar)
+        frame = FrameState(views[0], *effort.film, exposure_ev=exposure_ev)
 
         def draw(camera: Camera) -> Any:
             return renderer.display_image(replace(frame, camera=camera))

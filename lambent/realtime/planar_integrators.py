@@ -62,12 +62,9 @@ def interleaved_table(lobe: Lobe, n: int, bias: float = INTERLEAVED_BIAS) -> Flo
     return np.concatenate(blocks)
 
 
-# Two searches for hits: `marched` is better on cluttered floors; `interleaved` takes .7 of its time and is as good on
-# nearly empty floors (docs/performance.md).
 PLANAR: dict[str, dict[str, Integrator]] = {
     "rings": {
         "marched": Integrator("planar_interleaved.wgsl", interleaved_table, {"MARCH_STEPS": 12, **SHARED}),
-        "interleaved": Integrator("planar_interleaved.wgsl", interleaved_table, {"CELL_STEPS": 3, **SHARED}),
         "fixed": Integrator("planar_quadrature.wgsl", fixed_table),
     },
     "lobe-4.24": {"thesis": Integrator("planar_thesis.wgsl", multi_ring_table, {"FORMULA": 24})},

@@ -38,7 +38,7 @@ FLOOR = ReflectorRecord(
     parts=(ReflectorPart(object="floor", faces=(0, 1), area_m2=36),),
 )
 WIDTH, HEIGHT = 96, 64
-METHODS = (("rings", "interleaved"), ("rings", "marched"), ("rings", "fixed"), ("lobe-4.25", "thesis"))
+METHODS = (("rings", "marched"), ("rings", "fixed"), ("lobe-4.25", "thesis"))
 
 
 def mirror(m: float, **more: Any) -> Material:
@@ -92,7 +92,7 @@ def seen_below(device: Any) -> np.ndarray:
     return Renderer(device, scene_of(mirror(0.001), floor=False)).image(replace(state(), camera=below))[:, ::-1]
 
 
-@pytest.mark.parametrize("method", ["interleaved", "fixed", "thesis"])
+@pytest.mark.parametrize("method", ["marched", "fixed", "thesis"])
 def test_a_sharp_mirror_shows_the_scene_from_the_mirrored_camera(
     device: Any, seen_below: np.ndarray, method: str
 ) -> None:
@@ -225,8 +225,8 @@ def test_only_reflectors_in_view_cost_a_mirror(device: Any) -> None:
     assert renderer.statistics["mirrors"] == 0  # seen from behind
     renderer.draw(state(planar="off"))
     assert renderer.statistics["mirrors"] == 0
-    with pytest.raises(UserError, match="interleaved"):
-        renderer.draw(state(planar="interleved"))
+    with pytest.raises(UserError, match="marched"):
+        renderer.draw(state(planar="march"))
 
 
 def test_mirror_view_projects_and_clips() -> None:
@@ -333,7 +333,7 @@ def test_the_eye_lies_as_far_under_a_raised_floor_as_it_stands_over_it() -> None
     np.testing.assert_allclose(view.frame["eye"][:3], (0.4, 2 * 0.5 - 1.3, 3.0), atol=1e-6)
 
 
-@pytest.mark.parametrize("method", ["marched", "interleaved", "fixed"])
+@pytest.mark.parametrize("method", ["marched", "fixed"])
 def test_the_light_map_scales_what_the_mirrored_view_does_not_hold(device: Any, method: str) -> None:
     """A floor that the probe's light does not reach looks as with a dark probe, beside its mirrored view as well."""
     scene = scene_of(mirror(0.2))

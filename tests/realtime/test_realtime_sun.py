@@ -309,7 +309,7 @@ def test_a_mirror_shows_sunlight_and_shadows(device: Any) -> None:
     turned = replace(planar.CAMERA, position=(x, -y, z), target=(u, -v, w), up=(0, -1, 0))
     expected = Renderer(device, lit[1]).image(replace(planar.state(), camera=turned))[:, ::-1]
     renderer = Renderer(device, lit[0])
-    found = renderer.image(planar.state(n=3, integrator="rings", planar="interleaved"))
+    found = renderer.image(planar.state(n=3, integrator="rings"))
     floor = renderer.image(planar.state(planar="off"))[..., 2] == 0  # the dark probe
     on_wall = floor & (expected[..., 2] < 0.5)  # not the sky
     sunny, shaded = on_wall & (expected[..., 0] > 0.2), on_wall & (expected[..., 0] < 0.01)

@@ -10,7 +10,7 @@ from lambent.realtime.integrators import Integrator
 from lambent.realtime.layouts import LIGHT, Layouts
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.light import Shading, Stage
-from lambent.realtime.passes.planar_buffer import PlanarBuffer, PlanarBufferPass, PlanarCells
+from lambent.realtime.passes.planar_buffer import PlanarBuffer, PlanarBufferPass
 from lambent.realtime.pipelines import screen_pipeline
 from lambent.realtime.planar_integrators import interleaved_table, planar_integrator
 from lambent.realtime.targets import stored, target_texture
@@ -25,10 +25,10 @@ class PlanarPass:
 
     def __init__(self, layouts: Layouts, depth: DepthPass) -> None:
         self._layouts = layouts
-        self._buffers, self._cells = PlanarBufferPass(layouts, depth), PlanarCells(layouts)
+        self._buffers = PlanarBufferPass(layouts, depth)
         # Bindings have no gaps, because they crash a software Vulkan (Mesa 22.3). So the light maps have another number
         # than in shading.
-        self._hits = layouts.of("uniform", "flat", "exact", "exact", "layers")
+        self._hits = layouts.of("uniform", "flat", "exact", "layers")
         self._shading = Shading(layouts, STAGE, self._hits)
         self.reflections = layouts.of(*LIGHT, "exact layers")
         found = layouts.of("exact layers")
@@ -56,11 +56,8 @@ class PlanarPass:
     ) -> None:
         """The light of one view's pixels."""
         view, uniform = context.views[index], self._buffers.uniform(index)
-        if how.constants.get("CELL_STEPS"):
-            self._cells.encode(context, buffer.planes, view.size, uniform)
-        cells = self._cells.views(view.size)[0]
         light_maps = context.resources.light_view
-        group = self._layouts.group(self._hits, uniform, buffer.light, buffer.planes, cells, light_maps)
+        group = self._layouts.group(self._hits, uniform, buffer.light, buffer.planes, light_maps)
         mine = (draw for draw in context.draws if draw.lobes and view.has(draw.item.record))
         draws = [draw.by(how, context.resources, draw.planar_n) for draw in mine]
         render = context.begin("planar", layers, "load" if index else "clear")

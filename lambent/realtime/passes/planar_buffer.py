@@ -1,6 +1,6 @@
 """The planar reflection buffer: light of the mirrored view with MIP levels, and the plane seen at every pixel.
 
-Also the walls that bound the view, and the nearest surface in each cell of the buffer.
+Also the walls that bound the view.
 """
 
 from __future__ import annotations
@@ -27,9 +27,6 @@ from lambent.realtime.uploads import upload
 from lambent.store.contract import PlanRecord
 from lambent.store.plans import plan_of
 
-CELL_FORMAT = "rgba32float"
-FIRST_PX = 4  # side of the finest cells, CELL_PX of shaders/planar_view.wgsl
-MOST_LEVELS = 7  # of cells; the coarsest have 256 px
 FORMATS = LIGHT_FORMAT, PLANE_FORMAT = "rgba16float", "rgba32float"
 MIRRORED_N = 3  # samples per lobe of mirrored objects, from their probes
 BLURRED_N = 1  # samples per lobe if the reflector blurs the mirrored view
@@ -83,34 +80,6 @@ class PlanarWalls:
     def _uploaded(self, record: PlanRecord) -> Any:
         distance = plan_of(record).distance[None, ..., None]
         return upload(self._layouts.device, [distance], "r8snorm").create_view()
-
-
-class PlanarCells:
-    """The nearest surface in each cell of a buffer, so that searches take few steps."""
-
-    def __init__(self, layouts: Layouts) -> None:
-        self._layouts, self._layout = layouts, layouts.of("uniform", "exact")
-        self._first, self._next = (
-            screen_pipeline(layouts.device, "planar_cells", [self._layout], [CELL_FORMAT], entry)
-            for entry in ("first_cells_main", "cells_main")
-        )
-        self.views = lru_cache(MOST_REFLECTORS)(self._new_views)
-
-    def _new_views(self, size: tuple[int, int]) -> list[Any]:
-        """Views of the cells for buffers of this size: one of all levels, then one of each."""
-        cells = (size[0] // FIRST_PX, size[1] // FIRST_PX)
-        levels = min(MOST_LEVELS, max(cells).bit_length())
-        made = target_texture(self._layouts.device, cells, CELL_FORMAT, levels)
-        single = (made.create_view(base_mip_level=i, mip_level_count=1) for i in range(levels))
-        return [made.create_view(), *single]
-
-    def encode(self, context: FrameContext, planes: Any, size: tuple[int, int], uniform: Any) -> None:
-        """Fill the cells from a view of the planes of a buffer of this size."""
-        finer = planes
-        for level, into in enumerate(self.views(size)[1:]):
-            group = self._layouts.group(self._layout, uniform, finer)
-            context.cover("mips", [into], self._next if level else self._first, [group])
-            finer = into
 
 
 class PlanarBufferPass:

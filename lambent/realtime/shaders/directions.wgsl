@@ -21,9 +21,3 @@ fn octahedral(n: vec3f) -> vec2f {
     let folded = (1.0 - abs(p.yx)) * select(vec2f(-1.0), vec2f(1.0), p >= vec2f(0.0));
     return select(folded, p, n.z >= 0.0);
 }
-
-fn from_octahedral(p: vec2f) -> vec3f {
-    let z = 1.0 - abs(p.x) - abs(p.y);
-    let fold = max(-z, 0.0) * select(vec2f(-1.0), vec2f(1.0), p >= vec2f(0.0));
-    return normalize(vec3f(p - fold, z));
-}

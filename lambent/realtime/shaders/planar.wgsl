@@ -8,9 +8,8 @@
 @group(3) @binding(0) var<uniform> mirrored: MirroredView;
 @group(3) @binding(1) var buffer_light: texture_2d<f32>;
 @group(3) @binding(2) var buffer_planes: texture_2d<f32>;
-@group(3) @binding(3) var buffer_cells: texture_2d<f32>; // of planar_cells.wgsl
 
-@group(3) @binding(4) var reflector_light_maps: texture_2d_array<f32>; // `light_maps` of shade.wgsl, whose number is taken
+@group(3) @binding(3) var reflector_light_maps: texture_2d_array<f32>; // `light_maps` of shade.wgsl, whose number is taken
 
 override HIDDEN_DROP: f32 = 0.0; // of a hit's weight where the buffer shows something else before it
 

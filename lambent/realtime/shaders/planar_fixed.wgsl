@@ -1,7 +1,6 @@
 // Quadrature on planes: as quadrature.wgsl, the light from the planar reflection buffer, one filter size per sample.
 
 #include "planar_march.wgsl"
-#include "planar_search.wgsl"
 
 // Filters in the probe against those in the buffer, half the log2. Of the 64 pixels that sample in turns few look
 // at a sun that the buffer does not hold: with narrow filters their tiles show as blocks.
@@ -50,7 +49,6 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
 }
 
 fn first_hit(place: Place, w: vec3f, jitter: f32) -> Hit {
-    if (CELL_STEPS > 0u) { return search(place, w, jitter); }
     if (MARCH_STEPS > 0u) { return march(place, w, jitter); }
     return find_hit(place, w);
 }

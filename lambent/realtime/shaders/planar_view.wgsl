@@ -1,7 +1,5 @@
 // The mirrored view of a planar reflector, and how places in the scene find theirs in its planar reflection buffer.
 
-const CELL_PX = 4; // side of the finest cells of planar_cells.wgsl, FIRST_PX of passes/planar_buffer.py
-
 struct MirroredView {
     eye: vec4f,
     row_x: vec4f, // q to clip x, y and w
