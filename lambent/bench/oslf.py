@@ -1,8 +1,9 @@
 """Errors of reflections from an offset surface light field, by method, and miss rates of caches of its maps.
 
-Every look-up of `core.light_field_lookup` is compared with traced mirror rays of the teapot's pixels in the pavilion,
-as in tables 6.1 and 6.2 of thesis R; caches as in its tables 6.3 to 6.6. Look-ups count texels of radiance and
-distance. Pixels are means over the same places for all methods: the look-up is compared, not its sampling.
+The march of `core.light_field_lookup` and published look-ups are compared with traced mirror rays of the teapot's
+pixels in the pavilion, as in tables 6.1 and 6.2 of thesis R; caches as in its tables 6.3 to 6.6. Look-ups count texels
+of radiance and distance. Pixels are means over the same places for all methods: the look-up is compared, not its
+sampling.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from lambent.core.light_field_lookup import March, Place
 from lambent.core.light_field_maps import radiance_along
 from lambent.core.progress import Progress, part_of, silent
 from lambent.published.distance_impostors import fixed_point
+from lambent.published.surface_light_fields import Basis, basis_weights, surface
 from lambent.scenes import load_scene
 
 NAME = "oslf"
@@ -99,7 +101,10 @@ def methods(field: LightField, single: LightField, place: Place, view: LightFiel
     w, k = view.shown.w, len(place.x)
     middle = Place(place.x, place.n, np.stack([np.zeros(k, np.int64), *[np.full(k, NO_POINT)] * 3], axis=-1))
     far = March(1, first=0.02, last=4.0)
-    blend = partial(look.blended, field, place, w, sky=view.sky)
+
+    def blend(basis: Basis, power: int = look.POWER) -> Floats:
+        return look.blended(field, place, w, basis_weights(field, place, w, basis, power), view.sky)
+
     yield Method("single map", 1, partial(radiance_along, single, middle.named(1)[:, 0], w))
     yield Method("single map, marched", PER_POINT, partial(_marched, single, middle, w, far))
     yield Method("nearest", 1, partial(blend, "nearest"))
@@ -129,7 +134,7 @@ def true_hit(field: LightField, place: Place, w: Floats, distance_m: Floats, sky
     q = place.offsets(field) + np.where(is_open, 1e6, distance_m)[:, None, None] * w[:, None]
     seen = radiance_along(field, place.named(), q)
     seen[is_open] = radiance_along(field, place.named()[is_open], q[is_open], sky)
-    return np.asarray(np.einsum("kj,kjc->kc", look.basis_weights(field, place, w, "normal"), seen))
+    return np.asarray(np.einsum("kj,kjc->kc", look.normal_weights(field, place), seen))
 
 
 def stored_rows(
@@ -150,7 +155,7 @@ def surface_rows(
 ) -> Iterator[dict[str, Any]]:
     """The object itself from its light field, and the share of pixels that a point sees; no rows for a black object."""
     if view.surface.any():
-        light, seen = look.surface(field, place)
+        light, seen = surface(field, place)
         found = Compared.of(view.shown.pixel, view.size, view.surface).errors(light)
         yield {**said, "method": "surface", "look_ups": 5, **found, "seen": round(float(seen.mean()), 5)}
 

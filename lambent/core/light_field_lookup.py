@@ -1,17 +1,15 @@
-"""Reflections and surfaces from an offset surface light field: numpy versions of all look-ups of the renderer.
+"""Reflections from an offset surface light field: the numpy version of the renderer's look-up.
 
-Thesis R, chapters 3 and 4, plus look-ups corrected by distance. A `Place` is the object's surface at each pixel; w is
-the unit direction whose radiance is wanted there, for a mirror 2 (n.wo) n - wo. Directions are in world space.
-
-Uncorrected methods read the maps of near points along w itself (4.3 to 4.12). They err when surroundings are near:
-the ray from x then meets them elsewhere than the ray from the point. Corrected methods find in each map where the ray
-from x goes behind the surfaces that the point sees, and read there.
+A `Place` is the object's surface at each pixel; w is the unit direction whose radiance is wanted there, for a mirror
+2 (n.wo) n - wo. Directions are in world space. The ray from x meets near surroundings elsewhere than a ray along w from
+a point of the light field: in each map, a march finds where the ray from x goes behind the surfaces that the point
+sees, and the map is read there. Blends of maps along w itself (thesis R, chapter 4) are in
+`published.surface_light_fields`; rays that no point confirms fall back on the one by B_n.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -28,11 +26,8 @@ from lambent.core.light_field_maps import (
     surface_along,
 )  # fmt: skip
 
-Basis = Literal["nearest", "angle", "average", "reflection", "normal"]
-POWER = 4  # exponent N of B_n and B_r
-CONES_DEG = (65.0, 75.0)  # half angles about the normal of the cones tried in order for a point
+POWER = 4  # exponent N of B_n
 EDGE_STEEPNESS = 3.0  # of edges before the sky, relative to coverage interpolated between quarters of texels
-SURFACE_TOLERANCE = 0.15  # relative to the distance at which a point sees the surface
 
 
 @dataclass(frozen=True)
@@ -91,36 +86,31 @@ class Marched:
     distance_m: Floats  # (k,) along w; infinite without a hit
 
 
-def basis_weights(field: LightField, place: Place, w: Floats, basis: Basis, power: int = POWER) -> Floats:
-    """(k, 4) weights B_j, of sum 1, of the points near a place; all 0 without points (4.5, 4.9 to 4.11).
+def normal_weights(field: LightField, place: Place) -> Floats:
+    """(k, 4) weights B_n of the points near a place, by their cosine about the normal (4.11).
 
-    `w` (k, 3) is unit; `power` is the exponent N. If all points are below the horizon of the basis, the weights are
-    equal.
+    Their sum is 1, or 0 without points. If all points are below the horizon, the weights are equal.
     """
-    towards = normalize(-place.offsets(field))
+    return cosine_weights(field, place, place.n, POWER)
+
+
+def cosine_weights(field: LightField, place: Place, axis: Floats, power: int) -> Floats:
+    """As `normal_weights`, by powers of the cosine about unit axes (k, 3) (4.10)."""
     known = place.known
-    if basis == "nearest":
-        weight = np.cumsum(known, axis=1) == 1
-    elif basis == "angle":
-        cosine = np.where(known, np.einsum("kjc,kc->kj", towards, w), -np.inf)
-        weight = np.arange(known.shape[1]) == cosine.argmax(axis=1)[:, None]
-    elif basis == "average":
-        weight = known
-    else:
-        axis = w if basis == "reflection" else place.n
-        cosine = np.where(known, np.maximum(np.einsum("kjc,kc->kj", towards, axis), 0), 0.0)
-        largest = cosine.max(axis=1, keepdims=True)  # normalize first: powers of small cosines would underflow
-        weight = np.where(largest > 0, (cosine / np.maximum(largest, 1e-30)) ** power, known)
-    weight = np.where(known, weight, 0.0)
+    towards = normalize(-place.offsets(field))
+    cosine = np.where(known, np.maximum(np.einsum("kjc,kc->kj", towards, axis), 0), 0.0)
+    largest = cosine.max(axis=1, keepdims=True)  # normalize first: powers of small cosines would underflow
+    weight = np.where(known, np.where(largest > 0, (cosine / np.maximum(largest, 1e-30)) ** power, known), 0.0)
     return np.asarray(weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-30))
 
 
-def blended(
-    field: LightField, place: Place, w: Floats, basis: Basis = "normal", power: int = POWER, sky: Sky | None = None
-) -> Floats:
-    """(k, 3) radiance sum_j B_j L(p_j, w) (4.7); a given `sky` also fills its share of texels that show surfaces."""
+def blended(field: LightField, place: Place, w: Floats, weight: Floats, sky: Sky | None = None) -> Floats:
+    """(k, 3) radiance sum_j B_j L(p_j, w) (4.7) by weights (k, 4) of points.
+
+    A given `sky` also fills its share of texels that show surfaces.
+    """
     seen = radiance_along(field, place.named(), np.broadcast_to(w[:, None], (*place.points.shape, 3)), sky)
-    return np.asarray(np.einsum("kj,kjc->kc", basis_weights(field, place, w, basis, power), seen))
+    return np.asarray(np.einsum("kj,kjc->kc", weight, seen))
 
 
 def marched(
@@ -193,8 +183,9 @@ def combined(
     first = t.min(axis=1)
     met = np.isfinite(first)
     agree = t <= first[:, None] * (1 + rule.alike)
-    basis = np.maximum(basis_weights(field, place, w, "normal")[:, :count], 1e-6)
-    weight = np.where(agree & met[:, None], basis * focus_along(field, q), 0.0)
+    basis = normal_weights(field, place)
+    near = np.maximum(basis[:, :count], 1e-6)
+    weight = np.where(agree & met[:, None], near * focus_along(field, q), 0.0)
     weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-30)
     seen = np.einsum("kj,kjc->kc", weight, _without_lone_lights(radiance_along(field, place.named(count), q), weight))
     in_sky = np.asarray(~met & (open_sky & known).any(axis=1))
@@ -209,9 +200,8 @@ def combined(
     if sky is not None and beyond.any():
         other[beyond] = sky(w[beyond])
     if blends.any():
-        other[blends] = blended(
-            field, Place(place.x[blends], place.n[blends], place.points[blends]), w[blends], sky=edges
-        )
+        some = Place(place.x[blends], place.n[blends], place.points[blends])
+        other[blends] = blended(field, some, w[blends], basis[blends], edges)
     radiance = np.where(met[:, None], seen, other)
     if len(at):
         hit = place.x[at] + first[at, None] * w[at]
@@ -241,25 +231,3 @@ def _edge(field: LightField, hit: Floats, point: Indices, weight: Floats, known:
     mean = (share * known).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
     total = np.maximum(np.einsum("kj,kj->k", weight, shows), 1e-20)[:, None]
     return np.einsum("kj,kjc->kc", weight, light) / total, np.clip((mean - 0.5) * EDGE_STEEPNESS + 0.5, 0, 1)
-
-
-def surface(field: LightField, place: Place) -> tuple[Floats, Flags]:
-    """Radiance (k, 3) of the surface itself, and whether a point sees it, (k,) (3.11).
-
-    The result comes from the nearest point that lies in a cone about the normal and sees the surface at x: first in the
-    narrow cone, then in the wider one, then anywhere. If none sees it, the light of the nearest is returned.
-    """
-    offset, point, known = place.offsets(field), place.named(), place.known
-    distance = np.linalg.norm(offset, axis=-1)
-    cosine = -np.einsum("kjc,kc->kj", offset, place.n) / np.maximum(distance, 1e-12)
-    down = np.where(distance[..., None] > 0, offset, -place.n[:, None])
-    sees = np.asarray(known & (np.abs(distance * nearness_along(field, point, down) - 1) < SURFACE_TOLERANCE))
-    rank = np.zeros(known.shape)
-    for cone_deg in CONES_DEG:
-        rank += cosine < np.cos(np.radians(cone_deg))
-    rank = np.where(sees, rank, 3.0) + np.where(known, 0.0, 4.0)
-    best = rank.argmin(axis=1)[:, None]
-    chosen = np.take_along_axis(point, best, axis=1)[:, 0]
-    light = radiance_along(field, chosen, np.take_along_axis(down, best[..., None], axis=1)[:, 0])
-    found = np.asarray(known.any(axis=1))
-    return np.where(found[:, None], light, 0.0), np.take_along_axis(sees, best, axis=1)[:, 0]

@@ -12,7 +12,7 @@ import pytest
 
 from lambent.bench import oslf
 from lambent.bench.light_field_view import Compared, LightFieldView
-from lambent.core.light_field_lookup import surface
+from lambent.published.surface_light_fields import surface
 from lambent.scenes import load_scene
 
 TEXELS = 48

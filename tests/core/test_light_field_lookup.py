@@ -10,12 +10,10 @@ import pytest
 from lambent.core import light_field_maps
 from lambent.core.directions import normalize
 from lambent.core.light_field import NO_POINT, LightField
-from lambent.core.light_field_lookup import March, Place, basis_weights, blended, marched, surface
+from lambent.core.light_field_lookup import March, Place, blended, marched, normal_weights
 from lambent.core.light_field_maps import nearest_points, nearness_along, radiance_along, whole_texels
 from lambent.core.octahedral import bordered, texel_directions, to_square
-from tests.core.analytic_light_field import BALL, OWN, ball_field, errors, on_ball, places, seen, sky_light
-
-BASES = ("nearest", "angle", "average", "reflection", "normal")
+from tests.core.analytic_light_field import ball_field, errors, on_ball, places, seen, sky_light
 
 
 @pytest.fixture(scope="module")
@@ -70,42 +68,9 @@ def test_a_sample_map_is_cropped_from_its_grid(field: LightField) -> None:
     np.testing.assert_array_equal(outside[:2], field.sample_map[[10, 19], [30, 49]])
 
 
-@pytest.mark.parametrize("power", [1, 4, 16])
-@pytest.mark.parametrize("basis", BASES)
-def test_weights_are_a_partition_of_unity(field: LightField, basis: str, power: int) -> None:
-    place, w = places(field)
-    some = place.points.copy()
-    some[::3, 2:] = NO_POINT
-    some[::5] = NO_POINT
-    weight = basis_weights(field, replace(place, points=some), w, basis, power)
-    assert (weight >= 0).all() and (weight[some == NO_POINT] == 0).all()
-    np.testing.assert_allclose(weight.sum(axis=1), (some != NO_POINT).any(axis=1), atol=1e-12)
-
-
-def test_weights_by_hand() -> None:
-    """A place under the middle of three points, one of which stands straight above it."""
-    field = ball_field(3, 4)
-    points = np.array([[0, 0.1, 0], [0.1, 0.1, 0], [-0.1, 0.0, 0]], np.float32)
-    field = replace(field, points=points)
-    place = Place(np.zeros((1, 3)), np.array([[0.0, 1.0, 0.0]]), np.array([[0, 1, 2, NO_POINT]]))
-    w, half = np.array([[1.0, 0.0, 0.0]]), np.sqrt(0.5)
-    for basis, power, expected in (
-        ("nearest", 1, (1, 0, 0)),
-        ("angle", 1, (0, 1, 0)),
-        ("average", 1, (1 / 3, 1 / 3, 1 / 3)),
-        ("reflection", 4, (0, 1, 0)),
-        ("normal", 1, (1 / (1 + half), half / (1 + half), 0)),
-        ("normal", 4, (0.8, 0.2, 0)),
-    ):
-        found = basis_weights(field, place, w, basis, power)  # type: ignore[arg-type]
-        np.testing.assert_allclose(found, [[*expected, 0]], atol=1e-6, err_msg=f"{basis} {power}")
-
-
-def test_constant_surroundings_are_what_every_method_returns(field: LightField) -> None:
+def test_constant_surroundings_are_what_the_march_returns(field: LightField) -> None:
     constant = replace(field, radiance=np.full_like(field.radiance, 0.75), inverse_distance=0 * field.inverse_distance)
     place, w = places(field)
-    for basis in BASES:
-        np.testing.assert_allclose(blended(constant, place, w, basis), 0.75, rtol=1e-12)  # type: ignore[arg-type]
     answer = marched(constant, place, w)
     np.testing.assert_allclose(answer.radiance, 0.75, rtol=1e-12)
     assert answer.sky.all() and not answer.met.any()
@@ -113,7 +78,7 @@ def test_constant_surroundings_are_what_every_method_returns(field: LightField) 
 
 def test_a_march_meets_the_walls_where_the_ray_does(field: LightField) -> None:
     place, w = places(field)
-    uncorrected = errors(blended(field, place, w), place, w)
+    uncorrected = errors(blended(field, place, w, normal_weights(field, place)), place, w)
     for count, met in ((1, 0.98), (4, 0.998)):
         answer = marched(field, place, w, March(candidates=count))
         assert answer.met.mean() > met
@@ -128,7 +93,9 @@ def test_a_march_meets_the_walls_where_the_ray_does(field: LightField) -> None:
 def test_the_march_errs_by_texels_and_a_blend_by_the_spacing_of_points(field: LightField) -> None:
     def median(of: LightField, method: str) -> float:
         place, w = places(of)
-        answer = marched(of, place, w).radiance if method == "march" else blended(of, place, w)
+        answer = (
+            marched(of, place, w).radiance if method == "march" else blended(of, place, w, normal_weights(of, place))
+        )
         return float(np.median(errors(answer, place, w)))
 
     coarse, sparse = ball_field(144, 80), ball_field(36, 80)
@@ -182,43 +149,18 @@ def test_texels_of_the_object_itself_are_not_met_beside_the_place(field: LightFi
     assert answer.met.mean() > 0.97
 
 
-def test_a_ball_is_seen_by_its_points(field: LightField) -> None:
-    place, _ = places(field)
-    light, visible = surface(field, place)
-    assert visible.mean() > 0.99
-    np.testing.assert_allclose(light[visible], np.broadcast_to(OWN, light[visible].shape), atol=1e-4)
-
-
-def test_a_point_that_sees_something_else_does_not_show_the_surface(field: LightField) -> None:
-    """A wall between the nearest point and the ball: the next one answers, and where all are covered, that is told."""
-    radiance, nearness = field.radiance.copy(), field.inverse_distance.copy()
-    radiance[0], nearness[0] = 50.0, 1000.0
-    covered = replace(field, radiance=radiance, inverse_distance=nearness)
-    n = np.repeat(on_ball(144)[:1], 2, axis=0)
-    uv2 = np.stack([np.arctan2(n[:, 2], n[:, 0]) / (2 * np.pi) % 1, np.arccos(n[:, 1]) / np.pi], axis=-1)
-    place = Place.at(covered, n * BALL, n, uv2)
-    assert (place.points[:, 0] == 0).all()
-    light, visible = surface(covered, place)
-    assert visible.all()
-    np.testing.assert_allclose(light, np.broadcast_to(OWN, light.shape), atol=1e-4)
-    alone = replace(place, points=np.where(place.points == 0, 0, NO_POINT))
-    assert not surface(covered, alone)[1].any()
-
-
 def test_places_without_points_are_black_and_finite(field: LightField) -> None:
     place, w = places(field, 50)
     nowhere = replace(place, points=np.full_like(place.points, NO_POINT))
     answer = marched(field, nowhere, w, sky=sky_light)
     assert not answer.met.any() and not answer.sky.any()
-    for light in (answer.radiance, blended(field, nowhere, w), surface(field, nowhere)[0]):
-        np.testing.assert_array_equal(light, 0)
+    np.testing.assert_array_equal(answer.radiance, 0)
 
 
 def test_a_place_on_a_point_is_finite(field: LightField) -> None:
     n = on_ball(144)
     place = Place(field.points.astype(float), n, np.tile(np.arange(144)[:, None], (1, 4)))
-    for light in (marched(field, place, n).radiance, blended(field, place, n, "angle"), surface(field, place)[0]):
-        assert np.isfinite(light).all()
+    assert np.isfinite(marched(field, place, n).radiance).all()
 
 
 def test_quarters_of_texels_sharpen_the_edge_of_a_roof() -> None:

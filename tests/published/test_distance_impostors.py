@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.core.light_field_lookup import blended
+from lambent.core.light_field_lookup import blended, normal_weights
 from lambent.published.distance_impostors import fixed_point
 from tests.core.analytic_light_field import ball_field, errors, places
 
@@ -14,7 +14,8 @@ from tests.core.analytic_light_field import ball_field, errors, places
 def test_iteration_finds_the_walls() -> None:
     field = ball_field()
     place, w = places(field)
-    by_rounds, uncorrected = fixed_point(field, place, w).radiance, blended(field, place, w)
+    by_rounds = fixed_point(field, place, w).radiance
+    uncorrected = blended(field, place, w, normal_weights(field, place))
     assert np.median(errors(by_rounds, place, w)) < 0.03 * np.median(errors(uncorrected, place, w))
     constant = replace(field, radiance=np.full_like(field.radiance, 0.75), inverse_distance=0 * field.inverse_distance)
     answer = fixed_point(constant, place, w)
