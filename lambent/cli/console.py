@@ -33,7 +33,8 @@ CreaseAngle = Annotated[
         "--crease-angle",
         min=0,
         max=180,
-        help="Scenes: an edge above this angle in degrees is hard where smooth normals lean too far.",
+        help="Scenes: edges above this angle in degrees are hard, others smooth, where normals lean too far or are "
+        "missing.",
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace existing files, even the input.")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,11 @@ import pytest
 from lambent.core.directions import normalize
 from lambent.core.geometry import triangle_normals
 from lambent.scenes import load_scene
-from lambent.scenes.geometry import box, sphere
+from lambent.scenes.geometry import box, cylinder, sphere
 from lambent.scenes.loaders.meshes.creases import creased, leaning_faces
 from lambent.scenes.scene import Mesh
+from tests.scenes.test_gltf import document
+from tests.scenes.test_gltf_posed import FLOAT, with_arrays
 
 CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 SIDES = [(1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 4, 8, 6)]  # the last turned
@@ -53,6 +56,41 @@ def test_leaning_normals_are_told_once_and_a_crease_angle_mends_them(tmp_path: P
     toml = tmp_path / "scene.toml"
     toml.write_text('format = "lambent-scene"\nversion = 1\ngeometry = "box.obj"\ncrease_angle = 40\n')
     np.testing.assert_array_equal(load_scene(toml).objects[0].mesh.normals, mesh.normals)
+
+
+@pytest.mark.parametrize("ending", ["obj", "gltf"])
+def test_missing_normals_are_flat_or_smooth_below_the_angle(tmp_path: Path, ending: str) -> None:
+    """A hexagonal prism: its sides meet at 60 degrees, its caps at 90 with them.
+
+    40.9 = atan(2 sin 60 / (1 + 2 cos 60)), where one triangle of a side meets two of the next.
+    """
+    prism = cylinder(1.0, 1.0, 6)
+    corners = prism.corners.reshape(-1, 3)
+    path = tmp_path / f"prism.{ending}"
+    if ending == "obj":
+        faces = [f"f {i} {i + 1} {i + 2}" for i in range(1, len(corners), 3)]
+        path.write_text("\n".join(["o prism", *("v " + " ".join(map(str, p)) for p in corners.tolist()), *faces]))
+    else:
+        content = document(nodes=[{"mesh": 0, "name": "prism"}])
+        (number,) = with_arrays(content, (corners.astype(np.float32), FLOAT, "VEC3"))
+        content["meshes"][0]["primitives"] = [{"attributes": {"POSITION": number}}]
+        path.write_text(json.dumps(content))
+    (tmp_path / "scene.toml").write_text(
+        f'format = "lambent-scene"\nversion = 1\ngeometry = "prism.{ending}"\ncrease_angle = 70\n'
+    )
+    for place, angle, lean_deg, told in (
+        (path, None, 0.0, "faces are flat"),
+        (path, 50.0, 0.0, "smooth where faces meet at less than 50 degrees"),
+        (path, 70.0, 40.9, "smooth where faces meet at less than 70 degrees"),
+        (tmp_path / "scene.toml", None, 40.9, "smooth where faces meet at less than 70 degrees"),
+    ):
+        scene = load_scene(place, angle)
+        (o,) = scene.objects
+        assert f"prism: no normals: {told}" in scene.warnings
+        assert greatest_lean_deg(o.mesh) == pytest.approx(lean_deg, abs=0.1)
+        outwards = o.mesh.positions - (0, 0.5, 0)
+        assert ((o.mesh.normals * outwards).sum(axis=1) > 0.1).all()
+        np.testing.assert_allclose(o.mesh.corners, prism.corners, atol=1e-6)
 
 
 def test_edges_below_the_angle_stay_smooth() -> None:

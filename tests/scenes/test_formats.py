@@ -25,9 +25,9 @@ def recognise(head):
     return head.startswith(b"toy")
 
 
-def load(path, root=None):
+def load(path, options):
     """A cube of the size that the file names."""
-    files = SceneFiles(path, root)
+    files = SceneFiles(path, options.root)
     size = float(files.read(path, 100).split()[1])
     return Contents((SceneObject("cube", box((size,) * 3), "wood"),), {"wood": Material(name="wood", kd=(0.5,) * 3)},
                     sources=tuple(files.sources))

@@ -21,7 +21,7 @@ from lambent.core.inputs import read_bytes
 from lambent.materials.document import Material
 from lambent.scenes.geometry import bezier
 from lambent.scenes.geometry.tessellation import oriented_alike, steps_to, tessellated, triangles_of
-from lambent.scenes.loaders.contents import Contents
+from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
 from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.scene import SceneObject
 
@@ -34,7 +34,7 @@ TOLD = 5  # patches named in a warning
 NUMBER = re.compile(rb"[+-]?(\d+\.?\d*([eE][+-]?\d+)?|\.\d+([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
 
 
-def load(path: Path, root: Path | None = None) -> Contents:
+def load(path: Path, options: LoadOptions = DEFAULTS) -> Contents:
     """A file as one grey object, z up turned to y up, with its patches in the file's order."""
     control, notes = read(path), []
     usable = np.asarray((np.abs(control) < ABSURD).all(axis=(1, 2, 3)))

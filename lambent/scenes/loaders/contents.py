@@ -18,6 +18,21 @@ DAYLIGHT = SunSky(sun_direction=(0.4558, 0.7597, 0.4637))
 
 
 @dataclass(frozen=True)
+class LoadOptions:
+    """Options of every loader.
+
+    Files that the file refers to must be below `root`, by default its own folder. Normals that the file lacks are flat,
+    or, with `crease_deg`, smooth where faces meet at less than this angle.
+    """
+
+    root: Path | None = None
+    crease_deg: float | None = None
+
+
+DEFAULTS = LoadOptions()
+
+
+@dataclass(frozen=True)
 class Contents:
     """Objects in world space, and everything else that Lambent reads from the file.
 

@@ -1,8 +1,8 @@
 """`load_scene`: built-in scenes, scene.toml, and every format that has a module among the loaders.
 
-A format is a module or folder in `scenes/loaders` with NAME, ENDINGS and load(path, root) -> Contents; files that the
-file refers to must be below the folder `root`, by default its own. A format that shares its suffix with other files
-also has recognise(head), which recognises a scene by its first bytes.
+A format is a module or folder in `scenes/loaders` with NAME, ENDINGS and load(path, options) -> Contents; `options` are
+`contents.LoadOptions`. A format that shares its suffix with other files also has recognise(head), which recognises a
+scene by its first bytes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from lambent.core.errors import UserError
 from lambent.core.inputs import foreign_bytes
 from lambent.materials.document import Material
 from lambent.scenes import builtin, loaders
-from lambent.scenes.loaders.contents import Contents
+from lambent.scenes.loaders.contents import Contents, LoadOptions
 from lambent.scenes.loaders.meshes.creases import leaning_warnings, with_creases
 from lambent.scenes.loaders.meshes.repair import box_mapped
 from lambent.scenes.loaders.scene_files import SceneFiles
@@ -44,15 +44,15 @@ def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> 
         "builtin:room", "builtin:box", or the path of a scene.toml, .glb, .gltf, .obj, .ply, .bpt or Mitsuba's .xml;
         light and a camera are added to a file without them.
     crease_deg : float, optional
-        0 to 180. Normals that lean far from their faces are recomputed: smooth where faces meet at less than this
-        angle.
+        0 to 180. Normals that are missing or lean far from their faces are recomputed: smooth where faces meet at less
+        than this angle.
 
     Raises
     ------
     UserError
         If there is no such scene, or its file is unusable.
     """
-    scene, text = _load(path_or_builtin), str(path_or_builtin)
+    scene, text = _load(path_or_builtin, crease_deg), str(path_or_builtin)
     origin = text if text.startswith(BUILTIN_PREFIX) else os.path.abspath(text)
     scene = with_uv(scene)
     angle = scene.crease_deg if crease_deg is None else crease_deg
@@ -98,19 +98,19 @@ def counted(warnings: Sequence[str]) -> list[str]:
     return list(told)
 
 
-def _load(path_or_builtin: str | Path) -> Scene:
+def _load(path_or_builtin: str | Path, crease_deg: float | None) -> Scene:
     text = str(path_or_builtin)
     if text.startswith(BUILTIN_PREFIX):
         name = _builtin_name(text)
-        return load_toml(Path(str(files(builtin) / f"{name}{TOML}")), read_geometry)
+        return load_toml(Path(str(files(builtin) / f"{name}{TOML}")), read_geometry, crease_deg)
     path = Path(path_or_builtin)
     if path.suffix.lower() == TOML:
         with foreign_bytes("scene.toml", path):
-            return load_toml(path, read_geometry)
-    return _contents(path, None).scene(path.stem)
+            return load_toml(path, read_geometry, crease_deg)
+    return _contents(path, LoadOptions(crease_deg=crease_deg)).scene(path.stem)
 
 
-def read_geometry(name: str, scene_file: Path, scene_files: SceneFiles) -> Contents:
+def read_geometry(name: str, scene_file: Path, scene_files: SceneFiles, crease_deg: float | None) -> Contents:
     """Objects and other contents of a built-in scene, or of a file that `scene_file` refers to."""
     if name.startswith(BUILTIN_PREFIX):
         module = import_module(f"{builtin.__name__}.{_builtin_name(name)}")
@@ -123,13 +123,13 @@ def read_geometry(name: str, scene_file: Path, scene_files: SceneFiles) -> Conte
             textures={name: textures for name, (_, textures) in surfaces.items()},
         )
     path = scene_files.path(name, scene_file, "geometry")
-    return _contents(path, scene_files.root)
+    return _contents(path, LoadOptions(scene_files.root, crease_deg))
 
 
-def _contents(path: Path, root: Path | None) -> Contents:
+def _contents(path: Path, options: LoadOptions) -> Contents:
     module = _format_of(path)
     with foreign_bytes(module.NAME, path):
-        contents: Contents = module.load(path, root)
+        contents: Contents = module.load(path, options)
     return contents
 
 

@@ -14,7 +14,7 @@ from lambent.core.ceilings import FACE_CORNERS, PLY_BYTES, TRIANGLES
 from lambent.core.errors import UserError
 from lambent.core.inputs import read_bytes
 from lambent.materials.document import Material
-from lambent.scenes.loaders.contents import Contents
+from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
 from lambent.scenes.loaders.meshes.polygons import ranges, triangulate
 from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.scene import SceneObject
@@ -48,7 +48,7 @@ class _Element:
         return np.dtype(fields)
 
 
-def load(path: Path, root: Path | None = None) -> Contents:
+def load(path: Path, options: LoadOptions = DEFAULTS) -> Contents:
     """A file as one grey object; v points up, missing normals are smooth."""
     ignored: list[str] = []
     mesh, notes = mesh_of(read(path, ignored).smooth(), name=path.stem, file=path)

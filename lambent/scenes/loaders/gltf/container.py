@@ -139,8 +139,8 @@ def is_remote(uri: str) -> bool:
     return not uri.startswith("data:") and "://" in uri
 
 
-def read(path: Path, root: Path | None = None) -> Gltf:
-    """Read a .glb or .gltf file with all its buffers; referenced files must be below `root`, by default its own folder.
+def read(path: Path, root: Path | None) -> Gltf:
+    """A .glb or .gltf file with all its buffers; referenced files must be below `root`, by default its own folder.
 
     Raises
     ------

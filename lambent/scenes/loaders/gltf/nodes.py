@@ -17,7 +17,7 @@ from lambent.core.errors import UserError
 from lambent.core.photometry import radiometric
 from lambent.core.plain import Triple, triple
 from lambent.scenes.geometry import copies_under
-from lambent.scenes.loaders.contents import Contents, UniqueNames
+from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions, UniqueNames
 from lambent.scenes.loaders.gltf.container import Gltf, read
 from lambent.scenes.loaders.gltf.luminaires import Luminaires
 from lambent.scenes.loaders.gltf.materials import surface_of
@@ -35,18 +35,17 @@ _Key = tuple[int, int, int, tuple[float, ...], int]  # of a mesh: its number, pr
 DRACO = "KHR_draco_mesh_compression"
 
 
-def load(path: Path, root: Path | None = None) -> Contents:
+def load(path: Path, options: LoadOptions = DEFAULTS) -> Contents:
     """Contents of a .glb or .gltf file.
 
     Names are the nodes', made unique (with a warning); a mesh of several materials becomes an object per material.
-    Files that it refers to must be below `root`, by default its own folder.
 
     Raises
     ------
     UserError
         If the file is damaged or has no triangles.
     """
-    reading = _Reading(read(path, root))
+    reading = _Reading(read(path, options.root), options.crease_deg)
     reading.walk()
     reading.add_skinned()
     reading.place()
@@ -76,8 +75,8 @@ class _Materials:
 class _Reading:
     """State of reading one file."""
 
-    def __init__(self, gltf: Gltf) -> None:
-        self._gltf, self._materials = gltf, _Materials(gltf)
+    def __init__(self, gltf: Gltf, crease_deg: float | None) -> None:
+        self._gltf, self._materials, self._crease_deg = gltf, _Materials(gltf), crease_deg
         self._variants: dict[str, dict[str, tuple[str, Triple]]] = {}
         self._objects: list[SceneObject] = []
         self._lights: list[Light] = []
@@ -205,7 +204,7 @@ class _Reading:
             key = (index, k, uv_set, morph, -1 if skin is None else skin[0])
             if key not in self._meshes:
                 title = f"{wanted} ({k})" if k else wanted
-                self._meshes[key], notes = _primitive(gltf, primitive, title, uv_set, pose)
+                self._meshes[key], notes = _primitive(gltf, primitive, title, uv_set, pose, self._crease_deg)
                 self._warnings += notes
             local = self._meshes[key]
             if local is None:
@@ -282,7 +281,9 @@ def _volume(world: Floats) -> float:
     return math.fabs(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
 
 
-def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int, pose: Pose) -> tuple[Mesh | None, list[str]]:
+def _primitive(
+    gltf: Gltf, primitive: Primitive, name: str, uv_set: int, pose: Pose, crease_deg: float | None
+) -> tuple[Mesh | None, list[str]]:
     attributes = primitive.attributes
     if "POSITION" not in attributes:
         return None, [f"{name}: left out, it has no positions"]
@@ -322,7 +323,8 @@ def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int, pose: P
     if tangents is not None:
         tangents = tangents[:, :3]
     arrays = MeshArrays(positions, faces, optional("NORMAL", 3), uv, tangents)
-    mesh, repaired = mesh_of(posed(gltf, primitive, name, arrays, used, pose), name=name, file=gltf.path)
+    arrays = posed(gltf, primitive, name, arrays, used, pose)
+    mesh, repaired = mesh_of(arrays, name=name, file=gltf.path, crease_deg=crease_deg)
     return mesh, notes + repaired
 
 

@@ -14,6 +14,7 @@ from lambent.core.errors import UserError
 from lambent.core.geometry import area_vectors, cross_2d, triangle_areas, triangle_normals
 from lambent.scenes.geometry import tangents_along
 from lambent.scenes.geometry.grid import FLAT
+from lambent.scenes.loaders.meshes.creases import creased
 from lambent.scenes.loaders.meshes.polygons import smooth_normals
 from lambent.scenes.scene import Mesh
 
@@ -43,10 +44,13 @@ class MeshArrays:
         return replace(self, normals=normals)
 
 
-def mesh_of(arrays: MeshArrays, *, name: str, file: Path) -> tuple[Mesh | None, list[str]]:
+def mesh_of(
+    arrays: MeshArrays, *, name: str, file: Path, crease_deg: float | None = None
+) -> tuple[Mesh | None, list[str]]:
     """Mesh of arrays read from a file, None if no triangle is left, and notes of repairs.
 
-    Missing normals become flat ones, missing uv box-mapped metres, missing tangents the direction of u.
+    Missing normals become flat ones, or, with `crease_deg`, those of `creased`; missing uv box-mapped metres, missing
+    tangents the direction of u.
 
     Raises
     ------
@@ -62,12 +66,14 @@ def mesh_of(arrays: MeshArrays, *, name: str, file: Path) -> tuple[Mesh | None, 
     faces = _usable(positions, faces, notes)
     if not len(faces):
         return None, [f"{name}: left out, no triangle has an area ({'; '.join(notes) or 'empty'})"]
+    smoothed = crease_deg if normals is None else None
     if normals is None:  # every triangle gets its own vertices
         own = faces.reshape(-1)
         faces = np.arange(len(own)).reshape(-1, 3)
         positions, uv, tangents = positions[own], _at(uv, own), _at(tangents, own)
         normals = np.repeat(triangle_normals(positions[faces]), 3, axis=0)
-        notes.append("no normals: faces are flat")
+        how = "faces are flat" if smoothed is None else f"smooth where faces meet at less than {smoothed:g} degrees"
+        notes.append(f"no normals: {how}")
     else:
         normals = _unit_normals(positions, faces, normals, notes)
     if uv is None:
@@ -85,7 +91,7 @@ def mesh_of(arrays: MeshArrays, *, name: str, file: Path) -> tuple[Mesh | None, 
         uv[used].astype(np.float32),
         index.reshape(-1, 3).astype(np.uint32),
     )
-    return mesh, [f"{name}: {what}" for what in notes]
+    return mesh if smoothed is None else creased(mesh, smoothed), [f"{name}: {what}" for what in notes]
 
 
 def _tame(values: Floats) -> Floats:

@@ -16,7 +16,7 @@ from lambent.core.camera import Camera
 from lambent.core.ceilings import TRIANGLES
 from lambent.core.directions import Floats, normalize, rotation_about
 from lambent.core.errors import UserError
-from lambent.scenes.loaders.contents import Contents, UniqueNames
+from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions, UniqueNames
 from lambent.scenes.loaders.mitsuba import lights
 from lambent.scenes.loaders.mitsuba.bsdfs import surface_of
 from lambent.scenes.loaders.mitsuba.document import read
@@ -33,15 +33,15 @@ UNREAD = {"medium": "participating media are ignored", "volume": "volumes are ig
           "subsurface": "subsurface scattering is ignored"}  # fmt: skip
 
 
-def load(path: Path, root: Path | None = None) -> Contents:
-    """Contents of a Mitsuba scene; files that it refers to must be below `root`, by default its own folder.
+def load(path: Path, options: LoadOptions = DEFAULTS) -> Contents:
+    """Contents of a Mitsuba scene.
 
     Raises
     ------
     UserError
         If the file, or a mesh it refers to, is unusable, or there are no triangles.
     """
-    return _Scene(Reading(read(path, SceneFiles(path, root))), path).contents()
+    return _Scene(Reading(read(path, SceneFiles(path, options.root))), path).contents()
 
 
 class _Scene:

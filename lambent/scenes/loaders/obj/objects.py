@@ -11,7 +11,7 @@ import numpy as np
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.ceilings import MATERIALS, TRIANGLES
 from lambent.core.errors import UserError
-from lambent.scenes.loaders.contents import Contents, UniqueNames
+from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions, UniqueNames
 from lambent.scenes.loaders.meshes.polygons import smooth_normals, triangulate
 from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.loaders.obj.mtl import Library
@@ -35,17 +35,15 @@ class Triangles:
         return Triangles(self.corners[which], self.lines[which], self.smoothing[which])
 
 
-def load(path: Path, root: Path | None = None) -> Contents:
+def load(path: Path, options: LoadOptions = DEFAULTS) -> Contents:
     """Contents of an .obj file: an object for each of its objects (or groups) and each material on it.
-
-    Files that it refers to must be below `root`, by default its own folder.
 
     Raises
     ------
     UserError
         If a line is invalid, or the file has no triangles.
     """
-    files = SceneFiles(path, root)
+    files = SceneFiles(path, options.root)
     text = read(path)
     warnings = [f"{what} are ignored" for word, what in UNREAD.items() if any(w == word for _, w, _ in text.words)]
     warnings += ["vertex colours are ignored"] if text.coloured else []
@@ -63,7 +61,7 @@ def load(path: Path, root: Path | None = None) -> Contents:
     for number, (name, material) in enumerate(names):
         mine = by_owner[ends[number] : ends[number + 1]]
         single = name if materials_of[name] == 1 else f"{name}_{material_names[material]}"
-        mesh, notes = mesh_of_triangles(text, triangles.of(mine), single, path)
+        mesh, notes = mesh_of_triangles(text, triangles.of(mine), single, path, crease_deg=options.crease_deg)
         warnings += notes
         if mesh is not None:
             used = library.use(material_names[material])
@@ -126,20 +124,27 @@ def _changes(text: ObjText, keyword: str, start: str) -> tuple[list[str], tuple[
 
 
 def mesh_of_triangles(
-    text: ObjText, triangles: Triangles, name: str, file: Path, *, faceted: bool | None = None
+    text: ObjText,
+    triangles: Triangles,
+    name: str,
+    file: Path,
+    *,
+    faceted: bool | None = None,
+    crease_deg: float | None = None,
 ) -> tuple[Mesh | None, list[str]]:
     """Mesh of some of a file's triangles, None if nothing is left, and notes of repairs.
 
-    Missing normals follow the smoothing groups. If `faceted` is True all normals are flat; if False, missing ones are
-    smooth everywhere.
+    Missing normals follow the smoothing groups; if there is neither a normal nor a group, they are as of `mesh_of`. If
+    `faceted` is True all normals are flat; if False, missing ones are smooth everywhere.
     """
     notes = []
     corners, normals = triangles.corners.copy(), text.vn
     lacking = np.asarray((corners[..., 2] < 0).any(axis=1))
     if faceted:
         lacking[:] = True
-    if lacking.any() and len(corners):
-        smooth = (triangles.smoothing > 0) if faceted is None else np.full(len(corners), not faceted)
+    smooth = (triangles.smoothing > 0) if faceted is None else np.full(len(corners), not faceted)
+    bare = crease_deg is not None and faceted is None and bool(lacking.all()) and not smooth.any()
+    if lacking.any() and not bare:
         made, numbers = _made_normals(text.v, corners[lacking, :, 0], triangles.smoothing[lacking], smooth[lacking])
         corners[lacking, :, 2] = numbers + len(normals)
         normals = np.concatenate([normals, made])
@@ -157,8 +162,9 @@ def mesh_of_triangles(
     uv = None
     if len(text.vt) and (vertex[:, 1] >= 0).any():
         uv = np.where(vertex[:, 1:2] >= 0, text.vt[np.maximum(vertex[:, 1], 0)], np.nan)
-    own = normals[vertex[:, 2]] if len(vertex) else np.zeros((0, 3))
-    mesh, repaired = mesh_of(MeshArrays(text.v[vertex[:, 0]], index.reshape(-1, 3), own, uv), name=name, file=file)
+    own = None if bare else normals[vertex[:, 2]] if len(vertex) else np.zeros((0, 3))
+    arrays = MeshArrays(text.v[vertex[:, 0]], index.reshape(-1, 3), own, uv)
+    mesh, repaired = mesh_of(arrays, name=name, file=file, crease_deg=crease_deg)
     return mesh, notes + repaired
 
 

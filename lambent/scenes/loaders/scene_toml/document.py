@@ -51,11 +51,12 @@ from lambent.scenes.variants import with_variants
 
 # Required at the beginning of every scene.toml.
 HEAD = {"format": 'format = "lambent-scene"', "version": "version = 1", "geometry": 'geometry = "model.glb"'}
-ReadGeometry = Callable[[str, Path, SceneFiles], Contents]  # name as written, the scene.toml, files below its folder
+# Takes the name as written, the scene.toml, the files below its folder, and the crease angle.
+ReadGeometry = Callable[[str, Path, SceneFiles, float | None], Contents]
 
 
-def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
-    """Scene of a scene.toml; files that it refers to must be in its folder or below.
+def load_toml(path: Path, read_geometry: ReadGeometry, crease_deg: float | None = None) -> Scene:
+    """Scene of a scene.toml; files that it refers to must be in its folder or below. `crease_deg` replaces its own.
 
     Raises
     ------
@@ -64,7 +65,8 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
     """
     document, files = _parse(path), SceneFiles(path)
     there, missing = _there(document, path, files)
-    contents = [placed(read_geometry(entry.file, path, files), entry.scale, entry.up, path) for entry in there]
+    angle = document.crease_angle if crease_deg is None else crease_deg
+    contents = [placed(read_geometry(entry.file, path, files, angle), entry.scale, entry.up, path) for entry in there]
     for source in (s for c in contents for s in c.sources):
         files.use(source)
     environment = _environment(document, path, files) or next((c.environment for c in contents if c.environment), None)

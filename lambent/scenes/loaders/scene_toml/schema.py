@@ -262,7 +262,7 @@ class SceneDocument(Section):
     exposure_ev: Annotated[float, Field(ge=-30, le=30)] | None = None
     exposure_ev100: Annotated[float, Field(ge=-30, le=30)] | None = None
     environment: Annotated[EnvironmentSection, Field(discriminator="kind")] | None = None
-    crease_angle: Annotated[float, Field(ge=0, le=180)] | None = None  # degrees; edges with a larger angle are hard
+    crease_angle: Annotated[float, Field(ge=0, le=180)] | None = None  # degrees; see `load_scene`
     variant: str | None = None  # a material set of the geometry files
     materials: dict[str, dict[str, Any]] = Field(default_factory=dict)
     measured: dict[str, str] = Field(default_factory=dict)  # material -> file of the table that replaces it in bakes
