@@ -167,8 +167,7 @@ class Truth:
 
         if not len(texels):
             return np.zeros((2, 0, 3))
-        traced = retraced(self._context.traced, self._sides, texels, edited, paths, seed, self._progress)
-        return traced.halves.astype(float)
+        return retraced(self._context.traced, self._sides, texels, edited, paths, seed, self._progress)
 
     def _direct_sun(self) -> Floats:
         """Direct irradiance of the sun (n, 3), W/m^2."""

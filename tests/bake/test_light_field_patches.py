@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
+from lambent.bake.light_fields import sampling
 from lambent.bake.light_fields.on_patches import exact_places, surface_areas
-from lambent.bake.light_fields.sampling import Emphasis, densities, spread_evenly, thinned, turning_of
+from lambent.bake.light_fields.sampling import densities, spread_evenly, thinned, turning_of
 from lambent.core.geometry import triangle_areas
 from lambent.scenes.geometry import bezier, merge, patch, teapot, transformed
 from lambent.scenes.geometry.tessellation import tessellated
@@ -101,7 +102,7 @@ def test_points_are_not_behind_triangles_that_bulge_over_the_surface(mi: Any) ->
     assert over.min() > 0.002 and over.max() < 0.008, "at the offset over the triangles"
 
 
-def test_curvature_is_exact_in_the_density() -> None:
+def test_curvature_is_exact_in_the_density(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside a flat square, the ends of a bump turn fast: more points there than by area, unlike without emphasis."""
     both = tessellated(np.array([np.add(sheet(), (3, 0, 0)), octant(0.5)]), 4)
     share = {}
@@ -110,7 +111,8 @@ def test_curvature_is_exact_in_the_density() -> None:
         found = spread_evenly(both, 8 * count, rng)
         area = float(surface_areas(both).sum())
         free = np.full((len(found), 1), np.inf)
-        kept = thinned(found, densities(found, area, count, free, Emphasis(weight, 0.0)), count, rng)
+        monkeypatch.setattr(sampling, "DENSER_CURVED", weight)
+        kept = thinned(found, densities(found, area, count, free), count, rng)
         share[weight] = (found.positions[kept][:, 0] < 1).mean()
     ball = np.pi / 8
     assert share[0.0] == pytest.approx(ball / (1 + ball), abs=0.02)
@@ -119,17 +121,18 @@ def test_curvature_is_exact_in_the_density() -> None:
     assert share[2.0] == pytest.approx(denser * ball / (1 + denser * ball), abs=0.02)
 
 
-def test_density_by_patch(mi: Any) -> None:
+def test_density_by_patch(mi: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Three squares of equal area: twice as dense as the rest, not at all, and by area alone."""
     squares = np.array([sheet(), np.add(sheet(), (2, 0, 0)), np.add(sheet(), (4, 0, 0))])
     floor = merge([tessellated(squares, 2), patch((6, 0, 0), (1, 0, 0), (0, 1, 0))])
     placing = placing_of(SceneObject("floor", floor, "m"))
+    monkeypatch.setattr(sampling, "DENSER_NEAR", 0.0)
     density = (8.0, 0.0, 1.0)
-    x = placing.points(floor, 400, 0, emphasis=Emphasis(0, 0), patch_density=density).positions[:, 0]
+    x = placing.points(floor, 400, 0, patch_density=density).positions[:, 0]
     counts = [int(((x > left) & (x < left + 1)).sum()) for left in (0, 2, 4, 6)]
     assert sum(counts) == 400 and counts[1] == 0
     assert np.allclose(counts, [320, 0, 40, 40], atol=8)
-    even = placing.points(floor, 400, 0, emphasis=Emphasis(0, 0)).positions[:, 0]
+    even = placing.points(floor, 400, 0).positions[:, 0]
     assert [int(((even > left) & (even < left + 1)).sum()) for left in (0, 2, 4, 6)] == pytest.approx([100] * 4, abs=8)
 
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lambent.bake.light_fields import sampling
 from lambent.bake.light_fields.sampling import (
-    Emphasis,
     SurfacePoints,
     curvatures,
     densities,
@@ -33,13 +33,13 @@ def nearest_m(points: np.ndarray) -> np.ndarray:
     return np.asarray(cKDTree(points).query(points, 2)[0][:, 1])
 
 
-def even_points(mesh: Mesh, count: int, emphasis: Emphasis | None = None) -> SurfacePoints:
+def even_points(mesh: Mesh, count: int) -> SurfacePoints:
     """Points of a mesh that is alone: nothing is near."""
     rng = np.random.default_rng(0)
     found = spread_evenly(mesh, 8 * count, rng)
     area = float(triangle_areas(mesh.corners).sum())
     free = np.full((len(found), 1), np.inf)
-    return found[thinned(found, densities(found, area, count, free, emphasis or Emphasis()), count, rng)]
+    return found[thinned(found, densities(found, area, count, free), count, rng)]
 
 
 def test_candidates_lie_on_the_surface_in_equal_shares_of_area() -> None:
@@ -62,13 +62,14 @@ def test_points_keep_their_distance() -> None:
     assert nearest_m(random.positions).min() < 0.3 * best, "the test tells them apart"
 
 
-def test_density_follows_curvature_within_its_bounds() -> None:
+def test_density_follows_curvature_within_its_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
     """A large ball and a small one, of the same area in the end: the small one turns faster."""
     large, small = sphere(1.0, 48, 24), [placed(sphere(0.1, 24, 12), (3 + i, 0, 0)) for i in range(10)]
     mesh = merge([large, *small])
     share = {}
     for weight in (0.0, 2.0):
-        found = even_points(mesh, 600, Emphasis(weight, 0.0)).positions
+        monkeypatch.setattr(sampling, "DENSER_CURVED", weight)
+        found = even_points(mesh, 600).positions
         share[weight] = (found[:, 0] > 2).mean()
     of_area = 10 * 0.1**2 / (1 + 10 * 0.1**2)
     assert share[0.0] == pytest.approx(of_area, abs=0.02)
@@ -80,7 +81,7 @@ def test_density_follows_curvature_within_its_bounds() -> None:
 def test_points_gather_where_other_things_are_near() -> None:
     flat = spread_evenly(patch((0, 0, 0), (2, 0, 0), (0, 0, -1)), 8000, np.random.default_rng(0))
     free = np.where(flat.positions[:, :1] < 1, 1e-3, np.inf)
-    density = densities(flat, 2.0, 200, free, Emphasis(0.0, 2.0))
+    density = densities(flat, 2.0, 200, free)
     assert density.mean() == pytest.approx(100) and density.max() / density.min() == pytest.approx(3, rel=0.03)
     found = flat[thinned(flat, density, 200, np.random.default_rng(1))]
     assert (found.positions[:, 0] < 1).mean() == pytest.approx(0.75, abs=0.04)

@@ -18,7 +18,6 @@ import numpy as np
 from lambent.bake.light_fields.on_patches import surface_areas
 from lambent.bake.light_fields.sampling import (
     CANDIDATES,
-    Emphasis,
     SurfacePoints,
     densities,
     spread_evenly,
@@ -57,7 +56,7 @@ class Placing:
         self._solids, self._sheets = SolidTest(builder, scene), SolidTest(builder, scene, sheets=True)
 
     def points(
-        self, mesh: Mesh, count: int, seed: int, offset_m: float | None = None, emphasis: Emphasis | None = None,
+        self, mesh: Mesh, count: int, seed: int, offset_m: float | None = None,
         patch_density: Sequence[float] | None = None,
     ) -> Placed:  # fmt: skip
         """`count` points over a mesh, or less where little of it is in the open; by relative densities of its patches.
@@ -74,7 +73,7 @@ class Placing:
         places, heights = self.in_the_open(places, offset)
         if not len(places):
             raise UserError("its surface is hidden everywhere", hint="leave out its light field")
-        density = densities(places, area_m2, count, self.free_m(places), emphasis or Emphasis())
+        density = densities(places, area_m2, count, self.free_m(places))
         kept = thinned(places, density, count, rng)
         chosen = places[kept]
         return Placed(chosen.positions + heights[kept, None] * chosen.normals, chosen.normals, offset_m=offset)

@@ -23,6 +23,7 @@ CANDIDATES = 8  # for each point
 NEIGHBOURS = 40  # of a candidate that weigh: within two spacings there are about 30
 SHARPNESS = 8  # exponent of a neighbour's weight (Yuksel 2015, section 3)
 AROUND = 9  # nearest candidates that curvature is found from, the candidate itself included
+DENSER_CURVED, DENSER_NEAR = 2.0, 2.0  # more points where the surface turns, or other things are, within the spacing
 OPPOSED = 0.2  # cosine to the triangle's normal below which a shading normal is not believed
 
 
@@ -46,17 +47,6 @@ class SurfacePoints:
 
     def __len__(self) -> int:
         return len(self.positions)
-
-
-@dataclass(frozen=True)
-class Emphasis:
-    """How much denser points are where the surface turns, or other things are, within their spacing.
-
-    The densest places have 1 + `curvature` + `nearness` times as many to an area as flat and free ones.
-    """
-
-    curvature: float = 2.0
-    nearness: float = 2.0
 
 
 def spread_evenly(
@@ -95,17 +85,18 @@ def weights_of_faces(mesh: Mesh, patch_density: Sequence[float] | None) -> Float
     return weights
 
 
-def densities(points: SurfacePoints, area_m2: float, count: int, free_m: Floats, emphasis: Emphasis) -> Floats:
+def densities(points: SurfacePoints, area_m2: float, count: int, free_m: Floats) -> Floats:
     """Points per m^2 (n,) at points drawn by `spread_evenly`, for `count` points in all.
 
     Curvature and nearness are both shares from 0 to 1, by the spacing s of evenly spread points: k s/(1 + k s) of the
     curvature k, and the mean of s/(s + d) over the distances d that rays travel in `free_m` (n, rays). `area_m2` is
-    that of the surface, times the weight of its points.
+    that of the surface, times the weight of its points. The densest places have 1 + DENSER_CURVED + DENSER_NEAR times
+    as many to an area as flat and free ones.
     """
     spacing = np.sqrt(area_m2 / count)
     curved = turning_of(points) * spacing
     near = (spacing / (spacing + free_m)).mean(axis=1)
-    relative = 1 + emphasis.curvature * curved / (1 + curved) + emphasis.nearness * near
+    relative = 1 + DENSER_CURVED * curved / (1 + curved) + DENSER_NEAR * near
     weight = 1.0 if points.weight is None else points.weight
     return np.asarray(weight * relative * count / (area_m2 * relative.mean()))
 

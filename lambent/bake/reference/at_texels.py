@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,34 +11,21 @@ from lambent.bake.light.sampling import Sampling, tile_samples
 from lambent.bake.surfaces.texels import Sides, Texels
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats, Indices
-from lambent.core.progress import Progress, silent
+from lambent.core.progress import Progress
 from lambent.materials.document import Material
 
 DEPTH = 24
 AT_ONCE = 1024  # texels traced together
 
 
-@dataclass(frozen=True, eq=False)
-class Retraced:
-    """irradiance (n, 3) W/m^2 without direct sun, and halves (2, n, 3), whose difference is the noise."""
-
-    irradiance: Floats
-    halves: Floats
-
-    @property
-    def noise(self) -> float:
-        """Root mean square error relative to the mean."""
-        error = np.sqrt(((self.halves[0] - self.halves[1]) ** 2).mean()) / 2
-        return float(error / self.irradiance.mean())
-
-
 def retraced(
     traced: TracedScene, sides: Sides, chosen: Indices, materials: dict[str, Material], paths: int, seed: int,
-    progress: Progress = silent,
-) -> Retraced:  # fmt: skip
-    """Irradiance at texels `chosen` (n,) of a side, with `materials` replacing the scene's of the same names.
+    progress: Progress,
+) -> Floats:  # fmt: skip
+    """Irradiance, W/m^2 without direct sun, at texels `chosen` (n,) of a side, by halves of the paths (2, n, 3).
 
-    `paths` must be a multiple of 128. Points within texels are those of the light map's samples.
+    `materials` replace the scene's of the same names. `paths` must be a multiple of 128. Points within texels are those
+    of the light map's samples.
     """
     edited = _with_materials(traced, materials)
     scene, unseen = edited.whole(diffuse=True), edited.unseen(diffuse=True)
@@ -52,8 +39,7 @@ def retraced(
         region = tuple(slice(0, size) for size in (2, 1, len(mine), 4))
         parts.append(tile_samples(scene, line, region, seed + first, how)[:, 0])
     raw = np.concatenate(parts, axis=1)
-    halves = raw[..., :3] / np.maximum(raw[..., 3:], 1)
-    return Retraced(halves.mean(axis=0), halves)
+    return np.asarray(raw[..., :3] / np.maximum(raw[..., 3:], 1), float)
 
 
 def _with_materials(traced: TracedScene, materials: dict[str, Material]) -> TracedScene:
