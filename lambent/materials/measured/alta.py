@@ -15,6 +15,7 @@ include, are dropped.
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -91,10 +92,9 @@ def read(path: Path) -> MeasuredTable:
     if parametrisation.isotropic:
         phi_i, phi_o = np.zeros_like(phi_i), phi_o - phi_i
     table = np.column_stack([theta_i, phi_i, theta_o, phi_o, rows[above, inputs : inputs + outputs]])
-    places = {"theta_i": 0, "phi_i": 1, "theta_o": 2, "phi_o": 3}
-    layout = Layout(places, tuple(range(4, 4 + outputs)), quantity, kind if outputs == 3 else "grey")
-    gridded = parametrisation.gridded
-    return assemble(table, layout, 0.0, path, NAME, Path(path).stem, notes, gridded=gridded)
+    layout = Layout.absolute(quantity, kind if outputs == 3 else "grey", outputs)
+    layout = layout if parametrisation.gridded else replace(layout, gridded=False)
+    return assemble(table, layout, path, NAME, Path(path).stem, notes)
 
 
 def _parametrisation(name: str | None, inputs: int, path: Path) -> Parametrisation:

@@ -1,31 +1,41 @@
-"""Plain columns from other programs: angles and values, below a line of names in one of many conventions.
+"""One reader for texts of columns: angles and values below a line of names.
 
-    # measured 2025-03-04
-    theta_in, phi_in, theta_out, phi_out, BRDF
-    30, 0, 10, 180, 0.041
+    # name: rough copper
+    # symmetry: isotropic
+    theta_i phi_i theta_o phi_o p_r p_g p_b
+    5 0 0 0 0.0213 0.0175 0.0141
 
-The line of names may be a comment. Angles are in degrees unless a name says (rad). A file that does not name its
-quantity is refused, because f and f cos theta_o look alike. Lambent's own stricter format is in gonio_text.py.
+`FORMATS` describes each format: where it has its names and its keys, the unit of its angles, the azimuth of the light
+and the quantity that is meant where nothing states them.
+
+- Gonio text is Lambent's own (docs/formats.md), with `# key: value` comments, and that of other programs, whose names
+  have many spellings and may be a comment. A file that does not name its quantity is refused, because f and f cos
+  theta_o look alike.
+- ASTM E1392-96 (angle resolved optical scatter) has keywords in capitals, then VARS with the names. The reader follows
+  the files in circulation (Cornell's .astm, and those libbsdf and ALTA read): values are the BRDF unless the name says
+  cosine-corrected (CCBRDF, f_cos). The standard does not fix the unit of the angles: they are radians if no theta
+  exceeds pi/2. Without a column for phi_i it is 180 degrees, so that phi_s = 0 lies ahead, in the mirror direction.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from lambent.core.directions import Floats, direction
 from lambent.core.errors import UserError
-from lambent.core.plain import is_number
-from lambent.materials.measured import gonio_text
+from lambent.materials.measured.gonio import FORMAT
 from lambent.materials.measured.gonio_rows import LONGEST_NAME, check_angles, quantity_of, table_of, to_f
 from lambent.materials.measured.protocol import MeasuredTable, Quantity
 from lambent.materials.measured.scattered import ScatteredTable
 from lambent.materials.measured.spectral import rgb_of_measured, rgb_of_xyz
 from lambent.materials.measured.table import isotropic_brdf, require_values, sensible, unmarked, usable_values
 from lambent.materials.measured.text_numbers import (
+    HINT_QUANTITY,
     head_text,
     numbers,
     read_text,
@@ -34,14 +44,16 @@ from lambent.materials.measured.text_numbers import (
     without_comments,
 )
 
-NAME = "plain columns"
-HINT_QUANTITY = "name the columns in the first line: theta_i phi_i theta_o phi_o, then f, f_cos or p"
+_OWN = re.compile(r"theta_i phi_i theta_o phi_o (?:(?:f|f_cos|p)|(f|f_cos|p)_r \1_g \1_b)")  # surely degrees on a grid
 _OUT = ("o", "out", "s", "r", "scat", "refl", "v", "view", "e")
 _IN = ("i", "in", "inc", "l", "light", "incident")
 _WAVELENGTH = re.compile(r"(\d+(?:\.\d+)?)_?nm$", re.IGNORECASE)
 _SEPARATORS = re.compile(r"[\s,;]+")
 _BEFORE_UNIT = re.compile(r"\s+(?=[(\[])")  # "theta_i (deg)" is one name
-_LEAST_NUMBERS = 5
+_COMMENT_KEY = re.compile(rb"^#[^\S\n]*(\w+):[^\S\n]*(\S[^\n]*?)\s*$", re.MULTILINE)
+_VARS = re.compile(rb"^[ \t]*VARS[ \t=:]+([^\n]*theta_?i[^\n]*theta_?s[^\n]*)\n?", re.MULTILINE | re.IGNORECASE)
+_KEYWORD = re.compile(rb"^[ \t]*([A-Z][A-Z0-9_ ]*?)[ \t]*[=:]?[ \t]+(\S[^\n]*?)[ \t]*$", re.MULTILINE)
+_HEAD_BYTES = 1 << 16  # of a file, in which keys are sought
 _SCATTERED = 4  # fewer outgoing directions per incident one do not form a grid
 
 
@@ -61,6 +73,13 @@ class Layout:
         grey, rgb, xyz or spectra.
     wavelengths_nm : tuple of float
         Of spectra.
+    phi_i_deg : float
+        Used if no column has phi_i. A theta_o without a phi_o is in the plane of incidence, positive ahead of the
+        normal, in the mirror direction.
+    symmetry : str, optional
+        As the file names it.
+    gridded : bool, optional
+        Whether the incident directions form a grid; None if the rows decide.
     """
 
     angles: dict[str, int]
@@ -69,48 +88,93 @@ class Layout:
     kind: str
     wavelengths_nm: tuple[float, ...] = ()
     radians: bool = False
+    phi_i_deg: float = 0.0
+    symmetry: str | None = None
+    gridded: bool | None = None
+
+    @classmethod
+    def absolute(cls, quantity: Quantity, kind: str, values: int, wavelengths_nm: tuple[float, ...] = ()) -> Layout:
+        """The layout of theta_i, phi_i, theta_o and phi_o in degrees, then this many values."""
+        places = {"theta_i": 0, "phi_i": 1, "theta_o": 2, "phi_o": 3}
+        return cls(places, tuple(range(4, 4 + values)), quantity, kind, wavelengths_nm)
 
 
-def recognise(head: bytes, size: int) -> bool:
-    """Whether the first line names angles and values, or the first two have equally many numbers, at least five."""
-    text = head_text(head)
-    if text is None or gonio_text.recognise(head, size):
-        return False
-    names, body = _split(text)
-    if names is not None:
-        return True
-    first = [_SEPARATORS.split(line.strip()) for line in shown(body[: 1 << 12]).split("\n")]
-    first = [words for words in first if words != [""]][:2]
-    same = len({len(words) for words in first}) == 1 and len(first[0]) >= _LEAST_NUMBERS
-    return same and all(is_number(word) for words in first for word in words)
+@dataclass(frozen=True)
+class Heading:
+    """Names of the columns, keys and their values, and the text of the rows below."""
+
+    names: list[str]
+    keys: dict[str, str]
+    body: bytes
 
 
-def read(path: Path) -> MeasuredTable:
-    """The table of a file of columns.
+@dataclass(frozen=True)
+class ColumnText:
+    """Description of a format, and its reader.
 
-    Raises
-    ------
-    UserError
-        No name gives the quantity of the values, a row is broken, an angle is outside its range, or the incident
-        directions neither form a grid nor are scattered.
+    Attributes
+    ----------
+    heading : callable
+        The heading of a text, or None if no line names the angles.
+    name_key, count_key : str
+        Keys of the specimen's name and of the number of rows.
+    phi_i_deg : float
+        See `Layout`.
+    quantity : {"f"}, optional
+        Where no name gives it; without one, such a file is refused.
+    unit_by_range : bool
+        Whether angles are radians if no theta exceeds pi/2.
     """
-    names, body = _split(read_text(path))
-    if names is None:
-        refuse_decimal_commas(body, path)
-        first = shown(body.strip().split(b"\n")[0])
-        got = f"{len(_SEPARATORS.split(first.strip()))} columns without names"
-        raise UserError("the columns have no names", file=path, got=got, hint=HINT_QUANTITY)
-    layout = layout_of(names, path)
-    if layout.quantity is None:
-        got = ", ".join(names[column] for column in layout.values)
-        raise UserError("quantity of the value columns is not stated", file=path, got=got, hint=HINT_QUANTITY)
-    rows = rows_of(body, len(names), path)
-    notes = ("angles are in radians",) if layout.radians else ()
-    return assemble(rows, layout, 0.0, path, NAME, Path(path).stem, notes)
+
+    NAME: str
+    heading: Callable[[bytes], Heading | None]
+    name_key: str
+    count_key: str = ""
+    phi_i_deg: float = 0.0
+    quantity: Quantity | None = None
+    unit_by_range: bool = False
+
+    def recognise(self, head: bytes, size: int) -> bool:
+        """Whether the head of a file names the angles."""
+        text = head_text(head)
+        return text is not None and self.heading(text) is not None
+
+    def read(self, path: Path) -> MeasuredTable:
+        """The table of a file.
+
+        Raises
+        ------
+        UserError
+            A column is unknown, no name gives the quantity of the values, a row is broken, an angle is outside its
+            range, or the incident directions neither form a grid nor are scattered.
+        """
+        heading = self.heading(read_text(path))
+        if heading is None:
+            raise UserError("the columns have no names", file=path, hint=HINT_QUANTITY)
+        layout = layout_of(heading.names, path)
+        quantity = layout.quantity or self.quantity
+        if quantity is None:
+            got = ", ".join(heading.names[column] for column in layout.values)
+            raise UserError("quantity of the value columns is not stated", file=path, got=got, hint=HINT_QUANTITY)
+        rows = rows_of(heading.body, len(heading.names), path)
+        stated = heading.keys.get(self.count_key)
+        if stated is not None and stated.split()[0] != str(len(rows)):
+            expected = f"{len(rows)}, the number of rows"
+            raise UserError("wrong number of tuples", file=path, field=self.count_key, got=stated, expected=expected)
+        radians, notes = layout.radians, ("angles are in radians",) if layout.radians else ()
+        if self.unit_by_range:
+            theta = np.abs(rows[:, [layout.angles["theta_i"], layout.angles["theta_o"]]])
+            radians |= bool(theta[np.isfinite(theta)].max(initial=0.0) <= np.pi / 2 + 1e-3)
+            notes = (f"angles are taken as {'radians' if radians else 'degrees'}, by their range",)
+        name = heading.keys.get(self.name_key, "").strip("\"' ") or Path(path).stem
+        symmetry, gridded = heading.keys.get("symmetry"), _OWN.fullmatch(" ".join(heading.names)) is not None or None
+        layout = replace(layout, quantity=quantity, radians=radians, phi_i_deg=self.phi_i_deg)
+        return assemble(rows, replace(layout, symmetry=symmetry, gridded=gridded), path, self.NAME, name, notes)
 
 
-def _split(text: bytes) -> tuple[list[str] | None, bytes]:
-    """The column names, if a line gives them, and the rows below."""
+def _of_gonio_text(text: bytes) -> Heading | None:
+    """The last names before the rows, in a comment or not; None without any."""
+    keys = {key.decode(): shown(value) for key, value in _COMMENT_KEY.findall(text[:_HEAD_BYTES])}
     named: list[str] | None = None
     at = 0
     while at < len(text):
@@ -119,15 +183,31 @@ def _split(text: bytes) -> tuple[list[str] | None, bytes]:
         line = text[at:end].strip()
         comment = line.startswith((b"#", b"%", b"//"))
         if line:
-            words = _SEPARATORS.split(_BEFORE_UNIT.sub("", shown(line.lstrip(b"#%/")).strip(" \t,;")))
-            angles = {_angle(word) for word in words}
-            if {"theta_i", "theta_o"} <= angles and len(words) > 2:
+            line = line.lstrip(b"#%/") if comment else line.split(b"#")[0]
+            words = _SEPARATORS.split(_BEFORE_UNIT.sub("", shown(line).strip(" \t,;")))
+            if {"theta_i", "theta_o"} <= {_angle(word) for word in words} and len(words) > 2:
                 named = words
             if not comment:
-                is_names = named is words
-                return named, without_comments(text[end + 1 if is_names else at :])
+                body = without_comments(text[end + 1 if named is words else at :])
+                return Heading(named, keys, body) if named else None
         at = end + 1
-    return None, b""
+    return None
+
+
+def _of_astm(text: bytes) -> Heading | None:
+    """The names in a line VARS; None without one."""
+    text = without_comments(text)
+    found = _VARS.search(text)
+    if found is None:
+        return None
+    keys = {key.decode(): shown(value) for key, value in _KEYWORD.findall(text[: found.start()])}
+    return Heading([name for name in _SEPARATORS.split(shown(found[1])) if name], keys, text[found.end() :])
+
+
+FORMATS = (
+    ColumnText("ASTM E1392", _of_astm, "SAMPLE_NAME", "NUM_POINTS", 180.0, "f", unit_by_range=True),
+    ColumnText(FORMAT, _of_gonio_text, "name"),
+)
 
 
 def layout_of(names: list[str], path: Path) -> Layout:
@@ -198,57 +278,39 @@ def rows_of(body: bytes, columns: int, path: Path) -> Floats:
 
 
 def assemble(
-    rows: Floats,
-    layout: Layout,
-    phi_i_deg: float,
-    path: Path,
-    reader: str,
-    name: str,
-    notes: tuple[str, ...],
-    *,
-    gridded: bool = True,
+    rows: Floats, layout: Layout, path: Path, reader: str, name: str, notes: tuple[str, ...] = ()
 ) -> MeasuredTable:
-    """A gonio table if the incident directions form a grid, else a scattered one.
-
-    Parameters
-    ----------
-    phi_i_deg : float
-        Used if no column has phi_i. A theta_o without a phi_o is in the plane of incidence, positive ahead of the
-        normal, in the mirror direction.
-    gridded : bool
-        False for a format without columns for the light, where a grid would be coincidence.
-    """
-    angles = _degrees(rows, layout, phi_i_deg)
+    """A gonio table if the incident directions form a grid, else a scattered one."""
+    angles = _degrees(rows, layout)
     check_angles(angles, path)
-    if not layout.radians and angles[:, 2].max(initial=0.0) <= np.pi / 2 and angles[:, 2].max(initial=0.0) > 0.5:
-        raise UserError(
-            "angles seem to be radians", file=path, got=f"theta_o up to {angles[:, 2].max():.3g}",
-            hint="add (rad) to the names of their columns",
-        )  # fmt: skip
+    theta_o = angles[:, 2].max(initial=0.0)
+    if not (layout.radians or layout.gridded) and 0.5 < theta_o <= np.pi / 2:
+        got, hint = f"theta_o up to {theta_o:.3g}", "add (rad) to the names of their columns"
+        raise UserError("angles seem to be radians", file=path, got=got, hint=hint)
     f, said = _values(rows[:, list(layout.values)], layout)
     f = to_f(f, layout.quantity or "f", angles[:, 2])
     require_values(f, usable_values(f), path)
     if "phi_i" not in layout.angles:
-        notes += (f"phi_i not stated, taken as {phi_i_deg:g}",)
-    incident = np.unique(np.round(angles[:, :2], 5), axis=0)
-    few = len(incident) * _SCATTERED > len(rows)
-    if (few or not gridded) and not (angles[:, 2] > 90).any():
-        notes += ("incident directions form no grid: the material is taken as isotropic",)
-        wi, wo = (direction(*np.radians(angles[:, k : k + 2].T)) for k in (0, 2))
-        if f.shape[1] == 1:
-            f = np.repeat(f, 3, axis=1)
-        info = isotropic_brdf(path, reader, {"samples": len(rows)}, notes + said)
-        return ScatteredTable(wi, wo, f, info)
-    return table_of(angles, f, path, reader, name, stored=layout.quantity or "f", notes=notes + said)
+        notes += (f"phi_i not stated, taken as {layout.phi_i_deg:g}",)
+    gridded = layout.gridded
+    if gridded is None:
+        gridded = len(np.unique(np.round(angles[:, :2], 5), axis=0)) * _SCATTERED <= len(rows)
+    if gridded or (angles[:, 2] > 90).any():
+        stored = layout.quantity or "f"
+        return table_of(angles, f, path, reader, name, stored=stored, named=layout.symmetry, notes=notes + said)
+    notes += ("incident directions form no grid: the material is taken as isotropic",)
+    wi, wo = (direction(*np.radians(angles[:, k : k + 2].T)) for k in (0, 2))
+    info = isotropic_brdf(path, reader, {"samples": len(rows)}, notes + said)
+    return ScatteredTable(wi, wo, np.repeat(f, 3, axis=1) if f.shape[1] == 1 else f, info)
 
 
-def _degrees(rows: Floats, layout: Layout, phi_i_deg: float) -> Floats:
+def _degrees(rows: Floats, layout: Layout) -> Floats:
     """(N, 4) theta_i, phi_i, theta_o, phi_o."""
     unit = 180 / np.pi if layout.radians else 1.0
     with np.errstate(over="ignore"):
         given = {name: rows[:, column] * unit for name, column in layout.angles.items()}
     theta_i, theta_o = given["theta_i"], given["theta_o"]
-    phi_i = given.get("phi_i", np.full(len(rows), phi_i_deg))
+    phi_i = given.get("phi_i", np.full(len(rows), layout.phi_i_deg))
     phi_o = phi_i + given["dphi"] if "dphi" in given else given.get("phi_o", phi_i + 180)
     behind = theta_o < 0
     return np.stack([theta_i, phi_i, np.abs(theta_o), phi_o + np.where(behind, 180, 0)], axis=1)

@@ -20,7 +20,6 @@ from lambent.materials.measured.protocol import Quantity
 from lambent.materials.measured.sheets import ScatteredSheet, Sheet, specular_frame
 from lambent.materials.measured.table import sensible
 
-QUANTITIES: tuple[Quantity, ...] = ("f", "f_cos", "p")
 _WORDS: dict[str, Quantity] = {
     **dict.fromkeys(("f", "fr", "ft", "fs", "brdf", "btdf", "bsdf", "integrated"), "f"),
     **dict.fromkeys(("fcos", "ccbrdf", "ccbtdf", "ccbsdf", "brdfcos", "btdfcos", "bsdfcos"), "f_cos"),

@@ -43,7 +43,7 @@ from lambent.materials.measured.gonio import GonioTable
 from lambent.materials.measured.spectral import rgb_of_measured
 from lambent.materials.measured.specular_grids import SpecularGrid, specular_table
 from lambent.materials.measured.table import sensible
-from lambent.materials.measured.text_numbers import head_text, numbers, read_text, shown
+from lambent.materials.measured.text_numbers import angles_after, counted, head_text, numbers, read_text, shown
 
 NAME = "Integra DDR/DDT text"
 HINT_SPECULAR = "load the diffuse distribution of the same material (.ddr or .ddt)"
@@ -92,10 +92,8 @@ def read(path: Path) -> GonioTable:
     grid = _grid(head, path)
     kind = keys.get("typedata", "")
     if kind not in _KINDS:
-        expected = f"one of: {', '.join(_KINDS)}"
-        raise UserError(
-            "quantity of the values is not stated", file=path, field="TypeData", got=kind or None, expected=expected
-        )
+        expected, what = f"one of: {', '.join(_KINDS)}", "quantity of the values is not stated"
+        raise UserError(what, file=path, field="TypeData", got=kind or None, expected=expected)
     channels = _channels(text[first.start() :] if first else b"", grid, keys.get("typecolormodel", ""), path)
     values = np.stack([channel.values for channel in channels], axis=-1)
     cos_o = _cos_theta_o(grid)[..., None]
@@ -114,12 +112,8 @@ def read(path: Path) -> GonioTable:
     if kind.endswith("absolute"):
         values = values if kbdf is None else values * kbdf[:, :, None, None]
     elif kbdf is None:
-        raise UserError(
-            "is relative and does not state the share of the light (kbdf)",
-            file=path,
-            field="kbdf",
-            expected="its values",
-        )
+        what = "is relative and does not state the share of the light (kbdf)"
+        raise UserError(what, file=path, field="kbdf", expected="its values")
     else:
         values = values * _scale(specular_table(grid, values, path, NAME, far=far, mirrored=mirrored), grid, kbdf)
         notes += ("relative values are scaled to the shares of the light that the file states (kbdf)",)
@@ -131,22 +125,8 @@ def read(path: Path) -> GonioTable:
 
 def _grid(head: bytes, path: Path) -> SpecularGrid:
     """The lists of angles."""
-    lists = {"psi": np.zeros(1)}
-    for name, (low, high) in _RANGES.items():
-        found = re.search(rb"^[ \t]*" + name.encode() + rb"((?:\s+[-+.\de]+)*)", head, re.MULTILINE | re.IGNORECASE)
-        if found is None and name in lists:
-            continue
-        if found is None:
-            raise UserError("is missing", file=path, field=name)
-        count, *listed = numbers(found[1], path, name) if found[1].strip() else [np.nan]
-        if not listed or count != len(listed):
-            got = f"{count:g} and {len(listed)}"
-            raise UserError("count differs from the number of angles", file=path, field=name, got=got)
-        angles = np.array(listed)
-        if not ((np.diff(angles) > 0).all() and low <= angles[0] and angles[-1] <= high):
-            expected = f"increasing degrees from {low:g} to {high:g}"
-            raise UserError("is not a list of angles", file=path, field=name, got=listed, expected=expected)
-        lists[name] = angles
+    has_psi = re.search(rb"\bpsi\b", head, re.IGNORECASE) is not None
+    lists = {name: angles_after(name, *ends, head, path) for name, ends in _RANGES.items() if name != "psi" or has_psi}
     refracted = re.search(rb"^[ \t]*sigmat((?:\s+[-+.\de]+)*)", head, re.MULTILINE | re.IGNORECASE)
     specular = None
     if refracted is not None:
@@ -154,7 +134,7 @@ def _grid(head: bytes, path: Path) -> SpecularGrid:
         if len(specular) != len(lists["sigma"]) or not ((specular >= 0) & (specular <= 90)).all():
             expected = f"{len(lists['sigma'])} degrees from 0 to 90, one per sigma"
             raise UserError("is not a list of angles", file=path, field="sigmat", got=len(specular), expected=expected)
-    return SpecularGrid(lists["psi"], lists["sigma"], lists["phi"], lists["theta"], specular)
+    return SpecularGrid(lists.get("psi", np.zeros(1)), lists["sigma"], lists["phi"], lists["theta"], specular)
 
 
 def _channels(body: bytes, grid: SpecularGrid, model: str, path: Path) -> list[_Channel]:
@@ -190,17 +170,9 @@ def _channel(part: bytes, name: str, grid: SpecularGrid, path: Path) -> _Channel
     wavelength = float(numbers(data[1], path, name)[0]) if data[1] else np.nan
     if name == "wl" and not (np.isfinite(wavelength) and wavelength > 0):
         raise UserError("is not a wavelength in nm", file=path, field=name, got=shown(data[1]))
-    values = _counted(data[3], grid.shape, f"{name} def", path)
-    kbdf = None if data[2] is None else _counted(data[2], grid.shape[:2], f"{name} kbdf", path)
+    values = counted(data[3], grid.shape, path, f"{name} def")
+    kbdf = None if data[2] is None else counted(data[2], grid.shape[:2], path, f"{name} kbdf")
     return _Channel(values, kbdf, wavelength)
-
-
-def _counted(text: bytes, shape: tuple[int, ...], field: str, path: Path) -> Floats:
-    found, expected = numbers(text, path, field), int(np.prod(shape))
-    if len(found) != expected:
-        wanted = f"{expected}: " + " x ".join(str(count) for count in shape)
-        raise UserError("wrong number of values", file=path, field=field, got=len(found), expected=wanted)
-    return found.reshape(shape)
 
 
 def _cos_theta_o(grid: SpecularGrid) -> Floats:

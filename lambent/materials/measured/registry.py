@@ -1,7 +1,8 @@
 """Find the reader of a measured file by its content.
 
 A reader is a module of this package that has `NAME` (str), `recognise(head: bytes, size: int) -> bool` and
-`read(path: Path) -> MeasuredTable`. File suffixes are ignored: three formats share `.bsdf`.
+`read(path: Path) -> MeasuredTable`, or one of the `FORMATS` of a module. File suffixes are ignored: three formats share
+`.bsdf`.
 """
 
 from __future__ import annotations
@@ -43,7 +44,9 @@ class Reader(Protocol):
 def readers() -> tuple[Reader, ...]:
     """All readers in the package, by name."""
     package = sys.modules[__name__.rpartition(".")[0]]  # imports this module, so importing it would be circular
-    return tuple(sorted(modules_in(package, having="recognise").values(), key=lambda reader: reader.NAME))
+    found: list[Reader] = [*modules_in(package, having="recognise").values()]
+    found += [reader for module in modules_in(package, having="FORMATS").values() for reader in module.FORMATS]
+    return tuple(sorted(found, key=lambda reader: reader.NAME))
 
 
 def load(path: Path | str, reconstruction: Reconstruction | Literal["auto"] = AUTO) -> MeasuredTable:

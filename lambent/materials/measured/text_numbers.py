@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import math
 import re
 from pathlib import Path
 
@@ -17,6 +18,7 @@ UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _BINARY = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 _DECIMAL_COMMA = re.compile(rb"(?:^|[\s;])[-+]?\d+,\d+(?:[eE][-+]?\d+)?(?=[\s;]|$)")
 _COMMENT = re.compile(rb"#[^\n]*")
+HINT_QUANTITY = "name the columns in the first line: theta_i phi_i theta_o phi_o, then f, f_cos or p"
 HINT_DECIMAL_COMMA = "replace the decimal commas by points, and separate the columns by blanks or semicolons"
 
 
@@ -87,6 +89,36 @@ def numbers(text: bytes, path: Path, field: str | None = None) -> Floats:
             hint = HINT_DECIMAL_COMMA if has_decimal_commas(text) else None
             raise UserError("has a word that is not a number", file=path, field=field, got=word, hint=hint) from error
     raise UserError("has numbers that cannot be read", file=path, field=field)
+
+
+def counted(text: bytes, shape: tuple[int, ...], path: Path, field: str, of: str = "") -> Floats:
+    """The numbers of a text as an array of this shape, `of` in words; `UserError` if there are more or fewer."""
+    found, expected = numbers(text, path, field), math.prod(shape)
+    if len(found) != expected:
+        wanted = f"{' x '.join(map(str, shape))} {of}".strip()
+        raise UserError("wrong number of values", file=path, field=field, got=len(found), expected=wanted)
+    return found.reshape(shape)
+
+
+def angles_after(keyword: str, low: float, high: float, head: bytes, path: Path) -> Floats:
+    """(N,) angles that a header lists after a keyword and their number.
+
+    Raises
+    ------
+    UserError
+        The keyword is missing, the number differs, or the angles do not increase from `low` to at most `high`.
+    """
+    found = re.search(rb"\b" + keyword.encode() + rb"((?:\s+[-+.,\deE]+)*)", head, re.IGNORECASE)
+    if found is None:
+        raise UserError("is missing", file=path, field=keyword)
+    count, *angles = numbers(found[1], path, keyword) if found[1].strip() else [np.nan]
+    if not angles or count != len(angles):
+        got = f"{count:g} and {len(angles)}"
+        raise UserError("count differs from the number of angles", file=path, field=keyword, got=got)
+    if not ((np.diff(angles) > 0).all() and low <= angles[0] and angles[-1] <= high):
+        expected = f"increasing degrees from {low:g} to {high:g}"
+        raise UserError("is not a list of angles", file=path, field=keyword, got=angles, expected=expected)
+    return np.array(angles)
 
 
 def refuse_decimal_commas(text: bytes, path: Path) -> None:

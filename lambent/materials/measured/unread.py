@@ -7,7 +7,11 @@ from __future__ import annotations
 
 import re
 
+from lambent.core.plain import is_number
+from lambent.materials.measured.text_numbers import HINT_QUANTITY, shown
+
 _HEAD_BYTES = 4096
+_LEAST_NUMBERS = 5  # of a row of columns
 _TEXT_EXPORT = "export it as Zemax BSDF, ASTM E1392 or plain columns with named angles"
 _KINDS = (
     ("ALTA binary", rb"#FORMAT[ \t]+binary", "convert it to ALTA text: data2data without `format binary`"),
@@ -27,4 +31,9 @@ _KINDS = (
 def kind_of(head: bytes) -> tuple[str, str] | None:
     """Format of a file that begins with `head`, and advice on it; None if unknown."""
     begin = head[:_HEAD_BYTES]
-    return next(((name, remedy) for name, signature, remedy in _KINDS if re.search(signature, begin)), None)
+    found = next(((name, remedy) for name, signature, remedy in _KINDS if re.search(signature, begin)), None)
+    row = re.match(r"(?:\s*(?:[#%]|//)[^\n]*\n)*\s*([^\n]*)", shown(begin))
+    words = re.split(r"[\s;]+|,\s+", row[1].strip()) if row else []
+    if found is None and len(words) >= _LEAST_NUMBERS and all(is_number(word.replace(",", ".")) for word in words):
+        return "columns without names", f"{HINT_QUANTITY}, without decimal commas"
+    return found

@@ -20,18 +20,27 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.directions import direction
-from lambent.core.errors import UserError, did_you_mean
+from lambent.core.discovery import known
+from lambent.core.errors import UserError
 from lambent.materials.measured.gonio import GonioTable
 from lambent.materials.measured.protocol import LARGEST_F
 from lambent.materials.measured.spectral import rgb_of_xyz
 from lambent.materials.measured.specular_grids import SpecularGrid, specular_table
 from lambent.materials.measured.table import unmarked
-from lambent.materials.measured.text_numbers import begins_with, numbers, read_text, shown, without_comments
+from lambent.materials.measured.text_numbers import (
+    angles_after,
+    begins_with,
+    counted,
+    read_text,
+    shown,
+    without_comments,
+)
 
 NAME = "Zemax BSDF text"
+BELOW_90_DEG = float(np.nextafter(90, 0))
 LISTS = {
     "SampleRotation": (-360, 360),
-    "AngleOfIncidence": (0, 90),
+    "AngleOfIncidence": (0, BELOW_90_DEG),
     "ScatterAzimuth": (0, 360),
     "ScatterRadial": (0, 180),
 }
@@ -77,51 +86,30 @@ def read(path: Path) -> GonioTable:
 
 def _header(head: bytes, path: Path) -> tuple[dict[str, str], dict[str, Floats]]:
     """The keywords and the lists of angles above the data."""
+    lists = {name: angles_after(name, low, high, head, path) for name, (low, high) in LISTS.items()}
     words: dict[str, str] = {}
-    lists: dict[str, Floats] = {}
-    for name, (low, high) in LISTS.items():
-        found = re.search(rb"\b" + name.encode() + rb"\s([^A-Za-z]*)", head)
-        if found is None:
-            raise UserError("is missing", file=path, field=name)
-        count, *angles = numbers(found[1], path, name) if found[1].strip() else [np.nan]
-        if len(angles) == 0 or count != len(angles):
-            raise UserError(
-                "count differs from the number of angles", file=path, field=name, got=f"{count:g} and {len(angles)}"
-            )
-        lists[name] = np.array(angles)
-        open_end = name == "AngleOfIncidence" and angles[-1] >= high
-        if not ((np.diff(angles) > 0).all() and low <= angles[0] and angles[-1] <= high) or open_end:
-            expected = f"increasing degrees from {low} to {high}"
-            raise UserError("is not a list of angles", file=path, field=name, got=angles, expected=expected)
-    for name, known in _WORDS.items():
-        named = re.search(rb"\b" + name.encode() + rb"\s+(\w+)", head)
-        got = shown(named[1]) if named else None
-        word = next((word for word in known if got is not None and word.lower() == got.lower()), None)
-        if word is None:
-            hint = did_you_mean(got, known) if got else None
-            raise UserError("is unknown", file=path, field=name, got=got, expected=f"one of: {known}", hint=hint)
-        words[name] = word
+    for name, choices in _WORDS.items():
+        found = re.search(rb"\b" + name.encode() + rb"\s+(\w+)", head)
+        got = shown(found[1]) if found else "nothing"
+        same = next((word for word in choices if word.lower() == got.lower()), got)
+        words[name] = known(name, same, choices, file=path, field=name)
     return words, lists
 
 
 def _section(part: bytes, shape: tuple[int, ...], path: Path) -> tuple[Floats, Floats]:
     """(rotations, incidences, azimuths, radials) values and (rotations, incidences) TIS of one channel."""
     blocks = _BLOCK.split(part)
-    count, each = shape[0] * shape[1], shape[2] * shape[3]
-    if blocks[0].strip() or len(blocks) != count + 1:
+    if blocks[0].strip() or len(blocks) != shape[0] * shape[1] + 1:
         expected = f"{shape[0]} rotations x {shape[1]} angles of incidence, each after its TIS"
         raise UserError("wrong number of data blocks", file=path, got=len(blocks) - 1, expected=expected)
-    read_blocks = []
-    for number, block in enumerate(blocks[1:], 1):
-        # Without DataEnd, the next channel's name follows the last block.
-        field = f"block {number}"
-        found = numbers(re.sub(rb"\n\s*(?:Tristimulus\w*|Monochrome)\s*$", b"", block), path, field)
-        if len(found) != each + 1:
-            expected = f"TIS and {shape[2]} azimuths x {shape[3]} radial angles"
-            raise UserError("wrong number of values", file=path, field=field, got=len(found), expected=expected)
-        read_blocks.append(found)
-    whole = np.stack(read_blocks)
+    whole = np.stack([_block(block, f"block {number}", shape, path) for number, block in enumerate(blocks[1:], 1)])
     return whole[:, 1:].reshape(shape), whole[:, 0].reshape(shape[:2])
+
+
+def _block(text: bytes, field: str, shape: tuple[int, ...], path: Path) -> Floats:
+    """TIS and the values of a block; without DataEnd, the next channel's name follows the last block."""
+    text = re.sub(rb"\n\s*(?:Tristimulus\w*|Monochrome)\s*$", b"", text)
+    return counted(text, (1 + shape[2] * shape[3],), path, field, "(TIS, azimuths x radial angles)")
 
 
 def _table(values: Floats, tis: Floats, lists: dict[str, Floats], words: dict[str, str], path: Path) -> GonioTable:

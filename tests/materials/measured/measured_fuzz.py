@@ -88,14 +88,13 @@ def seeds() -> dict[str, list[bytes]]:
         "MERL binary": [merl_bytes(np.full((6, 5, 4, 3), 0.25))],
         "RGL tensor file": [tensor_bytes(rgl_fields(p)) for p in (np.zeros(1), np.linspace(-np.pi, -np.pi / 2, 3))],
         "Cornell / pbrt-v2 text": [cornell_text(cornell_rows(count=20), np.linspace(400, 700, 5)).encode()],
-        "gonio text": [_gonio(coarse), _gonio(turned)],
+        "gonio text": [_gonio(coarse), _gonio(turned), columns.encode(), scan],
         "Zemax BSDF text": [
             zemax_text(lambda wi, wo: 0.1 + 0 * wo[..., :1], "PlaneSymmetrical").encode(),
             zemax_text(lambda wi, wo: 0.1 + 0 * wo, "Asymmetrical", "BTDF").encode(),
         ],
         "FRED BSDF text": [fred_text({(10, 0): block, (40, 0): block}).encode()],
         "ASTM E1392": [(astm + "\n".join(",".join(f"{v:.6g}" for v in row) for row in tuples) + "\n").encode()],
-        "plain columns": [columns.encode(), scan],
         "LBNL BSDF XML": [
             lbnl_xml("Columns", matrix, basis, "mine").encode(),
             lbnl_xml("TensorTree3", [("Visible", "Transmission Back", tree)]).encode(),

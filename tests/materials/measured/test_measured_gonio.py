@@ -185,13 +185,13 @@ def test_outgoing_grid_is_closer_at_the_mirror_direction() -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("theta_i phi_i theta_o phi_o\n0 0 0 0\n", "quantity of the value columns is not stated"),
+        ("theta_i phi_i theta_o phi_o\n0 0 0 0\n", "unknown value columns; found none"),
         ("theta_i phi_i theta_o phi_o value\n0 0 0 0 1\n", "quantity of the value columns is not stated"),
-        ("theta_i phi_i theta_o phi_o f_r f_g\n0 0 0 0 1 1\n", "quantity of the value columns is not stated"),
+        ("theta_i phi_i theta_o phi_o f_r f_g\n0 0 0 0 1 1\n", "unknown value columns; found f_r f_g"),
         ("theta_i phi_i theta_o phi_o p\n", "no rows"),
         ("theta_i phi_i theta_o phi_o p\n# only this\n", "no rows"),
-        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 x\n", "row is malformed"),
-        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 1\n0 0 10\n", "row is malformed"),
+        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 x\n", "found x"),
+        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 1\n0 0 10\n", "one value per column name"),
         ("theta_i phi_i theta_o phi_o p\n0 0 0 0 1 2\n", "one value per column name"),
         ("theta_i phi_i theta_o phi_o p\n95 0 0 0 1\n", "outside its range"),
         ("theta_i phi_i theta_o phi_o p\n0 0 200 0 1\n", "outside its range"),

@@ -100,7 +100,7 @@ def test_crlf_commas_in_comments_and_capitals(tmp_path: Path) -> None:
         ("TypeColorModel BW", "TypeColorModel RGB", "channels do not match.*found bw"),
         ("theta 9", "theta 8", "theta: count differs"),
         ("sigma 4\n 0 30 60 90", "sigma 4\n 0 30 60 91", "sigma: is not a list of angles"),
-        (" kbdf\n  0.8", " kbdf\n ", "bw kbdf: wrong number of values; found 3; expected 4: 1 x 4"),
+        (" kbdf\n  0.8", " kbdf\n ", "bw kbdf: wrong number of values; found 3; expected 1 x 4"),
         (" enddef", " 1 enddef", "bw def: wrong number of values"),
         (" def", " 1,5 def", "not a number; found 1,5"),
         ("phi 8", "psi 8", "is missing|is not a list"),
@@ -158,7 +158,7 @@ def test_lighttools_in_colour(tmp_path: Path) -> None:
     ("text", "said"),
     [
         (lighttools(poi=(0, 45)), "several planes of incidence"),
-        (lighttools().replace("Side Front", "Side Top", 1), "block 1, Side: is unknown; found Top"),
+        (lighttools().replace("Side Front", "Side Top", 1), "block 1: unknown Side; found Top"),
         (lighttools().replace("ScatterRadial 6", "ScatterRadial 5"), "ScatterRadial: count differs"),
         (lighttools().replace("TIS 0.3\n", "TIS 0.3\n1 ", 1), "block 1: wrong number of values"),
         (lighttools().replace("TIS 0.3", "", 1), "is missing|wrong number of blocks"),

@@ -156,7 +156,7 @@ GOOD = zemax_text(tilted_lobe, "PlaneSymmetrical")
     ("change", "expected"),
     [
         (lambda text: text.replace("PlaneSymmetrical", "PlanSymmetrical"), "did you mean 'PlaneSymmetrical'"),
-        (lambda text: text.replace("ScatterType\tBRDF", ""), "ScatterType: is unknown"),
+        (lambda text: text.replace("ScatterType\tBRDF", ""), "ScatterType: unknown ScatterType"),
         (lambda text: text.replace("ScatterRadial", "Scatterradius"), "ScatterRadial: is missing"),
         (lambda text: text.replace("AngleOfIncidence\t3", "AngleOfIncidence\t4"), "count differs"),
         (lambda text: text.replace("10\t40\t70", "40\t10\t70"), "not a list of angles"),
