@@ -12,7 +12,7 @@ import pytest
 
 from lambent.core.camera import Camera
 from lambent.core.shared_exponent import packed_rgb, unpacked_rgb
-from lambent.editing.canvas import HostCanvas
+from lambent.editing.canvas import HostCanvas, viewed
 from lambent.editing.interreflection.entries import TermLight
 from lambent.editing.interreflection.noise import light_of, noise
 from lambent.editing.interreflection.picture import FrozenPicture
@@ -23,7 +23,7 @@ from lambent.editing.picture import EditedPicture, Part
 from lambent.editing.rows import Rows
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo, term_albedo
-from lambent.materials.factored.curve import KNOTS, Curve
+from lambent.materials.factored.curve import END_RAD, KNOTS, Curve
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable, Term
 from lambent.store.contract import view_artefact_name
@@ -275,3 +275,10 @@ def test_tiles_that_are_not_there_yet_are_black(tmp_path: Path) -> None:
         canvas.compose(FrozenPicture(found, START, edited, canvas).shown)
         image = canvas.image().reshape(-1, 3)
         assert image[0].all() and not image[1:].any()
+
+
+def test_curves_of_the_viewer_are_interpolated_between_their_knots() -> None:
+    ramp = Curve(np.multiply.outer(np.arange(KNOTS + 1.0), [1.0, 2.0, -3.0]))
+    step = np.array([-9.0, 0.0, 0.25, 700.75, KNOTS - 0.5, KNOTS, KNOTS + 9.0])
+    found = viewed((step * END_RAD / KNOTS).astype(np.float32), ramp)
+    assert np.allclose(found, np.multiply.outer([1.0, 2.0, -3.0], step.clip(0, KNOTS)), rtol=1e-5, atol=1e-3)

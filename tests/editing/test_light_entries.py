@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.shared_exponent import packed_rgb
+from lambent.core.shared_exponent import packed_rgb, unpacked_rgb
+from lambent.core.wavelets import transformed
 from lambent.editing.interreflection.entries import Entries, TermLight
+from lambent.editing.interreflection.folding import Cells, rows
 
 
 def tile(points: int, numbers: int, share: float, seed: int) -> Entries:
@@ -45,3 +47,21 @@ def test_fewer_bytes_than_numbers_in_full() -> None:
     entries = tile(200, 5000, 0.06, 3)
     light = TermLight.of_tiles([entries], np.ones(200, np.float32), (64,))
     assert light.steps.nbytes + light.values.nbytes < 0.65 * (entries[1].nbytes + entries[2].nbytes)
+
+
+@pytest.mark.parametrize("scale", [1e-4, 1.0, 3e3])
+def test_rows_of_very_bright_light_are_the_sums_of_its_entries(scale: float) -> None:
+    """Four tails in two cells, eight bands in two rows; half floats end at 65504."""
+    rng, units = np.random.default_rng(4), np.array([1, 50, 0.02, 900], np.float32)
+    light = TermLight.of_tiles([tile(4, 32, 0.8, 4)], units, (8,))
+    band, tail = rng.uniform(0, 7, (8, 3)) * scale, rng.uniform(0.2, 0.4, (4, 3)) * scale
+    band[0], tail[0] = 1e-3 * band[0], 1e-3 * tail[0]
+    cell, row = np.array([0, 1, 1, 0]), np.arange(8) % 2
+    found, unit = rows(light, band, tail, Cells(cell, np.arange(2), np.arange(2)), row, 2)
+    point = np.repeat(np.arange(4), np.diff(light.ends))
+    of_tail, of_band = np.divmod(light.codes, 8)
+    sums = np.zeros((2, 2, 3, 4))
+    each = unpacked_rgb(light.values) * units[point, None] * band[of_band] * tail[of_tail]
+    np.add.at(sums, (cell[of_tail], row[of_band], slice(None), point), each)
+    expected = np.stack([transformed(one) for one in sums])
+    assert np.allclose(found.astype(float) * unit, expected, atol=2e-3 * expected.max())

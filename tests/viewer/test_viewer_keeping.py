@@ -91,6 +91,21 @@ def test_a_drag_is_written_when_it_is_over(window, tmp_path):
     assert not (tmp_path / FILE).exists()
 
 
+def test_changes_are_written_once_they_rest(window, tmp_path):
+    window.paint(RED)
+    window.keeper.tick()
+    assert window.keeper.wait_s() == QUIET_S
+    window.screen.clock.now_s += 0.75 * QUIET_S
+    window.keeper.tick()
+    window.keeper._finish()
+    assert window.keeper.wait_s() == pytest.approx(QUIET_S / 4) and not (tmp_path / UNSAVED_FILE).exists()
+    window.screen.clock.now_s += QUIET_S
+    assert window.keeper.wait_s() == 0
+    window.keeper.tick()
+    window.keeper._finish()
+    assert window.keeper.wait_s() is None and (tmp_path / UNSAVED_FILE).exists()
+
+
 def test_discarding_keeps_the_saved_session_alone(window, tmp_path):
     window.paint(RED)
     window.keeper.save()
