@@ -1,4 +1,4 @@
-"""The Kurt lobe: eval, sample, pdf. One implementation for numpy and the JIT path tracer; lobes.wgsl is a copy.
+"""The Kurt lobe: eval, sample, pdf. One implementation for numpy and the JIT path tracer; lobes.wgsl has parts.
 
 Every function takes directions as (x, y, z) component tuples and the array library `ops`: `NUMPY`, or any module with
 the same names, such as drjit.
@@ -160,12 +160,3 @@ def pdf(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> Any:
     h = half_vector(wi, wo, ops)
     value = distribution(h, lobe, ops) * h[2] / (4 * ops.maximum(dot(wo, h), 1e-6))
     return ops.select(valid, value, 0.0)
-
-
-def weight(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> Vector:
-    """f |cos theta_i| / pdf of a direction from `sample`, RGB; D, which can under- or overflow, cancels."""
-    wi, wo, valid = _same_side(wi, wo, lobe, ops)
-    h = half_vector(wi, wo, ops)
-    value = ops.select(valid, wi[2] / (ops.maximum(h[2], 1e-6) * _cosine_power(wi, wo, lobe, ops)), 0.0)
-    red, green, blue = (value * tint(dot(wo, h), lobe, c, ops) for c in range(3))
-    return red, green, blue

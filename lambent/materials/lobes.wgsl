@@ -1,9 +1,8 @@
-// The Kurt lobe for shaders: eval, sample, pdf. lobes.py is the reference; tests compare the two.
+// Parts of the Kurt lobe for shaders. lobes.py is the reference; tests compare the two.
 //
 // Conventions (those of lobes.py): local shading frame (t, b, n), n = +z; unit directions away from the surface;
-// wi to the light, wo to the viewer. f is in 1/sr and without the cosine. The sheet is thin and two-sided: a pair of
-// directions seen from below is the same pair seen from above; for transmission wi is mirrored at the surface, for a
-// retro lobe about n.
+// wi to the light, wo to the viewer, both on the upper side: for transmission wi is mirrored at the surface, for a retro
+// lobe about n. f is in 1/sr and without the cosine.
 // No bindings, no entry points: a pure include. Every name begins with lambent_ / Lambent / LAMBENT_.
 //
 // Sources: Kurt, Szirmay-Kalos & Krivanek 2010; thesis M, equations in parentheses; GGX: Walter et al. 2007, eq. 33.
@@ -11,7 +10,6 @@
 // Hazards in float32: 1 - (n.h)^2 and tan^2(theta_h) cancel at low roughness, so everything is built from hx^2, hy^2,
 // hz^2. The half vector itself carries an absolute error of 6e-8, so f of a lobe of slope m carries a relative error
 // of about 1e-7 tan(theta_h) / m^2: harmless at m = .05, a few per cent at the foot of a lobe of m = .001.
-// Never divide f by pdf: both hold D, which under- and overflows. lambent_weight is that quotient with D cancelled.
 
 const LAMBENT_PI: f32 = 3.14159265358979;
 const LAMBENT_COS_MIN: f32 = 1e-4;
@@ -86,21 +84,6 @@ fn lambent_sample_half_vector(u: vec2f, lobe: LambentLobe) -> vec3f {
     return lambent_from_slopes(slope);
 }
 
-// Whether the lobe sees this pair: on one side for reflection, on both for transmission, not at the horizon.
-fn lambent_sees(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> bool {
-    let same = wi.z * wo.z > 0.0;
-    return min(abs(wi.z), abs(wo.z)) > LAMBENT_COS_MIN && same == (lobe.side == LAMBENT_REFLECTION);
-}
-
-fn lambent_up(w: vec3f) -> vec3f {
-    return vec3f(w.xy, abs(w.z));
-}
-
-// wi moved to the upper side, where the lobe is about the mirror direction. Its own inverse on that side.
-fn lambent_unfolded(wi: vec3f, lobe: LambentLobe) -> vec3f {
-    return vec3f(select(wi.xy, -wi.xy, lobe.retro == 1u), abs(wi.z));
-}
-
 fn lambent_cosine_power(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> f32 {
     return pow(max(abs(wi.z * wo.z), 1e-12), lobe.alpha);
 }
@@ -109,47 +92,4 @@ fn lambent_cosine_power(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> f32 {
 fn lambent_tint(cos_d: f32, lobe: LambentLobe) -> vec3f {
     let f = lambent_fresnel(cos_d, lobe.r0);
     return lobe.k * select(f, 1.0 - f, lobe.side == LAMBENT_TRANSMISSION);
-}
-
-// x: the lobe without its Fresnel factor, D / (4 (wo.h) (cos_i cos_o)^alpha) in 1/sr; y: cos_d = wo.h.
-fn lambent_shape(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> vec2f {
-    let up = lambent_up(wo);
-    let h = lambent_half_vector(lambent_unfolded(wi, lobe), up);
-    let cos_d = dot(up, h);
-    let value = lambent_distribution(h, lobe) / (4.0 * max(cos_d, 1e-6) * lambent_cosine_power(wi, wo, lobe));
-    return vec2f(select(0.0, value, lambent_sees(wi, wo, lobe)), cos_d);
-}
-
-// f of one lobe in 1/sr, RGB, without the cosine (3.4, 3.5).
-fn lambent_evaluate(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> vec3f {
-    let shape = lambent_shape(wi, wo, lobe);
-    return shape.x * lambent_tint(shape.y, lobe);
-}
-
-// wo mirrored about a half vector of the upper side; for transmission on the far side.
-fn lambent_scattered(wo: vec3f, h: vec3f, lobe: LambentLobe) -> vec3f {
-    let wi = lambent_mirrored(lambent_up(wo), h);
-    let below = (wo.z > 0.0) == (lobe.side == LAMBENT_TRANSMISSION);
-    return vec3f(select(wi.xy, -wi.xy, lobe.retro == 1u), select(wi.z, -wi.z, below));
-}
-
-// wi from u in [0, 1)^2. A direction on the wrong side of the surface is returned unchanged: pdf, f and weight are 0.
-fn lambent_sample(wo: vec3f, u: vec2f, lobe: LambentLobe) -> vec3f {
-    return lambent_scattered(wo, lambent_sample_half_vector(u, lobe), lobe);
-}
-
-// Density of lambent_sample in 1/sr: D h.z / (4 (wo.h)) (4.9).
-fn lambent_pdf(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> f32 {
-    let up = lambent_up(wo);
-    let h = lambent_half_vector(lambent_unfolded(wi, lobe), up);
-    let value = lambent_distribution(h, lobe) * h.z / (4.0 * max(dot(up, h), 1e-6));
-    return select(0.0, value, lambent_sees(wi, wo, lobe));
-}
-
-// f |cos theta_i| / pdf of a direction made by lambent_sample, with D cancelled.
-fn lambent_weight(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> vec3f {
-    let up = lambent_up(wo);
-    let h = lambent_half_vector(lambent_unfolded(wi, lobe), up);
-    let value = lambent_tint(dot(up, h), lobe) * (abs(wi.z) / (max(h.z, 1e-6) * lambent_cosine_power(wi, wo, lobe)));
-    return select(vec3f(0.0), value, lambent_sees(wi, wo, lobe));
 }

@@ -51,20 +51,6 @@ def test_reciprocal(name):
     assert reciprocity_error(MaterialBSDF(Material(lobes=(LOBES[name],)))) < RECIPROCITY_LIMIT
 
 
-@pytest.mark.parametrize("name", LOBES)
-def test_weight_is_value_over_density(name):
-    lobe = LOBES[name]
-    wo, _ = pairs()
-    u = np.random.default_rng(1).random((2, len(wo)))
-    wo = components(wo)
-    wi = lobes.sample(wo, *u, lobe)
-    p = lobes.pdf(wi, wo, lobe)
-    got = np.stack(lobes.weight(wi, wo, lobe), axis=-1)
-    expected = np.stack(lobes.evaluate(wi, wo, lobe), axis=-1) * np.abs(wi[2] / np.where(p > 0, p, 1))[:, None]
-    assert (p > 0).mean() > 0.3
-    np.testing.assert_allclose(got, expected, rtol=1e-6)
-
-
 def test_a_pdf_wrong_by_two_per_cent_is_noticed_and_explained(tmp_path):
     """The right pdf passes; 2 % too high, or a roughness 2 % too wide, fails, and an image shows it."""
     right = MaterialBSDF(Material(lobes=(Lobe(mx=0.2, my=0.2),)))
@@ -120,7 +106,7 @@ def test_a_retro_lobe_is_the_mirrored_one_of_the_image_of_the_light():
     for name in RETRO:
         lobe = LOBES[f"retro-{name}"]
         mirrored = lobe.model_copy(update={"retro": False})
-        for function in (lobes.evaluate, lobes.pdf, lobes.weight):
+        for function in (lobes.evaluate, lobes.pdf):
             expected = function(components(wi * (-1, -1, 1)), components(wo), mirrored)
             np.testing.assert_array_equal(function(components(wi), components(wo), lobe), expected)
 

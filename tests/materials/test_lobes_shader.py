@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
 from lambent.materials import lobes
 from lambent.materials.bsdf import components, under_fresnel
 from lambent.materials.document import Lobe
@@ -47,36 +46,26 @@ def declared(lobe: Lobe) -> str:
     )
 
 
-def pairs(lobe: Lobe, seed: int = 0):
-    """wo anywhere on the sphere and wi on the lobe, both unit to float32."""
-    rng = np.random.default_rng(seed)
-    cosine = rng.uniform(0.1, 1, COUNT) * rng.choice([-1, 1], COUNT)
-    wo = direction(np.arccos(cosine), rng.uniform(0, 2 * np.pi, COUNT)).astype(np.float32)
-    u = rng.uniform(0.001, 0.999, (COUNT, 2)).astype(np.float32)  # log(1 - u) in float32 is absolute near u = 0
-    wi = np.stack(lobes.sample(components(wo), *u.T.astype(float), lobe), axis=-1).astype(np.float32)
-    seen = np.abs(wi[:, 2]) > 0.01
-    return wi[seen], wo[seen], u[seen]
-
-
 @pytest.mark.parametrize("lobe", LOBES, ids=name_of)
-@pytest.mark.parametrize("function", ["evaluate", "pdf", "weight"])
-def test_functions_of_two_directions(lobe, function):
-    wi, wo, _ = pairs(lobe)
-    expected = getattr(lobes, function)(components(wi), components(wo), lobe)
-    expected = np.stack(expected, axis=-1) if isinstance(expected, tuple) else expected
-    call = f"lambent_{function}(wi, wo, LOBE)"
-    width = expected.shape[1] if expected.ndim == 2 else 1
-    got = run_wgsl(SHADER, call, {"wi": wi, "wo": wo}, components=width, declarations=declared(lobe))
+def test_distribution_and_sampled_half_vectors(lobe):
+    u = np.random.default_rng(0).uniform(0.001, 0.999, (COUNT, 2)).astype(np.float32)  # near 0, log(1 - u) is absolute
+    h = np.stack(lobes.sample_half_vector(*u.T.astype(float), lobe), axis=-1)
+    got = run_wgsl(SHADER, "lambent_sample_half_vector(u, LOBE)", {"u": u}, components=3, declarations=declared(lobe))
+    assert_parity(got, h, rtol=1e-5, atol=1e-5)
+    h = h.astype(np.float32)
+    expected = lobes.distribution(components(h), lobe)
+    got = run_wgsl(SHADER, "lambent_distribution(h, LOBE)", {"h": h}, declarations=declared(lobe))
     assert_parity(got, expected, rtol=1e-5, atol=1e-6 * expected.max())
 
 
 @pytest.mark.parametrize("lobe", LOBES, ids=name_of)
-def test_sample(lobe):
-    _, wo, u = pairs(lobe)
-    expected = np.stack(lobes.sample(components(wo), *u.T.astype(float), lobe), axis=-1)
-    inputs = {"wo": wo, "u": u}
-    got = run_wgsl(SHADER, "lambent_sample(wo, u, LOBE)", inputs, components=3, declarations=declared(lobe))
-    assert_parity(got, expected, rtol=1e-5, atol=1e-5)
+def test_tint_and_cosines(lobe):
+    cosine = np.random.default_rng(1).uniform(0.1, 1, (COUNT, 2)).astype(np.float32)
+    i, o = cosine.T.astype(float)
+    expected = np.stack([lobes.tint(i, lobe, c) for c in range(3)], axis=-1) * ((i * o) ** lobe.alpha)[:, None]
+    call = "lambent_tint(c.x, LOBE) * lambent_cosine_power(vec3f(0., 0., c.x), vec3f(0., 0., c.y), LOBE)"
+    got = run_wgsl(SHADER, call, {"c": cosine}, components=3, declarations=declared(lobe))
+    assert_parity(got, expected, rtol=1e-5, atol=1e-6 * expected.max())
 
 
 @pytest.mark.parametrize("distribution", ["beckmann", "ggx"])
@@ -99,18 +88,6 @@ def test_under_fresnel():
     cosine = np.geomspace(1e-4, 1, COUNT, dtype=np.float32)
     got = run_wgsl(SHADER, "lambent_under_fresnel(cosine)", {"cosine": cosine})
     assert_parity(got, under_fresnel(cosine.astype(float)), rtol=1e-5)
-
-
-@pytest.mark.parametrize("lobe", [LOBES[0], LOBES[-1]], ids=name_of)
-def test_pairs_outside_a_lobe_are_zero(lobe):
-    wi, wo, _ = pairs(lobe)
-    seen = lobes.pdf(components(wi), components(wo), lobe) > 0
-    wi, wo = wi[seen], wo[seen]
-    wi = wi * np.array([1, 1, -1], np.float32)
-    for function in ("evaluate", "weight"):
-        call = f"lambent_{function}(wi, wo, LOBE)"
-        got = run_wgsl(SHADER, call, {"wi": wi, "wo": wo}, components=3, declarations=declared(lobe))
-        assert (got == 0).all()
 
 
 def test_layout_is_the_shaders():
