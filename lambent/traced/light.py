@@ -12,7 +12,6 @@ from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.light_mix import Factors
 from lambent.materials.document import Material
-from lambent.realtime.answering import AnsweredLight, Lit
 from lambent.realtime.baked import read_baked
 from lambent.realtime.group_arrays import BAKE_GROUPS, NO_GROUPS, GroupArrays
 from lambent.scenes.scene import MaterialTextures
@@ -21,6 +20,7 @@ from lambent.store.store import Store
 
 if TYPE_CHECKING:
     from lambent.bake.pictures.tracer import LightMap
+    from lambent.realtime.answering import AnsweredLight, Lit
 
 Worn = Mapping[str, MaterialTextures | None]  # exchanged textures, by material
 
@@ -68,6 +68,8 @@ class StoredLight:
 
     @cached_property
     def _answer(self) -> AnsweredLight:
+        from lambent.realtime.answering import AnsweredLight  # imports what draws
+
         return AnsweredLight(self._baked, read_answer(self._store))
 
     def _in_watts(self, side: Floats | None) -> Floats | None:

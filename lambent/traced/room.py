@@ -36,7 +36,7 @@ class TracedRoom:
     """
 
     def __init__(self, traced: TracedScene, light: StoredLight | None, folder: Any = None) -> None:
-        self._given = self._traced = traced
+        self._traced, self._scene = traced, traced.scene  # the scene as given
         self._light, self._folder = light, folder  # the folder has images that the scene reads
         self._looks: Mapping[str, Look] = {}
         self._materials: Mapping[str, Material] = {}
@@ -50,17 +50,16 @@ class TracedRoom:
         return self._light is None or self._light.answers
 
     def wear(self, looks: Mapping[str, Look], materials: Mapping[str, Material]) -> None:
-        """Show materials with other textures (`looks`) and other documents (`materials`), by name; others as baked."""
+        """Show materials with other textures (`looks`) and other documents (`materials`), by name; others as baked.
+
+        A `tracer` from before must not be used any more.
+        """
         if (looks, materials) == (self._looks, self._materials):
             return
         self._looks, self._materials, self._tracer = dict(looks), dict(materials), None
-        if not (looks or materials):
-            self._traced = self._given
-            return
-        scene = self._given.scene
-        self._traced = self._given.dressed(replace(
-            scene, materials={**scene.materials, **materials}, textures=prepared(textures_worn(scene.textures, looks))
-        ))  # fmt: skip
+        scene, textures = self._scene, textures_worn(self._scene.textures, looks)
+        textures |= prepared({name: textures[name] for name in looks if name in textures})
+        self._traced.dress(replace(scene, materials={**scene.materials, **materials}, textures=textures))
 
     def follow(self, on: bool) -> None:
         """Let light between surfaces follow edited materials, if the room `answers`, or stay as baked."""
@@ -88,7 +87,7 @@ class TracedRoom:
 
     @property
     def _names(self) -> list[str]:
-        return [group.name for group in self._given.sorted_lights.groups]
+        return [group.name for group in self._traced.sorted_lights.groups]
 
     @property
     def tracer(self) -> Tracer:
@@ -96,7 +95,7 @@ class TracedRoom:
         from lambent.bake.pictures.tracer import Tracer  # imports Mitsuba, whose variant `engine` has set
 
         if self._tracer is None and self._light is not None:
-            worn = {name: worn_by(name, look, self._given.scene.textures) for name, look in self._looks.items()}
+            worn = {name: worn_by(name, look, self._scene.textures) for name, look in self._looks.items()}
             edits = (self._materials, worn) if self._follows else ({}, {})
             self._tracer = Tracer.of_baked(self._traced, self._light.of(*edits, self._factors))
         elif self._tracer is None:

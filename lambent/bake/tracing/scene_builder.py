@@ -24,6 +24,7 @@ from lambent.materials.factored.terms import Editable
 from lambent.materials.measured.patch_sheet import Lookup
 from lambent.scenes.computed import lat_long_image
 from lambent.scenes.environment_images import read_lat_long, up_turn
+from lambent.scenes.panes import is_clear
 from lambent.scenes.scene import (
     ComputedEnvironment,
     ConstantEnvironment,
@@ -31,11 +32,13 @@ from lambent.scenes.scene import (
     Environment,
     IesLight,
     Light,
+    MaterialTextures,
     PointLight,
     Scene,
     SunSky,
 )
 
+Look = tuple[str, bool, int]  # document, whether it is clear glass, and id of the textures
 COARSE = 4  # pixels along each side that become one pixel of a coarse sky
 FEW_PIXELS = 128  # least pixels along the shorter side of a coarse picture; otherwise it stays unchanged
 
@@ -88,23 +91,13 @@ class SceneBuilder:
     ) -> None:
         register_material_plugin()
         self.scene, self.measured, self.edited, self.unmapped = scene, measured or {}, edited or {}, unmapped
-        tables = {name: mi.load_dict(table_dict(grid)) for name, grid in self.measured.items()}
+        self._diffuse = diffuse
+        self._tables = {name: mi.load_dict(table_dict(grid)) for name, grid in self.measured.items()}
         for name, made in self.edited.items():
-            tables[name] = mi.load_dict(edited_dict(scene.materials[name], made, scene.textures.get(name)))
-        # Equal materials share a BSDF: each BSDF adds a function to every kernel.
-        bsdfs: dict[object, Any] = {}
-        worn = []
-        for o in scene.objects:
-            bsdf = tables.get(o.material)
-            if bsdf is None:
-                material, textures = scene.materials[o.material], scene.textures.get(o.material)
-                said = material_dict(material, textures, diffuse=diffuse or o.name in unmapped)
-                look = (said["material"], "clear" in said, textures and o.material)
-                if look not in bsdfs:
-                    bsdfs[look] = mi.load_dict(said)
-                bsdf = bsdfs[look]
-            worn.append(bsdf)
-        self._shapes = Shapes(scene.objects, worn, uv2 or {})
+            self._tables[name] = mi.load_dict(edited_dict(scene.materials[name], made, scene.textures.get(name)))
+        self._given = self._worn = dict[Look, tuple[Any, MaterialTextures | None]]()
+        self._shapes = Shapes(scene.objects, self._bsdfs(scene), uv2 or {})
+        self._given = self._worn
         self.meshes = self._shapes.meshes
         self.lights = [emitter_of(light) for light in scene.lights]
         if sampling is None:
@@ -112,6 +105,35 @@ class SceneBuilder:
         else:
             self.environment = sampling.environment
             self.weigh_emitters(sampling.weights)
+
+    def dress(self, scene: Scene) -> bool:
+        """Let the objects wear the materials and textures of a scene, in all scenes built, or return False.
+
+        False where objects of one shape would wear different materials: then only another builder can. Materials that
+        do not change keep their BSDFs, and those given first are kept: kernels contain the addresses of all.
+        """
+        dressed = self._shapes.wear(self._bsdfs(scene))
+        self.scene = scene if dressed else self.scene
+        return dressed
+
+    def _bsdfs(self, scene: Scene) -> list[Any]:
+        """mi.BSDF of each object. Equal materials share one: each BSDF adds a function to every kernel."""
+        made, worn = dict[tuple[str, bool], Any](), {}
+        for name, diffuse in ((o.material, self._diffuse or o.name in self.unmapped) for o in scene.objects):
+            if name in self._tables or (name, diffuse) in made:
+                continue
+            material, textures = scene.materials[name], scene.textures.get(name)
+            plain = material_dict(material, diffuse=diffuse)
+            look = plain["material"], is_clear(material, textures), id(textures)
+            if look not in worn:
+                known = self._worn.get(look) or self._given.get(look)
+                worn[look] = known or (mi.load_dict(material_dict(material, textures, diffuse=diffuse)), textures)
+            made[name, diffuse] = worn[look][0]
+        self._worn = worn
+        return [
+            self._tables.get(o.material) or made[o.material, self._diffuse or o.name in self.unmapped]
+            for o in scene.objects
+        ]
 
     def build(self, leave_out: Collection[str] = (), *, watertight: bool = False) -> Any:
         """mi.Scene without the named objects (and their emission).

@@ -50,6 +50,15 @@ class Shapes:
         self.numbers = ObjectNumbers(counts, self._groups)
         self.numbers.add(self._shapes, self._values)
 
+    def wear(self, bsdfs: Sequence[Any]) -> bool:
+        """Give objects these BSDFs (mi.BSDF by object); False, and no change, if objects of one shape would differ."""
+        if any(len({id(bsdfs[i]) for i in group}) > 1 for group in self._groups):
+            return False
+        self._bsdfs = bsdfs
+        for shape, group in zip(self._shapes, self._groups, strict=True):
+            shape.set_bsdf(bsdfs[group[0]])
+        return True
+
     def without(self, names: Collection[str]) -> list[Any]:
         """mi.Mesh of all objects but the named ones."""
         found, parted = [], []

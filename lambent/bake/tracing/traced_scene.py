@@ -140,18 +140,19 @@ class TracedScene:
     def _sorting(self, *, diffuse: bool) -> Sorting:
         return Sorting(self.sorted_lights, self.builder(diffuse=diffuse), self.sun)
 
-    def dressed(self, scene: Scene) -> TracedScene:
-        """The same objects under the same lights, with the materials and textures of another scene."""
-        mine = replace(self.scene, materials=scene.materials, textures=scene.textures)
-        found = TracedScene(
-            replace(self.atlas, scene=mine), self.merged, self.two_sided, self.progress,
-            sun_beside=self._sun_beside, unmapped=self._unmapped, effort=self._effort,
-        )  # fmt: skip
-        found._sampling, found._sky_without = self._sampling, self._sky_without
-        if self._found_sun is not None:
-            record = self._found_sun.record.model_copy(update={"panes": panes_of(mine)})
-            found._found_sun = replace(self._found_sun, record=record)
-        return found
+    def dress(self, scene: Scene) -> None:
+        """Put on the materials and textures of another scene: the same objects, under the same lights.
+
+        Every mi.Scene made before wears them too, so caches and tallies must be made anew.
+        """
+        self.scene = replace(self.scene, materials=scene.materials, textures=scene.textures)
+        self.atlas = replace(self.atlas, scene=self.scene)
+        if self._builder is not None and not self._builder[1].dress(self.scene):
+            self._builder = self._whole = None
+        found, panes = self._found_sun, panes_of(self.scene)
+        if found is not None and found.record.panes != panes:
+            self._found_sun = replace(found, record=found.record.model_copy(update={"panes": panes}))
+            self.__dict__.pop("sun", None)
 
     def grouped_cache(self, irradiance: Floats, irradiance_back: Floats | None) -> GroupedCache:
         """`cache` for the light maps (n, H, W, 3) of groups."""
