@@ -1,6 +1,6 @@
 """Ways to break a sound file: bytes, words, and the structure of JSON, XML, TOML and containers.
 
-`mutate` applies one to three of them. The byte ways are those of the measured formats' own test.
+`mutate` applies one to three of them.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import zlib
 from collections.abc import Callable
 from typing import Any
 
-from tests.materials.measured.measured_fuzz import WAYS as OF_BYTES
-from tests.materials.measured.measured_fuzz import Random
+from tests.reliability.byte_mutations import WAYS as OF_BYTES
+from tests.reliability.byte_mutations import Random
 
 LARGEST_BYTES = 200_000
 DIGITS = "9" * 5000

@@ -34,7 +34,7 @@ from lambent.store.source import inputs_of
 from lambent.store.store import Store
 from lambent.store.textures import read_textures, texture_records, write_textures
 from lambent.store.views import read_views, with_views
-from tests.materials.measured import measured_fuzz
+from tests.materials.measured import sound_files
 from tests.reliability import scene_seeds
 from tests.viewer.small_store import write_small_store
 
@@ -57,7 +57,7 @@ class Sound:
 @cache
 def sound() -> tuple[Sound, ...]:
     """A sound folder for every reader and each of its forms."""
-    found = [Sound(name, {"a": content}, "a", "a", use_table) for name, contents in measured_fuzz.seeds().items()
+    found = [Sound(name, {"a": content}, "a", "a", use_table) for name, contents in sound_files.seeds().items()
              for content in contents]  # fmt: skip
     factors = _factors()
     found += [Sound("homomorphic factors", factors, "alpha", file, use_table) for file in factors]
@@ -70,7 +70,7 @@ def sound() -> tuple[Sound, ...]:
         "PLY": [("scene.ply", scene_seeds.ply(f)) for f in ("ascii", "binary_little_endian", "binary_big_endian")],
         "Bezier patches": [("scene.bpt", scene_seeds.bpt(numbered)) for numbered in (False, True)],
         "Mitsuba XML": [("scene.xml", scene_seeds.mitsuba())],
-        "scene.toml": [("scene.toml", scene_seeds.toml(_material(), measured_fuzz.seeds()["gonio text"][0]))],
+        "scene.toml": [("scene.toml", scene_seeds.toml(_material(), sound_files.seeds()["gonio text"][0]))],
     }
     found += [Sound(name, files, main, main, use_scene) for name, folders in scenes.items() for main, files in folders]
     within = {

@@ -17,7 +17,7 @@ SAMPLE = 300
 
 
 def test_every_reader_has_sound_files() -> None:
-    """A new format, measured or of scenes, needs one in `measured_fuzz.seeds` or `readers.sound`."""
+    """A new format, measured or of scenes, needs one in `sound_files.seeds` or `readers.sound`."""
     names = {one.reader for one in sound()}
     assert {reader.NAME for reader in readers()} <= names
     assert all(any(name.startswith(found) for name in names) for found in scene_formats())

@@ -16,7 +16,7 @@ from lambent.materials.export.registry import writer_for
 from lambent.materials.measured import load, registry
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.registry import HEAD_BYTES, readers
-from tests.materials.measured.measured_fuzz import seeds
+from tests.materials.measured.sound_files import seeds
 
 
 def test_one_reader_claims_each_file(files: dict[str, Path]) -> None:
