@@ -135,7 +135,7 @@ class LightFieldView:
         from lambent.bake.light_fields.sample_map import sample_map
 
         traced, context = self._context.traced, self._context
-        mesh = context.scene.object(self._name).mesh  # with its Bezier patches, which the store does not hold
+        mesh = context.scene.object(self._name).mesh
         placing = Placing(traced.builder(diffuse=False), traced.whole(diffuse=False))
         placed = placing.points(mesh, points, SEED)
         at = placed.positions.astype(np.float32)

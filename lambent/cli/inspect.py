@@ -124,13 +124,11 @@ def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:
 
     scene = load_scene(file, crease_deg)
     low, high = scene.bounds
-    patches = {o.name: len(o.mesh.patches.control) for o in scene.objects if o.mesh.patches is not None}
     return {
         "is": "scene",
         "name": scene.name,
         "objects": len(scene.objects),
         "triangles": sum(len(o.mesh.faces) for o in scene.objects),
-        **({"bezier_patches": patches} if patches else {}),
         "materials": sorted(scene.materials),
         "environment": type(scene.environment).__name__ if scene.environment else "none",
         **({"daylight": daylight_in_words(scene.environment)} if isinstance(scene.environment, SunSky) else {}),

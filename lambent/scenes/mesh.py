@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,63 +14,11 @@ Array = NDArray[np.floating]
 TRIANGLES_AT_ONCE = 1 << 20
 
 
-NO_PATCH = -1
-
-
-@dataclass(frozen=True)
-class Patches:
-    """The bicubic Bezier patches that a mesh was tessellated from (`scenes.geometry.bezier`).
-
-    `control` (n, 4, 4, 3) are control points in world space, m. By vertex, `number` (V,) int32 is its patch or
-    NO_PATCH, and `uv` (V, 2) its parameters there. S_u x S_v may point inwards: outside is where the mesh's normals
-    point.
-    """
-
-    control: Array
-    number: NDArray[np.int32]
-    uv: Array
-
-    def at_vertices(self, source: NDArray[np.integer]) -> Patches:
-        """For a mesh whose vertices are copies of the vertices `source` (W,)."""
-        return replace(self, number=self.number[source], uv=self.uv[source])
-
-    def transformed(self, matrix: Array) -> Patches:
-        """The patches under an affine 4x4 matrix."""
-        return replace(self, control=self.control @ matrix[:3, :3].T + matrix[:3, 3])
-
-    def with_vertices_between(self, pairs: NDArray[np.integer], share: Array) -> Patches:
-        """With a vertex more on each edge (E, 2), at shares (E, 1) of its way: of no patch between two patches."""
-        numbers, ends = self.number[pairs], self.uv[pairs].astype(float)
-        number = np.where(numbers[:, 0] == numbers[:, 1], numbers[:, 0], NO_PATCH).astype(np.int32)
-        uv = (1 - share) * ends[:, 0] + share * ends[:, 1]
-        return replace(self, number=np.append(self.number, number), uv=np.concatenate([self.uv, uv]))
-
-
-def merged_patches(meshes: Sequence[Mesh]) -> Patches | None:
-    """The patches of meshes whose vertices are joined into one mesh, numbered mesh after mesh; None without any."""
-    if all(mesh.patches is None for mesh in meshes):
-        return None
-    parts = [mesh.patches or no_patches(len(mesh.positions)) for mesh in meshes]
-    first = np.cumsum([0] + [len(part.control) for part in parts[:-1]])
-    numbers = [np.where(part.number < 0, NO_PATCH, part.number + n) for part, n in zip(parts, first, strict=True)]
-    return Patches(
-        np.concatenate([part.control for part in parts]),
-        np.concatenate(numbers).astype(np.int32),
-        np.concatenate([part.uv for part in parts]),
-    )
-
-
-def no_patches(vertices: int) -> Patches:
-    """Vertices of no patch."""
-    return Patches(np.zeros((0, 4, 4, 3)), np.full(vertices, NO_PATCH, np.int32), np.zeros((vertices, 2)))
-
-
 @dataclass(frozen=True)
 class Mesh:
     """A triangle mesh: positions (m), normals, tangents (V, 3) and uv (V, 2) float32; faces (T, 3) uint32.
 
     `tangents` are unit brushing directions t of the shading frame, perpendicular to the normals n (b = n x t).
-    `patches` are the curved surface that it approximates, where that is known.
     """
 
     positions: Array
@@ -78,21 +26,11 @@ class Mesh:
     tangents: Array
     uv: Array
     faces: NDArray[np.uint32]
-    patches: Patches | None = None
-
-    @property
-    def patch_of_faces(self) -> NDArray[np.int32]:
-        """(T,) the patch that all corners of a triangle lie on, or NO_PATCH."""
-        if self.patches is None:
-            return np.full(len(self.faces), NO_PATCH, np.int32)
-        numbers = self.patches.number[self.faces]
-        return np.where((numbers == numbers[:, :1]).all(axis=1), numbers[:, 0], NO_PATCH)
 
     def at_vertices(self, source: NDArray[np.integer], faces: NDArray[np.uint32]) -> Mesh:
         """The mesh of `faces` (T, 3) over copies of the vertices `source` (W,)."""
-        patches = None if self.patches is None else self.patches.at_vertices(source)
         positions, normals, tangents, uv = (a[source] for a in (self.positions, self.normals, self.tangents, self.uv))
-        return Mesh(positions, normals, tangents, uv, faces, patches)
+        return Mesh(positions, normals, tangents, uv, faces)
 
     @property
     def bounds(self) -> tuple[Array, Array]:

@@ -265,8 +265,7 @@ class LightFieldWish:
 
     At most `points` points, each with a map of `texels` a side, at `offset_m` off the surface; with one of `levels`,
     the object shows itself without its lobes. With an `error`, the mean difference in log(1 + L/median) from what
-    viewers see mirrored, the bake uses only as many points as that error needs. `patch_density` is how much denser than
-    elsewhere points are on each of the object's Bezier patches. With `volume`, points fill the object's
+    viewers see mirrored, the bake uses only as many points as that error needs. With `volume`, points fill the object's
     bounding box, and maps leave the object out, so that another may stand there (thesis R, "Object Replacement"). With
     `refracts`, maps leave it out too, and light that it transmits is refracted ("Thin Lens Refractions").
     """
@@ -278,7 +277,6 @@ class LightFieldWish:
     levels: int | None = None
     volume: bool = False
     refracts: bool = False
-    patch_density: tuple[float, ...] | None = None
 
     @property
     def without_object(self) -> bool:

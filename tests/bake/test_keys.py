@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,6 @@ from lambent.materials.document import Lobe, Material, Provenance
 from lambent.materials.factored.of_models import editable
 from lambent.materials.models.phong import Phong
 from lambent.scenes.geometry import patch, placed, sphere
-from lambent.scenes.mesh import no_patches
 from lambent.scenes.scene import (
     ComputedEnvironment,
     ConstantEnvironment,
@@ -84,7 +82,6 @@ MESH: Answers = {
     "tangents": (lambda a: -a, SURFACES),
     "uv": (lambda a: a[:, ::-1], SURFACES),
     "faces": (lambda a: np.roll(a, 1, axis=1), SURFACES),
-    "patches": (no_patches(4), NOTHING),  # only points of light fields depend on them: see below
 }
 OBJECT: Answers = {
     "name": ("parquet", SURFACES),
@@ -159,7 +156,6 @@ WISH: Answers = {
     "levels": (1, FIELDS),
     "volume": (True, FIELDS),
     "refracts": (True, FIELDS),
-    "patch_density": ((2.0,), FIELDS),
 }
 SCENE: Answers = {
     "name": ("renamed", NOTHING),
@@ -354,18 +350,6 @@ def test_the_scene_has_every_array(scene: Scene, keys: Callable[..., dict[str, s
     assert {"light_map/irradiance", "light_map/irradiance_back", "light_map/noise_back", "light_map/lean"} < names
     assert {"geometry/tangents", "environment/radiance"} < names
     assert keys(scene) == keys(replace(scene)), "the same inputs, the same keys"
-
-
-def test_patches_count_where_points_lie_on_them(scene: Scene, keys: Callable[..., dict[str, str]]) -> None:
-    ball = next(o for o in scene.objects if o.name == "ball")
-    curved = replace(ball.mesh, patches=no_patches(len(ball.mesh.positions)))
-    moved = replace(curved, patches=replace(curved.patches, uv=curved.patches.uv + 0.1))
-    found = [
-        keys(replace(scene, objects=tuple(replace(o, mesh=mesh) if o is ball else o for o in scene.objects)))
-        for mesh in (ball.mesh, curved, moved)
-    ]
-    for before, after in pairwise(found):
-        assert stale(before, after) == starting(before, FIELDS)
 
 
 ANSWERS = [(kind, field) for kind, answers, _, _ in CASES for field in answers if answers[field][1] is not None]

@@ -59,12 +59,3 @@ def test_daylight_is_said_in_a_line(lambent, tmp_path):
         (tmp_path / "scene.toml").write_text(scene + sky + more)
         said = lambent("inspect", tmp_path / "scene.toml", "--json").json["daylight"]
         assert said == f"sun 45 degrees high, 90.1 klx facing it; sky 13.8 klx, turbidity 3; below the horizon {ground}"
-
-
-def test_bezier_patches_are_counted(lambent, refused, tmp_path):
-    path = tmp_path / "dome.bpt"
-    points = [f"{u} {v} {u * (3 - u) * v * (3 - v) / 4}" for v in range(4) for u in range(4)]
-    path.write_text("\n".join(["2", *(["3 3", *points] * 2)]))
-    assert lambent("inspect", path, "--json").json["bezier_patches"] == {"dome": 2}
-    path.write_text("\n".join(["1", "4 3", *points]))
-    assert "line 2: degree in u of patch 1 cannot be read; found 4" in refused("inspect", path)

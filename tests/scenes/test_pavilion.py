@@ -15,7 +15,6 @@ from tests.scenes.soundness import (  # noqa: F401
     test_closed_things_are_closed_and_the_right_side_out,
     test_materials_give_back_no_more_than_they_get,
 )
-from tests.scenes.test_patches_of_meshes import check
 
 OPEN = {"teapot", "cloth", "lawn"}  # parts that end in others, and sheets
 
@@ -45,13 +44,6 @@ def test_things_stand_on_each_other(scene: Scene) -> None:
     assert table.bounds[1][1] < pavilion.TABLE_HIGH - pavilion.GAP / 2  # below the cloth, not in it
     assert cloth.bounds[0][1] > 0.3 and low("table") == pytest.approx(0, abs=1e-6)
     assert abs(low("posts")) < 0.07  # their tilted ends are in the deck
-
-
-def test_the_teapot_keeps_its_patches(scene: Scene) -> None:
-    """Turned and placed with it; the seat of the lid is no patch."""
-    pot = scene.object("teapot").mesh
-    assert pot.patches is not None and len(pot.patches.control) == 32
-    check(pot, 0.99)
 
 
 def test_things_on_the_table_do_not_touch(scene: Scene) -> None:

@@ -224,7 +224,7 @@ WRONG = {
     "[objects.sphere]\nlight_field = { points = 0 }": r"light_field.points.*greater than or equal to 1; found 0",
     "[objects.sphere]\nlight_field = { points = 70000 }": r"light_field.points.*65535; found 70000",
     "[objects.sphere]\nlight_field = { volume = true, refracts = true }": r"light_field.*exclude each other",
-    "[objects.sphere]\nlight_field = { volume = true, offset_m = 0.1 }": r"light_field.*error and patch_density apply",
+    "[objects.sphere]\nlight_field = { volume = true, offset_m = 0.1 }": r"light_field.*offset_m and error apply",
     "[objects.sphere]\nlight_field = { refracts = true, levels = 1 }": r"light_field.*levels applies to maps that show",
     "[objects.sphere]\nlight_field = { texels = 7 }": r"light_field.texels.*greater than or equal to 8; found 7",
     "[objects.sphere]\nlight_field = { texels = 4096 }": r"light_field.texels.*1024; found 4096",

@@ -100,10 +100,6 @@ def keys(context: BakeContext) -> dict[str, str]:
             inputs.append("texels traced where they are read")  # decides the number of points
         if wish.without_object:  # keys of other light fields stay as they were
             inputs.append("volume" if wish.volume else "refracts")
-        if not wish.volume:
-            inputs += _patches(context, name)
-        if wish.patch_density is not None:
-            inputs.append(wish.patch_density)
         found |= dict.fromkeys(
             (light_field_name(name, part) for part in parts_of(wish)), key_of(KIND, REVISION, *inputs)
         )
@@ -160,12 +156,6 @@ def settings_of(context: BakeContext, wish: LightFieldWish) -> Settings:
     return replace(how, **asked)
 
 
-def _patches(context: BakeContext, name: str) -> list[Array]:
-    """The Bezier patches of an object as inputs of a key; empty if it has none."""
-    patches = context.scene.object(name).mesh.patches
-    return [] if patches is None else [patches.control, patches.number, patches.uv]
-
-
 def _shiny(context: BakeContext) -> list[str]:
     """Names of the objects that mirror what is around them."""
     return [o.name for o in context.scene.objects if needs_probe(context.scene.materials[o.material])]
@@ -181,8 +171,7 @@ def _choice(context: BakeContext) -> list[dict[str, Any]]:
         return []
     how, budget_mb = context.settings(KIND), float(context.methods[request.MEGABYTES])
     named = sorted(context.scene.light_fields)
-    curved = [part for name in _shiny(context) for part in _patches(context, name)]
-    inputs = [context.keys("light_map"), context.keys("probe"), _said(how), named, budget_mb, context.seed, *curved]
+    inputs = [context.keys("light_map"), context.keys("probe"), _said(how), named, budget_mb, context.seed]
     key = key_of(LIGHT_FIELD_CHOICE, 3, *inputs)
     said = context.store.documents.get(LIGHT_FIELD_CHOICE)
     if not isinstance(said, dict) or said.get("key") != key:
@@ -325,7 +314,7 @@ def _placed(context: BakeContext, name: str, wish: LightFieldWish, traced: Trace
             options = [Option(points, how.texels) for points in (*(some for some in COUNTS if some < most), most)]
             count = chooser.trial(name, seen, options=options).count_for(wish.error)
     mesh = turned_to_viewers(mesh, context.traced.places, traced.around.scene, seed)
-    return traced.placing.points(mesh, count, seed, wish.offset_m, patch_density=wish.patch_density)
+    return traced.placing.points(mesh, count, seed, wish.offset_m)
 
 
 def _sample_map(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced, start: float) -> None:

@@ -87,10 +87,8 @@ class Chooser:
         """
         probe = probe_light(self._store, name)
         mesh, seed, some = self._turned(name), self._seed_of(name), options or options_of(self._texels)
-        wish = self._scene.light_fields.get(name)
-        density = None if wish is None else wish.patch_density
         level = level or seen.level
-        return tried(self._placing, mesh, seen, probe, self._around, seed, some, level, patch_density=density)
+        return tried(self._placing, mesh, seen, probe, self._around, seed, some, level)
 
     def _turned(self, name: str) -> Mesh:
         mesh = self._scene.object(name).mesh

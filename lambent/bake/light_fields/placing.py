@@ -7,7 +7,6 @@ to it, and is dropped in gaps too narrow for that.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,14 +14,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from lambent.bake.light_fields.on_patches import surface_areas
 from lambent.bake.light_fields.sampling import (
     CANDIDATES,
     SurfacePoints,
     densities,
     spread_evenly,
     thinned,
-    weights_of_faces,
 )
 from lambent.bake.tiles import slices
 from lambent.bake.tracing.rays import distances, leaving, vectors
@@ -55,11 +52,8 @@ class Placing:
         self._scene = scene
         self._solids, self._sheets = SolidTest(builder, scene), SolidTest(builder, scene, sheets=True)
 
-    def points(
-        self, mesh: Mesh, count: int, seed: int, offset_m: float | None = None,
-        patch_density: Sequence[float] | None = None,
-    ) -> Placed:  # fmt: skip
-        """`count` points over a mesh, or less where little of it is in the open; by relative densities of its patches.
+    def points(self, mesh: Mesh, count: int, seed: int, offset_m: float | None = None) -> Placed:
+        """`count` points over a mesh, or less where little of it is in the open.
 
         Raises
         ------
@@ -67,9 +61,9 @@ class Placing:
             Where nothing of it is.
         """
         rng = np.random.default_rng(seed)
-        area_m2 = float((surface_areas(mesh) * weights_of_faces(mesh, patch_density)).sum())
+        area_m2 = float(triangle_areas(mesh.corners).sum())
         offset = usual_offset_m(mesh, count) if offset_m is None else offset_m
-        places = spread_evenly(mesh, CANDIDATES * count, rng, patch_density)
+        places = spread_evenly(mesh, CANDIDATES * count, rng)
         places, heights = self.in_the_open(places, offset)
         if not len(places):
             raise UserError("its surface is hidden everywhere", hint="leave out its light field")

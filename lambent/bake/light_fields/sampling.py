@@ -2,21 +2,19 @@
 
 Candidates, several to a point, are drawn by area. Those whose neighbours are closest are taken away until as many are
 left as are wanted (Yuksel 2015, "Sample elimination for generating Poisson disk sample sets"), distances measured by
-the spacing that the density gives at each. On Bezier patches, area, normal and curvature are exact.
+the spacing that the density gives at each.
 """
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from lambent.bake.light_fields.on_patches import even_in_area, exact_places, surface_areas
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import normalize
-from lambent.core.geometry import triangle_normals
+from lambent.core.geometry import triangle_areas, triangle_normals
 from lambent.scenes.scene import Mesh
 
 CANDIDATES = 8  # for each point
@@ -29,60 +27,33 @@ OPPOSED = 0.2  # cosine to the triangle's normal below which a shading normal is
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """Points of a surface and its unit normals there, (n, 3) float64 each.
-
-    `turning` (n,) is how fast the normal turns, 1/m, NaN where it is not known. `weight` (n,) is how much denser than
-    by area the points are drawn, and asked for.
-    """
+    """Points of a surface and its unit normals there, (n, 3) float64 each."""
 
     positions: Floats
     normals: Floats
-    turning: Floats | None = None
-    weight: Floats | None = None
 
     def __getitem__(self, chosen: Indices | Flags | slice) -> SurfacePoints:
-        turning = None if self.turning is None else self.turning[chosen]
-        weight = None if self.weight is None else self.weight[chosen]
-        return SurfacePoints(self.positions[chosen], self.normals[chosen], turning, weight)
+        return SurfacePoints(self.positions[chosen], self.normals[chosen])
 
     def __len__(self) -> int:
         return len(self.positions)
 
 
-def spread_evenly(
-    mesh: Mesh, count: int, rng: np.random.Generator, patch_density: Sequence[float] | None = None
-) -> SurfacePoints:
-    """Points in equal shares of a surface's area, with its shading normals; none where it has no area.
-
-    With `patch_density`, in equal shares of area times the density of its patch, 1 where there is no patch.
-    """
-    areas = surface_areas(mesh)
-    weight_of_faces = weights_of_faces(mesh, patch_density)
-    areas *= weight_of_faces
+def spread_evenly(mesh: Mesh, count: int, rng: np.random.Generator) -> SurfacePoints:
+    """Points in equal shares of a surface's area, with its shading normals; none where it has no area."""
+    areas = triangle_areas(mesh.corners)
     if not areas.sum() > 0:
         return SurfacePoints(np.zeros((0, 3)), np.zeros((0, 3)))
     up_to = np.cumsum(areas)
     face = np.searchsorted(up_to, (np.arange(count) + rng.random(count)) / count * up_to[-1], side="right")
     face = np.minimum(face, np.flatnonzero(areas)[-1])
-    weights = even_in_area(mesh, face, rng.dirichlet((1, 1, 1), size=count), rng)
+    weights = rng.dirichlet((1, 1, 1), size=count)
     corners = mesh.corners_of(face)
     positions = np.einsum("kc,kcx->kx", weights, corners)
     flat = triangle_normals(corners)
     leaning = normalize(np.einsum("kc,kcx->kx", weights, mesh.normals[mesh.faces[face]].astype(float)))
     opposed = (leaning * flat).sum(axis=1, keepdims=True) < OPPOSED
-    normals, turning = np.where(opposed, flat, leaning), np.full(count, np.nan)
-    exact = exact_places(mesh, face, weights)
-    positions[exact.found], normals[exact.found], turning[exact.found] = exact.positions, exact.normals, exact.turning
-    return SurfacePoints(positions, normals, turning, weight_of_faces[face])
-
-
-def weights_of_faces(mesh: Mesh, patch_density: Sequence[float] | None) -> Floats:
-    """(F,) relative densities of triangles: those of their patches, 1 where there is none."""
-    weights = np.ones(len(mesh.faces))
-    patch = mesh.patch_of_faces
-    if patch_density is not None:
-        weights[patch >= 0] = np.asarray(patch_density, float)[patch[patch >= 0]]
-    return weights
+    return SurfacePoints(positions, np.where(opposed, flat, leaning))
 
 
 def densities(points: SurfacePoints, area_m2: float, count: int, free_m: Floats) -> Floats:
@@ -90,23 +61,14 @@ def densities(points: SurfacePoints, area_m2: float, count: int, free_m: Floats)
 
     Curvature and nearness are both shares from 0 to 1, by the spacing s of evenly spread points: k s/(1 + k s) of the
     curvature k, and the mean of s/(s + d) over the distances d that rays travel in `free_m` (n, rays). `area_m2` is
-    that of the surface, times the weight of its points. The densest places have 1 + DENSER_CURVED + DENSER_NEAR times
-    as many to an area as flat and free ones.
+    that of the surface. The densest places have 1 + DENSER_CURVED + DENSER_NEAR times as many to an area as flat and
+    free ones.
     """
     spacing = np.sqrt(area_m2 / count)
-    curved = turning_of(points) * spacing
+    curved = curvatures(points) * spacing
     near = (spacing / (spacing + free_m)).mean(axis=1)
     relative = 1 + DENSER_CURVED * curved / (1 + curved) + DENSER_NEAR * near
-    weight = 1.0 if points.weight is None else points.weight
-    return np.asarray(weight * relative * count / (area_m2 * relative.mean()))
-
-
-def turning_of(points: SurfacePoints) -> Floats:
-    """How fast the normal turns (n,), 1/m: exact where it is known, elsewhere found from the points."""
-    if points.turning is None:
-        return curvatures(points)
-    unknown = np.isnan(points.turning)
-    return np.where(unknown, curvatures(points), points.turning) if unknown.any() else points.turning
+    return np.asarray(relative * count / (area_m2 * relative.mean()))
 
 
 def curvatures(points: SurfacePoints) -> Floats:
@@ -123,8 +85,7 @@ def curvatures(points: SurfacePoints) -> Floats:
 
 def thinned(points: SurfacePoints, density: Floats, count: int, rng: np.random.Generator) -> Indices:
     """Which points of `spread_evenly` to keep, `count` or all: blue noise of a `density` (n,), points per m^2."""
-    wanted = density if points.weight is None else density / points.weight
-    kept = np.flatnonzero(rng.random(len(points)) * wanted.max(initial=0) <= wanted)
+    kept = np.flatnonzero(rng.random(len(points)) * density.max(initial=0) <= density)
     if len(kept) < 2 * count:  # too few to choose from
         kept = np.arange(len(points))
     radius = np.sqrt(1 / (2 * np.sqrt(3) * density[kept]))  # of the densest packing of discs (Yuksel 2015, eq. 1)

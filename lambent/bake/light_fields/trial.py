@@ -124,7 +124,7 @@ def options_of(texels: int) -> list[Option]:
 
 def tried(
     placing: Placing, mesh: Mesh, seen: Watched, probe: ProbeLight, around: Around, seed: int,
-    options: Sequence[Option], level: float, patch_density: Sequence[float] | None = None,
+    options: Sequence[Option], level: float,
 ) -> Trial:  # fmt: skip
     """The errors of an object's probe, and of the light fields of `options`, rising, as far as more points help."""
     by_probe = probe.seen(seen)
@@ -140,7 +140,7 @@ def tried(
         sides = [option.texels for option in some if option.texels not in stopped]
         if not sides:
             continue
-        points = placing.points(mesh, count, seed, patch_density=patch_density)
+        points = placing.points(mesh, count, seed)
         near = nearest_points(seen.x, seen.normals, points.positions.astype(np.float32), views).astype(np.int64)
         every = np.arange(len(near)).repeat(seen.directions.shape[1])
         place = Place(seen.x[every], seen.normals[every], near[every])

@@ -133,6 +133,5 @@ def _with_vertices(mesh: Mesh, a: Indices, b: Indices, height: Floats | None = N
         longer(mesh.tangents, normalize(between(mesh.tangents))),
         longer(mesh.uv, between(mesh.uv)),
         mesh.faces,
-        None if mesh.patches is None else mesh.patches.with_vertices_between(pairs, -low / (high - low)),
     )
     return longer_mesh, len(mesh.positions) + index.reshape(-1)

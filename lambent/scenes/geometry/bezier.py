@@ -1,4 +1,4 @@
-"""Bicubic Bezier patches: position, derivatives, normal, curvature and area.
+"""Bicubic Bezier patches: position, derivatives and normal.
 
 Control points are (..., 4, 4, 3), those of a row along u, rows along v, as in files of patches. S(u, v) = sum over i, j
 of B_i(v) B_j(u) P_ij with u and v from 0 to 1; the normal is along S_u x S_v. Control points broadcast with u and v.
@@ -12,7 +12,6 @@ from lambent.core.arrays import Floats
 
 INWARDS = 1e-3  # share of the way to the middle of a patch where derivatives at a pole are taken instead
 NO_NORMAL = 1e-7  # of |S_u x S_v|, relative to the squared size of a patch: below it, the limit from inside
-GAUSS = 8  # abscissae along each side for an area
 
 
 def bernstein(t: Floats) -> Floats:
@@ -69,11 +68,6 @@ def bends(control: Floats, u: Floats, v: Floats) -> tuple[Floats, Floats, Floats
     )
 
 
-def area_elements(control: Floats, u: Floats, v: Floats) -> Floats:
-    """|S_u x S_v| (...)."""
-    return np.asarray(np.linalg.norm(np.cross(*tangents(control, u, v)), axis=-1))
-
-
 def normals(control: Floats, u: Floats, v: Floats) -> Floats:
     """Unit normals (..., 3) along S_u x S_v; 0 for patches without area.
 
@@ -107,47 +101,6 @@ def _inwards(u: Floats, v: Floats) -> tuple[Floats, Floats]:
 def extents(control: Floats) -> Floats:
     """Longest side (...) of the boxes of control points."""
     return np.asarray(np.ptp(control.reshape(*control.shape[:-3], 16, 3), axis=-2).max(axis=-1))
-
-
-def fundamental_forms(control: Floats, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """Coefficients (E, F, G) and (L, M, N), (..., 3) each, of the first and the second fundamental form."""
-    s_u, s_v = tangents(control, u, v)
-    n = normals(control, u, v)
-    first = np.stack([(s_u * s_u).sum(-1), (s_u * s_v).sum(-1), (s_v * s_v).sum(-1)], axis=-1)
-    return first, np.stack([(bend * n).sum(-1) for bend in bends(control, u, v)], axis=-1)
-
-
-def curvatures(control: Floats, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """Mean and Gaussian curvature, (...) each, by the units of the control points: 1/m and 1/m^2.
-
-    Positive mean curvature bends towards the normal. At a pole, both are those a little towards the middle; 0 for
-    patches without area.
-    """
-    size = np.asarray(extents(control))
-    pole = area_elements(control, u, v) <= NO_NORMAL * size**2
-    inner_u, inner_v = _inwards(u, v)
-    first, second = fundamental_forms(control, np.where(pole, inner_u, u), np.where(pole, inner_v, v))
-    (e, f, g), (bend_u, bend_uv, bend_v) = np.moveaxis(first, -1, 0), np.moveaxis(second, -1, 0)
-    determinant = e * g - f * f
-    flat = determinant <= (1e-14 * size**2) ** 2
-    determinant = np.where(flat, 1.0, determinant)
-    mean = (e * bend_v - 2 * f * bend_uv + g * bend_u) / (2 * determinant)
-    gaussian = (bend_u * bend_v - bend_uv**2) / determinant
-    return np.where(flat, 0.0, mean), np.where(flat, 0.0, gaussian)
-
-
-def turning(control: Floats, u: Floats, v: Floats) -> Floats:
-    """How fast the normal turns (...), 1/m: root mean square over all directions, sqrt((k1^2 + k2^2) / 2)."""
-    mean, gaussian = curvatures(control, u, v)
-    return np.asarray(np.sqrt(np.maximum(2 * mean**2 - gaussian, 0.0)))
-
-
-def areas(control: Floats) -> Floats:
-    """Areas (...) of patches, by Gauss-Legendre quadrature."""
-    x, weight = np.polynomial.legendre.leggauss(GAUSS)
-    t = (x + 1) / 2
-    found = area_elements(control[..., None, None, :, :, :], *np.meshgrid(t, t))
-    return np.asarray((found * np.outer(weight, weight) / 4).sum(axis=(-1, -2)))
 
 
 def elevated(points: Floats) -> Floats:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lambent.core.directions import Floats, basis, normalize
 from lambent.core.geometry import area_vectors, triangle_areas
-from lambent.scenes.mesh import Mesh, Patches, merged_patches
+from lambent.scenes.mesh import Mesh
 
 FLAT = 1e-10  # triangles below this share of their sheet's extent squared count as degenerate
 VERTICES_AT_ONCE = 1 << 18
@@ -24,10 +24,7 @@ def tangents_along(normals: Floats, direction: ArrayLike) -> Floats:
     return normalize(tangents - normals * np.sum(normals * tangents, axis=-1, keepdims=True))
 
 
-def build(
-    positions: Floats, normals: Floats, direction: ArrayLike, uv: Floats, faces: NDArray[np.integer],
-    patches: Patches | None = None,
-) -> Mesh:  # fmt: skip
+def build(positions: Floats, normals: Floats, direction: ArrayLike, uv: Floats, faces: NDArray[np.integer]) -> Mesh:
     """Mesh of (V, ...) arrays and triangles in any winding; `direction` as in `tangents_along`.
 
     Triangles without area and unused vertices are dropped, the winding follows the normals.
@@ -46,11 +43,10 @@ def build(
         tangents[used].astype(np.float32),
         np.asarray(uv, np.float32)[used],
         index.reshape(-1, 3).astype(np.uint32),
-        None if patches is None else patches.at_vertices(used),
     )
 
 
-def grid(positions: Floats, normals: Floats, direction: ArrayLike, uv: Floats, patches: Patches | None = None) -> Mesh:
+def grid(positions: Floats, normals: Floats, direction: ArrayLike, uv: Floats) -> Mesh:
     """Mesh of a sheet: positions and normals (R, C, 3), uv (R, C, 2), `direction` (3,) or (R, C, 3)."""
     rows, columns = positions.shape[:2]
     index = np.arange(rows * columns).reshape(rows, columns)
@@ -58,7 +54,7 @@ def grid(positions: Floats, normals: Floats, direction: ArrayLike, uv: Floats, p
     faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
     along = np.asarray(direction, float)
     along = along.reshape(-1, 3) if along.ndim == 3 else along
-    return build(positions.reshape(-1, 3), normals.reshape(-1, 3), along, uv.reshape(-1, 2), faces, patches)
+    return build(positions.reshape(-1, 3), normals.reshape(-1, 3), along, uv.reshape(-1, 2), faces)
 
 
 def merge(meshes: Iterable[Mesh]) -> Mesh:
@@ -68,7 +64,7 @@ def merge(meshes: Iterable[Mesh]) -> Mesh:
     names = ("positions", "normals", "tangents", "uv")
     positions, normals, tangents, uv = (np.concatenate([getattr(m, name) for m in parts]) for name in names)
     faces = np.concatenate([m.faces + start for m, start in zip(parts, starts, strict=True)])
-    return Mesh(positions, normals, tangents, uv, faces, merged_patches(parts))
+    return Mesh(positions, normals, tangents, uv, faces)
 
 
 def transformed(mesh: Mesh, matrix: ArrayLike) -> Mesh:
@@ -92,10 +88,9 @@ def copies_under(mesh: Mesh, matrices: Floats) -> list[Mesh]:
     for mine in _some(len(matrices), len(mesh.positions)):
         linear, moved = matrices[mine, :3, :3].transpose(0, 2, 1), matrices[mine, None, :3, 3]
         moved_positions = (mesh.positions @ linear + moved).astype(np.float32)
-        for positions, number, matrix in zip(moved_positions, which[mine], matrices[mine], strict=True):
+        for positions, number in zip(moved_positions, which[mine], strict=True):
             normals, tangents, flips = turned[number]
-            patches = None if mesh.patches is None else mesh.patches.transformed(matrix)
-            copies.append(Mesh(positions, normals, tangents, mesh.uv, mirrored if flips else mesh.faces, patches))
+            copies.append(Mesh(positions, normals, tangents, mesh.uv, mirrored if flips else mesh.faces))
     return copies
 
 

@@ -33,9 +33,7 @@ def _in_four(mesh: Mesh) -> Mesh:
         mean = values[pairs].mean(axis=1)
         return np.concatenate([values, normalize(mean) if unit else mean]).astype(np.float32)
 
-    half = np.full((len(pairs), 1), 0.5)
-    patches = None if mesh.patches is None else mesh.patches.with_vertices_between(pairs, half)
     return Mesh(
         halved(mesh.positions, False), halved(mesh.normals, True), halved(mesh.tangents, True), halved(mesh.uv, False),
-        parts.astype(np.uint32), patches,
+        parts.astype(np.uint32),
     )  # fmt: skip

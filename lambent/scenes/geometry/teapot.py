@@ -12,7 +12,7 @@ import numpy as np
 from lambent.core.directions import Floats, normalize
 from lambent.scenes.geometry import bezier
 from lambent.scenes.geometry.grid import grid, merge, transformed
-from lambent.scenes.mesh import Mesh, Patches
+from lambent.scenes.mesh import Mesh
 
 KAPPA = 0.56  # Newell's handle length of a quarter circle, by radius
 KNOB_PULL = 0.45  # the handle length of one circle that differs: the lid's knob, radius .8
@@ -109,13 +109,11 @@ def teapot_parts(length: float = 0.25, steps: int = 12) -> dict[str, Mesh]:
     """The parts of `teapot`: rim, body, knob, lid, bottom, handle, spout."""
     parts: dict[str, list[Mesh]] = {}
     uv = np.stack(np.meshgrid(*[np.linspace(0, 1, steps + 1)] * 2, indexing="ij"), axis=-1)
-    vertices = uv[..., ::-1].reshape(-1, 2)  # rows of control points run along the profile: the v of a patch
     for part, members in patches().items():
         for i, points in enumerate(members):
             positions, normals, along, across = evaluate(points, steps)
             name = "knob" if part == "lid" and i < 4 else part
-            own = Patches(points[None], np.zeros(len(vertices), np.int32), vertices)
-            sheet = grid(positions, normals, across if part in TURNED else along, uv, own)
+            sheet = grid(positions, normals, across if part in TURNED else along, uv)
             parts.setdefault(name, []).append(sheet)
     matrix = np.eye(4)
     matrix[:3, :3] = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]) * length / LENGTH  # z up to y up

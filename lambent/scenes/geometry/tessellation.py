@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.scenes.geometry import bezier
 from lambent.scenes.geometry.grid import build
-from lambent.scenes.mesh import NO_PATCH, Mesh, Patches
+from lambent.scenes.mesh import Mesh
 
 MOST_STEPS = 64  # along a side; a power of two, at which shared edges are bitwise equal
 POINTS_AT_ONCE = 1 << 18
@@ -74,8 +74,7 @@ def tessellated(control: Floats, steps: int | Steps) -> Mesh:
         positions[some], normals[some] = bezier.positions(*place), bezier.normals(*place)
         along[some] = bezier.tangents(*place)[0]
     normals[(normals == 0).all(axis=1)] = (0.0, 1.0, 0.0)  # of patches without area, whose triangles are left out
-    patches = Patches(np.where(usable[:, None, None, None], control, 0.0), number.astype(np.int32), uv)
-    return build(positions, normals, along, uv, np.concatenate(faces), patches)
+    return build(positions, normals, along, uv, np.concatenate(faces))
 
 
 def _groups(numbers: Indices, steps: Steps) -> Iterator[tuple[Indices, Floats, Indices]]:
@@ -143,8 +142,7 @@ def oriented_alike(control: Floats) -> Floats:
         neighbours[one // 4].append((other // 4, turned))
         neighbours[other // 4].append((one // 4, turned))
     flipped = np.full(len(control), -1)
-    diagonals = control[:, 1:, 1:] - control[:, :-1, :-1], control[:, 1:, :-1] - control[:, :-1, 1:]
-    areas = np.nan_to_num(np.linalg.norm(np.cross(*diagonals), axis=-1).sum(axis=(1, 2)))  # twice those of the nets
+    areas = net_areas(control)
     for first in range(len(control)):
         if flipped[first] >= 0:
             continue
@@ -160,8 +158,14 @@ def oriented_alike(control: Floats) -> Floats:
     return np.where((flipped == 1)[:, None, None, None], control[:, :, ::-1], control)
 
 
+def net_areas(control: Floats) -> Floats:
+    """Areas (n,) of the quads between control points (n, 4, 4, 3), in their unit squared; 0 where one is not finite."""
+    diagonals = control[:, 1:, 1:] - control[:, :-1, :-1], control[:, 1:, :-1] - control[:, :-1, 1:]
+    return np.asarray(np.nan_to_num(np.linalg.norm(np.cross(*diagonals), axis=-1).sum(axis=(1, 2))) / 2)
+
+
 def _edges(control: Floats) -> tuple[Indices, Flags]:
-    """By edge, four for each patch: its number, NO_PATCH if it is a point, and whether it runs forwards (4 n,).
+    """By edge, four for each patch: its number, -1 if it is a point, and whether it runs forwards (4 n,).
 
     Edges run around their patch. Those of the same control points have one number, in whichever direction they run.
     """
@@ -178,7 +182,7 @@ def _edges(control: Floats) -> tuple[Indices, Flags]:
     mixed = np.where(forward, ahead, back).astype(np.int64) @ _MIXING  # wraps around: a hash of 64 bits
     number = np.unique(mixed, return_inverse=True)[1]
     is_point = (np.ptp(rounded, axis=1) == 0).all(axis=1)
-    return np.where(is_point, NO_PATCH, number.reshape(-1)), forward.ravel()
+    return np.where(is_point, -1, number.reshape(-1)), forward.ravel()
 
 
 def _used_twice(number: Indices) -> Indices:

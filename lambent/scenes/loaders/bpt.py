@@ -20,7 +20,8 @@ from lambent.core.errors import UserError
 from lambent.core.inputs import read_bytes
 from lambent.materials.document import Material
 from lambent.scenes.geometry import bezier
-from lambent.scenes.geometry.tessellation import oriented_alike, steps_to, tessellated, triangles_of
+from lambent.scenes.geometry.grid import FLAT
+from lambent.scenes.geometry.tessellation import net_areas, oriented_alike, steps_to, tessellated, triangles_of
 from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
 from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.scene import SceneObject
@@ -51,9 +52,7 @@ def load(path: Path, options: LoadOptions = DEFAULTS) -> Contents:
         steps = steps_to(np.nan_to_num(control), tolerance)
     TRIANGLES.check(triangles_of(steps), file=path)
     mesh = tessellated(control, steps)
-    shown = np.zeros(len(control), bool)
-    shown[mesh.patch_of_faces] = True
-    notes += _left_out("no area", usable & ~shown)
+    notes += _left_out("no area", usable & (net_areas(control) <= FLAT * size**2))
     if not len(mesh.faces):
         raise UserError("holds no patch with an area", file=path, hint="; ".join(notes) or None)
     grey = Material(name="default", kd=(0.5, 0.5, 0.5))

@@ -28,7 +28,6 @@ from lambent.scenes.loaders.scene_toml.placing import placed
 from lambent.scenes.loaders.scene_toml.schema import (
     GeometrySection,
     ImageSection,
-    LightFieldSection,
     ObjectSection,
     SceneDocument,
     known_keys,
@@ -206,19 +205,8 @@ def _apply(
                 planes[name] = _unit_planes(own_planes)
             if section.light_field is not None:
                 light_fields.pop(name, None)
-                wish = _wish(section.light_field, by_name[name], path, pattern)
-                light_fields |= {name: wish} if section.light_field.use else {}
+                light_fields |= {name: section.light_field.wish} if section.light_field.use else {}
     return tuple(by_name.values()), centres, planes, light_fields
-
-
-def _wish(section: LightFieldSection, thing: SceneObject, path: Path, pattern: str) -> LightFieldWish:
-    """What is asked of the light field of an object."""
-    patches = thing.mesh.patches
-    try:
-        return section.wish(0 if patches is None else len(patches.control))
-    except ValueError as error:
-        field = f"objects.{pattern}.light_field.patch_density"
-        raise UserError(f"{thing.name} {error}", file=path, field=field) from error
 
 
 def _reflector_rules(

@@ -14,7 +14,6 @@ from lambent.core.surroundings import Axis, Layout
 from lambent.scenes.computed import COMPUTED
 from lambent.scenes.light_groups import MOST_GROUPS
 from lambent.scenes.loaders.scene_toml.lamps import LightSection, one_of
-from lambent.scenes.loaders.scene_toml.patch_density import PatchDensity, densities_of, patch_density_told
 from lambent.scenes.loaders.scene_toml.sections import (
     Colour,
     Finite,
@@ -122,12 +121,6 @@ class LightFieldSection(Section):
     levels: Literal[1] | None = None
     volume: bool = False
     refracts: bool = False
-    patch_density: PatchDensity | None = None
-
-    @field_validator("patch_density", mode="before")
-    @classmethod
-    def _by_patch(cls, value: Any) -> Any:
-        return None if value is None else patch_density_told(value)
 
     @model_validator(mode="after")
     def _one_place(self) -> LightFieldSection:
@@ -135,18 +128,15 @@ class LightFieldSection(Section):
             raise ValueError(
                 "volume (for a replacement of the object) and refracts (for the object itself) exclude each other"
             )
-        on_surface = self.offset_m, self.error, self.patch_density
-        if self.volume and any(value is not None for value in on_surface):
-            raise ValueError("offset_m, error and patch_density apply to points on the surface, not to a volume")
+        if self.volume and (self.offset_m is not None or self.error is not None):
+            raise ValueError("offset_m and error apply to points on the surface, not to a volume")
         if self.levels is not None and (self.volume or self.refracts):
             raise ValueError("levels applies to maps that show the object, not to a volume or to refraction")
         return self
 
-    def wish(self, patches: int) -> LightFieldWish:
-        """For an object with so many Bezier patches; `ValueError` if the densities are of other patches."""
-        settings = self.model_dump(exclude={"use", "patch_density"})
-        density = None if self.patch_density is None else densities_of(self.patch_density, patches)
-        return LightFieldWish(**settings, patch_density=density)
+    @property
+    def wish(self) -> LightFieldWish:
+        return LightFieldWish(**self.model_dump(exclude={"use"}))
 
 
 class ObjectSection(Section):
