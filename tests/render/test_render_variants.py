@@ -73,6 +73,10 @@ def test_a_variant_has_its_light_unless_another_is_given(adapter: None, store: P
     assert dim == pytest.approx(baked / 2, rel=6e-3, abs=2e-3)
     given = image(store, replace(SMALL, variant="dim", light=parse_light(["sun=on"])), tmp_path)
     assert given == pytest.approx(baked, rel=6e-3, abs=2e-3)
+    blue = LookTrack({"plaster": ((0.0, Look(MATERIALS["plaster"].model_copy(update={"kd": (0.0, 0.0, 0.6)}))),)})
+    moving = image(store, replace(SMALL, looks=blue), tmp_path)
+    assert np.array_equal(image(store, replace(SMALL, variant="red", looks=blue), tmp_path), moving), "likewise looks"
+    assert moving[-1, 0, 2] > 0 and moving[-1, 0, 0] == 0
 
 
 def test_states_of_the_session_are_variants(adapter: None, store: Path, tmp_path: Path) -> None:
