@@ -22,13 +22,11 @@ from lambent.viewer.modes.walk.traced import FADE_S, STILL_S
 from lambent.viewer.modes.walk.tracing import Wish
 from lambent.viewer.modes.walk.tracing_worker import Rooms
 from lambent.viewer.screen import Rect
-from lambent.viewer.work import POLL_S
 from tests.bake.small_scenes import TINY
-from tests.viewer.drawn_frames import drawn
+from tests.viewer.drawn_frames import LONGEST_S, drawn, until
 
 SIZE = (48, 32)
 PLACE = Rect(0, 0, *SIZE)
-LONGEST_S = 180.0  # for a picture: libraries are loaded and kernels compiled first
 BLACK = {"kd": (0.0, 0.0, 0.0), "lobes": ()}
 
 
@@ -69,32 +67,21 @@ def pictures(renderer, state, workers):
     if workers:
         made._at_rest._tracing = workers[0]._at_rest._tracing
         made._at_rest._tracing.ask(None)
+        workers[0]._state.screen.wake = lambda: state.screen.wake()
     else:
         workers.append(made)
     return made
 
 
-def until(pictures, state, condition):
-    """Draw frames until a condition is met."""
-    began_s = time.monotonic()
-    while time.monotonic() - began_s < LONGEST_S:
-        drawn(pictures, state, SIZE)
-        if condition():
-            return
-        assert not pictures._at_rest.fault
-        time.sleep(min(POLL_S, pictures.wait_s() or POLL_S))
-    raise AssertionError("never met")
-
-
 def traced(pictures, state, samples=1):
     """The picture A, once it is traced with that many samples."""
-    until(pictures, state, lambda: pictures.shown[0].samples >= samples)
+    until(pictures, state, SIZE, lambda: pictures.shown[0].samples >= samples)
     return pictures.shown[0]
 
 
 def b_of(pictures, state, samples):
     """The picture B, once it has that many samples."""
-    until(pictures, state, lambda: pictures.shown[-1].samples >= samples)
+    until(pictures, state, SIZE, lambda: pictures.shown[-1].samples >= samples)
     return pictures.shown[1]
 
 
@@ -124,7 +111,7 @@ def test_the_picture_at_rest_is_traced_and_movement_draws_at_once(pictures, stat
     np.testing.assert_allclose(tiles(found.read()), tiles(mean), rtol=0.25, atol=0.05 * mean.mean())
     assert found.size == SIZE and "samples" in state.screen.at_rest
     versions = a.version
-    until(pictures, state, lambda: found.samples >= 64)
+    until(pictures, state, SIZE, lambda: found.samples >= 64)
     assert a.version == versions, "nothing is drawn meanwhile"
     state.navigation.camera = replace(state.navigation.camera, fov_y_deg=30.0)
     pictures.update(PLACE, 1.0)
@@ -147,7 +134,7 @@ def test_a_coarse_picture_is_replaced_by_a_traced_one_of_half_size_first(picture
     assert state.comparison.figures is None and state.screen.at_rest == "traced: half size"
     pictures.save()
     assert read_image(state.screen.folder / "box-001.exr").shape == (32, 48, 3)
-    until(pictures, state, lambda: found.is_whole)
+    until(pictures, state, SIZE, lambda: found.is_whole)
     assert found.size == SIZE and "sample" in state.screen.at_rest
 
 
@@ -204,14 +191,14 @@ def test_glare_is_rated_in_traced_pictures_at_rest(pictures, state):
     shown, glare.wanted = found.taken, True
     drawn(pictures, state, SIZE)
     assert pictures._glare.waits and pictures.wait_s() is None and glare.share is None
-    until(pictures, state, lambda: glare.found is not None)
+    until(pictures, state, SIZE, lambda: glare.found is not None)
     assert glare.made == "traced, 16 samples" and not glare.is_old and not pictures._glare.busy
     assert pictures.shown[0] is found and found.taken is shown
-    until(pictures, state, lambda: found.taken is not shown)
+    until(pictures, state, SIZE, lambda: found.taken is not shown)
     assert found.samples >= shown.samples
     rated = glare.found.illuminance_lx
     state.screen.pace.traces, glare.wanted = False, True
-    until(pictures, state, lambda: not pictures._glare.busy)
+    until(pictures, state, SIZE, lambda: not pictures._glare.busy)
     assert glare.made == "drawn" and glare.found.illuminance_lx == pytest.approx(rated, rel=0.1)
     state.navigation.camera = replace(state.navigation.camera, fov_y_deg=41.0)
     drawn(pictures, state, SIZE)
@@ -228,7 +215,7 @@ def test_light_that_is_mixed_while_the_picture_is_traced_lets_the_window_sleep(p
     assert pictures.shown == (pictures._a,)
     assert traced(pictures, state).read().mean() == pytest.approx(0.5 * before, rel=0.1)
     mixer = pictures._renderer.mixer
-    until(pictures, state, lambda: not mixer.busy)
+    until(pictures, state, SIZE, lambda: not mixer.busy)
     assert not mixer.lags and pictures.shown[0].samples > 0
     drawn(pictures, state, SIZE)
     assert pictures.wait_s() is None
@@ -258,7 +245,7 @@ def test_b_is_the_path_traced_scene_beside_the_picture_at_rest(pictures, state, 
     assert views[0] is a.view and views[1] is not a.view and views[1].texture is a.view.texture
     b = b_of(pictures, state, 16)
     assert np.abs(z_of(b, reference(store, state.navigation.camera, 64))).max() < 4
-    until(pictures, state, lambda: state.comparison.figures is not None and min(state.comparison.figures.of) >= 4)
+    until(pictures, state, SIZE, lambda: state.comparison.figures is not None and min(state.comparison.figures.of) >= 4)
     assert state.comparison.divider.a_label.startswith("traced") and "path traced" in state.comparison.divider.b_label
     assert state.comparison.figures.psnr_db > 20
     state.look.show = "specular"
@@ -270,7 +257,7 @@ def test_beside_a_traced_b_the_picture_a_is_drawn(pictures, state):
     state.comparison.mode = "side by side"
     b = b_of(pictures, state, 4)
     assert pictures.shown[0] is pictures._a and b.drawing[0] == "traced"
-    until(pictures, state, lambda: state.comparison.figures is not None)
+    until(pictures, state, SIZE, lambda: state.comparison.figures is not None)
     assert state.comparison.figures.of[0] == 0 < state.comparison.figures.of[1]
 
 
@@ -297,11 +284,11 @@ def test_light_follows_edits_as_baked_estimated_or_rebaked(renderer, store, stat
 def test_a_film_is_traced_frame_by_frame(pictures, state, tmp_path):
     camera = state.navigation.camera
     state.films.file_name, state.films.size, state.films.quality = "a-##.exr", "640 x 360", "traced, 16 samples"
-    until(pictures, state, lambda: pictures._at_rest._tracing.ready)
+    until(pictures, state, SIZE, lambda: pictures._at_rest._tracing.ready)
     state.films.wanted = CameraPath(name="short", keys=(camera, replace(camera, fov_y_deg=30.0)), seconds=0.04)
     drawn(pictures, state, SIZE)
     assert state.films.under_way.waits and pictures.wait_s() is None, "the process wakes the window"
-    until(pictures, state, lambda: state.films.under_way is None)
+    until(pictures, state, SIZE, lambda: state.films.under_way is None)
     assert "2 frames" in state.screen.messages[-1].text
     first, last = (read_image(tmp_path / f"a-0{number}.exr") for number in (1, 2))
     assert first.shape == (360, 640, 3) and np.abs(first - last).mean() > 0.02 * first.mean()

@@ -1,0 +1,103 @@
+"""The walk under a turned sky, and with a mesh in an object's place: the picture at rest shows what is drawn."""
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.core.camera import Camera
+from lambent.core.images import write_image
+from lambent.scenes import load_scene
+from lambent.viewer.modes.walk.mode import open_store
+from tests.bake.small_scenes import TINY
+from tests.viewer.drawn_frames import drawn, until
+
+SIZE = (48, 32)
+QUALITY = TINY.changed("otherwise", light_field={"points": 32, "texels": 14, "strata": 1})
+SCENE = """
+format = "lambent-scene"
+version = 1
+name = "otherwise"
+geometry = "builtin:box"
+exposure_ev = 0.0
+materials.white.kd = 0.7
+materials.red.kd = [0.6, 0.05, 0.05]
+materials.green.kd = [0.1, 0.45, 0.1]
+materials.black.kd = 0.0
+materials.metal = { kd = 0.3, lobes = [{ mx = 0.15, my = 0.15, r0 = 0.3 }] }
+objects.sphere.light_field = { volume = true }
+environment = { kind = "image", file = "sky.exr" }
+"""
+TALL = """
+v 0 0 0
+v 1 0 0
+v 1 4 0
+v 0 4 0
+f 1 2 3 4
+"""
+OUTWARDS = Camera("outwards", (0.0, 0.5, 0.3), (0.0, 0.5, 2.0), fov_y_deg=60)
+
+
+@pytest.fixture(scope="module")
+def folder(mi, tmp_path_factory):
+    """A store beside its scene, under a sky that is bright towards +z, where the box is open."""
+    found = tmp_path_factory.mktemp("otherwise")
+    sky = np.full((16, 32, 3), 0.1, np.float32)
+    sky[:, :8] = sky[:, -8:] = 1.0
+    write_image(found / "sky.exr", sky)
+    (found / "scene.toml").write_text(SCENE)
+    (found / "tall.obj").write_text(TALL)
+    bake(load_scene(found / "scene.toml"), found / "s.store", quality=QUALITY).close()
+    return found
+
+
+@pytest.fixture
+def opened(adapter, screen, folder):
+    """Opens the store with options; the room in the window, closed after the test."""
+    made = []
+
+    def open_with(camera=None, **options):
+        made.append(open_store(folder / "s.store", "walk", screen, **options))
+        state, pictures = made[-1].state, made[-1].drawing
+        state.look.exposure_ev, state.meter.expose_wanted = 0.0, False
+        state.screen.pace.adaptive = False
+        state.navigation.camera = camera or state.navigation.camera
+        return state, pictures
+
+    yield open_with
+    for mode in made:
+        mode.drawing.close()
+        mode.state.session.close()
+
+
+def both(state, pictures):
+    """The drawn picture, then the traced one in its place."""
+    drawn(pictures, state, SIZE)
+    assert pictures.shown == (pictures._a,)
+    before = pictures._a.read()
+    until(pictures, state, SIZE, lambda: pictures.shown[0].samples >= 16)
+    assert not pictures._at_rest.fault
+    return before, pictures.shown[0].read()
+
+
+def test_a_turned_sky_is_traced(opened):
+    sky = {}
+    for turn in (0.0, 180.0):
+        drawn_sky, sky[turn] = both(*opened(OUTWARDS, sky_turn_deg=turn))
+        np.testing.assert_allclose(sky[turn].mean(), drawn_sky.mean(), rtol=0.1)
+    assert sky[0.0][16].mean() > 4 * sky[180.0][16].mean()
+
+
+def test_a_mesh_in_place_of_an_object_is_traced(opened, folder):
+    """Its edits as well, with light as baked."""
+    before, sphere = both(*opened())
+    state, pictures = opened(replaced=(f"sphere={folder / 'tall.obj'},red",))
+    with_mesh, traced = both(state, pictures)
+    for got, expected in ((sphere, before), (traced, with_mesh)):
+        assert np.abs(got - expected).mean() < 0.15 * expected.mean()
+    changed = np.abs(traced - sphere).max(axis=-1) > 0.1 * sphere.mean()
+    drawn_change = np.abs(with_mesh - before).max(axis=-1) > 0.1 * sphere.mean()
+    assert changed.mean() > 0.02 and (changed & drawn_change).sum() > 0.6 * drawn_change.sum()
+    red = state.scene.materials["red"]
+    state.materials.edits.change("red", red.model_copy(update={"kd": (0.0, 0.0, 0.0)}))
+    _, black = both(state, pictures)
+    assert 0.1 < (black < 0.1 * traced)[changed, 0].mean() < 0.6, "the mesh, which is narrower than the sphere"
