@@ -6,16 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
-from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.measured import load
-from lambent.materials.measured.scattered import ScatteredTable, _place
 from lambent.materials.measured.spectral import rgb_of_spectra
-from lambent.materials.measured.table import isotropic_brdf
-from tests.materials.measured.measured_files import GLOSSY, cornell_rows, cornell_text
+from tests.materials.measured.measured_files import cornell_rows, cornell_text
 
 BANDS_NM = np.linspace(400, 700, 31)
 
@@ -56,25 +51,6 @@ def test_constant_material(tmp_path: Path, hemisphere) -> None:
     table = load(path)
     np.testing.assert_allclose(table.eval(hemisphere(50, 1), hemisphere(50, 2)), 0.2, rtol=1e-6)
     np.testing.assert_allclose(table.albedo(np.array([0, 0, 1.0])), 0.2 * np.pi, rtol=5e-3)
-
-
-def test_between_samples_it_follows_a_lobe(hemisphere) -> None:
-    """1500 random tuples of a known lobe: half the error of eight neighbours weighted distance^-2, and no jumps."""
-    wi, wo = hemisphere(1500, 1, 75), hemisphere(1500, 2, 75)
-    truth = MaterialBSDF(GLOSSY)
-    table = ScatteredTable(wi, wo, truth.eval(wi, wo), isotropic_brdf(Path("a"), "test", {}, ()))
-    asked_i, asked_o = hemisphere(4000, 3, 65), hemisphere(4000, 4, 65)
-    expected = truth.eval(asked_i, asked_o)
-    tree = cKDTree(_place(wi, wo))
-    distance, index = tree.query(_place(asked_i, asked_o), k=8)
-    weight = distance**-2.0 / (distance**-2.0).sum(axis=1, keepdims=True)
-    inverse = (truth.eval(wi, wo)[index] * weight[..., None]).sum(axis=1)
-    ours = table.eval(asked_i, asked_o)
-    assert np.abs(ours - expected).sum() < np.abs(inverse - expected).sum() / 2
-    theta = np.linspace(0.01, 1.2, 4000)
-    along = direction(theta, np.where(theta > 0, np.pi, 0))
-    curve = table.eval(np.broadcast_to(direction(0.6, 0.0), along.shape), along)[:, 0]
-    assert np.abs(np.diff(curve)).max() < 0.02 * curve.max()
 
 
 def test_bad_samples_are_counted(tmp_path: Path) -> None:

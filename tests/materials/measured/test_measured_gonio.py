@@ -45,20 +45,6 @@ def test_text_round_trip(tmp_path: Path) -> None:
             np.testing.assert_allclose(theirs.weight, ours.weight, rtol=1e-3)
 
 
-def test_column_names_give_the_quantity(tmp_path: Path) -> None:
-    """The same numbers under f and p differ by exactly the cosine."""
-    path = tmp_path / "a"
-    rows = "".join(f"0 0 {t} {p} 0.25\n" for t in (0, 60) for p in (0, 120, 240))
-    table = {}
-    for quantity in ("f", "p", "f_cos"):
-        path.write_text(f"theta_i phi_i theta_o phi_o {quantity}\n{rows}")
-        table[quantity] = load(path).samples()
-    np.testing.assert_allclose(table["f"].f[:, 0], 0.25)
-    np.testing.assert_allclose(table["p"].f[:, 0], [0.25] * 3 + [0.5] * 3)
-    np.testing.assert_allclose(table["p"].p[:, 0], 0.25)
-    np.testing.assert_array_equal(table["p"].f, table["f_cos"].f)
-
-
 def test_not_measured_negative_and_separators(tmp_path: Path) -> None:
     path = tmp_path / "a"
     values = iter(["nan", "-1", "-0.001", "inf", "0.2", "0.3", "0.4", "0.5"])
@@ -88,55 +74,12 @@ def test_weights_tile_the_hemisphere() -> None:
     assert samples.weight[one].sum() == pytest.approx(2 * np.pi * (1 - np.cos(last_edge)), rel=1e-6)
 
 
-def test_half_vector_beats_quadrilinear_on_a_lobe() -> None:
-    """Between two incident directions a narrow lobe moves; blending makes two of it (thesis, figure 3.1)."""
-    table = synthesise(BRUSHED, replace(ANISOTROPIC, **CLEAN))
-    wi = np.broadcast_to(direction(np.radians(42), np.radians(38)), (3000, 3))
-    wo = wi * (-1, -1, 1) + np.random.default_rng(0).normal(0, 0.1, (3000, 3))
-    wo = wo / np.linalg.norm(wo, axis=1, keepdims=True)
-    wo = wo[wo[:, 2] > 0.2]
-    truth = MaterialBSDF(BRUSHED).eval(wi[: len(wo)], wo)
-    error = {
-        way: np.abs(replace(table, reconstruction=way).eval(wi[: len(wo)], wo) - truth).sum() / truth.sum()
-        for way in ("half_vector", "quadrilinear")
-    }
-    assert error["half_vector"] < 0.03 < 0.2 < error["quadrilinear"]
-
-
 def test_f_stays_in_bounds_at_the_horizon() -> None:
     """p of a neighbour does not vanish where wo's cosine does: their quotient is limited."""
     table = synthesise(GLOSSY, replace(ISOTROPIC, **CLEAN))
     wi = np.broadcast_to(direction(np.radians(40), 0.0), (500, 3))
     wo = direction(np.radians(np.linspace(80, 89.999, 500)), np.pi)
     assert table.eval(wi, wo).max() < 4 * MaterialBSDF(GLOSSY).eval(wi, wo).max()
-
-
-def test_quadrilinear_keeps_a_retro_reflector() -> None:
-    """A bump towards the light stays where it was measured; aligning on the half vector would move it."""
-    from lambent.materials.measured.synthetic import record
-
-    def retro(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-        return np.exp(-(np.arccos(np.sum(wi * wo, axis=1).clip(-1, 1)) ** 2) / 0.3)[:, None]
-
-    table = record(retro, "retro", replace(ISOTROPIC, sector_deg=0, step_deg=5, **CLEAN))
-    wi = direction(np.radians(np.array([26.0, 40, 54])), 0.0)
-    wo = direction(np.radians(np.array([20.0, 30, 60])), 0.1)
-    aligned = replace(table, reconstruction="quadrilinear").eval(wi, wo)
-    np.testing.assert_allclose(aligned, retro(wi, wo), rtol=0.1)
-    moved = replace(table, reconstruction="half_vector").eval(wi, wo)
-    assert np.abs(moved - retro(wi, wo)).max() > 2 * np.abs(aligned - retro(wi, wo)).max()
-
-
-@pytest.mark.parametrize(
-    ("symmetry", "phi_i"),
-    [("quadrant", range(0, 91, 15)), ("half", range(0, 180, 15)), ("none", range(0, 360, 15))],
-)
-def test_symmetries_give_the_same_material(hemisphere, symmetry: str, phi_i: range) -> None:
-    setup = replace(ANISOTROPIC, symmetry=symmetry, phi_i_deg=tuple(phi_i), **CLEAN, step_deg=5, fine_deg=2.5)
-    table = synthesise(BRUSHED, setup)
-    wi, wo = hemisphere(2000, 1, 60), hemisphere(2000, 2, 75)
-    truth = MaterialBSDF(BRUSHED).eval(wi, wo)
-    assert np.abs(table.eval(wi, wo) - truth).sum() / truth.sum() < 0.05
 
 
 def test_isotropic_table_turns_with_the_pair(hemisphere) -> None:

@@ -62,15 +62,6 @@ def test_samples_are_the_nodes(shared_data: Path, name: str) -> None:
     assert (table.info.notes != ()) == name.startswith("cc_")
 
 
-def test_weights_are_solid_angles(shared_data: Path) -> None:
-    """Sum of f cos weight over one incident direction is the albedo there, to the coarseness of 32 x 32 nodes."""
-    table = load(shared_data / "measured" / "rgl" / "paper_white_rgb.bsdf")
-    samples = table.samples()
-    normal = samples.wi[:, 2] > 0.999
-    total = (samples.p[normal] * samples.weight[normal, None]).sum(axis=0)
-    np.testing.assert_allclose(total, table.albedo(np.array([0, 0, 1.0])), rtol=0.05)
-
-
 def test_without_jacobian_and_spectral(tmp_path: Path, hemisphere) -> None:
     fields = rgl_fields(np.zeros(1))
     fields["jacobian"] = np.array([0], dtype=np.uint8)
@@ -179,20 +170,6 @@ def test_nodes_and_weights_of_an_even_warp(tmp_path: Path, phi_i: np.ndarray, nd
     assert len(found) == len(expected) > 100
     off = [cKDTree(some).query(others)[0].max() for some, others in ((found, expected), (expected, found))]
     assert max(off) < 1e-4, "all columns at once, whatever the order"
-
-
-def test_samples_of_made_up_files_are_their_nodes(tmp_path: Path) -> None:
-    fields = rgl_fields(np.zeros(1))
-    fields["theta_i"] = np.array([0.0, 0.4, 0.8, 1.2], np.float32)
-    path = tmp_path / "a"
-    path.write_bytes(tensor_bytes(fields))
-    table = load(path)
-    samples = table.samples()
-    inside = (np.abs(samples.wo[:, :2]).max(axis=1) > 1e-3) & (samples.weight > 1e-6)
-    seam = np.abs(samples.wi[:, 1] + samples.wo[:, 1]) > 1e-6
-    kept = inside & seam
-    assert kept.mean() > 0.4
-    np.testing.assert_allclose(table.eval(samples.wi, samples.wo)[kept], samples.f[kept], rtol=2e-3, atol=1e-6)
 
 
 def test_weights_add_up_to_the_albedo(tmp_path: Path) -> None:

@@ -93,28 +93,6 @@ def test_headers_that_promise_too_much(files: dict[str, Path], target: Path) -> 
     attempt(target, b"theta_i phi_i theta_o phi_o p\n" + b"0 " * 100000 + b"\n")
 
 
-@pytest.mark.parametrize("kind", ["merl", "rgl"])
-def test_wrong_endian(files: dict[str, Path], target: Path, kind: str) -> None:
-    content = files[kind].read_bytes()
-    attempt(target, np.frombuffer(content[: len(content) // 4 * 4], "<u4").byteswap().tobytes())
-
-
-@pytest.mark.parametrize("value", [np.nan, -np.inf, np.inf, -1.0])
-def test_merl_without_a_value(files: dict[str, Path], target: Path, value: float) -> None:
-    content = files["merl"].read_bytes()
-    target.write_bytes(content[:12] + np.full((len(content) - 12) // 8, value, "<f8").tobytes())
-    with pytest.raises(UserError, match="no measured value"):
-        load(target)
-
-
-def test_rgl_filled_with_nan(files: dict[str, Path], target: Path) -> None:
-    content = files["rgl"].read_bytes()
-    header = content.index(b"made up") + 7
-    target.write_bytes(content[:header] + b"\xff" * (len(content) - header))
-    with pytest.raises(UserError, match="not finite"):
-        load(target)
-
-
 @pytest.mark.parametrize("kind", ["cornell", "gonio"])
 @pytest.mark.parametrize("ending", [b"\n", b"\r\n", b"\r"])
 @pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
