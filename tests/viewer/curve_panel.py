@@ -1,7 +1,5 @@
 """Drives the curve editor without a window: real Dear ImGui and ImPlot frames, a mouse, keys and the wheel."""
 
-import time
-
 from imgui_bundle import imgui
 
 from lambent.core.camera import Camera
@@ -20,7 +18,7 @@ class Panel(Frames):
     def __init__(self, monkeypatch, starts, material, size=NARROW):
         camera = Camera(name="front", position=(0, 1, 3), target=(0, 1, 0))
         self.session, self.material, self.size = Session.new("room", camera, starts), material, size
-        self.editor, self.seconds = CurveEditor(), []
+        self.editor = CurveEditor()
         monkeypatch.setattr(panel_driver, "RECORDED", (*panel_driver.RECORDED, "drag_float"))
         super().__init__(monkeypatch, size)
         self.io.config_input_trickle_event_queue = False
@@ -30,9 +28,7 @@ class Panel(Frames):
         imgui.set_next_window_size(self.size)
         imgui.begin("window", None, layout.FIXED)
         imgui.push_item_width(-layout.LABEL_PX)
-        begin = time.perf_counter()
         self.editor.draw(self.session, self.material)
-        self.seconds.append(time.perf_counter() - begin)
         imgui.pop_item_width()
         imgui.end()
 
@@ -84,5 +80,10 @@ class Panel(Frames):
         return self.edit.curves[curve].layers
 
     @property
+    def curve(self):
+        state = self.editor.state
+        return state.curve(self.material, state.shown(self.session, self.material))
+
+    @property
     def view(self):
-        return self.editor.state.views[self.material, self.editor.curve(self.session, self.material)]
+        return self.editor.state.views[self.material, self.curve]

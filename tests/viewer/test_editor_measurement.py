@@ -15,7 +15,7 @@ from lambent.viewer.editor import readings
 from lambent.viewer.editor.matrix import matrix
 from lambent.viewer.editor.measurement import read_measurement, thinned
 from lambent.viewer.editor.readings import Disks, Incident
-from tests.viewer.measured_specimens import BRASS, BRUSHED, FROSTED, TURNED, write_measurement
+from tests.viewer.measured_specimens import BRUSHED, FROSTED, TURNED, write_measurement
 
 OTHERS = (
     Material(kd=0.3),
@@ -80,27 +80,6 @@ def test_disks_hold_the_cube_root_of_p(brushed):
     known = np.isfinite(measured[3])
     assert known.mean() > 0.6
     assert np.abs(measured[3] - model[3])[known].mean() < 0.05 * model[3].max(), "nearest tuples, so not exact"
-
-
-def test_the_picture_of_the_disks_holds_each_at_its_place(brushed):
-    disks = Disks(readings.incidents_of(brushed.gathered), False, 16)
-    values = np.zeros((len(disks.tiles), int(disks._inside.sum()), 3), np.float32)
-    values[4] = 1
-    picture = disks.picture(values, 1.0)
-    (u0, v0), (u1, v1) = disks.place(4, False)
-    height, width = picture.shape[:2]
-    tile = picture[round(v0 * height) : round(v1 * height), round(u0 * width) : round(u1 * width)]
-    assert tile.shape[:2] == (16, 16) and tile[8, 8].tolist() == [255, 255, 255, 255]
-    assert picture[..., :3].any(axis=-1).sum() == (tile[..., 3] > 0).sum(), "white elsewhere"
-    assert tile[0, 0, 3] == 0, "off the disk it is transparent"
-
-
-@pytest.mark.parametrize("material", [BRASS, FROSTED])
-def test_albedos_are_those_of_the_bsdf(material):
-    near, far = readings.albedo(material, 0.0, 2048)
-    wo = direction(np.radians(readings.ALBEDO_THETA_DEG[:15]), 0.0)
-    assert (near + far)[:15] == pytest.approx(MaterialBSDF(material).albedo(wo, 20_000), rel=0.03)
-    assert (far > 0).any() == material.transmits
 
 
 def test_the_curve_is_p_in_the_plane():

@@ -123,10 +123,9 @@ def test_a_loaded_document_fits_the_axes(driver, state, tmp_path):
     assert not state.editor.plots.fit_axes
 
 
-def test_a_click_on_a_disk_chooses_it(driver, state):
+def test_the_plane_nearest_to_45_degrees_is_shown_first(driver, state):
     editor = state.editor
     tick(driver)
-    driver.frame(1)
     assert editor.shown.incidents[editor.plots.chosen].theta_deg == 45
     editor.plots.choose(0)
     tick(driver)

@@ -38,6 +38,7 @@ def test_every_disk_lies_where_its_place_says() -> None:
         row, column = int((top + bottom) / 2 * height), int((left + right) / 2 * width)
         assert picture[row, column, 0] == pytest.approx(255 * number / 6, abs=1)
         assert picture[row, column, 3] == 255
+        assert picture[round(top * height), round(left * width), 3] == 0, "off the disk it is transparent"
 
 
 def test_albedo_of_both_sides_and_p_in_the_plane() -> None:

@@ -119,10 +119,10 @@ class Baking:
         self.samples = 0
         self.proposal: Proposal | None = None
         self._clock, self._passes = clock, Passes(bounces.samples) if bounces is not None else None
-        self._words = list(map(str, lights))
+        words = list(map(str, lights))
         if bounces is not None:
             kept = [] if proposing is None else [json.dumps(sorted(proposing))]
-            self._words = [BOUNCES, json.dumps(bounces.said()), *kept]
+            words = [BOUNCES, json.dumps(bounces.said()), *kept]
         terms = [(name, t) for name in self.document.materials for t in session.original(name).terms]
         self._curves = {(name, t.name): len(t.factors) for name, t in terms}
         self._stage = Stage({}, clock())
@@ -131,7 +131,7 @@ class Baking:
         job = Path(self._job.name) / "job.edits.json"
         Session(session.document, session.folder).save(job)
         self._process: WorkerProcess | None = WorkerProcess(
-            WORKER, [str(job), str(store), *self._words], "the bake", lambda said, _: self.take(said), ends=True
+            WORKER, [str(job), str(store), *words], "the bake", lambda said, _: self.take(said), ends=True
         )
 
     @property

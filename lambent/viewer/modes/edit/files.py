@@ -19,7 +19,7 @@ from lambent.viewer.editor.files import kind_of, typed_path
 from lambent.viewer.edits import unused
 from lambent.viewer.modes.edit.subject import SESSION_ENDING
 from lambent.viewer.screen import Screen
-from lambent.viewer.work import Work
+from lambent.viewer.work import Work, pending
 
 
 class Tables:
@@ -46,8 +46,8 @@ class Files:
         The last exported material.
     """
 
-    def __init__(self, session: Session, screen: Screen, name: str, home: Path | None, tables: Tables) -> None:
-        self._session, self._screen, self._tables = session, screen, tables
+    def __init__(self, session: Session, screen: Screen, name: str, home: Path | None) -> None:
+        self._session, self._screen, self._tables = session, screen, Tables()
         self._stem = plain_name(name, "scene")
         self.home = home
         self.exported: ExportedMaterial | None = None
@@ -72,8 +72,7 @@ class Files:
 
     def poll(self) -> None:
         """Handle the end of the running task."""
-        if self._work is not None and self._work.poll():
-            self._work = None
+        self._work = pending(self._work)
 
     def close(self) -> None:
         """Cancel the running task."""

@@ -20,7 +20,7 @@ from lambent.store.store import MANIFEST, Store
 from lambent.store.tails import FIXED
 from lambent.viewer.modes.edit.baking import Baking
 from lambent.viewer.modes.edit.painter import Painter
-from lambent.viewer.work import Work
+from lambent.viewer.work import Work, pending
 
 SERIES = ("64,1,1,1", "64,1,1", "128,8,1", "64,16")
 SAMPLES = (256, 1024, 4096, 16384)
@@ -97,8 +97,7 @@ class Bounced:
 
     def tick(self, session: Session, folder: Path, idle: bool) -> None:
         """Take finished work and start wanted work; `idle`: direct light is done and nothing else writes the store."""
-        if self._reading is not None and self._reading.poll():
-            self._reading = None
+        self._reading = pending(self._reading)
         if self.baking is not None and self.baking.samples > self.samples and self._reading is None:
             self._read(session)
         if self.baking is not None and not self.baking.running and self._reading is None:

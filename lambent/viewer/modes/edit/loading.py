@@ -20,7 +20,7 @@ from lambent.materials.factored.terms import Editable
 from lambent.store.contract import transport_lights, view_artefact_name
 from lambent.store.store import Store
 from lambent.viewer.modes.edit.painter import Materials, Painter
-from lambent.viewer.work import Work
+from lambent.viewer.work import Work, pending
 
 
 @dataclass(frozen=True)
@@ -106,8 +106,7 @@ class Loading:
 
     def poll(self) -> None:
         """Take finished reads."""
-        if self._work is not None and self._work.poll():
-            self._work = None
+        self._work = pending(self._work)
 
     def close(self) -> None:
         """Wait for the present read."""

@@ -158,11 +158,11 @@ class Curves:
         """Draw the curves of a material; a grabbed curve becomes active in the picture."""
         state, editor = self._state, self._editor
         editor.draw(state.session, material)
-        if editor.active_curve != self._active:
-            self._active = editor.active_curve
+        if editor.state.active_curve != self._active:
+            self._active = editor.state.active_curve
             if self._active is not None:
                 state.painter.run(partial(state.painter.activate, material, self._active))
         needed = state.painter.frame.needed if state.painter.frame is not None else frozenset()
         for name in self._needed - needed:
-            editor.transported(state.session, name)
+            editor.state.transported(state.session, name)
         self._needed = needed

@@ -18,7 +18,7 @@ from lambent.store.store import MANIFEST, Store
 from lambent.viewer.look import Look
 from lambent.viewer.mode import Divider
 from lambent.viewer.modes.edit.baking import LIGHTS, Baking
-from lambent.viewer.modes.edit.files import Files, Tables
+from lambent.viewer.modes.edit.files import Files
 from lambent.viewer.modes.edit.interreflections import SHOWN, Bounced
 from lambent.viewer.modes.edit.loading import Loading, ViewMap
 from lambent.viewer.modes.edit.painter import Frame, Materials, Painter, Wish, checked
@@ -73,7 +73,6 @@ class EditState:
         screen: Screen,
         lights: Sequence[int] = LIGHTS,
         bake: Callable[..., Baking] = Baking,
-        tables: Tables | None = None,
         backend: Backend | None = None,
     ) -> None:
         self.subject, self.session, self.screen, self.lights = subject, subject.session, screen, tuple(lights)
@@ -87,7 +86,7 @@ class EditState:
         self.painter = Painter(self.session.document.size[::-1], backend=backend)
         self.loading = Loading(self.painter, subject.store)
         self.baking: Baking | None = None
-        self.files = Files(self.session, screen, subject.name, subject.home, tables or Tables())
+        self.files = Files(self.session, screen, subject.name, subject.home)
         self._bake = bake
         self.bounced = Bounced(self.painter, bake)
         self._sources: Sequence[object] = ()  # sources of materials at the last check of transport

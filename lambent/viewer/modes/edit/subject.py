@@ -14,7 +14,7 @@ from lambent.core.errors import UserError
 from lambent.core.inputs import read_head, sha256_of
 from lambent.core.plain import plain_name, triple
 from lambent.editing.document import Surroundings
-from lambent.editing.session import Factorise, Session
+from lambent.editing.session import Session
 from lambent.scenes.loaders.load import BUILTIN_PREFIX, is_scene, load_scene
 from lambent.scenes.scene import Scene
 from lambent.store.source import SURROUNDINGS, scene_of, worn_in_views
@@ -88,7 +88,6 @@ def opened(
     picture: tuple[int, int] | None = None,
     store: Path | None = None,
     crease_deg: float | None = None,
-    factorise: Factorise | None = None,
 ) -> Subject:
     """Open a path.
 
@@ -114,7 +113,7 @@ def opened(
         raise UserError("picture is too large", field="--picture", got=got, expected=f"at most {LARGEST_PX} a side")
     kind = kind_of(path)
     if kind == "session":
-        session = Session.open(path, factorise)
+        session = Session.open(path)
         place = str(session.path(session.document.scene))
         place = place if Path(place).exists() else session.document.scene
         crease_deg = session.document.crease_deg if crease_deg is None else crease_deg
@@ -132,12 +131,12 @@ def opened(
         materials = {o.material: scene.materials[o.material] for o in scene.merged(merged).objects}
         begun = Session.new(_lasting(place), where, materials, size=picture or SIZE, environment=lit_by)
         kept_too = {"merged": merged, "crease_deg": crease_deg}
-        session = Session(begun.document.model_copy(update=kept_too), factorise=factorise)
+        session = Session(begun.document.model_copy(update=kept_too))
     else:
         changes = {**_changes(session, scene, base, camera, picture), "crease_deg": crease_deg}
         if environment is not None:
             changes["environment"] = lit_by
-        session = Session(session.document.model_copy(update=changes), session.folder, factorise)
+        session = Session(session.document.model_copy(update=changes), session.folder)
         lit_by = session.document.environment
     own = base if base is not None and lit_by == kept else None
     chosen = store or own or default_store(folder, scene.name, lit_by, session.folder)

@@ -34,23 +34,6 @@ class CurveEditor:
         self.axes: Axes | None = None  # of the last drawn plot
         self._outlined: Region | None = None
 
-    @property
-    def active_curve(self) -> str | None:
-        """Name of the curve that is being dragged or drawn."""
-        return self.state.active_curve
-
-    def curve(self, session: Session, material: str) -> str:
-        """Name of the curve on the plot."""
-        return self.state.curve(material, self.state.shown(session, material))
-
-    def choose(self, material: str, curve: str) -> None:
-        """Put a curve on the plot."""
-        self.state.chosen[material] = curve
-
-    def transported(self, session: Session, material: str) -> None:
-        """Note that transport was baked for the material as it is now."""
-        self.state.transported(session, material)
-
     def draw(self, session: Session, material: str) -> None:
         """Draw into the current window, at its full width."""
         state = self.state
@@ -98,7 +81,7 @@ class CurveEditor:
             imgui.table_next_row()
             imgui.table_next_column()
             if imgui.selectable(f"{name}{star}##curve", name == chosen, imgui.SelectableFlags_.span_all_columns)[0]:
-                self.choose(material, name)
+                self.state.chosen[material] = name
             explain(f"{name}: {_meaning(over)}\nin {', '.join(terms)}" + ("\n* edited" if star else ""))
             imgui.table_next_column()
             imgui.text_disabled(_title(over))
