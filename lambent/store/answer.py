@@ -177,7 +177,7 @@ def read_answer(store: Store) -> StoredAnswer:
         and all(not one.size or int(last_points(one).max()) < max(senders, 1) for one in (rays, more_rays))
     )
     if not fits:
-        raise UserError("broken store", file=store.folder, field="answer", got="arrays that match")
+        raise store.broken("answer", "its arrays do not match")
     sorted_light = bool(light_groups(store))
     maps = [group_name(side) if sorted_light else f"light_map/{side}" for side in SIDES]
     lights = maps, _directs(store)

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from lambent.core.camera import FARTHEST_M, Camera
-from lambent.core.errors import UserError
 from lambent.store.artefact import Array
-from lambent.store.store import MANIFEST, Store
+from lambent.store.store import Store
 
 SceneRecord = Any  # of `store.contract`, which imports this module
 ANY = None
@@ -51,49 +50,49 @@ def check_record(store: Store, record: SceneRecord) -> None:
                 cube = wanted[:3] != CUBE or (len(shape) > 2 and shape[1] == shape[2] > 0)
                 if not (fits and cube and np.dtype(artefact.dtype).kind in kinds):
                     got, expected = f"{shape} {artefact.dtype}", " x ".join("n" if w is ANY else str(w) for w in wanted)
-                    raise _broken(store, artefact.name, "array has the wrong shape or type", got, expected)
+                    raise store.broken(artefact.name, "array has the wrong shape or type", got, expected)
     _check_names(store, record)
     for field, camera in _cameras(record):
         if not is_usable(camera):
-            raise _broken(store, field, "a camera is beyond 1e9 m or has an impossible field of view")
+            raise store.broken(field, "a camera is beyond 1e9 m or has an impossible field of view")
     numbers = [record.exposure_ev or 0.0, *_flat(record.bounds)]
     numbers += [x for o in record.objects for x in (*o.emission, *_flat(o.bounds), *_flat(o.borders))]
     numbers += [path.seconds for path in record.paths] + [s for path in record.paths for s in path.times_s or ()]
     numbers += [x for r in record.reflectors for x in (*r.plane, *_flat(r.outline), *(p.area_m2 for p in r.parts))]
     numbers += [x for t in record.textures.values() for x in (t.cutoff, *_flat(_flat(t.parts.values())))]
     if not all(map(math.isfinite, numbers)):
-        raise _broken(store, "scene", "the scene record has a number that is not finite")
+        raise store.broken("scene", "the scene record has a number that is not finite")
 
 
 def _check_names(store: Store, record: SceneRecord) -> None:
     """Check that all references resolve and all face ranges lie within the faces."""
     objects = {o.name: o for o in record.objects}
     if len(objects) != len(record.objects):
-        raise _broken(store, "objects", "two objects have the same name")
+        raise store.broken("objects", "two objects have the same name")
     faces = store.artefact("geometry/faces").shape[0] if "geometry/faces" in store else math.inf
     for o in record.objects:
         if o.material not in record.materials:
-            raise _broken(store, f"objects.{o.name}", "unknown material", o.material)
+            raise store.broken(f"objects.{o.name}", "unknown material", o.material)
         if o.first_face < 0 or o.face_count < 0 or o.first_face + o.face_count > faces:
             got = f"{o.face_count} from {o.first_face}"
-            raise _broken(store, f"objects.{o.name}", "face index out of range", got, f"within {faces}")
+            raise store.broken(f"objects.{o.name}", "face index out of range", got, f"within {faces}")
     for material in record.textures:
         if material not in record.materials:
-            raise _broken(store, "textures", "unknown material", material)
+            raise store.broken("textures", "unknown material", material)
     if len({variant.name for variant in record.variants}) != len(record.variants):
-        raise _broken(store, "variants", "two variants have the same name")
+        raise store.broken("variants", "two variants have the same name")
     for variant in record.variants:
         textures = {look.textures for look in variant.looks.values() if isinstance(look.textures, str)}
         worn = {*variant.looks, *(textures - {""})}
         if strange := sorted(worn - set(record.materials)):
-            raise _broken(store, f"variants.{variant.name}", "unknown material", strange[0])
+            raise store.broken(f"variants.{variant.name}", "unknown material", strange[0])
     for number, reflector in enumerate(record.reflectors):
         for part in reflector.parts:
             field = f"reflectors.{number}"
             if part.object not in objects:
-                raise _broken(store, field, "unknown object", part.object)
+                raise store.broken(field, "unknown object", part.object)
             if part.faces and not 0 <= min(part.faces) <= max(part.faces) < objects[part.object].face_count:
-                raise _broken(store, field, "face index out of range", max(part.faces))
+                raise store.broken(field, "face index out of range", max(part.faces))
 
 
 def read_geometry(store: Store) -> dict[str, Array]:
@@ -102,11 +101,11 @@ def read_geometry(store: Store) -> dict[str, Array]:
     count = len(arrays["positions"])
     if any(len(arrays[name]) != count for name in _PER_VERTEX):
         got = ", ".join(f"{len(arrays[name])} {name}" for name in _PER_VERTEX)
-        raise _broken(store, "geometry", "arrays have different lengths", got)
+        raise store.broken("geometry", "arrays have different lengths", got)
     if arrays["faces"].size and not 0 <= int(arrays["faces"].min()) <= int(arrays["faces"].max()) < count:
-        raise _broken(store, "geometry/faces", "vertex index out of range", arrays["faces"].max(), f"below {count}")
+        raise store.broken("geometry/faces", "vertex index out of range", arrays["faces"].max(), f"below {count}")
     if not np.isfinite(arrays["positions"]).all():
-        raise _broken(store, "geometry/positions", "values are not finite")
+        raise store.broken("geometry/positions", "values are not finite")
     return arrays
 
 
@@ -116,7 +115,7 @@ def numbers_of(store: Store, artefact: str, name: str, count: int) -> tuple[floa
     listed = found if isinstance(found, list) else []
     numbers = tuple(float(x) for x in listed if isinstance(x, int | float) and math.isfinite(x))
     if not len(numbers) == len(listed) == count:
-        raise _broken(store, f"{artefact}: {name}", "not a list of numbers", found, f"{count} finite numbers")
+        raise store.broken(f"{artefact}: {name}", "not a list of numbers", found, f"{count} finite numbers")
     return numbers
 
 
@@ -133,8 +132,3 @@ def _cameras(record: SceneRecord) -> Iterable[tuple[str, Camera]]:
 
 def _flat(rows: Iterable[Iterable[Any]]) -> list[Any]:
     return [value for row in rows for value in row]
-
-
-def _broken(store: Store, field: str, fault: str, got: object = None, expected: object = None) -> UserError:
-    file = store.folder / MANIFEST
-    return UserError(f"broken store: {fault}", file=file, field=field, got=got, expected=expected, hint="bake again")

@@ -78,7 +78,7 @@ Radiance of a term at a point, W/(sr m^2): scale f_q f_o(theta_o) times the sum 
 times the curves' coefficients. Coefficients of pairs are the curves' values at nodes (Curve.node_values), the
 centres of equal bands from 0 to 90 degrees, with linear interpolation; those of rows are the curves' wavelets; f_q and
 f_o are the term's. Textures are included in the array. The first set of LIGHTS is small and ready early;
-`transport_lights` lists the complete sets, the best last, and `forget_lights` drops one.
+`transport_lights` lists the complete sets, the best last.
 
 For relighting a view with its materials unchanged; KEY includes the image's size, and the N triangles subdivide the
 icosahedron repeatedly into four, in the order of scenes.triangle_wavelets:
@@ -121,12 +121,13 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.colour import MOST_UNIT
 from lambent.core.errors import UserError, invalid
 from lambent.core.plain import Triple, triple
+from lambent.core.strict import Strict
 from lambent.materials.document import Material
 from lambent.scenes.scene import Border, Variant
 from lambent.store.consistency import check_record, numbers_of
@@ -145,14 +146,10 @@ DOMINANT_DIRECTION = "light_map/lean"  # kept for compatibility with existing st
 VIEW = "view"
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
 MOST_BORDERS = 2  # borders of a part with other parts of its object
 
 
-class ObjectRecord(_Record):
+class ObjectRecord(Strict):
     """One object: its faces are geometry/faces[first_face : first_face + face_count].
 
     At x, a part has the share product of smoothstep(0, 1, 1/2 + n.x + d) over its borders (n, d), n in 1/m, of its
@@ -193,7 +190,7 @@ def whole_objects(objects: Iterable[ObjectRecord]) -> tuple[ObjectRecord, ...]:
     return tuple(found)
 
 
-class SunRecord(_Record):
+class SunRecord(Strict):
     """A sun disc: unit direction towards it, irradiance in W/m^2 at normal incidence, angular radius.
 
     Clear glass of the materials `panes` (materials.clear) transmits its direct light; all other surfaces block it.
@@ -205,14 +202,14 @@ class SunRecord(_Record):
     panes: tuple[str, ...] = Field(default=(), exclude_if=lambda panes: not panes)
 
 
-class TexturesRecord(_Record):
+class TexturesRecord(Strict):
     """See scenes.scene.MaterialTextures. Maps PART to its uv transform; the texels are arrays."""
 
     parts: dict[str, tuple[Triple, Triple]]
     cutoff: float = 0.5
 
 
-class ReflectorPart(_Record):
+class ReflectorPart(Strict):
     """One object's share of a planar reflector. `faces` are indices within the object's range of geometry/faces."""
 
     object: str
@@ -220,7 +217,7 @@ class ReflectorPart(_Record):
     area_m2: float
 
 
-class PlanRecord(_Record):
+class PlanRecord(Strict):
     """See scenes.floor_plan.FloorPlan: a grid of signed distances, compressed into `packed` by store.plans."""
 
     corner: Triple
@@ -232,7 +229,7 @@ class PlanRecord(_Record):
     packed: str
 
 
-class ReflectorRecord(_Record):
+class ReflectorRecord(Strict):
     """A planar reflector, see scenes.reflectors.Reflector: plane (n, d) with n.x + d = 0, and a convex outline in it.
 
     `plan` has the walls along its true edges, or is None. Older stores have `walled` instead, which is ignored.
@@ -247,7 +244,7 @@ class ReflectorRecord(_Record):
     parts: tuple[ReflectorPart, ...]
 
 
-class SceneRecord(_Record):
+class SceneRecord(Strict):
     """Everything about a scene that the interactive side needs besides its arrays."""
 
     name: str
@@ -259,11 +256,11 @@ class SceneRecord(_Record):
     exposure_ev: float | None = 0.0  # None: metered from the first picture (core.exposure)
     bounds: tuple[Triple, Triple]
     warnings: tuple[str, ...] = ()
-    textures: dict[str, TexturesRecord] = {}  # by the material's name
+    textures: dict[str, TexturesRecord] = Field(default_factory=dict)  # by the material's name
     variants: tuple[Variant, ...] = Field(default=(), exclude_if=lambda variants: not variants)
 
 
-class ViewRecord(_Record):
+class ViewRecord(Strict):
     """A view that owns arrays: its camera, as named then, and the image's size if the arrays depend on it."""
 
     camera: Camera
@@ -293,7 +290,7 @@ def baked_views(store: Store) -> dict[str, ViewRecord]:
     try:
         return {a.name.split("/")[1]: ViewRecord.model_validate(a.meta.get(VIEW)) for a in mine}
     except ValidationError as error:
-        raise UserError("broken store", file=store.folder, field="view", got=str(error)) from error
+        raise store.broken("view", got=error) from error
 
 
 def transport_lights(store: Store, camera: Camera, width: int, height: int) -> list[int]:
@@ -303,13 +300,6 @@ def transport_lights(store: Store, camera: Camera, width: int, height: int) -> l
         a.name.removeprefix(start) for a in store.artefacts("transport") if a.name.startswith(start) and a.complete
     ]
     return sorted(int(name.removesuffix("/terms")) for name in names if name.endswith("/terms"))
-
-
-def forget_lights(store: Store, camera: Camera, width: int, height: int, lights: int) -> None:
-    """Drop the visibility and transport of one set of lights of a view; the next bake recreates them."""
-    start = f"{VIEW}/{view_key(camera, width, height)}"
-    mine = f"{start}/transport/{lights}/"
-    store.forget([f"{start}/visibility/{lights}", *(a.name for a in store.artefacts() if a.name.startswith(mine))])
 
 
 def probe_name(object_name: str, part: str) -> str:
@@ -332,8 +322,7 @@ def radiance_unit(store: Store, name: str) -> float:
     """Unit in W/(sr m^2), from 1 to MOST_UNIT, of the cube map `name`; `UserError` if it is invalid."""
     unit = store.artefact(name).meta.get("unit", 1.0)
     if not (isinstance(unit, int | float) and 1 <= unit <= MOST_UNIT):
-        expected = f"a number from 1 to {MOST_UNIT:g}"
-        raise UserError("broken store", file=store.folder, field=f"{name}: unit", got=unit, expected=expected)
+        raise store.broken(f"{name}: unit", got=unit, expected=f"a number from 1 to {MOST_UNIT:g}")
     return float(unit)
 
 
@@ -349,7 +338,7 @@ def sun_beside(store: Store) -> SunRecord | None:
         raise invalid(error, store.folder / MANIFEST) from error
     numbers = np.array([*sun.direction, *sun.irradiance, sun.radius_rad])
     if not np.isfinite(numbers).all() or abs(np.linalg.norm(sun.direction) - 1) > 1e-3:
-        raise UserError("broken store", file=store.folder, field=f"{name}: sun", got=str(said))
+        raise store.broken(f"{name}: sun", got=said)
     return sun
 
 
@@ -358,7 +347,7 @@ def shared_probes(store: Store) -> dict[str, str]:
     said = store.documents.get(SHARED_PROBES, {})
     found = said.get("owners", {}) if isinstance(said, dict) else None
     if not isinstance(found, dict) or not all(isinstance(owner, str) for owner in found.values()):
-        raise UserError("broken store", file=store.folder, field=SHARED_PROBES, got=str(said)[:80], hint="bake again")
+        raise store.broken(SHARED_PROBES, got=said)
     return found
 
 

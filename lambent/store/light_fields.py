@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.errors import UserError
 from lambent.core.light_field import CANDIDATES, NO_POINT, Glass, LightField, Maps
 from lambent.core.plain import triple
 from lambent.store.consistency import numbers_of
@@ -47,12 +46,10 @@ def read_light_field(store: Store, object_name: str) -> LightField:
     )
     if not fits:
         shapes = [array.shape for array in (points, normals, radiance)]
-        raise UserError("broken store", file=store.folder, field=f"light_field/{object_name}", got=str(shapes))
+        raise store.broken(f"light_field/{object_name}", got=str(shapes))
     named = sample_map[sample_map != NO_POINT]
     if named.size and int(named.max()) >= count:
-        raise UserError(
-            "broken store", file=store.folder, field=name, got=int(named.max()), expected=f"points below {count}"
-        )
+        raise store.broken(name, got=int(named.max()), expected=f"points below {count}")
     return LightField(
         points, normals, radiance, inverse_distance, sample_map,
         (int(corner[0]), int(corner[1])), (int(grid[0]), int(grid[1])), offset_m, blocks,
@@ -71,7 +68,7 @@ def _distances(store: Store, object_name: str) -> tuple[Maps, Maps | None, NDArr
     try:
         inverse, cover = distances_in_blocks(blocks, int(side))
     except ValueError as error:
-        raise UserError("broken store", file=store.folder, field=name, got=str(error)) from error
+        raise store.broken(name, got=error) from error
     return inverse, None if volume else cover, blocks
 
 
@@ -82,7 +79,7 @@ def _glass(store: Store, object_name: str, shape: tuple[int, ...]) -> Glass | No
         return None
     exits = store.read(name)
     if exits.shape != shape or exits.dtype != np.float16 or not np.isfinite(exits).all():
-        raise UserError("broken store", file=store.folder, field=name, got=str(exits.shape), expected=str(shape))
+        raise store.broken(name, got=exits.shape, expected=shape)
     eta, *tint, power = numbers_of(store, name, "glass", 5)
     return Glass(exits, float(eta), triple(tint), float(power))
 
@@ -94,8 +91,8 @@ def _radiance(store: Store, object_name: str, side: int) -> tuple[Maps, NDArray[
     name = light_field_name(object_name, BLOCKS)
     array = store.read(name)
     if array.ndim != 4 or array.shape[1] != array.shape[2] or array.shape[3] != 4 or array.dtype != np.uint32:
-        raise UserError("broken store", file=store.folder, field=name, got=str(array.shape), expected="n x b x b x 4")
+        raise store.broken(name, got=array.shape, expected="n x b x b x 4")
     try:
         return light_in_blocks(array, side), array
     except ValueError as error:
-        raise UserError("broken store", file=store.folder, field=name, got=str(error)) from error
+        raise store.broken(name, got=error) from error

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
-from lambent.core.errors import UserError, invalid
+from lambent.core.errors import invalid
+from lambent.core.strict import Strict
 from lambent.store.contract import SIDES
 from lambent.store.store import MANIFEST, Store
 
 
-class LightGroupRecord(BaseModel):
+class LightGroupRecord(Strict):
     """Emitters that are dimmed together: see scenes.light_groups.
 
     `share` is the fraction of luminous irradiance on surfaces that viewers see, the direct light of the sun included.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str = Field(min_length=1)
     members: tuple[str, ...]
@@ -39,7 +38,5 @@ def light_groups(store: Store) -> tuple[LightGroupRecord, ...]:
         raise invalid(error, store.folder / MANIFEST) from error
     count = store.artefact(name).shape[0]
     if len(found) != count or len({group.name for group in found}) != count:
-        raise UserError(
-            "broken store", file=store.folder, field=f"{name}: groups", got=str(said)[:80], hint="bake again"
-        )
+        raise store.broken(f"{name}: groups", got=said, expected=f"{count} groups with names of their own")
     return found

@@ -11,7 +11,6 @@ scaled by r^2, and (1 - r) E/pi of the light map's irradiance E is added from al
 from __future__ import annotations
 
 from lambent.core.arrays import Floats
-from lambent.core.errors import UserError
 from lambent.store.contract import probe_name
 from lambent.store.store import Store
 
@@ -26,7 +25,7 @@ def occlusion_gain(store: Store, object_name: str) -> float:
     gain = store.artefact(name).meta.get("occlusion_gain", 1.0)
     if not (isinstance(gain, int | float) and 1 <= gain <= MOST_GAIN):
         expected = f"a number from 1 to {MOST_GAIN:g}"
-        raise UserError("broken store", file=store.folder, field=f"{name}: occlusion_gain", got=gain, expected=expected)
+        raise store.broken(f"{name}: occlusion_gain", got=gain, expected=expected)
     return float(gain)
 
 
@@ -42,11 +41,10 @@ def probe_shares(store: Store) -> tuple[Floats | None, frozenset[str]]:
         return None, frozenset()
     names = store.artefact(PROBE_SHARE).meta.get("objects")
     if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
-        raise UserError("broken store", file=store.folder, field=f"{PROBE_SHARE}: objects", got=str(names)[:80])
+        raise store.broken(f"{PROBE_SHARE}: objects", got=names, expected="a list of names")
     of_light = store.artefact("light_map/irradiance").shape[:2] if "light_map/irradiance" in store else None
     if (shape := store.artefact(PROBE_SHARE).shape[:2]) != of_light:
-        expected = f"{of_light}, as the light map"
-        raise UserError("broken store", file=store.folder, field=PROBE_SHARE, got=str(shape), expected=expected)
+        raise store.broken(PROBE_SHARE, got=shape, expected=f"{of_light}, as the light map")
     return store.read(PROBE_SHARE), frozenset(names)
 
 
@@ -61,6 +59,5 @@ def has_even_niches(store: Store, object_name: str) -> bool:
     name = probe_name(object_name, "radiance")
     said = store.artefact(name).meta.get("even_niches", False)
     if not isinstance(said, bool):
-        expected = "true or false"
-        raise UserError("broken store", file=store.folder, field=f"{name}: even_niches", got=said, expected=expected)
+        raise store.broken(f"{name}: even_niches", got=said, expected="true or false")
     return said

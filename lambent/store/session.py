@@ -12,13 +12,14 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from lambent.core.ceilings import SESSION_BYTES
 from lambent.core.errors import UserError, invalid
 from lambent.core.files import write_text
 from lambent.core.inputs import parse_json, read_bytes
 from lambent.core.light_mix import LightMix
+from lambent.core.strict import Strict
 from lambent.materials.document import Material
 from lambent.scenes.scene import ImageTexture
 from lambent.store.lock import lock
@@ -55,18 +56,14 @@ class SessionLock:
             os.close(handle)
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class RoomState(_Strict):
+class RoomState(Strict):
     """The look of a room: replacement materials by name, and the mix of its light groups.
 
     `textures` maps a material to what it shows instead of its own textures: those of another material, "" for none, or
     an image, by its name in the store (`store.images`).
     """
 
-    materials: dict[str, Material] = {}
+    materials: dict[str, Material] = Field(default_factory=dict)
     textures: dict[str, str | ImageTexture] = Field(default={}, exclude_if=lambda one: not one)
     light: LightMix = LightMix()
 
@@ -86,14 +83,14 @@ class RoomState(_Strict):
         return RoomState(materials=known, textures=worn, light=self.light)
 
 
-class WalkSession(_Strict):
+class WalkSession(Strict):
     """Content of a session file: the current state, the state compared with it, and stored states by name."""
 
     format: Literal["lambent-walk-session"] = FORMAT
     version: Literal[1] = VERSION
     now: RoomState = RoomState()
     beside: RoomState | None = None
-    states: dict[str, RoomState] = {}
+    states: dict[str, RoomState] = Field(default_factory=dict)
 
     @property
     def rooms(self) -> list[RoomState]:

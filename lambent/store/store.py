@@ -233,6 +233,11 @@ class Store:
                 raise self._error("chunk is damaged", field, "bake again with --anew")
         raise self._error("chunk is not written", field, "bake it first")
 
+    def broken(self, field: str, fault: str = "", got: object = None, expected: object = None) -> UserError:
+        """The error for an array or a record that contradicts itself or others."""
+        message = f"broken store: {fault}" if fault else "broken store"
+        return UserError(message, file=self.folder, field=field, got=got, expected=expected, hint="bake again")
+
     def _error(self, message: str, field: str, hint: str) -> UserError:
         return UserError(message, file=self.folder, field=field, hint=hint)
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.errors import UserError
 from lambent.store.contract import SunRecord
 from lambent.store.store import Store
 
@@ -26,6 +25,5 @@ def read_sunlit(store: Store, sun: SunRecord | None) -> NDArray[np.uint8] | None
         return None
     of_light = store.artefact("light_map/irradiance").shape[:2]
     if found.shape != of_light:
-        expected = f"{of_light}, as the light map"
-        raise UserError("broken store", file=store.folder, field=SUNLIT, got=str(found.shape), expected=expected)
+        raise store.broken(SUNLIT, got=found.shape, expected=f"{of_light}, as the light map")
     return store.read(SUNLIT)

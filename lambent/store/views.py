@@ -15,7 +15,7 @@ from itertools import count, pairwise
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.ceilings import VIEWS_BYTES
@@ -23,6 +23,7 @@ from lambent.core.errors import UserError
 from lambent.core.files import write_text
 from lambent.core.inputs import parse_json, read_bytes
 from lambent.core.light_mix import LightMix, MixTrack
+from lambent.core.strict import Strict
 from lambent.store.consistency import is_usable
 from lambent.store.contract import SceneRecord
 from lambent.store.lock import lock
@@ -31,10 +32,8 @@ FILE = "views.json"
 LONGEST_NAME = 80
 
 
-class Views(BaseModel):
+class Views(Strict):
     """Content of a `views.json`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     format: Literal["lambent-views"] = "lambent-views"
     version: Literal[1] = 1

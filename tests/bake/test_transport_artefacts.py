@@ -22,7 +22,7 @@ from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import ConstantEnvironment, ImageEnvironment, MaterialTextures, Scene, SceneObject, Texture
-from lambent.store.contract import baked_views, forget_lights, transport_lights, view_artefact_name
+from lambent.store.contract import baked_views, transport_lights, view_artefact_name
 from lambent.store.store import Store
 from tests.bake.small_scenes import GREY
 from tests.bake.test_transport import CAMERA, GLOSSY, ball_on_floor, view
@@ -206,18 +206,6 @@ def test_light_from_behind_shows_where_a_material_transmits(tmp_path: Path) -> N
     share = np.bitwise_count(seen).sum(axis=0) / lights
     assert (share[objects == 0] > 0.7).all()
     assert (share[objects == 1] < 0.6).all()
-
-
-def test_a_set_of_lights_can_be_forgotten(scene: Scene, tmp_path: Path) -> None:
-    store = bake_view(scene, tmp_path / "s")
-    forget_lights(store, CAMERA, *SIZE, 60)
-    left = Store.open(tmp_path / "s")
-    assert transport_lights(left, CAMERA, *SIZE) == [200]
-    assert name("visibility", "60") not in left
-    assert not (tmp_path / "s" / name("transport", "60/grey/0/rows")).exists()
-    assert np.isfinite(picture(left, 200, editables(scene))).all()
-    store.close()
-    assert transport_lights(bake_view(scene, tmp_path / "s"), CAMERA, *SIZE) == [60, 200]
 
 
 def test_transport_without_a_view_is_an_error(scene: Scene, tmp_path: Path) -> None:
