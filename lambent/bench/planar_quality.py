@@ -13,15 +13,15 @@ from lambent.bench import planar_scene
 from lambent.bench.reference import Reference, by_n, mean
 from lambent.core.progress import Progress, part_of, silent
 from lambent.materials.document import Lobe
+from lambent.published import planar_thesis
 from lambent.realtime.device import open_device
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 
 NAME = "planar-quality"
 METHODS = {
-    "marched": ("rings", "marched"),
-    "fixed": ("rings", "fixed"),
-    "thesis": ("lobe-4.25", "thesis"),
+    "marched": "rings",
+    "thesis": "lobe-4.25",
 }
 ROUGHNESSES = ((0.01, 0.01), (0.02, 0.02), (0.05, 0.05), (0.1, 0.1), (0.2, 0.2), (0.02, 0.1), (0.1, 0.02))
 
@@ -55,19 +55,19 @@ def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
         casting = part_of(progress, done / count, (done + 1) / count, f"{name}, exact")
         radiance, floor = planar_scene.exact_reflection(lobe, planar_scene.CAMERA, width, height, effort.spp, casting)
         exact, state = Reference.of(radiance, floor), planar_scene.floor_state(lobe, width, height)
-        rows += [
-            {"mx": mx, "my": my, "n": n, "way": method, **_errors(renderer, replace(state, n=n), method, exact)}
-            for n in effort.ns
-            for method in METHODS
-        ]
+        with planar_thesis.offered():
+            rows += [
+                {"mx": mx, "my": my, "n": n, "way": method, **_errors(renderer, replace(state, n=n), method, exact)}
+                for n in effort.ns
+                for method in METHODS
+            ]
         progress(done + 1, count, name)
     size = {"width": width, "height": height, "spp": effort.spp}
     return {"rows": rows, "summary": {**size, **summary(rows)}}
 
 
 def _errors(renderer: Renderer, state: FrameState, method: str, exact: Reference) -> dict[str, float]:
-    integrator, planar = METHODS[method]
-    image = renderer.image(replace(state, integrator=integrator, planar=planar))
+    image = renderer.image(replace(state, integrator=METHODS[method]))
     return {f"{name.replace('shown', 'floor')}_path": value for name, value in exact.errors(image).items()}
 
 

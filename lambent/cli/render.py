@@ -94,8 +94,7 @@ def command(
     planar: Annotated[
         str,
         typer.Option(
-            help="How planar reflectors are drawn: auto, off (from their probes), or by a method of the integrator: "
-            "marched or fixed (lamps, rings), thesis (lobe-4.24, lobe-4.25), fis."
+            help="How planar reflectors are drawn: auto (from a mirrored picture) or off (from their probes)."
         ),
     ] = "auto",
     lookup: Annotated[

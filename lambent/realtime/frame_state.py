@@ -18,7 +18,7 @@ from lambent.core.sequences import radical_inverse
 from lambent.materials.document import Material
 from lambent.realtime.integrators import integrator
 from lambent.realtime.patterns import N_MAX, automatic_n
-from lambent.realtime.planar_integrators import AUTO, MOST_SHARED, TILE, interleaved_table, planar_integrator
+from lambent.realtime.planar_integrators import AUTO, MOST_SHARED, TILE, planar_integrator
 from lambent.realtime.structs import FRAME_DTYPE, Record
 
 LIGHT_MAP = "light-map"  # irradiance in place of radiance
@@ -77,7 +77,7 @@ class FrameState:
     lookups : mapping
         The same for single objects, by name.
     planar : str
-        Method for planar reflectors: auto, off (drawn from their probes), or a method of `planar_integrators`.
+        Whether planar reflectors are mirrored: auto, or off (drawn from their probes).
     show : str
         full, diffuse, specular, light-map (irradiance, W/m^2), or noise (relative standard error of the irradiance,
         always in false colours).
@@ -154,10 +154,9 @@ class FrameState:
         return self.n or automatic_n(material, roughness, without_lamps)
 
     def planar_samples(self, material: Material, roughness: float = 1.0) -> int:
-        """`samples` on planar reflectors, where neighbouring pixels may share a lobe's samples."""
-        n, how = self.samples(material, roughness), planar_integrator(self.integrator, self.planar)
-        shared = self.n is None and how is not None and how.table is interleaved_table
-        return min(n, MOST_SHARED) if shared else n
+        """`samples` on planar reflectors, where neighbouring pixels share a lobe's samples."""
+        n = self.samples(material, roughness)
+        return min(n, MOST_SHARED) if self.n is None else n
 
 
 def quantity_of(show: str) -> Quantity:

@@ -23,7 +23,7 @@ from lambent.realtime.group_arrays import BAKE_GROUPS, FIELDS_FOLLOW, NO_GROUPS
 from lambent.realtime.incident import AUTO, look_ups
 from lambent.realtime.incident.light_field import check_serves
 from lambent.realtime.integrators import integrator
-from lambent.realtime.planar_integrators import check_planar
+from lambent.realtime.planar_integrators import CHOICES as PLANARS
 from lambent.realtime.renderer import SUPERSAMPLES, Renderer
 from lambent.realtime.replaced import with_replacements
 from lambent.realtime.turned_sky import under_turned_sky
@@ -53,8 +53,8 @@ class RealTime(Images):
         if settings.show == NOISE and noise_name(SIDES[0]) not in store:
             hint = "`lambent bake` of the same scene adds it from the samples that the store keeps"
             raise UserError("the store has no noise of its light map", field="--show", got=NOISE, hint=hint)
+        known("way for planar reflectors", settings.planar, PLANARS, field="--planar")
         self._progressive, self._moving = integrator(settings.integrator).progressive, moving
-        check_planar(settings.integrator, settings.planar)
         self.quantity = quantity_of(settings.show)
         self._frame = partial(
             FrameState, width=settings.width, height=settings.height, integrator=settings.integrator,

@@ -26,7 +26,7 @@ from lambent.store.store import Store
 COARSE = quality_named("preview").changed("coarse", geometry={"texels": 64}, environment={"texels": 32})
 WHITE = Switch("colour.wgsl:srgb_encode", "    return vec3f(1.0);")
 UNREAD = Switch("lambent.realtime.outline.REACH_PX", 7)
-FROZEN = Switch("lambent.realtime.planar_integrators.INTERLEAVED_BIAS", 1.0)
+FROZEN = Switch("lambent.bake.surfaces.clusters.MIXED", 0.0)
 
 
 def test_a_name_changes_wherever_it_was_imported() -> None:
@@ -68,7 +68,7 @@ def test_a_place_that_is_not_there_is_named(place: str) -> None:
 
 
 def test_a_constant_that_no_function_reads_is_frozen() -> None:
-    assert is_frozen(FROZEN) and is_frozen(Switch("lambent.bake.surfaces.clusters.MIXED", 0))
+    assert is_frozen(FROZEN)
     assert not is_frozen(Switch("lambent.realtime.lamps.FAINT", 0.0)) and not is_frozen(WHITE)
 
 

@@ -31,11 +31,9 @@ def test_interleaving_beats_the_thesis_and_the_probe() -> None:
     """At n = 7 it is 8 dB at full size; here a tile of 8 x 8 pixels is much of the image."""
     effort = planar_quality.Effort(160, 120, 64, ns=(7,), roughnesses=((0.05, 0.05), (0.1, 0.1)))
     report = planar_quality.run(effort)
-    assert len(report["rows"]) == 2 * 3
+    assert len(report["rows"]) == 2 * 2
     psnr = {method: by_n["7"] for method, by_n in report["summary"]["psnr_path"].items()}
     assert psnr["marched"] > psnr["thesis"] + 2
-    assert psnr["marched"] > psnr["fixed"] + 1
-    assert psnr["fixed"] > psnr["thesis"]
     assert all(0 < row["flip_path"] < row["flip_worst_tile_path"] < 1 for row in report["rows"])
 
 

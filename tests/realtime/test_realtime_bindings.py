@@ -12,7 +12,6 @@ from lambent.realtime import textures as on_gpu
 from lambent.realtime.frame_state import LIGHT_MAP_NOISE, FrameState
 from lambent.realtime.incident import look_ups
 from lambent.realtime.integrators import INTEGRATORS
-from lambent.realtime.planar_integrators import PLANAR
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.scene import MaterialTextures, Texture
 from tests.realtime.lit_plate import plate_field
@@ -69,8 +68,7 @@ def test_no_pipeline_samples_more_than_twelve_textures(device: Any, counted: lis
         renderer.image(replace(small, integrator=integrator))
     for look_up in look_ups():
         renderer.image(replace(small, lookup=look_up, planar="off"))
-    for method in PLANAR["rings"]:
-        renderer.display_image(replace(small, planar=method, lookup="distance"))
+    renderer.display_image(replace(small, lookup="distance"))
     renderer.image(replace(small, show=LIGHT_MAP_NOISE, accumulate=0))
     assert {entry for entry, _ in counted} == ENTRIES
     assert max(count for _, count in counted) <= MOST, counted

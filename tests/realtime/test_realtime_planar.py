@@ -14,8 +14,7 @@ from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.patterns import radius
-from lambent.realtime.planar_integrators import interleaved_table, multi_ring_table
+from lambent.realtime.planar_integrators import interleaved_table
 from lambent.realtime.planar_view import (
     MOST_MARGIN,
     STEP_PX,
@@ -38,7 +37,6 @@ FLOOR = ReflectorRecord(
     parts=(ReflectorPart(object="floor", faces=(0, 1), area_m2=36),),
 )
 WIDTH, HEIGHT = 96, 64
-METHODS = (("rings", "marched"), ("rings", "fixed"), ("lobe-4.25", "thesis"))
 
 
 def mirror(m: float, **more: Any) -> Material:
@@ -92,13 +90,9 @@ def seen_below(device: Any) -> np.ndarray:
     return Renderer(device, scene_of(mirror(0.001), floor=False)).image(replace(state(), camera=below))[:, ::-1]
 
 
-@pytest.mark.parametrize("method", ["marched", "fixed", "thesis"])
-def test_a_sharp_mirror_shows_the_scene_from_the_mirrored_camera(
-    device: Any, seen_below: np.ndarray, method: str
-) -> None:
+def test_a_sharp_mirror_shows_the_scene_from_the_mirrored_camera(device: Any, seen_below: np.ndarray) -> None:
     renderer = Renderer(device, scene_of(mirror(0.001)))
-    integrator = "lobe-4.25" if method == "thesis" else "rings"
-    image = renderer.image(state(n=3, integrator=integrator, planar=method))
+    image = renderer.image(state(n=3))
     floor = renderer.image(state(planar="off"))[..., 2] == 0  # the dark probe
     assert 0.2 < floor.mean() < 0.9
     difference = np.abs(image - seen_below).max(axis=-1)[floor]
@@ -108,12 +102,11 @@ def test_a_sharp_mirror_shows_the_scene_from_the_mirrored_camera(
     assert (wrong_hand < 0.1).mean() < 0.8
 
 
-@pytest.mark.parametrize(("integrator", "method"), METHODS)
-def test_a_retro_lobe_takes_nothing_from_the_mirrored_view(device: Any, integrator: str, method: str) -> None:
+def test_a_retro_lobe_takes_nothing_from_the_mirrored_view(device: Any) -> None:
     """Its light is the probe's, here dark: beside a mirroring lobe nothing changes, alone the floor is dark."""
     both = mirror(0.02)
     back = Lobe(retro=True, mx=0.05, my=0.05, r0=1.0)
-    asked = state(n=5, integrator=integrator, planar=method)
+    asked = state(n=5)
     plain, with_it, alone = (
         Renderer(device, scene_of(both.model_copy(update={"lobes": lobes}))).image(asked)
         for lobes in (both.lobes, (*both.lobes, back), (back,))
@@ -169,15 +162,13 @@ def test_filters_leave_the_streaks_of_mirrored_windows_apart(device: Any) -> Non
 
 
 def test_uniform_light_stays_uniform(device: Any) -> None:
-    """White furnace: under one radiance everywhere, a floor with albedo 1 shows it, whatever the method."""
+    """White furnace: under one radiance everywhere, a floor with albedo 1 shows it."""
     scene = scene_of(mirror(0.05))
     record = scene.record.model_copy(update={"objects": scene.record.objects[-1:]})
     sky = np.ones((6, 4, 4, 3), np.float32)
     scene = replace(scene, record=record, environment=sky, probes={"floor": Probe((0, 0, 0), sky)})
     renderer = Renderer(device, scene)
-    for integrator, method in METHODS:
-        image = renderer.image(state(n=7, integrator=integrator, planar=method))
-        np.testing.assert_allclose(image[HEIGHT // 2 :], 1.0, rtol=0.03)
+    np.testing.assert_allclose(renderer.image(state(n=7))[HEIGHT // 2 :], 1.0, rtol=0.03)
 
 
 def test_no_light_comes_in_below_the_walls(device: Any) -> None:
@@ -225,8 +216,8 @@ def test_only_reflectors_in_view_cost_a_mirror(device: Any) -> None:
     assert renderer.statistics["mirrors"] == 0  # seen from behind
     renderer.draw(state(planar="off"))
     assert renderer.statistics["mirrors"] == 0
-    with pytest.raises(UserError, match="marched"):
-        renderer.draw(state(planar="march"))
+    with pytest.raises(UserError, match="auto"):
+        renderer.draw(state(planar="aut"))
 
 
 def test_mirror_view_projects_and_clips() -> None:
@@ -291,14 +282,6 @@ def test_wide_lobes_have_a_wider_buffer() -> None:
     assert sizes[-1][0] <= width * (1 + 2 * MOST_MARGIN) + 2 * STEP_PX
 
 
-def test_multi_rings_of_ten_are_three_of_three() -> None:
-    rows = multi_ring_table(Lobe(mx=0.1, my=0.1), 10)
-    r = np.hypot(rows[:, 0], rows[:, 1]) / 0.1
-    assert sorted({round(float(x), 3) for x in r}) == pytest.approx([0, *sorted(set(r.round(3)))[1:]])
-    assert [int((np.abs(r - x) < 1e-3).sum()) for x in np.unique(r.round(3))] == [1, 3, 3, 3]
-    assert r.max() < radius(0.99)
-
-
 def test_a_still_takes_all_turns_of_interleaved_samples(device: Any) -> None:
     """16 frames of n samples are, at every pixel, 16 n different ones: the tile's pattern is gone."""
     renderer = Renderer(device, scene_of(mirror(0.25)))
@@ -316,10 +299,9 @@ def test_two_half_lobes_are_one(device: Any) -> None:
     whole = mirror(0.15)
     half = whole.lobes[0].model_copy(update={"k": (0.5, 0.5, 0.5)})
     halves = whole.model_copy(update={"lobes": (half, half)})
-    for integrator, method in METHODS:
-        drawn = state(n=7, integrator=integrator, planar=method, show="specular")
-        one, two = (Renderer(device, scene_of(material)).image(drawn) for material in (whole, halves))
-        np.testing.assert_allclose(two, one, atol=2e-3, rtol=5e-3)
+    drawn = state(n=7, show="specular")
+    one, two = (Renderer(device, scene_of(material)).image(drawn) for material in (whole, halves))
+    np.testing.assert_allclose(two, one, atol=2e-3, rtol=5e-3)
 
 
 def test_the_eye_lies_as_far_under_a_raised_floor_as_it_stands_over_it() -> None:
@@ -333,12 +315,11 @@ def test_the_eye_lies_as_far_under_a_raised_floor_as_it_stands_over_it() -> None
     np.testing.assert_allclose(view.frame["eye"][:3], (0.4, 2 * 0.5 - 1.3, 3.0), atol=1e-6)
 
 
-@pytest.mark.parametrize("method", ["marched", "fixed"])
-def test_the_light_map_scales_what_the_mirrored_view_does_not_hold(device: Any, method: str) -> None:
+def test_the_light_map_scales_what_the_mirrored_view_does_not_hold(device: Any) -> None:
     """A floor that the probe's light does not reach looks as with a dark probe, beside its mirrored view as well."""
     scene = scene_of(mirror(0.2))
     white = Probe((0.0, 0.5, 0.0), np.ones((6, 4, 4, 3), np.float32))
-    asked = state(n=7, planar=method, show="specular")
+    asked = state(n=7, show="specular")
 
     def shown(probe: Probe, share: float | None) -> np.ndarray:
         probes = {**scene.probes, "floor": probe}

@@ -90,8 +90,8 @@ def test_nothing_pops_where_windows_move(device: Any) -> None:
 
 def test_a_tile_that_shares_a_lobe_needs_fewer_samples() -> None:
     rough, smooth = mirror(0.3), mirror(0.03)
-    shared, own = FrameState(CAMERA), FrameState(CAMERA, integrator="rings", planar="fixed")
-    assert shared.planar_samples(rough) < own.planar_samples(rough) == own.samples(rough) == shared.samples(rough)
+    shared = FrameState(CAMERA)
+    assert shared.planar_samples(rough) < shared.samples(rough)
     assert shared.planar_samples(smooth) == shared.samples(smooth)
     assert FrameState(CAMERA, n=19).planar_samples(rough) == 19, "what is asked for"
 

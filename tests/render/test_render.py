@@ -108,7 +108,7 @@ def test_the_path_tracer_sees_the_scene_that_was_baked(mi, tmp_path: Path) -> No
         ({"view": "filmc"}, "did you mean 'filmic'"),
         ({"exposure_ev": float("nan")}, "-64 to 64"),
         ({"integrator": "ring"}, "did you mean 'rings'"),
-        ({"planar": "thesis"}, "not supported by"),
+        ({"planar": "thesis"}, "way for planar reflectors"),
     ],
 )
 def test_nonsense(store: Path, change: dict, word: str) -> None:

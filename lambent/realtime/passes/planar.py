@@ -12,8 +12,8 @@ from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.light import Shading, Stage
 from lambent.realtime.passes.planar_buffer import PlanarBuffer, PlanarBufferPass
 from lambent.realtime.pipelines import screen_pipeline
-from lambent.realtime.planar_integrators import interleaved_table, planar_integrator
-from lambent.realtime.targets import stored, target_texture
+from lambent.realtime.planar_integrators import planar_integrator
+from lambent.realtime.targets import target_texture
 
 FORMAT = "rgba16float"
 FOUND, CLEANED = 2, 3  # numbers of layers (shaders/planar_layers.wgsl) of planar.wgsl and of planar_clean.wgsl
@@ -47,7 +47,9 @@ class PlanarPass:
         for index, (mirrored, buffer) in enumerate(self._buffers.mirrored(context)):
             self._buffers.encode(mirrored, index, context.views[index], buffer)
             self._encode_hits(context, index, how, buffer, layers[:FOUND])
-        self._encode_clean(context, how, texture, layers[FOUND:])
+        found = texture.create_view(dimension="2d-array", base_array_layer=0, array_layer_count=FOUND)
+        group = self._layouts.group(self._layouts.of("exact layers"), found)
+        context.cover("clean", layers[FOUND:], self._clean, [group])
         views = *context.light, texture.create_view(dimension="2d-array")
         context.reflections = self._layouts.group(self.reflections, *views)
 
@@ -63,12 +65,3 @@ class PlanarPass:
         render = context.begin("planar", layers, "load" if index else "clear")
         self._shading.draw(render, context, draws, context.seen(), (FORMAT,) * FOUND, group)
         render.end()
-
-    def _encode_clean(self, context: FrameContext, how: Integrator, texture: Any, layers: list[Any]) -> None:
-        """Clean interleaved light along rows; without any, the layers are black."""
-        if how.table is interleaved_table:  # neighbouring pixels take different samples of a lobe
-            found = texture.create_view(dimension="2d-array", base_array_layer=0, array_layer_count=FOUND)
-            group = self._layouts.group(self._layouts.of("exact layers"), found)
-            context.cover("clean", layers, self._clean, [group])
-        else:
-            context.encoder.begin_render_pass(color_attachments=stored(layers), **context.timer.writes("clean")).end()

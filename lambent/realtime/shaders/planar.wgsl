@@ -11,12 +11,11 @@
 
 @group(3) @binding(3) var reflector_light_maps: texture_2d_array<f32>; // `light_maps` of shade.wgsl, whose number is taken
 
-override HIDDEN_DROP: f32 = 0.0; // of a hit's weight where the buffer shows something else before it
-
 const FARTHEST = 2e4; // m
 const FADE_PX = 24.0; // beyond the edges of the buffer
 const FLAT_COS = 0.998; // least cosine of the reflector's own normals: bevels beside them have the probe's light
 const BESIDE = 8u;    // neighbours, up to two pixels away
+const HIDDEN_DROP = 0.8; // of a hit's weight where the buffer shows something else before it
 
 // A pixel of a reflector: q, the plane seen in the mirror direction, the distance to it; x about the probe's centre.
 struct Place {
@@ -157,18 +156,6 @@ fn level_of(hit: Hit, w: vec3f, half_log2_omega: f32) -> f32 {
     let turned = abs(dot(hit.plane.xyz, hit.q)) / (d * max(abs(dot(hit.plane.xyz, w)), 1e-4));
     return half_log2_omega + log2(hit.t / d * mirrored.focal_px) + 0.5 * log2(clamp(turned, 0.1, 4.0))
         - 1.5 * log2(max(cosine, 1e-3));
-}
-
-// Samples that the buffer does not hold, for one look-up in the probe in their mean direction.
-struct Beyond {
-    gain: vec3f,
-    w: vec3f,
-    omega: f32, // sr
-}
-
-fn from_probe(s: Surface, beyond: Beyond) -> vec3f {
-    if (beyond.omega <= 0.0) { return vec3f(0.0); }
-    return beyond.gain * incident(s, normalize(beyond.w), 0.5 * log2(beyond.omega));
 }
 
 // Tells pixels apart that cleaning must not mix: of other reflectors and materials, and with other lobes interleaved (the

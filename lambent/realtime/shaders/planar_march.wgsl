@@ -2,7 +2,7 @@
 
 #include "planar.wgsl"
 
-override MARCH_STEPS: u32 = 0u;
+const MARCH_STEPS = 12u;
 
 // Distance at which a ray leaves the image.
 fn exit_distance(q: vec3f, w: vec3f) -> f32 {

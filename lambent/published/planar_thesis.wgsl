@@ -5,6 +5,18 @@
 
 override FORMULA: u32 = 25u;
 
+// Samples that the buffer does not hold, for one look-up in the probe in their mean direction.
+struct Beyond {
+    gain: vec3f,
+    w: vec3f,
+    omega: f32, // sr
+}
+
+fn from_probe(s: Surface, beyond: Beyond) -> vec3f {
+    if (beyond.omega <= 0.0) { return vec3f(0.0); }
+    return beyond.gain * incident(s, normalize(beyond.w), 0.5 * log2(beyond.omega));
+}
+
 fn reflected(wo: vec3f, slope: vec2f) -> vec3f {
     return lambent_mirrored(wo, lambent_from_slopes(slope));
 }
