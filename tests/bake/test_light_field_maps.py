@@ -54,7 +54,7 @@ def test_every_texel_sees_the_wall_behind_it(mi: Any) -> None:
     room = coloured_room()
     scene = SceneBuilder(replace(room, objects=room.objects[:-1])).build()
     points, n = np.array([[0.0, 0, 0], [1.5, -0.7, 0.3], [-1.9, 1.9, -1.9]]), 32
-    radiance = radiance_maps(Around(scene, None, 1), points, n, 2, 0)
+    radiance, _ = radiance_maps(Around(scene, None, 1), points, n, 2, 0)
     inverse = inverse_distances(scene, points, n)
     for p, light, nearness in zip(points, radiance, inverse, strict=True):
         w = texel_directions(n)
@@ -83,7 +83,7 @@ def test_what_is_open_is_at_no_distance_and_shows_the_sky(mi: Any) -> None:
     point, n = np.array([[0.0, 1e-4, 0.0]]), 16
     up = texel_directions(n)[..., 1] > 0.15
     down = texel_directions(n)[..., 1] < -0.15
-    inverse, light = inverse_distances(scene, point, n)[0], radiance_maps(Around(scene, None, 2), point, n, 1, 0)[0]
+    inverse, light = inverse_distances(scene, point, n)[0], radiance_maps(Around(scene, None, 2), point, n, 1, 0)[0][0]
     assert (inverse[up] == 0).all() and (inverse[down] > 1000).all()
     np.testing.assert_allclose(light[up], np.broadcast_to(sky.radiance, light[up].shape), rtol=1e-5)
     assert (light[down] == 0).all()
@@ -190,7 +190,7 @@ def test_texels_hold_the_light_of_what_their_middle_meets(mi: Any) -> None:
     square = SceneObject("square", patch((-1.03, -1, 1.07), (2, 0, 0), (0, 0, -2)), "black")
     scene = Scene("s", (square,), {"black": BLACK}, environment=ConstantEnvironment((1.0, 1.0, 1.0)))
     built, point, n = SceneBuilder(scene).build(), np.zeros((1, 3)), 31
-    light = radiance_maps(Around(built, None, 2), point, n, 4, 0)[0]
+    light = radiance_maps(Around(built, None, 2), point, n, 4, 0)[0][0]
     met = inverse_distances(built, point, n)[0] > 0
     assert 0.05 < met.mean() < 0.3
     np.testing.assert_allclose(light, np.where(met[..., None], 0.0, 1.0) * np.ones(3), atol=1e-6)
@@ -198,7 +198,7 @@ def test_texels_hold_the_light_of_what_their_middle_meets(mi: Any) -> None:
 
 def test_quarters_of_texels_tell_where_a_square_ends(mi: Any) -> None:
     """Every quarter whose middle is before the square, by hand; texels with any of these show it, and its distance."""
-    from lambent.bake.light_fields.acquisition import Around, covered_distances, covered_radiance_maps, radiance_maps
+    from lambent.bake.light_fields.acquisition import Around, covered_distances, radiance_maps
     from lambent.bake.tracing.scene_builder import SceneBuilder
 
     square = SceneObject("square", patch((-1.03, -1, 1.07), (2, 0, 0), (0, 0, -2)), "black")
@@ -212,9 +212,8 @@ def test_quarters_of_texels_tell_where_a_square_ends(mi: Any) -> None:
     np.testing.assert_array_equal(cover[0], (bits * [1, 2, 4, 8]).sum(axis=-1))
     mixed = bits.any(axis=-1) & ~bits.all(axis=-1)
     assert mixed.sum() > 20 and (inverse[0][bits.any(axis=-1)] > 0).all()
-    light = radiance_maps(Around(built, None, 2), point, n, 2, 0, covers=True)[0, ..., 0]
-    with_shows, shows = covered_radiance_maps(Around(built, None, 2), point, n, 2, 0)
-    np.testing.assert_array_equal(with_shows[0, ..., 0], light)
+    maps, shows = radiance_maps(Around(built, None, 2), point, n, 2, 0, covers=True)
+    light = maps[0, ..., 0]
     np.testing.assert_array_equal(shows[0], bits.any(axis=-1))
     assert (light[bits.all(axis=-1)] == 0).all()
     np.testing.assert_allclose(light[inverse[0] == 0], 1, atol=1e-6)
@@ -240,7 +239,7 @@ def test_lamps_smaller_than_texels_keep_their_light(mi: Any) -> None:
     assert 0.6 < side_m / np.sqrt(omega[w[..., 1] > 0.95].mean()) < 0.7
 
     def share(covers: bool) -> float:
-        light = radiance_maps(around, points, n, 4, 0, covers=covers)[..., 0]
+        light = radiance_maps(around, points, n, 4, 0, covers=covers)[0][..., 0]
         return float((light * omega).sum() / expected)
 
     without, found = share(covers=False), share(covers=True)
@@ -259,7 +258,7 @@ def test_the_disc_of_the_sun_is_left_out(mi: Any) -> None:
     found, n, strata = sun_of(scene), 16, 128
     assert found is not None
     built, point = SceneBuilder(scene).build(), np.zeros((1, 3))
-    whole, rest = (radiance_maps(Around(built, None, 2, sun), point, n, strata, 0)[0] for sun in (None, Sun(found)))
+    whole, rest = (radiance_maps(Around(built, None, 2, sun), point, n, strata, 0)[0][0] for sun in (None, Sun(found)))
     difference = (whole - rest) * texel_solid_angles(n)[..., None]
     near = texel_directions(n) @ np.array(found.record.direction) > 0.97
     assert not difference[~near].any()
@@ -274,7 +273,7 @@ def test_maps_that_are_traced_where_they_are_read_are_those_of_a_bake(mi: Any) -
     room = coloured_room()
     around = Around(SceneBuilder(replace(room, objects=room.objects[:-1])).build(), None, 1)
     points = np.array([[0.0, 0, 0], [1.5, -0.7, 0.3]])
-    whole, read = radiance_maps(around, points, 16, 1, 0), TracedMaps(around, points, 16, 0)
+    whole, read = radiance_maps(around, points, 16, 1, 0)[0], TracedMaps(around, points, 16, 0)
     some = np.array([[1, 0], [1, 1]]), np.array([[3, 3], [15, 0]]), np.array([[4, 4], [0, 7]])
     for _ in range(2):
         np.testing.assert_array_equal(read[some], whole[some])

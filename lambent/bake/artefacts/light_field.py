@@ -238,7 +238,6 @@ def _chooser(context: BakeContext, traced: Traced) -> Chooser:
 def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced, progress: Progress) -> None:
     from lambent.bake.light_fields.acquisition import (
         covered_distances,
-        covered_radiance_maps,
         inverse_distances,
         radiance_maps,
     )
@@ -253,10 +252,11 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
     def radiance(region: tuple[slice, ...], seed: int) -> Array:
         some = region[0]
         surface = None if wish.without_object else normals[some]  # what is beneath points is seen as well
-        rays = seen, points[some], how.texels, how.strata, seed, how.onward, surface
         # maps of volumes give irradiance, too, and have what texels show altogether
-        light, shows = (radiance_maps(*rays), None) if wish.volume else covered_radiance_maps(*rays)
-        return blocks_of(halves(light, traced.unit), shows)
+        light, shows = radiance_maps(
+            seen, points[some], how.texels, how.strata, seed, how.onward, surface, covers=not wish.volume
+        )
+        return blocks_of(halves(light, traced.unit), None if wish.volume else shows)
 
     def distances(region: tuple[slice, ...], seed: int) -> Array:
         some = points[region[0]]

@@ -60,8 +60,8 @@ class _First:
 def radiance_maps(
     around: Around, points: Floats, texels: int, strata: int, seed: int, onward: int = 1, normals: Floats | None = None,
     covers: bool = False,
-) -> NDArray[np.float32]:  # fmt: skip
-    """Maps (P, texels, texels, 3) of the radiance that arrives at points (P, 3).
+) -> tuple[NDArray[np.float32], Flags]:  # fmt: skip
+    """Maps (P, texels, texels, 3) of the radiance that arrives at points (P, 3), and which texels show a surface.
 
     Where the ray through a texel's middle meets no glossy surface, and its neighbours show nearly the same, its light
     is the texel's (Whitted 1980), unless, with `covers`, a lamp is seen through the middle of one of its quarters or
@@ -70,23 +70,8 @@ def radiance_maps(
     (P, 3), where next to no reflection looks, glossy surfaces are met through the middle alone. A path that is not
     finite counts as black. A texel holds the light of surfaces or of the sky, as its middle does: as
     `inverse_distances` has it, and look-ups tell them apart. With `covers`, it has that of surfaces where any of its
-    quarters meets one: as `covered_distances`.
+    quarters meets one: as `covered_distances`. Without, all texels count as showing one.
     """
-    return _maps(around, points, texels, strata, seed, onward, normals, covers)[0]
-
-
-def covered_radiance_maps(
-    around: Around, points: Floats, texels: int, strata: int, seed: int, onward: int = 1, normals: Floats | None = None
-) -> tuple[NDArray[np.float32], Flags]:
-    """As `radiance_maps` with `covers`, and which texels (P, texels, texels) show a surface in any quarter."""
-    return _maps(around, points, texels, strata, seed, onward, normals, covers=True)
-
-
-def _maps(
-    around: Around, points: Floats, texels: int, strata: int, seed: int, onward: int, normals: Floats | None,
-    covers: bool,
-) -> tuple[NDArray[np.float32], Flags]:  # fmt: skip
-    """Radiance, and where `covers` asks for it which texels show a surface; all of them otherwise."""
     found = np.empty((len(points), texels, texels, 3), np.float32)
     shows = np.full(found.shape[:3], True)
     for mine in slices(len(points), max(1, PATHS_AT_ONCE // texels**2)):

@@ -92,7 +92,7 @@ class MirrorTracer:
         middle = np.mean(self._mesh.bounds, axis=0, keepdims=True).astype(float)
         scene = self._builder.build(leave_out=(self._name,))
         without = Around(scene, self._cache, DEPTH, self._around.sun)
-        light = radiance_maps(without, middle, texels, strata, seed)
+        light, _ = radiance_maps(without, middle, texels, strata, seed)
         return middle, halves(light, 1.0), inverse_distances(without.scene, middle, texels)
 
     def _seen(self, eye: Floats, w: Floats) -> Shown:
@@ -124,6 +124,6 @@ def _maps(
 ) -> tuple[Halves, Halves, NDArray[np.uint8]]:
     radiance = np.empty((len(points), texels, texels, 3), np.float16)
     for mine in slices(len(points), max(1, PATHS_AT_ONCE // (texels * strata) ** 2)):
-        maps = radiance_maps(seen, points[mine], texels, strata, seed + mine.start, covers=True)
+        maps, _ = radiance_maps(seen, points[mine], texels, strata, seed + mine.start, covers=True)
         radiance[mine] = np.minimum(maps, HALF_MAX)
     return radiance, *covered_distances(seen.scene, points, texels)
