@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import time
+from concurrent.futures import wait
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -85,20 +86,25 @@ def test_the_lamp_itself_dims(device: Any, scene: BakedScene) -> None:
     assert wall == pytest.approx(np.array([0.5, 0.4, 0.3]) + 0.25 * np.array([0.6, 0.55, 0.5]) * 2 / np.pi, rel=0.02)
 
 
-def test_a_window_does_not_wait_and_shows_the_same_in_the_end(device: Any, scene: BakedScene) -> None:
-    renderer = Renderer(device, scene)
-    renderer.waits = False
+def test_a_window_does_not_wait_and_shows_the_same_in_the_end(
+    device: Any, scene: BakedScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    renderer, may_mix = Renderer(device, scene), Event()
+    mixer, renderer.waits = renderer.mixer, False
     state = replace(STATE, light={"lamp": RED, "sky": DARK})
-    renderer.image(STATE)
-    version, ends_s = renderer.mixer.version, time.monotonic() + 60
-    assert not renderer.mixer.lags, "light as baked"
-    renderer.image(state)
-    assert renderer.mixer.lags or renderer.mixer.version > version, "the frame may take longer than the mix"
-    while renderer.mixer.busy:
+    before, version, mix = renderer.image(STATE), mixer.version, mixer._map
+    assert not mixer.lags, "light as baked"
+    monkeypatch.setattr(mixer, "_map", lambda factors: may_mix.wait() and mix(factors))
+    try:
+        held = renderer.image(state)
+        assert mixer.busy and mixer.lags and mixer.version == version
+    finally:
+        may_mix.set()
+    assert held == pytest.approx(before, rel=1e-3, abs=1e-3), "as baked until the mix is ready"
+    while mixer.busy:
+        wait([work for work in [mixer._work] if work is not None])
         renderer.image(state)
-        assert time.monotonic() < ends_s
-        time.sleep(0.01)
-    assert renderer.mixer.version > version and not renderer.mixer.lags
+    assert mixer.version > version and not mixer.lags
     expected = image(device, scene, state.light)
     assert renderer.image(state) == pytest.approx(expected, rel=1e-3, abs=1e-3)
 
