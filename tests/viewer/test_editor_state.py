@@ -95,15 +95,6 @@ def test_what_is_compared_with(editor):
     assert ("B", False) not in editor.shown.curves and "B" not in editor.shown.images
 
 
-def test_revert_can_be_undone(editor):
-    editor.subject.step(moved(BRASS, mx=0.3))
-    assert editor.subject.unsaved
-    editor.subject.step(editor.subject.loaded)
-    assert editor.subject.material == BRASS and not editor.subject.unsaved
-    editor.subject.edits.undo()
-    assert editor.subject.material.lobes[0].mx == 0.3
-
-
 def test_lobes_come_and_go_and_restrictions_follow(editor):
     editor.subject.add_lobe("reflection")
     editor.subject.add_lobe("transmission")

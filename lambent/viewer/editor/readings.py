@@ -78,15 +78,12 @@ class Disks:
         cosine = np.abs(self._wo[2])[:, None]
         return np.asarray(np.cbrt(f * cosine), np.float32).reshape(len(self.tiles), -1, 3)
 
-    def measured(self, gathered: Sequence[Incidence]) -> Floats:
-        """(K, inside, 3) brightness, NaN without a measurement."""
-        return self._of(gathered)
-
     def mirrored(self, gathered: Sequence[Incidence]) -> Floats:
         """(K, inside, 3) brightness known by symmetry from other measured directions, else NaN."""
-        return self._of([mirrored(entry, gathered) for entry in gathered])
+        return self.measured([mirrored(entry, gathered) for entry in gathered])
 
-    def _of(self, gathered: Sequence[Incidence | None]) -> Floats:
+    def measured(self, gathered: Sequence[Incidence | None]) -> Floats:
+        """(K, inside, 3) brightness, NaN without a measurement."""
         values = np.full((len(self.tiles), int(self._inside.sum()), 3), np.nan, np.float32)
         for disk, (index, far) in zip(values, self.tiles, strict=True):
             entry = gathered[index] if gathered else None

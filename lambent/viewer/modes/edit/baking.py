@@ -6,7 +6,7 @@ import json
 import re
 import tempfile
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -107,7 +107,6 @@ class Baking:
         session: Session,
         store: Path,
         lights: Sequence[int] = LIGHTS,
-        clock: Callable[[], float] = time.monotonic,
         bounces: Bounces | None = None,
         proposing: Collection[str] | None = None,
     ) -> None:
@@ -118,14 +117,14 @@ class Baking:
         self._share = 0.0
         self.samples = 0
         self.proposal: Proposal | None = None
-        self._clock, self._passes = clock, Passes(bounces.samples) if bounces is not None else None
+        self._passes = Passes(bounces.samples) if bounces is not None else None
         words = list(map(str, lights))
         if bounces is not None:
             kept = [] if proposing is None else [json.dumps(sorted(proposing))]
             words = [BOUNCES, json.dumps(bounces.said()), *kept]
         terms = [(name, t) for name in self.document.materials for t in session.original(name).terms]
         self._curves = {(name, t.name): len(t.factors) for name, t in terms}
-        self._stage = Stage({}, clock())
+        self._stage = Stage({}, time.monotonic())
         self.weigh({name: 1 / len(self.document.materials) for name in self.document.materials})
         self._job = tempfile.TemporaryDirectory()  # kept while the process runs
         job = Path(self._job.name) / "job.edits.json"
@@ -146,9 +145,9 @@ class Baking:
     @property
     def line(self) -> str:
         """The present step and the remaining time, as a line."""
-        left_s, stage = self._stage.left_s(self._clock()), self._stage
+        left_s, stage = self._stage.left_s(time.monotonic()), self._stage
         if self._passes is not None:
-            left_s, step = self._passes.left_s(self._clock()), f"{self.what} {100 * self._share:.0f} %"
+            left_s, step = self._passes.left_s(time.monotonic()), f"{self.what} {100 * self._share:.0f} %"
             return step if left_s is None else f"{step}, about {time_said(left_s)} for {self._passes.wanted}"
         step = f"{self.what} {100 * stage.share:.0f} %"
         return step if left_s is None else f"{step}, about {left_s:.0f} s for {stage.lights} lights"
@@ -183,7 +182,7 @@ class Baking:
         found = _NUMBER.search(self.what)
         if found:
             self.has_view = True
-            self._stage.take(self.what, self._share, int(found[1]), self._clock())
+            self._stage.take(self.what, self._share, int(found[1]), time.monotonic())
         found = PASS.search(self.what)
         if found and self._passes is not None:
-            self._passes.take(self.samples, int(found[1]), self._share, self._clock())
+            self._passes.take(self.samples, int(found[1]), self._share, time.monotonic())

@@ -54,7 +54,7 @@ class Bounced:
         that, noted by the bake. None if unknown.
     """
 
-    def __init__(self, painter: Painter, bake: Callable[..., Baking] = Baking) -> None:
+    def __init__(self, painter: Painter, bake: Callable[..., Baking]) -> None:
         self.on, self.series, self.wanted, self.shown = False, SERIES[0], SAMPLES[1], "all light"
         self.samples = 0
         self.noise: float | None = None

@@ -85,14 +85,12 @@ class Painter:
     when the last one was taken or another one is wanted, so that no frame is drawn that a slower window never shows.
     """
 
-    def __init__(
-        self, size: tuple[int, int], clock: Callable[[], float] = time.monotonic, backend: Backend | None = None
-    ) -> None:
+    def __init__(self, size: tuple[int, int], backend: Backend | None = None) -> None:
         self.frame: Frame | None = None
         self.error: Exception | None = None
         self.notice = ""
         self._taken: Frame | None = None
-        self._clock = clock
+        self._clock: Callable[[], float] = time.monotonic
         self._backend = backend if backend is not None else OnHost()
         self._light: Interreflections | None = None
         self._picture = self._anew(np.zeros((*size, 3), np.float32))

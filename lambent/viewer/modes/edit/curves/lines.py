@@ -16,8 +16,8 @@ FEATURE = 0.002  # share of a curve's span that counts as a change
 DECADES = 6.0  # most decades below the largest value on a logarithmic axis
 
 
-def decimated(values: Floats, low_deg: float, high_deg: float, buckets: int = BUCKETS) -> tuple[Floats, Floats]:
-    """Angles in degrees and values of at most 2 `buckets` + 2 points of one channel (KNOTS + 1,) within a range.
+def decimated(values: Floats, low_deg: float, high_deg: float) -> tuple[Floats, Floats]:
+    """Angles in degrees and values of at most 2 BUCKETS + 2 points of one channel (KNOTS + 1,) within a range.
 
     Every bucket keeps its smallest and its largest value, so that no peak is lost; one knot beyond each end is kept.
     """
@@ -25,9 +25,9 @@ def decimated(values: Floats, low_deg: float, high_deg: float, buckets: int = BU
     last = min(int(np.searchsorted(ANGLES_DEG, high_deg, "right")), len(ANGLES_DEG) - 1)
     x, y = ANGLES_DEG[first : last + 1], values[first : last + 1]
     inner = len(x) - 2
-    if inner <= 2 * buckets:
+    if inner <= 2 * BUCKETS:
         return x.copy(), np.ascontiguousarray(y)
-    per = -(-inner // buckets)
+    per = -(-inner // BUCKETS)
     whole = inner // per * per
     blocks = y[1 : 1 + whole].reshape(-1, per)
     starts = 1 + per * np.arange(len(blocks))

@@ -12,7 +12,7 @@ from lambent.editing.operators import Region
 from lambent.editing.session import Session
 from lambent.materials.factored.curve import KNOTS, Curve
 from lambent.viewer.modes.edit.curves.axes import END_DEG, Axes, Place
-from lambent.viewer.modes.edit.curves.drags import Direction
+from lambent.viewer.modes.edit.curves.drags import Direction, Tool
 from lambent.viewer.modes.edit.curves.lines import decimated, is_grey
 from lambent.viewer.modes.edit.curves.regions import EDGES, MEANINGS, STRIP_PX, edges_deg, flags_px, grip_at
 from lambent.viewer.modes.edit.curves.state import CurveState, Shown, View, whole_x
@@ -28,6 +28,9 @@ _BUTTONS = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_butto
 _BUTTONS |= imgui.ButtonFlags_.mouse_button_middle
 PADDING_PX = 14.0  # half of the last angle's label
 TICKS_DEG = (0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30)  # tick spacings of the angle axis
+TOOL_KEYS: tuple[tuple[imgui.Key, Tool], ...] = (
+    (imgui.Key.t, "translate"), (imgui.Key.a, "amplify"), (imgui.Key.d, "draw"),
+)  # fmt: skip
 Line = tuple[int | None, Floats, Floats]  # channel, or None for all; degrees; values
 
 
@@ -152,12 +155,9 @@ def keys(state: CurveState, session: Session, view: View, values: Floats) -> Non
     if io.key_ctrl or io.key_alt:
         return
     pressed = imgui.is_key_pressed
-    if pressed(imgui.Key.t, False):
-        state.tool = "translate"
-    if pressed(imgui.Key.a, False):
-        state.tool = "amplify"
-    if pressed(imgui.Key.d, False):
-        state.tool = "draw"
+    for key, tool in TOOL_KEYS:
+        if pressed(key, False):
+            state.tool = tool
     if pressed(imgui.Key.l, False):
         view.set_log(values, not view.y.log)
     if pressed(imgui.Key.f, False):
