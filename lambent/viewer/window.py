@@ -64,7 +64,8 @@ class Window:
         self._wake_at_s: float | None = None
         self._error: Exception | None = None
         self.canvas.add_event_handler(self._on_event, *EVENTS, order=BEFORE_IMGUI)
-        self.screen.wake = self.canvas.request_draw  # sets a flag that the canvas reads sixty times a second
+        self._woken = False  # by background work, since the last frame
+        self.screen.wake = self._wake
         self._take_dropped_files()
         self._take_the_close_button()
 
@@ -217,12 +218,18 @@ class Window:
             self._extra_frames = max(0, self._extra_frames - 1)
         self._told = told
         self._moving = self.mode.moving
-        if self._moving or self._extra_frames or self._frames is not None:
+        woken, self._woken = self._woken, False  # Dear ImGui fits new text to its table one frame later
+        if self._moving or self._extra_frames or self._frames is not None or woken:
             self.canvas.request_draw()
         messages = (message.until_s - self.screen.clock() for message in self.screen.messages)
         due_s = least(self.mode.wait_s(), self.mode.drawing.wait_s(), *messages)
         if due_s is not None:
             self._wake_in(max(0.0, due_s))
+
+    def _wake(self) -> None:
+        """Draw a frame soon; runs in any thread, and sets flags that the canvas reads sixty times a second."""
+        self._woken = True
+        self.canvas.request_draw()
 
     def _wake_in(self, seconds: float) -> None:
         at_s = self.screen.clock() + seconds

@@ -13,19 +13,23 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
+import wgpu
+
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
 from lambent.viewer import app, edit, modes, window
 from lambent.viewer.modes.edit.state import EditState
+from lambent.viewer.modes.walk.pictures import Pictures
 from tests.viewer.panel_driver import recording
 
 MARK = "F12"  # a key that means nothing: what was sent before it has arrived when it does
 INTERRUPT = "F11"  # another: Ctrl-C, while the next frame is drawn to the window
+SKIP = "F10"  # another: the display has no image for the next frame
 
 
 class WatchedWindow(window.Window):
-    frames_drawn = marks_seen = 0
-    interrupt = False
+    frames_drawn = marks_seen = skipped = 0
+    interrupt = skip = False
 
     def __init__(self, *args, **kwargs):
         self.rects = {}
@@ -36,8 +40,13 @@ class WatchedWindow(window.Window):
         super()._on_event(event)
         self.marks_seen += event["event_type"] == "key_down" and event["key"] == MARK
         self.interrupt |= event["event_type"] == "key_down" and event["key"] == INTERRUPT
+        self.skip |= event["event_type"] == "key_down" and event["key"] == SKIP
 
     def _clear(self):
+        if self.skip:
+            self.skip = False
+            self.skipped += 1
+            raise wgpu.DrawCancelled("Timeout")
         super()._clear()
         if self.interrupt:
             self.interrupt = False
@@ -55,6 +64,8 @@ class WatchedWindow(window.Window):
             "resolution": screen.statistics.resolution,
             "integrator": screen.statistics.integrator,
             "at_rest": screen.at_rest,
+            "skipped": self.skipped,
+            "tracing": tracing_of(self.mode.drawing),
             "drawn": sum(getattr(one, "version", 0) for one in getattr(self.mode.drawing, "shown", ())),
             "moving": self._moving,
             "picture": [screen.picture.width, screen.picture.height],
@@ -62,6 +73,12 @@ class WatchedWindow(window.Window):
             **(seen_of(state) if state is not None else {}),
         }
         write_text(out / "state.json", json.dumps(seen))
+
+
+def tracing_of(drawing):
+    """Number of the tracing process."""
+    tracing = drawing._at_rest._tracing if isinstance(drawing, Pictures) else None
+    return None if tracing is None or tracing._process is None else tracing._process._process.pid
 
 
 def seen_of(state):

@@ -14,7 +14,7 @@ from tests.viewer.panel_driver import point_of
 ROOT = Path(__file__).parents[2]
 PATIENCE_S = 120.0  # software adapters on a busy machine
 ASLEEP_S = 1.0  # without a frame
-MARK, INTERRUPT = "F12", "F11"  # see watched_window
+MARK, INTERRUPT, SKIP = "F12", "F11", "F10"  # see watched_window
 
 
 def missing_tools():

@@ -1,0 +1,37 @@
+"""The real window at rest: the tracing process wakes it, and nothing else has to."""
+
+import os
+import signal
+
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.scenes import load_scene
+from tests.bake.small_scenes import TINY
+from tests.viewer.window_session import SKIP, VirtualScreen, WindowSession, missing_tools
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def session(mi, adapter, tmp_path):
+    if missing_tools():
+        pytest.skip(f"not installed: {', '.join(missing_tools())}")
+    store = tmp_path / "box.store"
+    bake(load_scene("builtin:box"), store, quality=TINY, only={"geometry", "environment", "light_map"}).close()
+    screen = VirtualScreen()
+    session = WindowSession(screen, store, tmp_path)
+    yield session
+    session.kill()
+    screen.close()
+
+
+def test_the_window_sleeps_until_a_picture_is_traced_and_learns_that_tracing_has_ended(session):
+    first = session.wait_for(lambda state: state["at_rest"].startswith("traced"))
+    session.wait_for(lambda state: state["at_rest"] != first["at_rest"] and "noise" in state["at_rest"])
+    session.tool("key", SKIP)
+    session.wait_for(lambda state: state["skipped"] == 1)
+    session.settle()
+    os.kill(session.state()["tracing"], signal.SIGKILL)
+    ended = session.wait_for(lambda state: any("tracing was killed" in text for text in state["messages"]))
+    assert session.wait_for(lambda state: state["settled"])["drawn"] >= ended["drawn"] > 0
