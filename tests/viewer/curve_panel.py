@@ -5,7 +5,7 @@ from imgui_bundle import imgui
 from lambent.core.camera import Camera
 from lambent.editing.session import Session
 from lambent.viewer import layout
-from lambent.viewer.modes.edit.curves import CurveEditor
+from lambent.viewer.modes.edit.curves.editor import CurveEditor
 from tests.viewer import panel_driver
 from tests.viewer.panel_driver import Frames, point_of
 

@@ -180,8 +180,7 @@ def _choice(context: BakeContext) -> list[dict[str, Any]]:
         with context.timed(LIGHT_FIELD_CHOICE):
             others = [name for name in _shiny(context) if name not in named]
             trials = _chooser(context, _traced(context)).trials(others, context.progress)
-            beside_mb = partial(_sample_map_mb, context)
-            found = chosen(trials, budget_mb, BYTES_PER_TEXEL, beside_mb)
+            found = chosen(trials, budget_mb, BYTES_PER_TEXEL, partial(_sample_map_mb, context))
         said = {"key": key, "chosen": [one.said() for one in found]}
         context.store.set_document(LIGHT_FIELD_CHOICE, said)
     return list(said["chosen"])

@@ -45,11 +45,11 @@ def worth_trying(wrong: Mapping[str, float]) -> list[str]:
 
 
 def chosen(
-    trials: Mapping[str, Trial], budget_mb: float, bytes_per_texel: float, beside_mb: Callable[[str, int], float]
+    trials: Mapping[str, Trial], budget_mb: float, bytes_per_texel: float, sample_map_mb: Callable[[str, int], float]
 ) -> list[Chosen]:
     """The objects that get a light field within a budget, the most worth first, and which.
 
-    `beside_mb` tells the memory that a light field takes beside its maps, by object and number of points.
+    `sample_map_mb` is the memory of a sample map, MB, by object and number of points.
     """
     taken, left = dict[str, Option](), budget_mb
     least = PER_MB * sum(trial.probe * trial.size_sr for trial in trials.values())  # of a megabyte
@@ -57,7 +57,7 @@ def chosen(
     def megabytes(name: str, option: Option) -> float:
         if option == PROBE:
             return 0.0
-        return option.points * option.texels**2 * bytes_per_texel / 1e6 + beside_mb(name, option.points)
+        return option.points * option.texels**2 * bytes_per_texel / 1e6 + sample_map_mb(name, option.points)
 
     while True:
         best, gain, cost = None, 0.0, 0.0

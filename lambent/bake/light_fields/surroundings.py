@@ -29,8 +29,7 @@ def around(traced: TracedScene, maps: Maps | None, depth: int, bare: Collection[
         cache = None if maps is None else traced.cache(*maps)
         return Around(traced.whole(diffuse=diffuse), cache, depth, traced.sun)
     usual, scene = traced.builder(diffuse=diffuse), without_lobes(traced.scene, bare)
-    how = usual.measured, usual.sampling()
-    builder = SceneBuilder(scene, traced.atlas.uv2, diffuse=diffuse, measured=how[0], sampling=how[1])
+    builder = SceneBuilder(scene, traced.atlas.uv2, diffuse=diffuse, measured=usual.measured, sampling=usual.sampling())
     whole = builder.build()
     sun = None if traced.sun is None else SunRays(traced.sun, whole)
     return Around(whole, None if maps is None else LightMapCache(builder, *maps, sun), depth, traced.sun)
@@ -41,10 +40,10 @@ def without_lobes(scene: Scene, names: Collection[str]) -> Scene:
     materials, textures = dict(scene.materials), dict(scene.textures)
     changed = {}
     for o in scene.objects:
-        worn = scene.materials[o.material]
-        if o.name in names and not worn.transmits:
+        material = scene.materials[o.material]
+        if o.name in names and not material.transmits:
             bare = f"{o.material} without lobes"
-            materials[bare] = worn.model_copy(update={"name": bare, "lobes": ()})
+            materials[bare] = material.model_copy(update={"name": bare, "lobes": ()})
             if o.material in textures:
                 textures[bare] = textures[o.material]
             changed[o.name] = replace(o, material=bare)

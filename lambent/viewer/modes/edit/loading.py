@@ -76,9 +76,9 @@ def read_view(store: Store, view: SessionDocument) -> ViewMap | None:
     names = [view_artefact_name(view.camera, *view.size, "view_points", n) for n in ("pixel", "object", "backdrop")]
     if any(name not in store for name in names):
         return None
-    pixel, worn, backdrop = (store.read(name) for name in names)
+    pixel, number, backdrop = (store.read(name) for name in names)
     numbers = np.full(view.size[0] * view.size[1], -1, np.int32)
-    numbers[pixel] = worn
+    numbers[pixel] = number
     objects = tuple((str(name), str(material)) for name, material in store.artefact(names[1]).meta["objects"])
     return ViewMap(backdrop.astype(np.float32), numbers.reshape(view.size[::-1]), objects)
 

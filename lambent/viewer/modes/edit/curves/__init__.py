@@ -1,7 +1,5 @@
-"""The curve editor: `CurveEditor` draws the curves of a material and edits a session.
+"""The curve editor: `editor.CurveEditor` draws the curves of a material and edits a session.
 
 `axes`, `regions`, `drags`, `lines`, `strokes` and `state` have the logic, without Dear ImGui. `editor`, `plot`,
 `toolbar`, `layers` and `quantities` draw.
 """
-
-from lambent.viewer.modes.edit.curves.editor import CurveEditor as CurveEditor
