@@ -183,3 +183,33 @@ def test_bands_of_a_large_picture_are_the_picture(room: TracedRoom, monkeypatch:
     np.testing.assert_allclose(bands.mean(), whole.mean(), rtol=1e-5)
     for one, other in zip(bands.guides(), whole.guides(), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-5)
+
+
+def test_edits_sizes_and_counts_compile_nothing(store: Store) -> None:
+    """Every number that changes from picture to picture is read from memory; a material's structure is compiled."""
+    import drjit as dr
+
+    room, glossy = room_of_store(store, lit_room()), lit_room().materials["glossy"]
+
+    def edited(mx: float) -> Material:
+        return glossy.model_copy(update={"lobes": (Lobe(mx=mx, my=0.1, r0=0.2),)})
+
+    def kernels(size: tuple[int, int], samples: int, camera: Camera = INSIDE) -> list[dict[str, Any]]:
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            picture = TracedPicture(room.tracer, camera, size)
+            while picture.samples < samples:
+                picture.sample()
+            picture.guides()
+            return [one for one in dr.kernel_history([dr.KernelType.JIT]) if one["type"] == dr.KernelType.JIT]
+
+    states: list[dict[str, Material]] = [{}, {"glossy": edited(0.3)}, {}, {"wall": Material(kd=(0.1, 0.5, 0.2))}]
+    first = set[str]()
+    for state in states[:2]:
+        room.wear({}, state)
+        first |= {one["hash"] for one in kernels(SIZE, 24)}
+    for state in [*states, {"glossy": edited(0.5)}]:
+        room.wear({}, state)
+        for size, samples, camera in ((SIZE, 24, WIDE), ((40, 30), 40, INSIDE)):
+            later = {one["hash"] for one in kernels(size, samples, camera)}
+            assert later <= first, (state, size)

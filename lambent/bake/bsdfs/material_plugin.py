@@ -29,7 +29,7 @@ from lambent.bake.bsdfs.textured import SurfaceTextures, faced_side, facing_fram
 from lambent.bake.engine import once_per_variant
 from lambent.materials import bsdf
 from lambent.materials.clear import MOST, clear_terms, transmittance
-from lambent.materials.document import Material, material_from
+from lambent.materials.document import BLACK, Material, material_from
 from lambent.scenes.panes import is_clear
 from lambent.scenes.scene import MaterialTextures
 
@@ -70,6 +70,7 @@ def register_material_plugin() -> type:
         def __init__(self, props: Any) -> None:
             mi.BSDF.__init__(self, props)
             self.material = material_from(json.loads(str(props["material"])), f"{PLUGIN} {props.id()}")
+            self._on_device = on_device(self.material)
             self.textures = SurfaceTextures(props)
             self.anisotropic = any(lobe.mx != lobe.my for lobe in self.material.lobes)
             self.framed = "normal" in self.textures or (self.anisotropic and "direction" in self.textures)
@@ -151,7 +152,8 @@ def register_material_plugin() -> type:
         def _enabled(self, ctx: Any, si: Any, active: Any) -> Material:
             """The material at `si`, with coefficients of components excluded by `ctx` set to zero."""
             on = [ctx.is_enabled(kind, i) for i, kind in enumerate(self.kinds)]
-            return self.textures.material(self.material if all(on) else _masked(self.material, on), si, active)
+            material = self._on_device if all(on) else _masked(self._on_device, on)
+            return self.textures.material(material, si, active)
 
         def _frame(self, si: Any, active: Any) -> Any:
             tangent = brushing_angle(si, active, self.anisotropic or self.framed)
@@ -191,11 +193,34 @@ def brushing_angle(si: Any, active: Any, anisotropic: bool) -> tuple[Any, Any]:
     return dr.select(brushed, t.x / length, 1.0), dr.select(brushed, t.y / length, 0.0)
 
 
+def on_device(material: Material) -> Material:
+    """The material with numbers that kernels read from memory: kernels depend on its structure alone.
+
+    That is which numbers are 0, whether a colour is grey and whether a lobe is isotropic. Materials of one structure
+    share their functions, so an edit compiles nothing.
+    """
+    lobes = []
+    for lobe in material.lobes:
+        mx, my = _held((lobe.mx, lobe.my))
+        update = {"k": _held(lobe.k), "r0": _held(lobe.r0), "mx": mx, "my": my, "alpha": _held((lobe.alpha,))[0]}
+        lobes.append(lobe.model_copy(update=update))
+    update = {"kd": _held(material.kd), "kt_d": _held(material.kt_d), "lobes": tuple(lobes)}
+    return material.model_copy(update=update)
+
+
+def _held(values: tuple[float, ...]) -> tuple[Any, ...]:
+    """Numbers as mi.Float that are no constants, equal ones as one; if all are 0, as they are."""
+    if not any(values):
+        return values
+    if len(set(values)) == 1:
+        return (dr.opaque(mi.Float, values[0]),) * len(values)
+    return tuple(dr.opaque(mi.Float, value) for value in values)
+
+
 def _masked(material: Material, on: list[bool]) -> Material:
-    black = (0.0, 0.0, 0.0)
     lobes = [
-        lobe if keep else lobe.model_copy(update={"k": black})
+        lobe if keep else lobe.model_copy(update={"k": BLACK})
         for lobe, keep in zip(material.lobes, on[2:], strict=True)
     ]
-    update = {"kd": material.kd if on[0] else black, "kt_d": material.kt_d if on[1] else black, "lobes": tuple(lobes)}
+    update = {"kd": material.kd if on[0] else BLACK, "kt_d": material.kt_d if on[1] else BLACK, "lobes": tuple(lobes)}
     return material.model_copy(update=update)

@@ -3,7 +3,7 @@
     scene["ball"]["bsdf"] = table_dict(load("satin.bsdf"))
 
 A table of patch matrices (LBNL Klems) is looked up directly, by `patch_sheet`. Every other table is resampled once to a
-`half_vector_grid`, which documents look-up and sampling, or, with peaks about the light, to a `twin_grid`;
+`half_vector_grid`, which documents look-up and sampling, or, with peaks about the light, to a `retro_grid`;
 docs/performance.md states the error of resampling.
 
 Conventions are those of material_plugin.py: Mitsuba's `si.wi` is the viewer (our wo), its `wo` the light (our wi), its
@@ -32,11 +32,11 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.measured.half_vector_grid import GridShape, HalfVectorGrid
 from lambent.materials.measured.patch_sheet import Lookup, PatchSheet, lookup_of
 from lambent.materials.measured.protocol import MeasuredTable
-from lambent.materials.measured.twin_grid import TwinGrid
+from lambent.materials.measured.retro_grid import RetroGrid
 
 PLUGIN = "lambent_table"
-_LOOKUPS: dict[str, type[HalfVectorGrid] | type[PatchSheet] | type[TwinGrid]] = {
-    "grid": HalfVectorGrid, "patches": PatchSheet, "twins": TwinGrid,
+_LOOKUPS: dict[str, type[HalfVectorGrid] | type[PatchSheet] | type[RetroGrid]] = {
+    "grid": HalfVectorGrid, "patches": PatchSheet, "retro": RetroGrid,
 }  # fmt: skip
 
 

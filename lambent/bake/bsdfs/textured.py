@@ -77,14 +77,13 @@ class SurfaceTextures:
         return mi.Color3f(*self.at(part, si, active)) if part in self else mi.Color3f(1.0)
 
     def material(self, material: Material, si: Any, active: Any) -> Material:
-        """The material with its parameters at `si`."""
+        """A material whose numbers other than 0 are on the device (`material_plugin.on_device`), as it is at `si`."""
         update: dict[str, Any] = {}
-        if "diffuse" in self and (any(material.kd) or any(material.kt_d)):
+        both = {"kd": material.kd, "kt_d": material.kt_d}
+        colours = {name: colour for name, colour in both.items() if not isinstance(colour[0], float)}  # not black
+        if "diffuse" in self and colours:
             factor = self.at("diffuse", si, active)
-            for name in ("kd", "kt_d"):
-                value = getattr(material, name)
-                if any(value):
-                    update[name] = tuple(x * y for x, y in zip(value, factor, strict=True))
+            update = {name: tuple(x * y for x, y in zip(value, factor, strict=True)) for name, value in colours.items()}
         if material.lobes and ("specular" in self or "roughness" in self):
             colour = self.at("specular", si, active) if "specular" in self else [1.0] * 3
             rough = self.at("roughness", si, active)[0] if "roughness" in self else None
@@ -113,7 +112,7 @@ class SurfaceTextures:
 def _lobe(lobe: Lobe, colour: list[Any], rough: Any) -> Lobe:
     update: dict[str, Any] = {"k": tuple(x * y for x, y in zip(lobe.k, colour, strict=True))}
     if rough is not None:
-        scale = dr.clip(rough, SMALLEST_M / min(lobe.mx, lobe.my), LARGEST_M / max(lobe.mx, lobe.my))
+        scale = dr.clip(rough, SMALLEST_M / dr.minimum(lobe.mx, lobe.my), LARGEST_M / dr.maximum(lobe.mx, lobe.my))
         update |= {"mx": lobe.mx * scale, "my": lobe.my * scale}
     return lobe.model_copy(update=update)
 

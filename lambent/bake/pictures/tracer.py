@@ -142,6 +142,8 @@ def in_bands(
     """
     pixels, parts = size[0] * size[1], []
     for band in slices(pixels, max(1, RAYS_AT_ONCE // count)):
+        # Without it the kernel depends on which constants are in use elsewhere, and is often compiled again.
+        dr.detail.new_scope(dr.backend_v(mi.Float))
         sampler = SobolSampler.of_pixels(seed, range(band.start, band.stop), first, count)
         ray = camera_rays(camera, size, count, sampler, range(band.start, band.stop))
         found = trace(ray, sampler)

@@ -95,9 +95,9 @@ class SceneBuilder:
         self._tables = {name: mi.load_dict(table_dict(grid)) for name, grid in self.measured.items()}
         for name, made in self.edited.items():
             self._tables[name] = mi.load_dict(edited_dict(scene.materials[name], made, scene.textures.get(name)))
-        self._given = self._worn = dict[Look, tuple[Any, MaterialTextures | None]]()
-        self._shapes = Shapes(scene.objects, self._bsdfs(scene), uv2 or {})
-        self._given = self._worn
+        self._given = dict[Look, tuple[Any, MaterialTextures | None]]()
+        self._first = self._bsdfs(scene, self._given)
+        self._shapes = Shapes(scene.objects, self._first, uv2 or {})
         self.meshes = self._shapes.meshes
         self.lights = [emitter_of(light) for light in scene.lights]
         if sampling is None:
@@ -109,31 +109,28 @@ class SceneBuilder:
     def dress(self, scene: Scene) -> bool:
         """Let the objects wear the materials and textures of a scene, in all scenes built, or return False.
 
-        False where objects of one shape would wear different materials: then only another builder can. Materials that
-        do not change keep their BSDFs, and those given first are kept: kernels contain the addresses of all.
+        False where objects of one shape would wear different materials: then only another builder can. BSDFs of the
+        first scene are kept. Those of another are dropped before new ones are made, which get their places: kernels
+        depend on the number of BSDFs.
         """
-        dressed = self._shapes.wear(self._bsdfs(scene))
+        self._shapes.wear(self._first)
+        dressed = self._shapes.wear(self._bsdfs(scene, dict(self._given)))
         self.scene = scene if dressed else self.scene
         return dressed
 
-    def _bsdfs(self, scene: Scene) -> list[Any]:
-        """mi.BSDF of each object. Equal materials share one: each BSDF adds a function to every kernel."""
-        made, worn = dict[tuple[str, bool], Any](), {}
-        for name, diffuse in ((o.material, self._diffuse or o.name in self.unmapped) for o in scene.objects):
-            if name in self._tables or (name, diffuse) in made:
+    def _bsdfs(self, scene: Scene, known: dict[Look, tuple[Any, MaterialTextures | None]]) -> list[Any]:
+        """mi.BSDF of each object. Equal materials share one, because each takes time in every kernel: `known` ones."""
+        found = dict.fromkeys([(o.material, self._diffuse or o.name in self.unmapped) for o in scene.objects])
+        for name, diffuse in found:
+            if name in self._tables:
+                found[name, diffuse] = self._tables[name]
                 continue
             material, textures = scene.materials[name], scene.textures.get(name)
-            plain = material_dict(material, diffuse=diffuse)
-            look = plain["material"], is_clear(material, textures), id(textures)
-            if look not in worn:
-                known = self._worn.get(look) or self._given.get(look)
-                worn[look] = known or (mi.load_dict(material_dict(material, textures, diffuse=diffuse)), textures)
-            made[name, diffuse] = worn[look][0]
-        self._worn = worn
-        return [
-            self._tables.get(o.material) or made[o.material, self._diffuse or o.name in self.unmapped]
-            for o in scene.objects
-        ]
+            look = material_dict(material, diffuse=diffuse)["material"], is_clear(material, textures), id(textures)
+            if look not in known:
+                known[look] = mi.load_dict(material_dict(material, textures, diffuse=diffuse)), textures
+            found[name, diffuse] = known[look][0]
+        return [found[o.material, self._diffuse or o.name in self.unmapped] for o in scene.objects]
 
     def build(self, leave_out: Collection[str] = (), *, watertight: bool = False) -> Any:
         """mi.Scene without the named objects (and their emission).
