@@ -43,26 +43,15 @@ def draw(state: CurveState, session: Session, material: str, shown: Shown, name:
     edit = shown.edit(name)
     under = _list(state, session, material, name, edit.layers, edit.drawn is not None)
     edited = edit.drawn is not None or bool(edit.layers)
-    once: Callable[[Callable[[], object]], None] = partial(state.strokes.once, session)
-    collapse: Callable[[], None] = partial(once, partial(session.collapse, material, name))
-    reset_curve: Callable[[], None] = partial(once, partial(session.reset, material, name))
-    reset: Callable[[], None] = partial(once, partial(session.reset, material))
-    any_edit = bool(shown.document.curves or shown.document.tints)
+    once, any_edit = partial(state.strokes.once, session), bool(shown.document.curves or shown.document.tints)
     actions: list[tuple[str, bool, Callable[[], None], str]] = [
-        (
-            "collapse",
-            bool(edit.layers),
-            collapse,
-            "merges all layers into one drawn curve, which numbers no longer change",
-        ),
-        ("reset curve", edited, reset_curve, "removes all edits of this curve; undo restores them"),
-        (
-            "reset material",
-            any_edit,
-            reset,
-            "removes the edits of all curves and colours of this material; undo restores them",
-        ),
-    ]
+        ("collapse", bool(edit.layers), partial(once, partial(session.collapse, material, name)),
+         "merges all layers into one drawn curve, which numbers no longer change"),
+        ("reset curve", edited, partial(once, partial(session.reset, material, name)),
+         "removes all edits of this curve; undo restores them"),
+        ("reset material", any_edit, partial(once, partial(session.reset, material)),
+         "removes the edits of all curves and colours of this material; undo restores them"),
+    ]  # fmt: skip
     room, space = imgui.get_content_region_avail().x, imgui.get_style().item_spacing.x
     buttons(actions, (room - (len(actions) - 1) * space) / len(actions))
     return under
