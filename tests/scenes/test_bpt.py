@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from lambent.core.errors import UserError
 from lambent.scenes import load_scene
@@ -125,19 +123,6 @@ def test_broken_files_are_one_line(tmp_path: Path, name: str) -> None:
     with pytest.raises(UserError, match=said) as error:
         load_scene(written(tmp_path / "a.bpt", text))
     assert "\n" not in str(error.value) and "a.bpt" in str(error.value)
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=5))
-def test_damaged_bytes_are_one_line_or_a_scene(tmp_path_factory: pytest.TempPathFactory, damage: list) -> None:
-    data = bytearray(SOUND.encode())
-    for at, byte in damage:
-        data[at % len(data)] = byte
-    path = written(tmp_path_factory.getbasetemp() / "damaged.bpt", bytes(data))
-    try:
-        assert load_scene(path).objects
-    except UserError as error:
-        assert "\n" not in str(error)
 
 
 def test_many_patches_are_read_within_bounds(tmp_path: Path) -> None:

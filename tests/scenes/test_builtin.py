@@ -5,14 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.materials.bsdf import MaterialBSDF
-from lambent.scenes import load_scene, sample_path, validate
+from lambent.scenes import load_scene, sample_path
 from lambent.scenes.camera_paths import path_length
-from lambent.scenes.geometry import signed_volume
 from lambent.scenes.scene import Scene
-
-OPEN = {"floor", "floor_tiles_light", "floor_tiles_dark", "grout", "walls", "window_reveal", "ceiling", "shell",
-        "curtains", "screen_pane", "terrace", "lawn", "hedge", "lamp_cap", "teapot"}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -20,27 +15,11 @@ def room() -> Scene:
     return load_scene("builtin:room")
 
 
-@pytest.mark.parametrize("name", ["room", "box", "teatray", "earrings", "cornell", "vase", "loft", "ring", "pavilion"])
-def test_builtin_scenes_are_without_fault(name: str) -> None:
-    scene = load_scene(f"builtin:{name}")
-    assert scene.warnings == () and validate(scene) == []
-    names = [o.name for o in scene.objects]
-    assert len(set(names)) == len(names)
-
-
 def test_size(room: Scene) -> None:
     assert 50_000 <= sum(len(o.mesh.faces) for o in room.objects) <= 100_000
     low, high = room.object("walls").mesh.bounds
     assert np.allclose(high - low, (5.2, 2.804, 6.4))
     assert sum(len(o.mesh.faces) for o in load_scene("builtin:box").objects) < 1000
-
-
-def test_closed_things_are_the_right_side_out(room: Scene) -> None:
-    for o in room.objects:
-        if o.name not in OPEN:
-            middle = np.mean(o.mesh.bounds, axis=0)
-            o = type(o)(o.name, type(o.mesh)(**{**vars(o.mesh), "positions": o.mesh.positions - middle}), o.material)
-            assert signed_volume(o.mesh) > 0, o.name
 
 
 def test_what_the_demo_needs_is_there(room: Scene) -> None:
@@ -59,13 +38,6 @@ def test_brushing_runs_along_the_plate(room: Scene) -> None:
     assert np.allclose(np.abs(mesh.tangents[front]), (0, 0, 1), atol=1e-3)
     lobe = room.materials["brushed_aluminium"].lobes[0]
     assert lobe.my > 3 * lobe.mx
-
-
-def test_materials_give_back_no_more_than_they_get(room: Scene) -> None:
-    theta = np.radians([0, 30, 60, 80])
-    wo = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], axis=-1)
-    for name, material in room.materials.items():
-        assert MaterialBSDF(material).albedo(wo).max() < 1.02, name
 
 
 def test_nothing_floats_or_stands_in_the_floor(room: Scene) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -136,23 +135,6 @@ def test_teapot_parts_meet() -> None:
     for upper, lower in pairwise((parts["rim"][:4], parts["body"][:4], parts["body"][4:], parts["bottom"])):
         for a, b in zip(upper, lower, strict=True):
             assert np.allclose(a[3], b[0])
-
-
-def test_teapot_is_newells(shared_data: Path) -> None:
-    """Every control point of the published 32 patches, to the last digit of the file."""
-    lines = (shared_data / "geometry" / "newell_teapot.bpt.txt").read_text().split()
-    count = int(lines[0])
-    index = np.array([line.split(",") for line in lines[1 : 1 + count]], int) - 1
-    points = np.array([line.split(",") for line in lines[2 + count : 2 + count + int(lines[1 + count])]], float)
-    published = {_key(points[row]) for row in index}
-    ours = {_key(p) for members in patches().values() for p in members}
-    assert len(published) == len(ours) == 32
-    assert ours == published
-
-
-def _key(points: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    """A patch by its control points in any order."""
-    return tuple(sorted(tuple(p) for p in (points.reshape(-1, 3).round(5) + 0.0).tolist()))
 
 
 def test_placed_turns_then_moves() -> None:

@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from lambent.core.ceilings import TRIANGLES
 from lambent.core.errors import UserError
@@ -311,24 +309,6 @@ def test_sparse_accessors(tmp_path: Path) -> None:
         loaded(tmp_path, content)
 
 
-def test_variants_are_material_sets(tmp_path: Path) -> None:
-    names = [{"name": "oak"}, {"name": "night"}]
-    lamp = {"name": "lamp", "emissiveFactor": [1, 1, 1]}
-    content = _worn({"name": "plain"}, [], extensions={"KHR_materials_variants": {"variants": names}})
-    content["materials"] += [{"name": "wood"}, lamp]
-    mappings = [{"material": 1, "variants": [0]}, {"material": 2, "variants": [1]}]
-    content["meshes"][0]["primitives"][0]["extensions"] = {"KHR_materials_variants": {"mappings": mappings}}
-    assert loaded(tmp_path, content).object("thing").material == "plain"
-    head = 'format = "lambent-scene"\nversion = 1\ngeometry = "thing.gltf"\n'
-    for variant, material, emission in (("oak", "wood", 0.0), ("night", "lamp", 1.0)):
-        (tmp_path / "scene.toml").write_text(head + f'variant = "{variant}"\n')
-        thing = load_scene(tmp_path / "scene.toml").object("thing")
-        assert thing.material == material and thing.emission == (emission,) * 3
-    (tmp_path / "scene.toml").write_text(head + 'variant = "nigth"\n')
-    with pytest.raises(UserError, match="did you mean 'night'"):
-        load_scene(tmp_path / "scene.toml")
-
-
 def test_what_is_missing_is_made_and_said(tmp_path: Path) -> None:
     content = document(nodes=[{"mesh": 0, "name": "a"}, {"mesh": 0, "name": "a"}], scenes=[{"nodes": [0, 1]}])
     content["meshes"][0]["primitives"][0]["attributes"] = {"POSITION": 0}
@@ -440,22 +420,6 @@ def test_every_truncation_of_a_glb_is_one_line(tmp_path: Path) -> None:
             load_scene(path)
 
 
-@settings(max_examples=150)
-@given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=6))
-def test_damaged_bytes_are_one_line_or_a_scene(tmp_path: Path, damage: list[tuple[int, int]]) -> None:
-    data = bytearray(_good_glb())
-    for place, value in damage:
-        data[place % len(data)] = value
-    path = tmp_path / "damaged.glb"
-    path.write_bytes(bytes(data))
-    try:
-        scene = load_scene(path)
-    except UserError as error:
-        assert "\n" not in str(error)
-    else:
-        assert all(np.isfinite(o.mesh.positions).all() for o in scene.objects)
-
-
 def test_variants_of_primitives_are_variants_of_the_scene(tmp_path: Path) -> None:
     names = [{"name": "oak"}, {"name": "night"}, {"name": "bare"}]
     lamp = {"name": "lamp", "emissiveFactor": [1, 1, 1]}
@@ -468,6 +432,12 @@ def test_variants_of_primitives_are_variants_of_the_scene(tmp_path: Path) -> Non
     assert oak.materials["plain"] == scene.materials["wood"] and not night.looks and not bare.looks
     assert "variant night: thing would change emission, which is ignored" in scene.warnings
     head = 'format = "lambent-scene"\nversion = 1\ngeometry = "thing.gltf"\n'
+    (tmp_path / "scene.toml").write_text(head + 'variant = "night"\n')
+    lit = load_scene(tmp_path / "scene.toml").object("thing")
+    assert lit.material == "lamp" and lit.emission == (1, 1, 1) and scene.object("thing").material == "plain"
+    (tmp_path / "scene.toml").write_text(head + 'variant = "nigth"\n')
+    with pytest.raises(UserError, match="did you mean 'night'"):
+        load_scene(tmp_path / "scene.toml")
     more = 'variant = "oak"\n[[variants]]\nname = "oak"\nlight.sun = "off"\n[[variants]]\nname = "red"\n'
     (tmp_path / "scene.toml").write_text(f'{head}{more}materials.wood.colour = "#ff0000"\n')
     chosen = load_scene(tmp_path / "scene.toml")

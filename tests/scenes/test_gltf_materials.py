@@ -96,14 +96,6 @@ def test_specular_glossiness(tmp_path: Path) -> None:
     assert slopes == pytest.approx([0.04, (1 - 0.8 * 128 / 255) ** 2], rel=5e-3)
 
 
-def test_colours_of_pictures_are_decoded_and_roughness_is_as_stored(tmp_path: Path) -> None:
-    png(tmp_path / "grey.png", [[[188, 188, 188, 255]]])
-    pbr = {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}, "metallicFactor": 0}
-    material = loaded(tmp_path, worn({"name": "m", "pbrMetallicRoughness": pbr}, ["grey.png"])).materials["m"]
-    assert material.kd == pytest.approx((0.96 * 0.5029,) * 3, rel=1e-3)  # of sRGB's curve at 188
-    assert material.lobes[0].mx == pytest.approx((188 / 255) ** 2)
-
-
 def test_missing_pictures_are_said(tmp_path: Path) -> None:
     pbr = {"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 0.4, 0.3, 1], "metallicFactor": 0}
     scene = loaded(tmp_path, worn({"name": "m", "pbrMetallicRoughness": pbr}, ["gone.png"]))

@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from lambent.core.errors import UserError
 from lambent.core.geometry import triangle_areas
@@ -244,23 +242,6 @@ def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
     for name in ("v", "vt", "vn", "corners", "sizes", "lines"):
         assert np.array_equal(getattr(whole, name), getattr(cut, name)), name
     assert whole.words == cut.words and whole.lines[:3].tolist() == [11, 13, 15]
-
-
-@settings(max_examples=80)
-@given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=6))
-def test_damaged_bytes_are_one_line_or_a_scene(tmp_path: Path, damage: list[tuple[int, int]]) -> None:
-    data = bytearray((QUAD + "mtllib thing.mtl\no a\nusemtl w\ns 1\nf 1/1 2/2 3/3\nf 1//1 -2//1 4//1 2//1\n").encode())
-    (tmp_path / "thing.mtl").write_text("newmtl w\nKd .5 .5 .5\n")
-    for place, value in damage:
-        data[place % len(data)] = value
-    path = tmp_path / "damaged.obj"
-    path.write_bytes(bytes(data))
-    try:
-        parts = read_obj(path)
-    except UserError as error:
-        assert "\n" not in str(error)
-    else:
-        assert all(np.isfinite(o.mesh.positions).all() for o in parts.objects)
 
 
 def test_what_exporters_write_otherwise(tmp_path: Path) -> None:

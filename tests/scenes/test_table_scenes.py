@@ -14,10 +14,6 @@ from lambent.scenes.builtin import earrings, teatray
 from lambent.scenes.builtin.wood import wood
 from lambent.scenes.geometry.drape import Drape
 from lambent.scenes.scene import Mesh, Scene, SceneObject
-from tests.scenes.soundness import (  # noqa: F401
-    test_closed_things_are_closed_and_the_right_side_out,
-    test_materials_give_back_no_more_than_they_get,
-)
 
 # Pixels at 512x512 of Ben-Artzi 2007, table 4.2, and which of our objects they are.
 PUBLISHED: Mapping[str, Mapping[str, tuple[int, tuple[str, ...]]]] = {
@@ -32,7 +28,6 @@ PUBLISHED: Mapping[str, Mapping[str, tuple[int, tuple[str, ...]]]] = {
         "cloth": (98_890, ("cloth",)),
     },
 }
-OPEN = {"teapot", "teapot_spout", "teapot_handle", "teapot_knob", "cloth"}  # parts that end in others, and a sheet
 
 
 @pytest.fixture(scope="module", params=list(PUBLISHED))

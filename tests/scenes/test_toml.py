@@ -348,23 +348,6 @@ def test_missing_and_unknown(tmp_path: Path) -> None:
         load_scene(written(tmp_path, "", 'format = "lambent-scene"\nversion = 1\n'))
 
 
-def test_the_rooms_own_toml_can_be_copied(tmp_path: Path) -> None:
-    import lambent.scenes.builtin as builtin
-
-    copy = tmp_path / "mine.toml"
-    copy.write_bytes((Path(builtin.__file__).parent / "room.toml").read_bytes())
-    mine, theirs = load_scene(copy), load_scene("builtin:room")
-    assert mine.sources == (copy,) and mine.cameras == theirs.cameras and mine.materials == theirs.materials
-
-
-def test_a_byte_order_mark_changes_nothing(tmp_path: Path) -> None:
-    import lambent.scenes.builtin as builtin
-
-    copy = tmp_path / "mine.toml"
-    copy.write_bytes(b"\xef\xbb\xbf" + (Path(builtin.__file__).parent / "room.toml").read_bytes())
-    assert load_scene(copy).materials == load_scene("builtin:room").materials
-
-
 def test_known_keys_are_all_keys() -> None:
     assert {"turbidity", "probe_planes", "fov_y_deg", "intensity", "scale"} | set(
         SceneDocument.model_fields
