@@ -162,6 +162,19 @@ def test_a_picture_is_blended_in_and_a_new_exposure_needs_no_samples(pictures, s
     np.testing.assert_allclose(read_image(state.screen.folder / "x-001.exr"), found.read(), rtol=2e-3)
 
 
+def test_no_picture_of_another_exposure_is_blended(pictures, state):
+    traced(pictures, state)
+    state.navigation.camera = replace(state.navigation.camera, fov_y_deg=43.0)
+    pictures.update(PLACE, 1.0)
+    state.screen.clock.now_s += 2 * STILL_S
+    began_s = time.monotonic()
+    while pictures.shown[0].samples == 0:
+        assert time.monotonic() - began_s < LONGEST_S
+        state.look.exposure_ev += 0.01  # also in the frame in which the picture arrives
+        pictures.update(PLACE, 1.0)
+        assert "before A" not in pictures.images
+
+
 def test_what_is_edited_is_traced_and_drawn_over_the_traced_picture(pictures, state):
     """A black material in place of all takes the light that they scatter."""
     found = traced(pictures, state)

@@ -209,6 +209,7 @@ class AtRest:
         self._wish: Wish | None = None  # the request
         self._shown: Wish | None = None  # the request whose pictures are shown
         self._least: dict[Kind, int] = {}  # samples of shown pictures that are being traced again
+        self._display: object = None  # exposure and view transform at the last update
         self._changed_s = 0.0
         self.still = False  # whether the view had not changed for a moment at the last `update`
 
@@ -282,8 +283,9 @@ class AtRest:
     ) -> None:
         """Request a view in these kinds once it stands still, and show its present pictures.
 
-        The first picture is blended from the view `before`. While `paused`, because single pictures are traced,
-        nothing is requested; then the view is traced again, and shown once it has as many samples as before.
+        The first picture is blended from the view `before`, unless the exposure has just changed. While `paused`,
+        because single pictures are traced, nothing is requested; then the view is traced again, and shown once it has
+        as many samples as before.
         """
         tracing, now_s = self._tracing, self._screen.clock()
         if tracing is None:
@@ -301,6 +303,7 @@ class AtRest:
             self._wish = self._shown = None
             for picture in self._pictures.values():
                 picture.show(None, wanted, None)
+        redisplayed, self._display = self._display != _display(wanted), _display(wanted)
         wish = replace(of[0], kinds=kinds, rebaked=worn.rebaked)
         if paused:
             self._wish = None
@@ -312,7 +315,7 @@ class AtRest:
                 found = None
             picture = self.held(kind)
             if found is not None or picture.readable:
-                picture.show(found or picture.taken, wanted, picture.view or before)
+                picture.show(found or picture.taken, wanted, None if redisplayed else picture.view or before)
 
     def _ask(self, wish: Wish) -> None:
         assert self._tracing is not None, "there is a process to ask"
