@@ -106,9 +106,16 @@ def test_seconds_are_of_paths_calls_tiles_and_passes() -> None:
     assert Cost(call_s=1.0).seconds(4096, slow) > Cost(call_s=1.0).seconds(4096, replace(fast, samples=512))
 
 
-def test_what_the_user_wants_to_edit_is_kept_and_views_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def short_trials(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few points and paths, where no test asks for seconds."""
     monkeypatch.setattr(trial, "TIMED", 64)
     monkeypatch.setattr(trial, "MANY", 64)
+    monkeypatch.setattr(trial, "paths_at_once", lambda slow: 1 << 12)
+
+
+@pytest.mark.usefixtures("short_trials")
+def test_what_the_user_wants_to_edit_is_kept_and_views_agree() -> None:
     scene, quick = with_small_things(), replace(BOUNCES, samples=16)
     tight = propose(scene, VIEW, quick, kept={"bead", "ball"}, most_bytes=1)
     assert tight.edited == {"bead", "ball"} and {"floor", "back"} <= tight.bounces.fixed
@@ -119,15 +126,15 @@ def test_what_the_user_wants_to_edit_is_kept_and_views_agree(monkeypatch: pytest
     assert far.same == near.same == {}
 
 
-def test_materials_that_look_the_same_are_merged_where_the_store_would_not_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(trial, "TIMED", 64)
-    monkeypatch.setattr(trial, "MANY", 64)
+@pytest.mark.usefixtures("short_trials")
+def test_materials_that_look_the_same_are_merged_where_the_store_would_not_fit() -> None:
     twins = corner({**KINDS, "side": KINDS["back"]})
     assert same_materials(twins) == {"side": "back"} and not same_materials(twins, keep={"side"})
-    roomy = propose(twins, VIEW, BOUNCES)
+    few = replace(BOUNCES, samples=16)
+    roomy = propose(twins, VIEW, few)
     assert (roomy.same, roomy.alike, roomy.reasons) == ({}, {"side": "back"}, ())
     most = roomy.edit_bytes * 2 // 3
-    tight = propose(twins, VIEW, BOUNCES, most_bytes=most)
+    tight = propose(twins, VIEW, few, most_bytes=most)
     assert tight.same == {"side": "back"} and tight.reasons
     assert tight.edit_bytes <= most or [row.role for row in tight.rows].count("edited") == 1
     assert {o.material for o in tight.merged(twins).objects} == {"floor", "back", "ball", "black"}

@@ -21,6 +21,7 @@ from lambent.scenes.scene import LightFieldWish, Scene, SceneObject
 from tests.bake.small_scenes import TINY, room_with_step
 
 FINER = TINY.changed("finer", geometry={"texels": 96}, probe={"texels": 64, "samples": 64})
+LIT = ("light_map", "probe", "light_field")
 BALL = replace(room_with_step().object("ball"), mesh=placed(sphere(0.3, 64, 32), (-0.8, 0.5, 0)))
 VIEW = FrameState(Camera("ball", (0.2, 0.9, -0.4), (-0.8, 0.5, 0.0), fov_y_deg=35), 64, 64, n=1, show="specular")
 MIX: Factors = {"lamp": (0.0, 0.0, 0.0), "wall lamp": (2.0, 2.0, 2.0)}
@@ -42,8 +43,10 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Floats]:
     """Of the ball by its light field: as baked, in the mix, and of a bake in the mix."""
     folder: Path = tmp_path_factory.mktemp("mixes")
     device = open_device()
-    mixed = Renderer(device, read_baked(bake(room(1, 1), folder / "both", quality=FINER, light_groups="scene")))
-    again = Renderer(device, read_baked(bake(room(1e-6, 2), folder / "again", quality=FINER)))
+    mixed = Renderer(
+        device, read_baked(bake(room(1, 1), folder / "both", quality=FINER, only=LIT, light_groups="scene"))
+    )
+    again = Renderer(device, read_baked(bake(room(1e-6, 2), folder / "again", quality=FINER, only=LIT)))
     states = {"as baked": VIEW, "ones": replace(VIEW, light=dict.fromkeys(MIX, (1.0, 1.0, 1.0)))}
     states["mixed"] = replace(VIEW, light=MIX)
     found = {name: mixed.image(state) for name, state in states.items()}
