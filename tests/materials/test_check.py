@@ -7,7 +7,6 @@ import json
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
 from lambent.materials import check as module
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.check import check, check_sampler, furnace
@@ -103,9 +102,3 @@ def test_the_check_is_deterministic_and_shows_progress(quick):
     first = check(FOIL, seed=3, progress=lambda done, total, what: seen.append((done, total, what)))
     assert first.to_json() == check(FOIL, seed=3).to_json()
     assert seen[0][0] == 0 and seen[-1][0] == seen[-1][1]
-
-
-def test_from_below_is_as_from_above():
-    bsdf = MaterialBSDF(FOIL)
-    above, below = direction(0.6, 0.2), direction(np.pi - 0.6, 0.2)
-    np.testing.assert_allclose(bsdf.albedo(above, samples=50_000), bsdf.albedo(below, samples=50_000), rtol=0.02)

@@ -114,10 +114,3 @@ def test_ggx_density_is_mitsubas(mi):
     theirs = np.array(plugin.pdf(mi.BSDFContext(), interaction(wo), mi.Vector3f(wi.T)))
     ours = MODELS["ggx"](alpha_x=0.1, alpha_y=0.4).pdf(wi.astype(float), wo.astype(float))
     np.testing.assert_allclose(theirs, ours, rtol=1e-3, atol=1e-6)
-
-
-def test_ggx_at_normal_incidence_by_hand():
-    """h = n, no masking: f = f0 / (4 pi ax ay)."""
-    n = direction(0.0, 0.0)
-    value = MODELS["ggx"](f0=(0.2, 0.4, 0.6), alpha_x=0.1, alpha_y=0.3).eval(n, n)
-    np.testing.assert_allclose(value, np.array([0.2, 0.4, 0.6]) / (4 * np.pi * 0.03))

@@ -114,8 +114,8 @@ def document(name: str, found: Likeness) -> str:
     ET.SubElement(surface, "input", name="bsdf", type="BSDF", nodename=total)
     ET.SubElement(surface, "input", name="thin_walled", type="boolean", value="true")
     own = _identifier(name, {element.get("name", "") for element in root})
-    worn = ET.SubElement(root, "surfacematerial", name=own, type="material")
-    ET.SubElement(worn, "input", name="surfaceshader", type="surfaceshader", nodename="thin_sheet")
+    surface_material = ET.SubElement(root, "surfacematerial", name=own, type="material")
+    ET.SubElement(surface_material, "input", name="surfaceshader", type="surfaceshader", nodename="thin_sheet")
     ET.indent(root, "  ")
     return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 

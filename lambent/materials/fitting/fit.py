@@ -112,6 +112,7 @@ def fit(
     """Fit a diffuse term and `lobes` lobes per side (3.6), and a retro-reflective lobe if the table shows one.
 
     Channels share mx, my, r0 and alpha; every coefficient is solved per channel.
+
     Parameters
     ----------
     table : MeasuredSamples or MeasuredTable

@@ -33,8 +33,8 @@ class Azimuths:
         nearest = min(wide, key=lambda parts: abs(np.log((span + step) * parts / (2 * np.pi))))
         return cls(nodes, whole[0] if whole else nearest)
 
-    def brought(self, wi: Floats, wo: Floats) -> tuple[Floats, Floats, Floats]:
-        """Pairs (N, 3) moved into the nodes' part of the circle, and the azimuths (N,) of wi there."""
+    def folded(self, wi: Floats, wo: Floats) -> tuple[Floats, Floats, Floats]:
+        """Pairs (N, 3) folded into the nodes' part of the circle, and the azimuths (N,) of wi there."""
         phi, period = np.arctan2(wi[:, 1], wi[:, 0]), 2 * np.pi / self.parts
         if self.parts < 4:
             parts = (phi - self.nodes[0]) / period
@@ -49,7 +49,7 @@ class Azimuths:
         return wi, wo, middle + off - 2 * np.pi * np.round(off / (2 * np.pi))
 
     def beyond(self, phi: Floats) -> tuple[Floats, Floats, Floats]:
-        """For `brought` azimuths (N,): flip (N, 3), azimuth (N,) and weight (N,) of the other image to blend with."""
+        """For `folded` azimuths (N,): flip (N, 3), azimuth (N,) and weight (N,) of the other image to blend with."""
         first, last = self.nodes[0], self.nodes[-1]
         over, under = np.maximum(phi - last, 0), np.maximum(first - phi, 0)
         if self.parts < 4:

@@ -165,14 +165,14 @@ class HalfVectorGrid:
             cell = ((page + node) * shape.theta_h + row) * shape.phi_h + column
             of_h = of_h + weight * ops.gather(self.density, cell)
         value = DIFFUSE * ops.abs(wi[2]) / np.pi + (1 - DIFFUSE) * of_h / (4 * ops.maximum(cos_d, 1e-6))
-        across = self.share_across(wo, ops, viewers)
+        across = self.transmitted_share(wo, ops, viewers)
         value = value * ops.select(wi[2] * wo[2] < 0, across, 1 - across)
         return ops.select(self._seen(wi, wo, ops), value, 0.0)
 
     def sample(self, wo: Vector, u_select: Any, u1: Any, u2: Any, ops: ArrayOps = NUMPY) -> Vector:
         """wi; u_* uniform in [0, 1). A sample at or beyond the horizon is returned with wi.z = 0."""
         shape, viewers = self.shape, self._viewers(wo, ops)
-        across, u_select = chosen_side(u_select, self.share_across(wo, ops, viewers), ops)
+        across, u_select = chosen_side(u_select, self.transmitted_share(wo, ops, viewers), ops)
         diffuse = u_select < DIFFUSE
         u_select = (u_select - DIFFUSE) / (1 - DIFFUSE)
 
@@ -193,7 +193,7 @@ class HalfVectorGrid:
         z = ops.select(z > COS_MIN, z, 0.0)
         return x, y, ops.select((wo[2] > 0) == across, -z, z)
 
-    def share_across(self, wo: Vector, ops: ArrayOps = NUMPY, viewers: _Viewers | None = None) -> Any:
+    def transmitted_share(self, wo: Vector, ops: ArrayOps = NUMPY, viewers: _Viewers | None = None) -> Any:
         """Probability of a transmitted sample; `viewers` are the nodes around wo, if known."""
         return self.of_viewer(self.across, wo, ops, viewers)
 

@@ -33,7 +33,7 @@ def grid_of(
 ) -> HalfVectorGrid:
     """Resample a table to the grid; `shape` defaults to ISOTROPIC or ANISOTROPIC, by the table's declaration.
 
-    `part` serves `TwinGrid`: "mirror" and "light" are the shares that `back_share` assigns to each peak.
+    `part` serves `RetroGrid`: "mirror" and "light" are the shares that `back_share` assigns to each peak.
     """
     shape = shape or (ISOTROPIC if table.info.isotropic else ANISOTROPIC)
     sheet = table if isinstance(table, TwoSided) else TwoSided(table)
@@ -41,14 +41,14 @@ def grid_of(
     values = np.zeros((faces, kinds, shape.viewer_theta, shape.viewer_phi, shape.cells, 3), np.float32)
     weights = np.zeros(values.shape[:-1])
     viewers, h = _viewer_nodes(shape), _cell_centres(shape)
-    twins = _twins(sheet, shape)
+    symmetric = _symmetric_viewers(sheet, shape)
     for a, ring in enumerate(viewers):
         progress(a, len(viewers), f"resampling {table.info.file}")
         for b, viewer in enumerate(ring):
-            twin, cells = twins[b]
-            if twin != b:
-                values[..., a, b, :, :] = values[..., a, twin, cells, :]
-                weights[..., a, b, :] = weights[..., a, twin, cells]
+            other, cells = symmetric[b]
+            if other != b:
+                values[..., a, b, :, :] = values[..., a, other, cells, :]
+                weights[..., a, b, :] = weights[..., a, other, cells]
                 continue
             wo = np.broadcast_to(viewer, h.shape)
             wi = reflect(wo, h)
@@ -76,7 +76,7 @@ def _share_of(part: str, wi: Floats, wo: Floats) -> Any:
     return back if part == "light" else 1 - back
 
 
-def _twins(table: TwoSided, shape: GridShape) -> list[tuple[int, Any]]:
+def _symmetric_viewers(table: TwoSided, shape: GridShape) -> list[tuple[int, Any]]:
     """For each viewer azimuth, the one whose values it can share, and the order of cells; tables are often symmetric.
 
     Mirror symmetry at x = 0 and y = 0, and under half a turn, is detected by look-ups at random pairs.
@@ -100,8 +100,8 @@ def _twins(table: TwoSided, shape: GridShape) -> list[tuple[int, Any]]:
     if same([1, -1, 1]) and same([-1, 1, 1]):
         for k in range(n):
             if k > n // 2:
-                twin, order = own[n - k][0], columns - 1 - j
-                own[k] = (twin, ordered(order if twin == n - k else columns // 2 + j))
+                other, order = own[n - k][0], columns - 1 - j
+                own[k] = (other, ordered(order if other == n - k else columns // 2 + j))
             elif k > n // 4:
                 own[k] = (n // 2 - k, ordered(columns // 2 - 1 - j))
     elif same([-1, -1, 1]):

@@ -30,7 +30,7 @@ from lambent.materials.measured.klems import BEYOND, WHOLE_DEG, AngleBasis, Patc
 from lambent.materials.measured.lbnl_parts import Side, Way
 from lambent.materials.measured.lbnl_xml import LbnlTable, Use
 from lambent.materials.measured.protocol import MeasuredTable
-from lambent.materials.measured.twin_grid import TwinGrid, twin_grid_of
+from lambent.materials.measured.retro_grid import RetroGrid, retro_grid_of
 from lambent.materials.measured.two_sided import Reversed
 
 _WAYS: tuple[Way, ...] = ("reflection", "transmission")
@@ -108,13 +108,13 @@ class PatchSheet:
     def pdf(self, wi: Vector, wo: Vector, ops: ArrayOps = NUMPY) -> Any:
         """Density of `sample` in 1/sr."""
         pair, seen = self._pair(wi, wo, ops)
-        across = self.share_across(wo, ops)
+        across = self.transmitted_share(wo, ops)
         share = ops.select(wi[2] * wo[2] < 0, across, 1 - across)
         return ops.select(seen, ops.gather(self.density, pair) * ops.abs(wi[2]) * share, 0.0)
 
     def sample(self, wo: Vector, u_select: Any, u1: Any, u2: Any, ops: ArrayOps = NUMPY) -> Vector:
         """wi; u_* uniform in [0, 1). wi.z = 0 at the horizon, and if nothing is scattered."""
-        across, u_select = chosen_side(u_select, self.share_across(wo, ops), ops)
+        across, u_select = chosen_side(u_select, self.transmitted_share(wo, ops), ops)
         page = self._page(wo, across, ops)
         row, inside = self._viewer_row(wo, page, ops)
         light = first_above(ops.minimum(u_select, _BELOW_ONE), self.cdf, row * self.patches, self.patches, ops)
@@ -125,7 +125,7 @@ class PatchSheet:
         z = ops.select(inside & (z > COS_MIN) & (ops.gather(self.albedo, row) > 0), z, 0.0)
         return sin_theta * ops.cos(phi), sin_theta * ops.sin(phi), ops.select((wo[2] > 0) == across, -z, z)
 
-    def share_across(self, wo: Vector, ops: ArrayOps = NUMPY) -> Any:
+    def transmitted_share(self, wo: Vector, ops: ArrayOps = NUMPY) -> Any:
         """Probability of a transmitted sample."""
         if self.kinds == 1:
             return 0.0 * wo[2]
@@ -176,7 +176,7 @@ class PatchSheet:
         return ops.whole(ops.gather(self.starts, ring) + place), count > 0.5
 
 
-Lookup = HalfVectorGrid | PatchSheet | TwinGrid
+Lookup = HalfVectorGrid | PatchSheet | RetroGrid
 _TREE = GridShape(180, 1, 256, 64)  # isotropic trees: their steps do not follow the mirror direction
 
 
@@ -193,7 +193,7 @@ def lookup_of(
     if shape is None and isinstance(table, LbnlTable) and table.info.isotropic:
         shape = _TREE
     returns = isinstance(table, GonioTable) and table.choice.way == "back_vector"
-    return (twin_grid_of if returns else grid_of)(Reversed(table) if reverse else table, shape, progress)
+    return (retro_grid_of if returns else grid_of)(Reversed(table) if reverse else table, shape, progress)
 
 
 def patch_sheet_of(table: MeasuredTable, *, reverse: bool = False) -> PatchSheet | None:

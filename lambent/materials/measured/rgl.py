@@ -124,7 +124,7 @@ class RglTable(ReflectionTable):
         """f (N, 3) in 1/sr; negative values become 0."""
         if self._azimuths is None:
             return self._at(wi, wo, np.arctan2(wi[:, 1], wi[:, 0]))
-        wi, wo, phi_i = self._azimuths.brought(wi, wo)
+        wi, wo, phi_i = self._azimuths.folded(wi, wo)
         value = self._at(wi, wo, phi_i)
         flip, phi_there, share = self._azimuths.beyond(phi_i)
         gap = share > 0

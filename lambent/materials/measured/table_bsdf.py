@@ -16,7 +16,7 @@ from lambent.materials.lobes import COS_MIN
 from lambent.materials.measured.half_vector_grid import GridShape, HalfVectorGrid
 from lambent.materials.measured.patch_sheet import Lookup, lookup_of, patch_sheet_of
 from lambent.materials.measured.protocol import MeasuredTable
-from lambent.materials.measured.twin_grid import TwinGrid
+from lambent.materials.measured.retro_grid import RetroGrid
 from lambent.materials.measured.two_sided import TwoSided
 
 
@@ -67,8 +67,8 @@ class TableBSDF(_Part):
         lookup = self.lookup
         if isinstance(lookup, HalfVectorGrid):
             return _chi_square_in_half_vectors(self, lookup, wo, samples, seed)
-        if isinstance(lookup, TwinGrid):
-            share = float(lookup.share_returned(components(wo)))
+        if isinstance(lookup, RetroGrid):
+            share = float(lookup.returned_share(components(wo)))
             parts = ((lookup.mirror, 1 - share), (lookup.light, share))
             return combined(
                 [_chi_square_in_half_vectors(_Part(grid), grid, wo, round(samples * p), seed) for grid, p in parts]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,6 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import patch_mean
 from lambent.materials.export.lbnl_xml import write
-from lambent.materials.export.registry import writer_for
 from lambent.materials.measured import load
 from lambent.materials.measured.equal_energy import xyz_of_rgb
 from lambent.materials.measured.klems import KLEMS_FULL
@@ -186,20 +184,3 @@ def test_an_interrupted_write_leaves_no_file(tmp_path: Path) -> None:
     with pytest.raises(Cancelled):
         write(FOIL, tmp_path / "f.xml", stop)
     assert not list(tmp_path.iterdir())
-
-
-def test_the_writer_is_found_by_name() -> None:
-    assert writer_for(Path("x"), "lbnl_xml").write is write
-
-
-def test_rings_are_written_with_their_middles(foil) -> None:
-    """The cap's angle is 0; that of every other ring is half way between its bounds, which meet."""
-    text = foil[0].read_text()
-    rings = [
-        tuple(map(float, ring))
-        for ring in re.findall(
-            r"<Theta>(.*?)</Theta>.*?<LowerTheta>(.*?)</LowerTheta>.*?<UpperTheta>(.*?)</UpperTheta>", text, re.DOTALL
-        )
-    ]
-    assert [ring[0] for ring in rings] == [0, *((low + high) / 2 for _, low, high in rings[1:])]
-    assert [low for _, low, _ in rings] == [0, *(high for *_, high in rings[:-1])] and rings[-1][2] == 90

@@ -73,12 +73,6 @@ def test_gonio_text_keeps_the_peak(tmp_path: Path):
         np.testing.assert_allclose(table.eval(wi, wi), MaterialBSDF(TAPE).eval(wi, wi), rtol=0.05)
 
 
-def test_gonio_text_of_a_table_is_the_table(tmp_path: Path):
-    table = TAPES[0].measured(10.0)
-    cost = gonio_text.write(table, tmp_path / "tape.txt")
-    assert cost.lost == () and cost.share["l1"] < 1e-3
-
-
 def test_a_file_with_a_wider_peak_is_described(tmp_path: Path):
     """A quarter as high, twice as wide: as much light, .94 of it elsewhere (both are equal at r^2 = 4/3 ln 4)."""
     tape = TAPES[1]

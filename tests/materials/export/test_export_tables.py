@@ -13,7 +13,6 @@ from lambent.core.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import gonio_text, merl, rgl
-from lambent.materials.export.registry import writers
 from lambent.materials.measured import load
 from lambent.materials.measured.gonio import GonioTable
 from lambent.materials.measured.metrics import METRICS
@@ -38,11 +37,6 @@ def small_merl(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fewer bins, for a fortieth of the time."""
     monkeypatch.setattr(merl, "SHAPE", (40, 20, 30))
     monkeypatch.setattr(merl, "TURNS", 8)
-
-
-def test_table_writers_are_found() -> None:
-    assert {"merl", "rgl", "gonio_text"} <= set(writers())
-    assert all(writers()[name].TAKES == ("table", "material") for name in ("merl", "rgl", "gonio_text"))
 
 
 def test_merl_round_trip(tmp_path: Path, small_merl: None) -> None:

@@ -16,9 +16,8 @@ from lambent.core.progress import Cancelled
 from lambent.core.sequences import r2
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.export import lbnl_xml, patch_mean, tensor_tree, tree_growth
+from lambent.materials.export import tensor_tree, tree_growth
 from lambent.materials.export.proposal import knows_the_back
-from lambent.materials.export.registry import writer_for
 from lambent.materials.measured.lbnl_xml import read
 from lambent.materials.measured.tensor_tree import Rank, disk_of
 from lambent.materials.measured.tree_part import on_sphere
@@ -109,14 +108,6 @@ def test_the_peak_and_the_energy_are_kept(tmp_path: Path, small: Callable[[int],
     expected = MaterialBSDF(GLOSSY).albedo(asked)[:, 0].mean()
     assert read(tmp_path / "a.xml").reflectivity(asked).mean() == pytest.approx(expected, rel=0.005)
     assert cost.verdict.word == "faithful" and cost.share["l2_ngan"] < 0.1
-
-
-def test_it_loses_a_fraction_of_what_klems_loses(
-    tmp_path: Path, small: Callable[[int], None], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(patch_mean, "LOBES_LOG2", 9)
-    tree, klems = (writer.write(GLOSSY, tmp_path / "a.xml").share for writer in (tensor_tree, lbnl_xml))
-    assert tree["l2_ngan"] < klems["l2_ngan"] / 4 and tree["l1"] < klems["l1"] / 4
 
 
 @pytest.mark.parametrize(("rank", "log2_cells"), [(3, 11), (4, 13)])
@@ -267,7 +258,3 @@ def test_what_cannot_be_written(tmp_path: Path, small: Callable[[int], None]) ->
     with pytest.raises(Cancelled):
         tensor_tree.write(GLOSSY, tmp_path / "a.xml", stop)
     assert not list(tmp_path.iterdir())
-
-
-def test_the_writer_is_found_by_name() -> None:
-    assert writer_for(Path("x"), "tensor_tree").write is tensor_tree.write

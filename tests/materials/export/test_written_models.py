@@ -1,4 +1,4 @@
-"""The numbers of written glTF and Mitsuba files, evaluated by their specifications, cost what is stated."""
+"""The numbers of written glTF, Mitsuba and MaterialX files, evaluated by their specifications, cost what is stated."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 
 from lambent.core.directions import Floats
 from lambent.materials.document import Material
-from lambent.materials.export import gltf, mitsuba
+from lambent.materials.export import gltf, materialx, mitsuba
 from lambent.materials.export.pairs import CHECK_LOG2, pairs_of
 from tests.materials.export.export_materials import BRUSHED, FOIL, GOLD, PAPER, PLASTIC, VARNISH
 from tests.materials.export.facets_by_hand import Geometry, assert_costs
@@ -139,3 +139,39 @@ def test_mitsuba_thin_sheet(tmp_path: Path) -> None:
     np.testing.assert_allclose((1 - weight) * texture(near.find("bsdf"), "reflectance"), 0.6, rtol=1e-4)
     assert far.get("type") == "principledthin" and number(far, "diff_trans") == 2
     np.testing.assert_allclose(weight * texture(far, "base_color"), 0.2, rtol=1e-4)
+
+
+def inputs_of(node: ET.Element) -> dict[str, Floats]:
+    """The numbers of a MaterialX node's inputs, by name."""
+    numeric = (one for one in node if one.get("type") in ("float", "vector2", "color3"))
+    return {one.get("name", ""): np.array([float(v) for v in one.get("value", "").split(",")]) for one in numeric}
+
+
+def materialx_f(root: ET.Element, geometry: Geometry) -> Floats:
+    """f (N, 3) of the document's nodes by their own definitions, added up."""
+    near, far = np.zeros((2, len(geometry.cos_d), 3))
+    grazing = ((1 - geometry.cos_d) ** 5)[:, None]
+    for node in root:
+        numbers = inputs_of(node)
+        scatter = [one.get("value") for one in node if one.get("name") == "scatter_mode"]
+        if node.tag == "oren_nayar_diffuse_bsdf":
+            assert numbers["roughness"] == 0
+            near += numbers["color"] / np.pi
+        elif node.tag == "translucent_bsdf":
+            far += numbers["color"] / np.pi
+        elif node.tag == "generalized_schlick_bsdf":
+            assert scatter == ["R"] and numbers["exponent"] == 5
+            fresnel = numbers["color0"] + (numbers["color90"] - numbers["color0"]) * grazing
+            near += fresnel * geometry.ggx(*numbers["roughness"])[:, None]
+        elif node.tag == "dielectric_bsdf":
+            assert scatter == ["T"]
+            f0 = ((numbers["ior"] - 1) / (numbers["ior"] + 1)) ** 2
+            far += numbers["tint"] * (1 - f0 - (1 - f0) * grazing) * geometry.ggx(*numbers["roughness"])[:, None]
+    return np.asarray(np.where(geometry.far[:, None], far, near))
+
+
+@pytest.mark.parametrize("material", [PLASTIC, BRUSHED, GOLD, FOIL, PAPER], ids=named)
+def test_materialx(tmp_path: Path, material: Material) -> None:
+    cost = materialx.write(material, tmp_path / "a.mtlx")
+    samples = pairs_of(material, CHECK_LOG2, seed=1).samples
+    assert_costs(samples, materialx_f(ET.parse(tmp_path / "a.mtlx").getroot(), Geometry(samples)), cost.share)

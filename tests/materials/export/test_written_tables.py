@@ -127,6 +127,10 @@ def test_klems_rings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert [int(ring.findtext(f"{SPACE}nPhis")) for ring in rings] == list(KLEMS_COUNTS)
     bounds = [float(ring.findtext(f"{SPACE}ThetaBounds/{SPACE}UpperTheta")) for ring in rings]
     assert bounds == list(KLEMS_EDGES_DEG[1:])
+    middles = [float(ring.findtext(f"{SPACE}Theta")) for ring in rings]
+    assert middles == [0, *np.convolve(bounds, [0.5, 0.5], "valid")]
+    lower = [float(ring.findtext(f"{SPACE}ThetaBounds/{SPACE}LowerTheta")) for ring in rings]
+    assert lower == list(KLEMS_EDGES_DEG[:-1])
     blocks = blocks_by_hand(tmp_path / "a.xml")
     for way, (r, g, b) in {"Reflection": (0.6, 0.2, 0.1), "Transmission": (0.1, 0.1, 0.2)}.items():
         expected = {

@@ -132,9 +132,8 @@ def test_the_table_alone_does_not_change_the_fit():
 
 
 def test_what_cannot_be_kept_is_refused():
-    for options in ({"method": "grid", "whole": CarPaint()}, {}):
-        with pytest.raises(UserError, match="gradient"):
-            fit(CarPaint().samples(), keep_albedo=True, **options)
+    with pytest.raises(UserError, match="needs a whole table"):
+        fit(CarPaint().samples(), keep_albedo=True)
 
 
 @pytest.mark.parametrize("metric", METRICS)

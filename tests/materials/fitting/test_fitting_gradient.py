@@ -26,23 +26,6 @@ def free_boxes(side, lobes):
     return [box_of(side, i, False, 1, {}, {"t_r0": (0.1, 0.9)} if side == "transmission" else {}) for i in range(lobes)]
 
 
-@pytest.mark.parametrize("metric", METRICS)
-@pytest.mark.parametrize("distribution", ["beckmann", "ggx"])
-def test_minimise_walks_to_the_known_lobe(metric, distribution):
-    lobe = PAINT.lobes[0].model_copy(update={"distribution": distribution})
-    samples = grey(PAINT.model_copy(update={"lobes": (lobe,)}), FEW)
-    problem = problem_of(samples, "reflection", METRICS[metric], distribution, False)
-    bounds = Bounds([box_of("reflection", 0, True, 1, {"alpha": 0.3}, {})], True)
-    start = Mixture(np.array([0.1]), (Candidate(to_search(np.array([0.12, 0.12, 0.09, 0.3])), np.array([0.5])),))
-    found, error = minimise(problem, bounds, start, 60, 1e-9)
-    mx, my, r0, alpha = found.lobes[0].shape
-    assert mx == my == pytest.approx(0.15, rel=0.01)
-    assert r0 * found.lobes[0].k[0] == pytest.approx(0.042, rel=0.02)
-    assert found.diffuse[0] == pytest.approx(0.2, rel=0.01)
-    assert alpha == 0.3
-    assert error == pytest.approx(problem.remaining(found))
-
-
 @pytest.mark.parametrize("metric", ["cuberoot", "log", "l2_ngan"])
 @pytest.mark.parametrize("distribution", ["beckmann", "ggx"])
 @pytest.mark.parametrize("side", ["reflection", "transmission"])

@@ -76,9 +76,9 @@ def test_symmetric_viewers_share_their_values(monkeypatch):
     for turn_rad in (0.0, 0.3):
         table = Exact(SHEET, turn_rad=turn_rad)
         shared = grid_of(table, SMALL)
-        assert any(twin != k for k, (twin, _) in enumerate(half_vector_resampling._twins(table, SMALL)))
+        assert any(other != k for k, (other, _) in enumerate(half_vector_resampling._symmetric_viewers(table, SMALL)))
         with monkeypatch.context() as patch:
-            patch.setattr(half_vector_resampling, "_twins", lambda *_: [(k, slice(None)) for k in range(8)])
+            patch.setattr(half_vector_resampling, "_symmetric_viewers", lambda *_: [(k, slice(None)) for k in range(8)])
             alone = grid_of(table, SMALL)
         for name in ("values", "density", "across"):
             np.testing.assert_allclose(getattr(shared, name), getattr(alone, name), rtol=1e-5, atol=1e-7)

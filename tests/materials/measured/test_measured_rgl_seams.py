@@ -106,12 +106,12 @@ def test_a_quarter_is_mirrored_with_and_without_its_ends(begin: float) -> None:
         nodes = np.radians(begin + np.array(nodes_deg, float))
         azimuths = Azimuths.of(nodes)
         assert azimuths.parts == 4
-        brought, _, phi = azimuths.brought(wi, wi)
-        np.testing.assert_allclose(direction(np.full(721, 0.7), phi), brought, atol=1e-12)
-        np.testing.assert_allclose(np.abs(brought), np.abs(wi))
+        folded, _, phi = azimuths.folded(wi, wi)
+        np.testing.assert_allclose(direction(np.full(721, 0.7), phi), folded, atol=1e-12)
+        np.testing.assert_allclose(np.abs(folded), np.abs(wi))
         value, (flip, there, share) = np.interp(phi, nodes, np.cos(nodes) ** 2), azimuths.beyond(phi)
         np.testing.assert_allclose(
-            direction(np.full(721, 0.7), there)[share > 0], (brought * flip)[share > 0], atol=1e-12
+            direction(np.full(721, 0.7), there)[share > 0], (folded * flip)[share > 0], atol=1e-12
         )
         found = value + share * (np.interp(there, nodes, np.cos(nodes) ** 2) - value)
         assert share.max() <= 0.5 + 1e-9 and np.abs(np.diff(found)).max() < 0.02, "no step"
