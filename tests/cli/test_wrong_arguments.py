@@ -25,6 +25,7 @@ WRONG = {
     "bench nothing": "unknown bench",
     "bench flicker --input nothing": "nothing: input does not exist",
     "check folder": "folder: cannot be read",
+    "check ward --seed -1": "--seed",
     "compare bad.edits.json bad.edits.json": "unknown picture format",
     "convert half.edits.json thing.nope": "thing.nope: unknown ending",
     "convert half.edits.json thing.glb": "half.edits.json",
