@@ -120,8 +120,6 @@ def test_saved_views_can_be_rendered(lambent, refused, store, tmp_path):
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        (("-o", "a.gif"), "expected .exr, .hdr, .png, .mp4"),
-        (("-o", "a.png", "--size", "10"), "expected WIDTHxHEIGHT"),
         (("-o", "a.png", "--size", "0x5"), "expected WIDTHxHEIGHT"),
         (("-o", "a.png", "--size", "9000x9000"), "expected 1x1 to 8192x8192"),
         (("-o", "/proc/a.png"), "cannot be written"),
@@ -130,7 +128,6 @@ def test_saved_views_can_be_rendered(lambent, refused, store, tmp_path):
         (("-o", "a#b#.png", "--path", "tour"), "one run of # signs"),
         (("-o", "a.png", "--view", "falsecolour"), "did you mean 'false-colour'?"),
         (("-o", "a.png", "--view", "false-colour", "--range", "5"), "expected LOW:HIGH"),
-        (("-o", "a.png", "--view", "false-colour", "--range", "5:1"), "luminance range"),
         (("-o", "a.png", "--show", "spec"), "unknown part of the light"),
         (("-o", "a.png", "--show", "nois"), "did you mean 'noise'?"),
         (("-o", "a.mp4", "--camera", "side"), "a film follows a path"),
@@ -139,7 +136,6 @@ def test_saved_views_can_be_rendered(lambent, refused, store, tmp_path):
         (("-o", "a.png", "--integrator", "lamps", "--planar", "of"), "did you mean 'off'?"),
         (("-o", "a.png", "--integrator", "path", "--planar", "off"), "--planar: applies to drawn pictures only"),
         (("-o", "a.png", "--lookup", "plain"), "--lookup: applies to drawn pictures only"),
-        (("-o", "a.png", "--samples", "0"), "--samples"),
         (("-o", "a.png", "--integrator", "path"), "name it with --scene"),
     ],
 )
