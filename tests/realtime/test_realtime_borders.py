@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from lambent.bake.bake import bake
 from lambent.core.camera import Camera
@@ -16,11 +15,12 @@ from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene, read_baked
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
-from lambent.scenes.geometry import box, merge, patch, placed, sphere, tube
+from lambent.scenes.geometry import box, merge, patch, placed, sphere
 from lambent.scenes.scene import Mesh, ReflectorRule, Scene, SceneObject
 from tests.bake.small_scenes import GREY, TINY, turned_inwards
 
 SIZE = 160, 120
+LIT = ("light_map", "probe", "probe_share")
 QUALITY = TINY.changed("bordered", probe={"texels": 64, "samples": 16})
 METAL = Material(name="metal", lobes=(Lobe(mx=0.1, my=0.1, r0=0.9),))
 SIDES = ((-3, (1.0, 0.3, 0.1)), (3, (0.1, 0.4, 1.0)))
@@ -37,15 +37,6 @@ def room(*objects: SceneObject, camera: Camera) -> Scene:
     materials = {"grey": GREY, "metal": METAL}
     probes_alone = (ReflectorRule("*", use=False),)
     return Scene("room", (shell, lamp, *walls, *objects), materials, cameras=(camera,), reflector_rules=probes_alone)
-
-
-def torus() -> Scene:
-    """A ring around a column."""
-    angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
-    ring = tube(np.stack([0.75 * np.cos(angle), 1 + 0 * angle, 0.75 * np.sin(angle)], axis=1), 0.16, 24, 1, closed=True)
-    column = placed(box((0.8, 3, 0.8)), (0, 1.5, 0))
-    camera = Camera(name="front", position=(0.6, 1.9, 2.7), target=(0.0, 1.0, 0.0), fov_y_deg=36.0)
-    return room(SceneObject("ring", ring, "metal"), SceneObject("column", column, "grey"), camera=camera)
 
 
 def cabinet() -> Scene:
@@ -65,17 +56,7 @@ def hard(scene: BakedScene) -> BakedScene:
     return replace(scene, record=scene.record.model_copy(update={"objects": objects}))
 
 
-def around(scene: Scene) -> tuple[Camera, ...]:
-    """The scene's camera, for a ring from all sides: few pixels of one picture are near its borders."""
-    (camera,) = scene.cameras
-    if not any(o.name == "ring" for o in scene.objects):
-        return (camera,)
-    angles = np.linspace(0, 2 * np.pi, 6, endpoint=False) + np.arctan2(camera.position[0], camera.position[2])
-    places = [(2.77 * np.sin(angle), camera.position[1], 2.77 * np.cos(angle)) for angle in angles]
-    return tuple(replace(camera, name=f"side {k}", position=place) for k, place in enumerate(places))
-
-
-def pictures(scene: Scene, baked: BakedScene, camera: Camera, device: Any, spp: int = 128) -> tuple[np.ndarray, ...]:
+def pictures(scene: Scene, baked: BakedScene, camera: Camera, device: Any, spp: int = 64) -> tuple[np.ndarray, ...]:
     """Path traced, with parts mixed, and with a hard border."""
     from lambent.bake.reference.path_traced import render_reference
 
@@ -84,15 +65,11 @@ def pictures(scene: Scene, baked: BakedScene, camera: Camera, device: Any, spp: 
     return render_reference(scene, camera, *SIZE, spp)[0], mixed, cut
 
 
-@pytest.mark.parametrize("make", [torus, cabinet])
-def test_light_near_a_border_is_nearer_to_path_tracing(make: Any, tmp_path: Path, device: Any) -> None:
-    scene = make()
-    baked = read_baked(bake(scene, tmp_path / "s", quality=QUALITY))
-    errors, pixels, cameras = np.zeros(2), 0, around(scene)
-    for camera in cameras:
-        truth, mixed, cut = pictures(scene, baked, camera, device)
-        seam = np.abs(mixed - cut).max(axis=-1) > 0.05 * truth.mean()
-        errors += [flip_error(*display_pair(truth, image))[seam].sum() for image in (mixed, cut)]
-        pixels += int(seam.sum())
-    assert 0.004 < pixels / (len(cameras) * SIZE[0] * SIZE[1]) < 0.2
-    assert errors[0] < errors[1]
+def test_light_near_a_border_is_nearer_to_path_tracing(tmp_path: Path, device: Any) -> None:
+    scene = cabinet()
+    baked = read_baked(bake(scene, tmp_path / "s", quality=QUALITY, only=LIT))
+    truth, mixed, cut = pictures(scene, baked, scene.cameras[0], device)
+    seam = np.abs(mixed - cut).max(axis=-1) > 0.05 * truth.mean()
+    assert 0.004 < seam.mean() < 0.2
+    errors = [flip_error(*display_pair(truth, image))[seam].mean() for image in (mixed, cut)]
+    assert errors[0] < 0.95 * errors[1], errors
