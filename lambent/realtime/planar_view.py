@@ -154,8 +154,6 @@ def _view(
     uniform["eye"][:3] = eye
     for row, name in ((0, "row_x"), (1, "row_y"), (3, "row_w")):
         uniform[name][:3] = clip[row, :3]
-    for name in ("across", "up", "forward"):
-        uniform[name][:3] = seen[name][:3]
     uniform["plane"], uniform["size"], uniform["offset"] = plane, wide, offset
     uniform["tolerance"] = reflector.deviation_m + 2 * clearance
     uniform["focal_px"] = wide[1] / 2 / np.linalg.norm(up)

@@ -6,9 +6,6 @@ struct MirroredView {
     row_y: vec4f,
     row_w: vec4f,
     plane: vec4f, // of the reflector, n towards the viewer
-    across: vec4f, // the ray of clip position (x, y) is forward + x across + y up
-    up: vec4f,
-    forward: vec4f,
     size: vec2f,
     offset: vec2f,  // of the frame in the buffer
     tolerance: f32, // m: how far the reflector's pixels may lie from its plane
@@ -17,8 +14,3 @@ struct MirroredView {
     number: f32, // of the reflector in this frame
 }
 
-// The ray from the mirrored eye, of depth 1, through a texel of the buffer.
-fn mirrored_ray(texel: vec2f) -> vec3f {
-    let clip = texel / mirrored.size * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
-    return mirrored.forward.xyz + clip.x * mirrored.across.xyz + clip.y * mirrored.up.xyz;
-}
