@@ -14,8 +14,6 @@
 const FARTHEST = 2e4; // m
 const FADE_PX = 24.0; // beyond the edges of the buffer
 const FLAT_COS = 0.998; // least cosine of the reflector's own normals: bevels beside them have the probe's light
-const BESIDE = 8u;    // neighbours, up to two pixels away
-const HIDDEN_DROP = 0.8; // of a hit's weight where the buffer shows something else before it
 
 // A pixel of a reflector: q, the plane seen in the mirror direction, the distance to it; x about the probe's centre.
 struct Place {
@@ -63,26 +61,10 @@ fn is_shown(plane: vec4f) -> bool {
     return dot(plane.xyz, plane.xyz) > 0.5;
 }
 
-// The point of the reflector at a texel of the buffer.
-fn reflector_at(texel: vec2f) -> vec3f {
-    let w = mirrored_ray(texel);
-    return w * (-(dot(mirrored.plane.xyz, mirrored.eye.xyz) + mirrored.plane.w) / dot(mirrored.plane.xyz, w));
-}
-
-// Pixels at the very foot of a wall, which the plan counts as past it, look from beside: the probe's light there would be
-// that of windows behind the wall.
 fn place_of(v: Varyings, s: Surface, w_mirror: vec3f) -> Place {
-    var q = v.p_world - mirrored.eye.xyz;
-    let texel = v.position.xy + mirrored.offset;
-    var seen = plane_at(texel);
-    for (var i = 0u; i < BESIDE && !is_shown(seen); i++) {
-        let step = (1.0 + f32(i >> 2u)) * select(-1.0, 1.0, (i & 1u) == 0u);
-        let beside = texel + select(vec2f(step, 0.0), vec2f(0.0, step), (i & 2u) == 0u);
-        seen = plane_at(beside);
-        if (is_shown(seen)) { q = reflector_at(beside); }
-    }
-    let t = meet(seen, q, w_mirror, FARTHEST);
-    return Place(q, seen, t, s.x);
+    let q = v.p_world - mirrored.eye.xyz;
+    let seen = plane_at(v.position.xy + mirrored.offset);
+    return Place(q, seen, meet(seen, q, w_mirror, FARTHEST), s.x);
 }
 
 // Depth of what the buffer shows at a point's place, relative to the point's.
@@ -140,12 +122,6 @@ fn buffer_sample(texel: vec2f, level: f32) -> vec3f {
     let uv = clamp(texel, vec2f(0.5), mirrored.size - 0.5) / mirrored.size;
     let found = textureSampleLevel(buffer_light, linear_sampler, uv, wanted);
     return found.rgb / max(found.a, 1e-3);
-}
-
-// How much a hit counts: less where it lies behind what the buffer shows there, by 2 to 8 % of its depth.
-fn seen_share(hit: Hit) -> f32 {
-    let deeper = 1.0 - seen_depth(hit.q, plane_at(hit.texel));
-    return 1.0 - HIDDEN_DROP * clamp((deeper - 0.02) / 0.06, 0.0, 1.0);
 }
 
 // Level at which a texel covers the solid angle of a sample: omega t^2/D^2 |N.v|/|N.wi| f^2/cos^3 texels, D and v from
