@@ -16,7 +16,7 @@ from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
 from lambent.scenes.scene import ImageTexture, Look, Scene
-from lambent.scenes.variants import textures_worn
+from lambent.scenes.variants import textures_in_looks
 from lambent.store.contract import LAST_RUN, SIDES, TIMINGS, needs_probe, probe_name, scene_record, shared_probes
 from lambent.store.source import SOURCE, scene_of
 from lambent.store.store import MANIFEST, Store
@@ -72,7 +72,7 @@ def bake_again(
     scene = replace(
         scene,
         materials={**scene.materials, **materials},
-        textures=textures_worn(scene.textures, worn),
+        textures=textures_in_looks(scene.textures, worn),
         measured={name: file for name, file in scene.measured.items() if name not in materials},
     )
     _check_parts(store, scene, materials)
@@ -93,11 +93,11 @@ def _check_parts(store: Store, scene: Scene, materials: Mapping[str, Material]) 
     record, shared = scene_record(store), shared_probes(store)
     for name in sorted(materials):
         given, wanted = record.materials.get(name), materials[name]
-        worn_by = [o.name for o in record.objects if o.material == name]
-        if given is None or not worn_by:
+        textures_in_look = [o.name for o in record.objects if o.material == name]
+        if given is None or not textures_in_look:
             continue
         lacks = ""
-        owners = [shared.get(one, one) for one in worn_by]
+        owners = [shared.get(one, one) for one in textures_in_look]
         if needs_probe(wanted) and not needs_probe(given):
             lacks = "" if all(probe_name(one, "radiance") in store for one in owners) else "a probe"
         if wanted.transmits and not given.transmits and BACK not in store:

@@ -119,7 +119,7 @@ def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:
     """A scene: its contents, and the repairs of its loader."""
     from lambent.scenes import load_scene
     from lambent.scenes.clear_sky import daylight_in_words
-    from lambent.scenes.light_groups import groups_as_told
+    from lambent.scenes.light_groups import groups_before_bake
     from lambent.scenes.scene import SunSky
 
     scene = load_scene(file, crease_deg)
@@ -133,7 +133,7 @@ def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:
         "environment": type(scene.environment).__name__ if scene.environment else "none",
         **({"daylight": daylight_in_words(scene.environment)} if isinstance(scene.environment, SunSky) else {}),
         "lights": len(scene.lights) + sum(any(o.emission) for o in scene.objects),
-        "light_groups": {group.name: ", ".join(group.members) for group in groups_as_told(scene)},
+        "light_groups": {group.name: ", ".join(group.members) for group in groups_before_bake(scene)},
         "variants": _variants(scene.variants),
         "cameras": [camera.name for camera in scene.cameras],
         "paths": [path.name for path in scene.paths],

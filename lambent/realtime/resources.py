@@ -28,7 +28,7 @@ from lambent.realtime.sun_disc import without_sun
 from lambent.realtime.textures import TextureCache
 from lambent.realtime.uploads import half, upload, with_alpha
 from lambent.scenes.scene import ImageTexture, Look
-from lambent.scenes.variants import worn_by
+from lambent.scenes.variants import textures_in_look
 from lambent.store.contract import MOST_BORDERS, ObjectRecord
 
 EVEN_NICHES = 9  # index, in a shader object's `irradiance`, of the flag for `Probe.even_niches`
@@ -154,7 +154,7 @@ class SceneResources:
                 own[name] = self._textured[of]
                 continue
             images[of.file] = cache = self._images.get(of.file) or TextureCache(self._layouts.device)
-            bound = cache.of_material(worn_by(name, look, self.scene.textures))
+            bound = cache.of_material(textures_in_look(name, look, self.scene.textures))
             own[name] = MaterialBuffers(self._layouts, cache.sampler, bound)
         self.materials, self._images = own, images
         records = self.scene.record.objects

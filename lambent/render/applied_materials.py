@@ -14,7 +14,7 @@ from lambent.realtime.renderer import Renderer
 from lambent.realtime.texture_detail import without_uv
 from lambent.render.edits import edits_of
 from lambent.scenes.scene import Look
-from lambent.scenes.variants import worn_by
+from lambent.scenes.variants import textures_in_look
 from lambent.store.answer import NO_ANSWER, has_answer, read_answer
 from lambent.store.contract import needs_probe
 from lambent.store.store import Store
@@ -55,7 +55,7 @@ class AppliedMaterials:
             self._note_limits(materials)
         if self.answers:
             answer, shown = self._shown
-            worn = {name: worn_by(name, look, scene.textures) for name, look in changed.items()}
+            worn = {name: textures_in_look(name, look, scene.textures) for name, look in changed.items()}
             shown.show(answer.lit(materials, worn))
 
     @cached_property

@@ -87,7 +87,7 @@ def sorted_lights(scene: Scene, suns: Collection[int] = (), *, sun_in_sky: bool 
     return SortedLights(tuple(map(LightGroup, order, members)), of_lights, of_objects, sun, sky)
 
 
-def groups_as_told(scene: Scene) -> tuple[LightGroup, ...]:
+def groups_before_bake(scene: Scene) -> tuple[LightGroup, ...]:
     """The groups of a scene before its bake, when a sun in a picture of the environment is not yet known."""
     suns = [n for n, light in enumerate(scene.lights) if isinstance(light, DirectionalLight) and any(light.irradiance)]
     shines = isinstance(scene.environment, SunSky) and scene.environment.sun_scale > 0

@@ -25,8 +25,8 @@ Kept = TypeVar("Kept")
 
 
 @dataclass(frozen=True)
-class Dressed:
-    """A variant as given by a file: the look of each object, in the scene's order, and the mix of the light.
+class VariantByObject:
+    """A variant of a file: the look of each object, in the scene's order, and the mix of the light.
 
     Objects of equal looks share one `Look`.
     """
@@ -36,7 +36,7 @@ class Dressed:
     light: LightMix = field(default_factory=LightMix)
 
 
-def with_variants(scene: Scene, told: Sequence[Dressed]) -> Scene:
+def with_variants(scene: Scene, told: Sequence[VariantByObject]) -> Scene:
     """The scene with variants; objects that need a separate material get a copy of theirs under a new name."""
     names, given, objects = _free_names(scene.materials), dict[tuple[object, ...], str](), []
     for number, o in enumerate(scene.objects):
@@ -72,13 +72,14 @@ def _copied(of_materials: Mapping[str, Kept], copies: Mapping[str, str]) -> dict
     return {**of_materials, **{own: of_materials[of] for own, of in copies.items() if of in of_materials}}
 
 
-def _changed(scene: Scene, one: Dressed) -> dict[str, Look]:
+def _changed(scene: Scene, one: VariantByObject) -> dict[str, Look]:
     """The looks of a variant by material, where they differ from the scene's."""
-    found, loaded = {}, looks_as_loaded(scene.materials, scene.textures)
+    found, own = {}, scene.textures
+    loaded = looks_as_loaded(scene.materials, own)
     for o, look in zip(scene.objects, one.looks, strict=True):
         name, now = o.material, loaded[o.material]
         same_document = now.material.model_copy(update={"name": look.material.name}) == look.material
-        if not (same_document and worn_by(name, now, scene.textures) is worn_by(name, look, scene.textures)):
+        if not same_document or textures_in_look(name, now, own) is not textures_in_look(name, look, own):
             found[name] = look
     return found
 
@@ -102,23 +103,25 @@ def variant_named(variants: Iterable[Variant], name: str, field: str = FIELD) ->
     return found[known("variant", name, found, field=field)]
 
 
-def worn_by(name: str, look: Look, textures: Mapping[str, MaterialTextures]) -> MaterialTextures | None:
+def textures_in_look(name: str, look: Look, textures: Mapping[str, MaterialTextures]) -> MaterialTextures | None:
     """The textures of a material in a look; `UserError` for an image that cannot be read."""
     of = look.textures
     return with_image(textures.get(name), of) if isinstance(of, ImageTexture) else textures.get(of)
 
 
-def textures_worn(textures: Mapping[str, MaterialTextures], looks: Mapping[str, Look]) -> dict[str, MaterialTextures]:
+def textures_in_looks(
+    textures: Mapping[str, MaterialTextures], looks: Mapping[str, Look]
+) -> dict[str, MaterialTextures]:
     """The textures of each material after some get other looks."""
-    changed = {name: worn_by(name, look, textures) for name, look in looks.items()}
+    changed = {name: textures_in_look(name, look, textures) for name, look in looks.items()}
     return {name: found for name, found in {**textures, **changed}.items() if found is not None}
 
 
-def dressed(scene: Scene, variant: Variant) -> Scene:
+def scene_in_variant(scene: Scene, variant: Variant) -> Scene:
     """The scene with the materials of a variant; its light stays as loaded."""
     return replace(
         scene,
         materials={**scene.materials, **variant.materials},
-        textures=textures_worn(scene.textures, variant.looks),
+        textures=textures_in_looks(scene.textures, variant.looks),
         measured={name: file for name, file in scene.measured.items() if name not in variant.looks},
     )

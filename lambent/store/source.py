@@ -72,7 +72,7 @@ def scene_of(store: Store, given: str | None = None) -> Scene:
         return scene
     record = scene_record(store)
     if not record.objects:  # a store of edited views alone
-        worn = worn_in_views(store)
+        worn = materials_in_views(store)
         objects = (replace(o, material=worn.get(o.name, o.material)) for o in scene.objects)
         return replace(scene, objects=tuple(objects), materials={**scene.materials, **record.materials})
     cuts = set(store.documents.get(CUTS, {}).get("objects", ()))
@@ -90,7 +90,7 @@ def scene_of(store: Store, given: str | None = None) -> Scene:
     return replace(scene, objects=tuple(objects), materials=materials, textures=read_textures(store, record))
 
 
-def worn_in_views(store: Store) -> dict[str, str]:
+def materials_in_views(store: Store) -> dict[str, str]:
     """Material name by object, as used by baked edited views; materials may have been merged since."""
     found = (a for a in store.artefacts("view_points") if "objects" in a.meta)
     return {str(name): str(material) for artefact in found for name, material in artefact.meta["objects"]}

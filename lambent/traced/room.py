@@ -16,7 +16,7 @@ from lambent.scenes.replacement import Replacement, with_replacements
 from lambent.scenes.scene import Look, Scene
 from lambent.scenes.textures import prepared
 from lambent.scenes.turned_sky import under_turned_sky
-from lambent.scenes.variants import textures_worn, worn_by
+from lambent.scenes.variants import textures_in_look, textures_in_looks
 from lambent.store.contract import SIDES
 from lambent.store.source import SOURCE
 from lambent.store.store import Store
@@ -57,7 +57,7 @@ class TracedRoom:
         if (looks, materials) == (self._looks, self._materials):
             return
         self._looks, self._materials, self._tracer = dict(looks), dict(materials), None
-        scene, textures = self._scene, textures_worn(self._scene.textures, looks)
+        scene, textures = self._scene, textures_in_looks(self._scene.textures, looks)
         textures |= prepared({name: textures[name] for name in looks if name in textures})
         self._traced.dress(replace(scene, materials={**scene.materials, **materials}, textures=textures))
 
@@ -95,7 +95,7 @@ class TracedRoom:
         from lambent.bake.pictures.tracer import Tracer  # imports Mitsuba, whose variant `engine` has set
 
         if self._tracer is None and self._light is not None:
-            worn = {name: worn_by(name, look, self._scene.textures) for name, look in self._looks.items()}
+            worn = {name: textures_in_look(name, look, self._scene.textures) for name, look in self._looks.items()}
             edits = (self._materials, worn) if self._follows else ({}, {})
             self._tracer = Tracer.of_baked(self._traced, self._light.of(*edits, self._factors))
         elif self._tracer is None:

@@ -25,7 +25,7 @@ from lambent.materials.document import Material
 from lambent.materials.factored.of_lobes import of_material
 from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
-from lambent.store.source import worn_in_views
+from lambent.store.source import materials_in_views
 from lambent.store.store import Store
 from tests.bake.test_interreflection import FROM_ABOVE, corner
 
@@ -150,7 +150,7 @@ def test_a_store_goes_on_with_what_was_merged_for_it(tmp_path: Path) -> None:
     bake(merged, folder, only={"interreflection"}, views=[VIEW], bounces=bounces).close()
     held = held_by(folder, twins, VIEW, bounces.series)
     assert held is not None and (held.edited, held.same) == ({"back"}, {"side": "back"})
-    assert held.merged(twins).objects == merged.objects and worn_in_views(Store.open(folder))["side"] == "back"
+    assert held.merged(twins).objects == merged.objects and materials_in_views(Store.open(folder))["side"] == "back"
     repainted = replace(twins, materials={**twins.materials, "side": KINDS["floor"]})
     changed = held_by(folder, repainted, VIEW, bounces.series)
     assert changed is not None and not changed.same, "they no longer look the same"

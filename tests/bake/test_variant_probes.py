@@ -8,7 +8,7 @@ from pathlib import Path
 from lambent.bake.bake import bake
 from lambent.realtime.baked import read_baked
 from lambent.scenes.scene import Look
-from lambent.scenes.variants import Dressed, with_variants
+from lambent.scenes.variants import VariantByObject, with_variants
 from tests.bake.small_scenes import MIRROR, TINY, room_with_step
 
 
@@ -16,7 +16,7 @@ def test_an_object_that_a_variant_makes_glossy_has_a_probe(tmp_path: Path) -> No
     plain = room_with_step()
     matte, shiny = {name: Look(m) for name, m in plain.materials.items()}, Look(MIRROR)
     looks = [shiny if o.name == "block" else matte[o.material] for o in plain.objects]
-    varied = with_variants(plain, [Dressed("chrome", looks)])
+    varied = with_variants(plain, [VariantByObject("chrome", looks)])
     bake(plain, tmp_path / "s", quality=TINY, only=("probe",)).close()
     store = bake(varied, tmp_path / "s", quality=TINY, only=("probe",))
     before = store.artefact("light_map/irradiance").key

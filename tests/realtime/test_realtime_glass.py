@@ -45,7 +45,7 @@ def lens() -> Glass:
     return Glass(np.concatenate([normal, np.full((*GRID, 1), DEPTH)], axis=-1).astype(np.float16), ETA, TINT, 0.0)
 
 
-def seen_through(field: LightField, glass: Glass, w: np.ndarray, place: Place, uv2: np.ndarray) -> tuple[Any, ...]:
+def with_opacity(field: LightField, glass: Glass, w: np.ndarray, place: Place, uv2: np.ndarray) -> tuple[Any, ...]:
     """Places behind the glass, directions there, and shares (k, 3) of light that faces let pass, and mirror back."""
     exits = between(glass.exits.astype(float), uv2)
     step = sideways(through_glass(w, place.n, exits, glass.eta)[0], place.n)
@@ -88,7 +88,7 @@ def views(field: LightField) -> tuple[Place, np.ndarray, np.ndarray, np.ndarray]
 def test_a_prism_shows_the_room_behind_it(device: Any, field: LightField) -> None:
     """By Snell's law and both faces' transmittance, from the room's own light; without glass it is elsewhere."""
     place, w, inside, uv2 = views(field)
-    x, leaving, passed, back = seen_through(field, pane(25), w, place, uv2)
+    x, leaving, passed, back = with_opacity(field, pane(25), w, place, uv2)
     mirror = back * room_light(place.x, w * [1, -1, 1])
     truth = passed * room_light(x, leaving) + mirror
     image = Renderer(device, plate_scene(replace(field, glass=pane(25)), CLEAR)).image(STATE).reshape(-1, 3)
@@ -106,7 +106,7 @@ def room_light(x: np.ndarray, w: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("glass", [pane(), lens()], ids=["pane", "lens"])
 def test_shader_and_numpy_agree(device: Any, field: LightField, glass: Glass) -> None:
     place, w, inside, uv2 = views(field)
-    x, leaving, passed, back = seen_through(field, glass, w, place, uv2)
+    x, leaving, passed, back = with_opacity(field, glass, w, place, uv2)
     up = w * [1, -1, 1]
     beyond, sky = Place(x, place.n, place.points), cube_of(smooth_light)
     light = marched(field, beyond, leaving, March(), lambda w: sample(sky, w)).radiance

@@ -12,7 +12,7 @@ from lambent.core.directions import normalize
 from lambent.core.geometry import triangle_normals
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import box, cylinder, sphere
-from lambent.scenes.loaders.meshes.creases import creased, leaning_faces
+from lambent.scenes.loaders.meshes.creases import creased, deviating_faces
 from lambent.scenes.scene import Mesh
 from tests.scenes.test_gltf import document
 from tests.scenes.test_gltf_posed import FLOAT, with_arrays
@@ -95,7 +95,7 @@ def test_missing_normals_are_flat_or_smooth_below_the_angle(tmp_path: Path, endi
 
 def test_edges_below_the_angle_stay_smooth() -> None:
     ball = sphere(1.0, 24, 12)
-    assert not leaning_faces([ball, box((1, 1, 1))]).any()
+    assert not deviating_faces([ball, box((1, 1, 1))]).any()
     smooth = creased(ball, 40.0)
     outwards = normalize(smooth.positions.astype(float))
     assert (smooth.normals * outwards).sum(axis=1).min() > np.cos(np.radians(8))

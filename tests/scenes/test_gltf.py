@@ -22,7 +22,7 @@ from lambent.materials.document import Material
 from lambent.scenes import load_scene, validate
 from lambent.scenes.geometry import signed_volume
 from lambent.scenes.loaders.contents import DAYLIGHT
-from lambent.scenes.loaders.surfaces.made_materials import masking
+from lambent.scenes.loaders.surfaces.material_builder import masking
 from lambent.scenes.scene import DirectionalLight, PointLight, Scene
 
 TRIANGLE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], np.float32)

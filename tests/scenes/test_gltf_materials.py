@@ -11,7 +11,7 @@ import pytest
 from lambent.core.sequences import cosine_hemisphere, hammersley
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
-from lambent.scenes.loaders.surfaces.made_materials import masking
+from lambent.scenes.loaders.surfaces.material_builder import masking
 from tests.scenes.test_gltf import _png as png
 from tests.scenes.test_gltf import _worn as worn
 from tests.scenes.test_gltf import loaded

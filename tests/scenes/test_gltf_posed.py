@@ -14,7 +14,7 @@ from lambent.core.directions import normalize
 from lambent.core.errors import UserError
 from lambent.core.geometry import triangle_normals
 from lambent.scenes.geometry import box, copies_under, sphere, transformed
-from lambent.scenes.loaders.meshes.creases import leaning_faces
+from lambent.scenes.loaders.meshes.creases import deviating_faces
 from lambent.scenes.mesh import areas_of, boxes_of, corners_of
 from lambent.scenes.scene import Mesh
 from tests.scenes.test_gltf import TRIANGLE, document, loaded
@@ -174,8 +174,8 @@ def test_what_is_found_of_many_meshes_is_what_is_found_of_each(monkeypatch: pyte
     assert np.array_equal(corners_of(meshes), np.concatenate([mesh.corners for mesh in meshes]))
     assert np.array_equal(boxes_of(meshes), np.array([mesh.bounds for mesh in meshes]))
     assert np.array_equal(areas_of(meshes), np.concatenate([areas_of([mesh]) for mesh in meshes]))
-    assert np.array_equal(leaning_faces(meshes), np.concatenate([leaning_faces([mesh]) for mesh in meshes]))
-    assert leaning_faces(meshes)[-3:].tolist() == [12, 0, 12]
+    assert np.array_equal(deviating_faces(meshes), np.concatenate([deviating_faces([mesh]) for mesh in meshes]))
+    assert deviating_faces(meshes)[-3:].tolist() == [12, 0, 12]
 
 
 def test_a_ground_of_any_size_is_no_matter_of_units(tmp_path: Path) -> None:

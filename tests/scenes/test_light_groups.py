@@ -10,7 +10,7 @@ from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch
-from lambent.scenes.light_groups import MOST_GROUPS, OTHERS, groups_as_told, names_of_lights, sorted_lights, stem
+from lambent.scenes.light_groups import MOST_GROUPS, OTHERS, groups_before_bake, names_of_lights, sorted_lights, stem
 from lambent.scenes.scene import (
     ConstantEnvironment,
     DirectionalLight,
@@ -93,9 +93,9 @@ def test_parts_of_an_object_are_one_member():
 
 
 def test_before_a_bake_the_sun_of_daylight_is_known():
-    assert [g.name for g in groups_as_told(scene_of(environment=SunSky(UP)))] == ["sun", "sky"]
-    assert [g.name for g in groups_as_told(scene_of(environment=SunSky(UP, sun_scale=0.0)))] == ["sky"]
-    assert [g.name for g in groups_as_told(scene_of(DirectionalLight(DOWN, (1, 1, 1))))] == ["sun"]
+    assert [g.name for g in groups_before_bake(scene_of(environment=SunSky(UP)))] == ["sun", "sky"]
+    assert [g.name for g in groups_before_bake(scene_of(environment=SunSky(UP, sun_scale=0.0)))] == ["sky"]
+    assert [g.name for g in groups_before_bake(scene_of(DirectionalLight(DOWN, (1, 1, 1))))] == ["sun"]
 
 
 TOML = """

@@ -14,7 +14,7 @@ from lambent.materials.document import Material
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import ImageTexture, Look, MaterialTextures, Scene, SceneObject, Texture
-from lambent.scenes.variants import Dressed, dressed, textures_worn, variant_named, with_variants
+from lambent.scenes.variants import VariantByObject, scene_in_variant, textures_in_looks, variant_named, with_variants
 
 HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
 PAINTED = """
@@ -62,7 +62,7 @@ materials.white.kd = 0.1
     assert copper.materials["white"].kd == (0.3, 0.1, 0.05)
     assert dark.materials["white"].kd == (0.1, 0.1, 0.1) and not dark.light.groups
     assert tmp_path / "copper.json" in scene.sources
-    assert dressed(scene, dark).materials["white"].kd == (0.1, 0.1, 0.1)
+    assert scene_in_variant(scene, dark).materials["white"].kd == (0.1, 0.1, 0.1)
 
 
 def test_objects_of_one_material_that_part_ways_get_materials_of_their_own(tmp_path: Path) -> None:
@@ -82,20 +82,21 @@ def test_a_material_keeps_its_textures_with_other_numbers_and_takes_those_of_ano
     scene = Scene("s", objects, {"grain": GRAIN, "grey": GREY}, textures={"grain": texture}, measured=tables)
     darker, plain = Look(GRAIN.model_copy(update={"kd": (0.1, 0.1, 0.1)}), "grain"), Look(GREY)
     same = Look(GRAIN, "grain")
-    found = with_variants(scene, [Dressed("dark", (darker, darker)), Dressed("half", (same, plain))])
+    found = with_variants(scene, [VariantByObject("dark", (darker, darker)), VariantByObject("half", (same, plain))])
     left, right = (o.material for o in found.objects)
     assert (left, right) == ("grain", "grain_2") and found.textures["grain_2"] is texture
     dark, half = found.variants
     assert {*dark.looks} == {left, right} and {*half.looks} == {right}
-    assert textures_worn(found.textures, dark.looks) == {left: texture, right: texture}
-    assert textures_worn(found.textures, half.looks) == {left: texture}
-    assert {*dressed(found, dark).measured} == {"grey"} and {*dressed(found, half).measured} == {left, "grey"}
+    assert textures_in_looks(found.textures, dark.looks) == {left: texture, right: texture}
+    assert textures_in_looks(found.textures, half.looks) == {left: texture}
+    assert {*scene_in_variant(found, dark).measured} == {"grey"}
+    assert {*scene_in_variant(found, half).measured} == {left, "grey"}
 
 
 def test_variants_that_change_nothing_part_no_materials() -> None:
     objects = tuple(SceneObject(name, SQUARE, "grey") for name in ("a", "b"))
     look = Look(GREY)
-    found = with_variants(Scene("s", objects, {"grey": GREY}), [Dressed("as it is", (look, look))])
+    found = with_variants(Scene("s", objects, {"grey": GREY}), [VariantByObject("as it is", (look, look))])
     assert found.objects == objects and not found.variants[0].looks
 
 
@@ -127,7 +128,7 @@ def test_what_is_wrong_is_said(tmp_path: Path, text: str) -> None:
 
 
 def test_an_unknown_variant_is_said_with_those_there_are() -> None:
-    scene = with_variants(Scene("s", (), {"grey": GREY}), [Dressed("oak", ())])
+    scene = with_variants(Scene("s", (), {"grey": GREY}), [VariantByObject("oak", ())])
     with pytest.raises(UserError, match=r"--variant: unknown variant; found oke; expected oak; did you mean 'oak'"):
         variant_named(scene.variants, "oke")
     with pytest.raises(UserError, match=r"the store has no variants"):
@@ -159,7 +160,7 @@ def test_a_variant_shows_an_image(tmp_path: Path) -> None:
     assert bricks.materials["white"].kd == pytest.approx((0.5, 0, 0), abs=1e-3)
     assert tinted.materials["white"].kd == pytest.approx((0, 0, 1)) and tinted.looks["white"].textures
     assert not none.looks and image.resolve() in [path.resolve() for path in scene.sources]
-    shown = dressed(scene, bricks)
+    shown = scene_in_variant(scene, bricks)
     np.testing.assert_allclose(shown.textures["white"].diffuse.texels[0, :, 0], (2, 0), atol=0.01)
 
 

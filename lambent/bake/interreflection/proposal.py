@@ -25,7 +25,7 @@ from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
 from lambent.scenes.textures import prepared
-from lambent.store.source import worn_in_views
+from lambent.store.source import materials_in_views
 from lambent.store.store import MANIFEST, Store
 from lambent.store.tails import FIXED, Tails
 
@@ -260,7 +260,7 @@ def held_by(folder: Path, scene: Scene, view: View, series: Sequence[int]) -> He
     if name not in store or store.artefact(name).meta["series"] != list(series):
         return None
     edited = frozenset(one for one, side in Tails.of(store.artefact(name).meta["tails"]).slots if side != FIXED)
-    worn_then, alike = worn_in_views(store), same_materials(scene)
+    worn_then, alike = materials_in_views(store), same_materials(scene)
     pairs = {(o.material, worn_then.get(o.name, o.material)) for o in scene.objects}
     return Held(edited, {one: other for one, other in pairs if one != other and alike.get(one) == other})
 

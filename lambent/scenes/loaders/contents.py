@@ -12,7 +12,7 @@ from lambent.core.plain import Triple
 from lambent.materials.document import Material
 from lambent.scenes.first_view import first_views
 from lambent.scenes.scene import DirectionalLight, Environment, Light, MaterialTextures, Scene, SceneObject, SunSky
-from lambent.scenes.variants import Dressed, looks_as_loaded, with_variants
+from lambent.scenes.variants import VariantByObject, looks_as_loaded, with_variants
 
 DAYLIGHT = SunSky(sun_direction=(0.4558, 0.7597, 0.4637))
 
@@ -57,31 +57,31 @@ class Contents:
         shines = bool(self.environment or self.lights or any(any(o.emission) for o in self.objects))
         own_light = self.environment is not None or (self.tells_its_light and shines)
         notes = ("it has no light: daylight is added",) if self.tells_its_light and not own_light else ()
-        sets = {variant: self.dressed(variant) for variant in self.variants}
+        sets = {variant: self.objects_in(variant) for variant in self.variants}
         scene = Scene(
             name=name,
             objects=self.objects,
             materials=self.materials,
-            environment=self.environment if own_light else daylight_beside(self.lights),
+            environment=self.environment if own_light else daylight_with(self.lights),
             lights=self.lights,
             cameras=self.cameras or first_views(self.objects),
             sources=self.sources,
-            warnings=(*self.warnings, *notes, *lights_that_stay(self.objects, sets)),
+            warnings=(*self.warnings, *notes, *emission_warnings(self.objects, sets)),
             textures=self.textures,
         )
         looks = looks_as_loaded(scene.materials, scene.textures)
         return with_variants(scene, [
-            Dressed(variant, [looks[o.material] for o in objects]) for variant, objects in sets.items()
+            VariantByObject(variant, [looks[o.material] for o in objects]) for variant, objects in sets.items()
         ])  # fmt: skip
 
-    def dressed(self, variant: str | None) -> tuple[SceneObject, ...]:
+    def objects_in(self, variant: str | None) -> tuple[SceneObject, ...]:
         """The objects in the material set `variant`; unchanged if the file has none of this name."""
-        worn = {} if variant is None else self.variants.get(variant, {})
-        found = ((o, *worn.get(o.name, (o.material, o.emission))) for o in self.objects)
+        changed = {} if variant is None else self.variants.get(variant, {})
+        found = ((o, *changed.get(o.name, (o.material, o.emission))) for o in self.objects)
         return tuple(replace(o, material=material, emission=emission) for o, material, emission in found)
 
 
-def daylight_beside(lights: Sequence[Light]) -> SunSky:
+def daylight_with(lights: Sequence[Light]) -> SunSky:
     """Daylight, without its sun if a directional light comes from above: the brightest such light is the sun."""
     suns = [light for light in lights if isinstance(light, DirectionalLight) and light.direction[1] < 0]
     if not suns:
@@ -90,10 +90,10 @@ def daylight_beside(lights: Sequence[Light]) -> SunSky:
     return replace(DAYLIGHT, sun_direction=(-x, -y, -z), sun_scale=0.0)
 
 
-def lights_that_stay(objects: Sequence[SceneObject], variants: Mapping[str, Sequence[SceneObject]]) -> Iterator[str]:
+def emission_warnings(objects: Sequence[SceneObject], variants: Mapping[str, Sequence[SceneObject]]) -> Iterator[str]:
     """A warning for each variant, the same objects in other materials, that would emit different light."""
-    for variant, dressed in variants.items():
-        others = [o.name for o, now in zip(objects, dressed, strict=True) if now.emission != o.emission]
+    for variant, changed in variants.items():
+        others = [o.name for o, now in zip(objects, changed, strict=True) if now.emission != o.emission]
         if others:
             yield f"variant {variant}: {', '.join(others[:2])} would change emission, which is ignored"
 

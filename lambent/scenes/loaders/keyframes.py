@@ -15,7 +15,7 @@ from lambent.core.errors import UserError, invalid
 from lambent.core.inputs import foreign_bytes
 from lambent.core.light_mix import AS_BAKED, GroupMix, LightMix, MixTrack
 from lambent.scenes.loaders.scene_files import SceneFiles
-from lambent.scenes.loaders.scene_toml.looks import looks_told, mixes_told
+from lambent.scenes.loaders.scene_toml.looks import parse_looks, parse_mixes
 from lambent.scenes.loaders.scene_toml.material_files import LookFiles
 from lambent.scenes.loaders.scene_toml.sections import NotNegative, Section
 from lambent.scenes.loaders.scene_toml.text import toml_of
@@ -110,8 +110,8 @@ def _moment(key: _Key, number: int, given: Known, files: LookFiles) -> _Moment:
     if key.view is not None:
         light = dict((given.mixes or {})[_known_view(key.view, given, path, where)].groups)
     present = {**given.looks, **looks}
-    looks |= looks_told(key.materials, present, given.coloured, files, f"{where}.materials")
-    light |= mixes_told(key.light, path, f"{where}.light")
+    looks |= parse_looks(key.materials, present, given.coloured, files, f"{where}.materials")
+    light |= parse_mixes(key.light, path, f"{where}.light")
     whole = key.as_baked or key.variant is not None
     return _Moment(key.at, looks, light, whole, whole or key.view is not None)
 

@@ -23,7 +23,7 @@ from lambent.core.inputs import foreign_bytes
 from lambent.materials.document import Material
 from lambent.scenes import builtin, loaders
 from lambent.scenes.loaders.contents import Contents, LoadOptions
-from lambent.scenes.loaders.meshes.creases import leaning_warnings, with_creases
+from lambent.scenes.loaders.meshes.creases import deviation_warnings, with_creases
 from lambent.scenes.loaders.meshes.repair import box_mapped
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.document import load_toml
@@ -58,7 +58,7 @@ def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> 
     angle = scene.crease_deg if crease_deg is None else crease_deg
     if angle is not None:
         scene = replace(scene, objects=with_creases(scene.objects, angle), crease_deg=angle)
-    notes = leaning_warnings(scene.objects) if angle is None else []
+    notes = deviation_warnings(scene.objects) if angle is None else []
     return replace(scene, warnings=(*counted(scene.warnings), *notes, *size_warnings(scene)), origin=origin)
 
 

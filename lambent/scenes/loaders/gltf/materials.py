@@ -176,7 +176,7 @@ class _Reading:
         if even >= 1:
             return surface
         self._notes.append(f"alpha BLEND lets {1 - even:.0%} of the light through")
-        return surface.seen_through(np.full(3, even))
+        return surface.with_opacity(np.full(3, even))
 
 
 def _srgb(image: TextureImage | None) -> Textured | None:

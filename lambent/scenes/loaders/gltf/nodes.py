@@ -26,7 +26,7 @@ from lambent.scenes.loaders.gltf.schema import READ_EXTENSIONS, MaterialDocument
 from lambent.scenes.loaders.gltf.textures import Textures, main_uv_set
 from lambent.scenes.loaders.gltf.transforms import instances_of, locals_of
 from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
-from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
+from lambent.scenes.loaders.surfaces.material_builder import MaterialBuilder
 from lambent.scenes.scene import DirectionalLight, Light, Mesh, PointLight, SceneObject
 
 FAR = 1e9  # metres
@@ -60,7 +60,7 @@ class _Materials:
         names = UniqueNames()
         self._names = [names.unique(d.name or f"material_{i}") for i, d in enumerate(self._documents)]
         self.textures = Textures(gltf)
-        self.made = MadeMaterials()
+        self.made = MaterialBuilder()
 
     def use(self, number: int) -> tuple[str, Triple]:
         """Name of a material, and the radiance it emits."""

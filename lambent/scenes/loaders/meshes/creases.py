@@ -1,4 +1,4 @@
-"""Hard edges: smooth normals across them lean far from their faces, and shade a box like a ball."""
+"""Hard edges: smooth normals across them deviate far from the faces', and shade a box like a ball."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from lambent.scenes.geometry import tangents_along
 from lambent.scenes.mesh import Mesh, batches_of, corners_of, vertices_at_corners
 from lambent.scenes.scene import SceneObject
 
-LEANING_DEG = 40.0  # from its face, for a normal to be worth a warning; those of a round thing of 10 sides lean 18
-MUCH = 0.2  # of an object's area: fillets lean, and are meant to
+DEVIATION_DEG = 40.0  # of a normal from its face's, above which it is reported; a smooth prism of 10 sides has 18
+DEVIATION_SHARE = 0.2  # of an object's area: the normals of fillets deviate, and are meant to
 NAMED = 2
 
 
-def leaning_faces(meshes: Sequence[Mesh]) -> Indices:
-    """(N,) triangles of each mesh with a normal that leans more than LEANING_DEG from them.
+def deviating_faces(meshes: Sequence[Mesh]) -> Indices:
+    """(N,) triangles of each mesh with a normal more than DEVIATION_DEG from the face's.
 
-    0 where they are less than MUCH of the mesh's area.
+    0 where they are less than DEVIATION_SHARE of the mesh's area.
     """
     found = [np.zeros(0, np.int64)]
     for mine in batches_of(meshes):
@@ -32,23 +32,23 @@ def leaning_faces(meshes: Sequence[Mesh]) -> Indices:
         faces, areas = normalize(vectors), np.linalg.norm(vectors, axis=-1) / 2
         normals = vertices_at_corners(some, [mesh.normals for mesh in some])
         cosine = np.abs((normals * faces[:, None]).sum(axis=2)).min(axis=1)
-        leaning = (cosine < np.cos(np.radians(LEANING_DEG))) & (areas > 0)
-        share = np.bincount(owner, areas * leaning, len(some)), MUCH * np.bincount(owner, areas, len(some))
-        found.append(np.where(share[0] > share[1], np.bincount(owner[leaning], minlength=len(some)), 0))
+        deviates = (cosine < np.cos(np.radians(DEVIATION_DEG))) & (areas > 0)
+        area_m2, least_m2 = (np.bincount(owner, areas * w, len(some)) for w in (deviates, DEVIATION_SHARE))
+        found.append(np.where(area_m2 > least_m2, np.bincount(owner[deviates], minlength=len(some)), 0))
     return np.concatenate(found)
 
 
-def leaning_warnings(objects: Sequence[SceneObject]) -> list[str]:
-    """One warning for all objects with `leaning_faces`, or none."""
-    found = leaning_faces([o.mesh for o in objects])
+def deviation_warnings(objects: Sequence[SceneObject]) -> list[str]:
+    """One warning for all objects with `deviating_faces`, or none."""
+    found = deviating_faces([o.mesh for o in objects])
     counts = {objects[i].name: int(found[i]) for i in np.flatnonzero(found).tolist()}
     if not counts:
         return []
     names = ", ".join([*list(counts)[:NAMED], *(["..."] if len(counts) > NAMED else [])])
     return [
-        f"{sum(counts.values())} triangles of {len(counts)} objects ({names}) have normals over {LEANING_DEG:.0f} "
-        f"degrees from the face, as on boxes with smooth normals: a crease angle of {LEANING_DEG:.0f} makes them hard "
-        "(--crease-angle, crease_angle in a scene.toml)"
+        f"{sum(counts.values())} triangles of {len(counts)} objects ({names}) have normals over {DEVIATION_DEG:.0f} "
+        f"degrees from the face, as on boxes with smooth normals: a crease angle of {DEVIATION_DEG:.0f} makes them "
+        "hard (--crease-angle, crease_angle in a scene.toml)"
     ]
 
 
@@ -87,6 +87,6 @@ def creased(mesh: Mesh, angle_deg: float) -> Mesh:
 
 
 def with_creases(objects: Sequence[SceneObject], angle_deg: float) -> tuple[SceneObject, ...]:
-    """The objects whose normals lean, `creased`; the others as they are."""
-    leaning = leaning_faces([o.mesh for o in objects])
-    return tuple(replace(o, mesh=creased(o.mesh, angle_deg)) if n else o for o, n in zip(objects, leaning, strict=True))
+    """The objects, those with `deviating_faces` creased."""
+    counts = deviating_faces([o.mesh for o in objects])
+    return tuple(replace(o, mesh=creased(o.mesh, angle_deg)) if n else o for o, n in zip(objects, counts, strict=True))

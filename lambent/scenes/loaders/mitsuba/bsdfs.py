@@ -182,7 +182,7 @@ def _mask(plugin: Plugin) -> Surface:
     share = float(np.clip(held.mean[0], 0, 1))
     if share < 1:
         plugin.note("transmission is .13 too low at 75 degrees")
-    return surface if share == 1 else surface.seen_through(np.full(3, share))
+    return surface if share == 1 else surface.with_opacity(np.full(3, share))
 
 
 def _normal_map(plugin: Plugin) -> Surface:
@@ -236,7 +236,7 @@ def _blended(plugin: Plugin, shares: list[tuple[Surface, float]]) -> Surface:
 
 
 def _nothing(plugin: Plugin) -> Surface:
-    return Surface().seen_through(BLACK)
+    return Surface().with_opacity(BLACK)
 
 
 KINDS: dict[str, Callable[[Plugin], Surface]] = {

@@ -23,7 +23,7 @@ from lambent.scenes.loaders.mitsuba.document import read
 from lambent.scenes.loaders.mitsuba.shapes import Made, mesh_of_shape, stem_of
 from lambent.scenes.loaders.mitsuba.values import Plugin, Reading, children_of
 from lambent.scenes.loaders.scene_files import SceneFiles
-from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
+from lambent.scenes.loaders.surfaces.material_builder import MaterialBuilder
 from lambent.scenes.loaders.surfaces.surface import Surface
 from lambent.scenes.scene import DirectionalLight, Environment, Light, PointLight, SceneObject, SunSky
 
@@ -57,7 +57,7 @@ class _Scene:
         self._local: dict[int, Made] = {}
         self._triangles = 0
         self._warnings: list[str] = []
-        self._made = MadeMaterials(self._warnings)
+        self._made = MaterialBuilder(self._warnings)
 
     def contents(self) -> Contents:
         sensors = list(children_of(self._reading, "sensor"))

@@ -21,7 +21,7 @@ from lambent.core.inputs import decoded, read_bytes
 from lambent.core.plain import Triple, is_number
 from lambent.materials.fresnel import r0_of
 from lambent.scenes.loaders.scene_files import SceneFiles
-from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
+from lambent.scenes.loaders.surfaces.material_builder import MaterialBuilder
 from lambent.scenes.loaders.surfaces.surface import (
     GREY,
     ROUGHNESS_MIN,
@@ -69,7 +69,7 @@ class Library:
         self._files, self._images = files, TextureImages(files)
         self._entries: dict[str, Entry] = {}
         self._notes: list[str] = []
-        self.made = MadeMaterials()
+        self.made = MaterialBuilder()
 
     @property
     def warnings(self) -> list[str]:
@@ -250,7 +250,7 @@ class _Reading:
         tint = np.clip(self._colour("Tf", 1.0), 0, 1)
         tint = tint if tint.any() else np.ones(3)
         if int(self._number("illum", 2)) not in GLASS:
-            covered = surface.seen_through(np.full(3, opacity))
+            covered = surface.with_opacity(np.full(3, opacity))
             *others, straight = covered.lobes
             return replace(covered, lobes=(*others, replace(straight, k=scaled(straight.k, tint))))
         r0 = np.full(3, self._r0())

@@ -49,7 +49,7 @@ def assembled(contents: Sequence[Contents], variant: str | None, path: Path) -> 
     names = UniqueNames()
     for c in contents:
         called = _own_names(c, materials, textures, warnings)
-        for o in c.dressed(variant):
+        for o in c.objects_in(variant):
             objects.append(replace(o, name=names.unique(o.name), material=called.get(o.material, o.material)))
         materials |= {called[n]: m.model_copy(update={"name": called[n]}) for n, m in c.materials.items()}
         textures |= {called[n]: t for n, t in c.textures.items() if n in called}

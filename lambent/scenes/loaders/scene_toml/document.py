@@ -19,7 +19,7 @@ from lambent.materials.document import Material, material_from
 from lambent.scenes.first_view import first_views
 from lambent.scenes.ies import read_ies
 from lambent.scenes.light_groups import SKY, SUN, names_of_lights
-from lambent.scenes.loaders.contents import DAYLIGHT, Contents, lights_that_stay
+from lambent.scenes.loaders.contents import DAYLIGHT, Contents, emission_warnings
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.assembly import assembled, assigned, check_material, fitting
 from lambent.scenes.loaders.scene_toml.lamps import IesSection, coloured
@@ -33,7 +33,7 @@ from lambent.scenes.loaders.scene_toml.schema import (
     known_keys,
 )
 from lambent.scenes.loaders.scene_toml.text import toml_of
-from lambent.scenes.loaders.scene_toml.variants import variants_told
+from lambent.scenes.loaders.scene_toml.variants import parse_variants
 from lambent.scenes.loaders.surfaces.surface import UNDESCRIBED
 from lambent.scenes.scene import (
     Environment,
@@ -77,9 +77,9 @@ def load_toml(path: Path, read_geometry: ReadGeometry, crease_deg: float | None 
     for o in objects:
         check_material(o.material, materials, path, f"objects.{o.name}.material")
     sets = [c.variants for c in contents]
-    dressings = {
-        name: _apply(document, assigned(document.assign, worn.objects, materials, path)[0], path)[0]
-        for name, worn in ((name, assembled(contents, name, path)) for name in dict.fromkeys(chain(*sets)))
+    by_variant = {
+        name: _apply(document, assigned(document.assign, one.objects, materials, path)[0], path)[0]
+        for name, one in ((name, assembled(contents, name, path)) for name in dict.fromkeys(chain(*sets)))
     }
     if isinstance(environment, ImageEnvironment):
         files.use(environment.file)
@@ -91,7 +91,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry, crease_deg: float | None 
         *unfit,
         *missing,
         *_idle_patterns(described, objects),
-        *lights_that_stay(objects, dressings),
+        *emission_warnings(objects, by_variant),
     )
     if environment is None and not lights and not any(any(o.emission) for o in objects):
         environment, notes = DAYLIGHT, (*notes, "it has no light: daylight is added")
@@ -117,10 +117,9 @@ def load_toml(path: Path, read_geometry: ReadGeometry, crease_deg: float | None 
         crease_deg=document.crease_angle,
         light_groups=_light_groups(document, objects, lights, path),
     )
-
-    worn = {name: [o.material for o in worn] for name, worn in dressings.items()}
-    told = variants_told(document.variants, worn, scene, LookFiles(path, files))
-    return replace(with_variants(scene, told), sources=tuple(files.sources))
+    of_geometry = {name: [o.material for o in changed] for name, changed in by_variant.items()}
+    variants = parse_variants(document.variants, of_geometry, scene, LookFiles(path, files))
+    return replace(with_variants(scene, variants), sources=tuple(files.sources))
 
 
 def _there(document: SceneDocument, path: Path, files: SceneFiles) -> tuple[list[GeometrySection], list[str]]:
@@ -148,8 +147,8 @@ def _parse(path: Path) -> SceneDocument:
 
 def _idle_patterns(described: Iterable[str], objects: Iterable[SceneObject]) -> list[str]:
     """A warning for each described material that is named by a pattern and that no object has."""
-    worn = {o.material for o in objects}
-    idle = [name for name in described if {*name} & {*"*?"} and name not in worn]
+    used = {o.material for o in objects}
+    idle = [name for name in described if {*name} & {*"*?"} and name not in used]
     return [
         f"materials.{name} is a name, not a pattern, and no object has it: assign it under [assign]" for name in idle
     ]

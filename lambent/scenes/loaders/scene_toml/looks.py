@@ -21,7 +21,7 @@ USE, FILE, COLOUR, TEXTURE = "use", "file", "colour", "texture"
 ALONE = USE, FILE  # keys that allow no others beside them
 
 
-def looks_told(
+def parse_looks(
     tables: Mapping[str, Mapping[str, Any]],
     looks: Mapping[str, Look],
     coloured: Mapping[str, bool],
@@ -49,7 +49,7 @@ def looks_told(
     return found
 
 
-def mixes_told(light: Mapping[str, str | float], path: Path, where: str) -> dict[str, GroupMix]:
+def parse_mixes(light: Mapping[str, str | float], path: Path, where: str) -> dict[str, GroupMix]:
     """Mixes of light groups given by a table; whether the groups exist is known only after the bake."""
     found = {}
     for name, value in light.items():

@@ -10,26 +10,26 @@ from pathlib import Path
 from lambent.core.errors import UserError
 from lambent.core.light_mix import LightMix
 from lambent.scenes.loaders.scene_toml.assembly import check_material, fitting
-from lambent.scenes.loaders.scene_toml.looks import looks_told, mixes_told
+from lambent.scenes.loaders.scene_toml.looks import parse_looks, parse_mixes
 from lambent.scenes.loaders.scene_toml.material_files import LookFiles
 from lambent.scenes.loaders.scene_toml.schema import VariantSection
 from lambent.scenes.scene import Scene
-from lambent.scenes.variants import Dressed, looks_as_loaded
+from lambent.scenes.variants import VariantByObject, looks_as_loaded
 
 
-def variants_told(
+def parse_variants(
     sections: Sequence[VariantSection],
     of_geometry: Mapping[str, Sequence[str]],
     scene: Scene,
-    given: LookFiles,
-) -> list[Dressed]:
+    files: LookFiles,
+) -> list[VariantByObject]:
     """The variants of a scene.toml.
 
     Parameters
     ----------
     of_geometry : mapping
         Variants of the geometry files: the material of each of the scene's objects.
-    given : LookFiles
+    files : LookFiles
         The scene.toml, and the files that it refers to.
 
     Raises
@@ -37,37 +37,39 @@ def variants_told(
     UserError
         If a section uses unknown names or invalid values.
     """
-    path = given.path
+    path = files.path
     for name, times in Counter(section.name for section in sections).items():
         if times > 1:
             raise UserError("name is used twice", file=path, field="variants", got=name)
     described = {section.name: section for section in sections}
     as_loaded, loaded = [o.material for o in scene.objects], looks_as_loaded(scene.materials, scene.textures)
-    coloured = {name: one.diffuse is not None for name, one in scene.textures.items()}
-    told = []
+    has_colour = {name: one.diffuse is not None for name, one in scene.textures.items()}
+    found = []
     for name in dict.fromkeys([*of_geometry, *described]):
-        worn = list(of_geometry.get(name, as_loaded))
+        materials = list(of_geometry.get(name, as_loaded))
         section = described.get(name) or VariantSection(name=name)
-        worn = _exchanged(section, worn, scene, path)
-        told_looks = looks_told(section.materials, loaded, coloured, given, f"variants.{section.name}.materials")
-        looks = {**loaded, **told_looks}
-        told.append(Dressed(name, [looks[material] for material in worn], _mix(section, path)))
-    return told
+        materials = _exchanged(section, materials, scene, path)
+        changes = parse_looks(section.materials, loaded, has_colour, files, f"variants.{section.name}.materials")
+        looks = {**loaded, **changes}
+        found.append(VariantByObject(name, [looks[material] for material in materials], _mix(section, path)))
+    return found
 
 
-def _exchanged(section: VariantSection, worn: list[str], scene: Scene, path: Path) -> list[str]:
+def _exchanged(section: VariantSection, materials: list[str], scene: Scene, path: Path) -> list[str]:
     """The materials of objects after the section's exchanges; later patterns win."""
     names = [o.name for o in scene.objects]
     for pattern, material in section.objects.items():
         field = f"variants.{section.name}.objects.{pattern}"
         check_material(material, scene.materials, path, field)
         fitting(pattern, names, path, field)
-        worn = [material if fnmatchcase(name, pattern) else was for name, was in zip(names, worn, strict=True)]
-    return worn
+        materials = [
+            material if fnmatchcase(name, pattern) else was for name, was in zip(names, materials, strict=True)
+        ]
+    return materials
 
 
 def _mix(section: VariantSection, path: Path) -> LightMix:
     mix = LightMix()
-    for name, one in mixes_told(section.light, path, f"variants.{section.name}.light").items():
+    for name, one in parse_mixes(section.light, path, f"variants.{section.name}.light").items():
         mix = mix.changed(name, one)
     return mix

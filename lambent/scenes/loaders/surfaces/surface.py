@@ -57,14 +57,14 @@ class Surface:
         """A surface without a description."""
         return Surface(kd=constant(np.full(3, GREY)))
 
-    def seen_through(self, opacity: Floats) -> Surface:
+    def with_opacity(self, opacity: Floats) -> Surface:
         """A surface that covers a share (3,) of the background; the rest of the light passes undeviated."""
         held = constant(opacity)
 
         def part(v: Textured) -> Textured:
             return combined(lambda a, b: a * b, v, held, notes=[])
 
-        lobes = (*(replace(lobe, k=part(lobe.k)) for lobe in self.lobes), straight_through(1 - opacity))
+        lobes = (*(replace(lobe, k=part(lobe.k)) for lobe in self.lobes), unscattered(1 - opacity))
         return replace(self, kd=part(self.kd), kt_d=part(self.kt_d), lobes=lobes)
 
     def coated(self, coat: SpecularLobe) -> Surface:
@@ -79,7 +79,7 @@ class Surface:
         return replace(self, kd=scaled(self.kd, left), coupled=coupled, lobes=(*under, coat))
 
 
-def straight_through(k: Floats) -> SpecularLobe:
+def unscattered(k: Floats) -> SpecularLobe:
     """The narrowest lobe of transmission, which passes a share k (3,) of the light undeviated.
 
     Such a lobe falls off as 1 - (1 - cos)^5 for any r0; the exponent compensates for that up to 60 degrees.

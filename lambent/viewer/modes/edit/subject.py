@@ -17,7 +17,7 @@ from lambent.editing.document import Surroundings
 from lambent.editing.session import Session
 from lambent.scenes.loaders.load import BUILTIN_PREFIX, is_scene, load_scene
 from lambent.scenes.scene import Scene
-from lambent.store.source import SURROUNDINGS, scene_of, worn_in_views
+from lambent.store.source import SURROUNDINGS, materials_in_views, scene_of
 from lambent.store.store import MANIFEST, Store
 from lambent.store.views import read_views
 from lambent.viewer.picture import LARGEST_PX
@@ -221,7 +221,7 @@ def _scene_at(place: str, crease_deg: float | None) -> Scene:
 
 def _merged_in(base: Path | None, scene: Scene) -> dict[str, str]:
     """Replacements of materials that were merged before the store's views were baked, by name."""
-    worn = worn_in_views(Store.open(base)) if base is not None else {}
+    worn = materials_in_views(Store.open(base)) if base is not None else {}
     pairs = {o.material: worn.get(o.name, o.material) for o in scene.objects}
     return {name: other for name, other in pairs.items() if name != other and other in scene.materials}
 

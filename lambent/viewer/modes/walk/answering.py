@@ -25,7 +25,7 @@ from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.scene import ImageTexture, Look
-from lambent.scenes.variants import worn_by
+from lambent.scenes.variants import textures_in_look
 from lambent.store.answer import has_answer, read_answer
 from lambent.store.store import Store
 from lambent.viewer.work import Work
@@ -146,7 +146,7 @@ class AnsweringLight:
             self._answer = AnsweredLight(self._renderer.scene, read_answer(self._store))
         scene = self._renderer.scene
         looks = {name: Look(scene.record.materials[name], of) for name, of in wanted.textures.items()}
-        worn = {name: worn_by(name, look, scene.textures) for name, look in looks.items()}
+        worn = {name: textures_in_look(name, look, scene.textures) for name, look in looks.items()}
         light = self._answer.lit(wanted.materials, worn)
         groups = self._answer.groups(light)
         off = None if light.is_baked else self._answer.likely_error(light, self._renderer.mixer.factors)

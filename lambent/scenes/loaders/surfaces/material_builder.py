@@ -31,7 +31,7 @@ MASKED = {
 }  # fmt: skip
 
 
-class MadeMaterials:
+class MaterialBuilder:
     """The materials of one file, each created at its first use."""
 
     def __init__(self, notes: list[str] | None = None) -> None:
