@@ -27,7 +27,7 @@ LEAVE = 128  # gathered samples at which the first kind has left the mean
 PIXELS_AT_ONCE = 1 << 20
 MEAN_TO_DEVIATION = math.sqrt(math.pi / 2)  # of normally distributed errors
 DARK = 0.1  # of the mean luminance: darker pixels count as if they had it
-GUIDING = 8  # samples of albedo and normals
+GUIDING = 2  # samples of albedo and normals: 8 lower FLIP by less than .001
 TILE_PX, TILES = 96, 12  # parts of the picture whose noise stands for the whole
 
 
@@ -75,7 +75,7 @@ class TracedPicture:
         """Add samples, at most `most` and as many as are traced together; returns their number."""
         kind, done = self._next()
         left = ENDED - done if kind is not self._then else most
-        count = max(1, min(most, left, self.at_once, max(1, done)))
+        count = max(1, min(most, left, self.at_once, max(done, min(most, ENDED) // 2)))
         sums = self._sums[kind]
         half = int(np.argmin(sums.count))
         # each half is a series of its own

@@ -139,7 +139,8 @@ class Converging:
     def sample(self) -> None:
         """Trace a pass."""
         began, before = time.monotonic(), self.picture.samples
-        most = 1 if before == 0 else max(1, int(PASS_S / max(self._sample_s, 1e-6)))
+        first = self._most if self._once else 1
+        most = first if before == 0 else max(1, int(PASS_S / max(self._sample_s, 1e-6)))
         count = self.picture.sample(min(most, self._most - before))
         seconds = time.monotonic() - began
         self._sample_s = seconds / count
