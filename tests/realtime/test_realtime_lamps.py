@@ -66,7 +66,7 @@ def test_small_lamps_are_those_of_the_cube_map(device, name: str, lookup: str) -
     scene = wall_scene(material((lobe,)), cube, planes=box_planes(LOW, HIGH), distance=distance)
     camera = Camera(name="c", position=(0.6, 0.4, 1.5), target=(0.3, 0.1, 0.0), fov_y_deg=40.0)
     renderer, state = Renderer(device, scene), replace(STATE, camera=camera, lookup=lookup)
-    truth = renderer.converged(replace(state, n=64), 65536)
+    truth = renderer.converged(replace(state, n=64), 32768)
     error = rms(renderer.image(state), truth)
     assert error < (0.03 if lobe.distribution == "ggx" else 0.02)
     assert rms(renderer.image(replace(state, integrator="rings")), truth) > 4 * error
