@@ -1,9 +1,10 @@
-"""Plain values: JSON-ready results, words that are numbers, tuples of floats, lists of names, file names."""
+"""Plain values: JSON-ready results, words that are numbers, tuples of floats, lists of names, unique and file names."""
 
 from __future__ import annotations
 
 import math
 import unicodedata
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -64,3 +65,23 @@ def quad(values: Iterable[Any]) -> tuple[float, float, float, float]:
 def plain_name(name: str, otherwise: str = "material") -> str:
     """A file name made from any user-supplied name; `otherwise` if no character survives."""
     return "".join(c if c.isalnum() or c in " ._-" else "_" for c in name).strip(" .") or otherwise
+
+
+class UniqueNames:
+    """Makes names unique; those in `taken` are in use already."""
+
+    def __init__(self, taken: Iterable[str] = ()) -> None:
+        self._taken = set(taken)
+        self._tried: Counter[str] = Counter()
+
+    def unique(self, name: str) -> str:
+        """`name`, or the first free one of name_2, name_3...
+
+        The search resumes where it ended, so that the thousandth object of a name costs as much as the second.
+        """
+        candidate = name
+        while candidate in self._taken:
+            self._tried[name] += 1
+            candidate = f"{name}_{self._tried[name] + 1}"
+        self._taken.add(candidate)
+        return candidate

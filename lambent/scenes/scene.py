@@ -8,7 +8,7 @@ Rec.709. All dataclasses are frozen; arrays must not be modified.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -313,7 +313,9 @@ class Scene:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        return bounds_of(self.objects)
+        """Corners (3,), (3,) of the box around all objects, m."""
+        boxes = boxes_of([o.mesh for o in self.objects])
+        return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
 
     @property
     def corners(self) -> Array:
@@ -330,9 +332,3 @@ class Scene:
     @cached_property
     def _by_name(self) -> dict[str, SceneObject]:
         return {o.name: o for o in self.objects}
-
-
-def bounds_of(objects: Iterable[SceneObject]) -> tuple[Array, Array]:
-    """Corners (3,), (3,) of the box around objects."""
-    boxes = boxes_of([o.mesh for o in objects])
-    return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)

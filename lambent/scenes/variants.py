@@ -6,14 +6,14 @@ computed by material. So objects that share a material, but differ in some varia
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import count
 from typing import TypeVar
 
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.light_mix import LightMix
+from lambent.core.plain import UniqueNames
 from lambent.materials.document import Material
 from lambent.scenes.image_textures import with_image
 from lambent.scenes.scene import ImageTexture, Look, MaterialTextures, Scene, Variant
@@ -38,13 +38,13 @@ class VariantByObject:
 
 def with_variants(scene: Scene, told: Sequence[VariantByObject]) -> Scene:
     """The scene with variants; objects that need a separate material get a copy of theirs under a new name."""
-    names, given, objects = _free_names(scene.materials), dict[tuple[object, ...], str](), []
+    names, materials, objects = UniqueNames(scene.materials), dict[tuple[object, ...], str](), []
     for number, o in enumerate(scene.objects):
         future = (o.material, *(id(one.looks[number]) for one in told))
-        if future not in given:
-            given[future] = names(o.material) if o.material in given.values() else o.material
-        objects.append(replace(o, material=given[future]))
-    copies = {own: str(future[0]) for future, own in given.items() if own != future[0]}
+        if future not in materials:
+            materials[future] = names.unique(o.material) if o.material in materials.values() else o.material
+        objects.append(replace(o, material=materials[future]))
+    copies = {own: str(future[0]) for future, own in materials.items() if own != future[0]}
     renamed = {own: scene.materials[of].model_copy(update={"name": own}) for own, of in copies.items()}
     whole = replace(
         scene, objects=tuple(objects), materials={**scene.materials, **renamed},
@@ -53,18 +53,6 @@ def with_variants(scene: Scene, told: Sequence[VariantByObject]) -> Scene:
                                      copies.items())),
     )  # fmt: skip
     return replace(whole, variants=tuple(Variant(one.name, _changed(whole, one), one.light) for one in told))
-
-
-def _free_names(taken: Collection[str]) -> Callable[[str], str]:
-    """A function that makes unused names: NAME_2, NAME_3..."""
-    used = set(taken)
-
-    def free(name: str) -> str:
-        found = next(one for number in count(2) if (one := f"{name}_{number}") not in used)
-        used.add(found)
-        return found
-
-    return free
 
 
 def _copied(of_materials: Mapping[str, Kept], copies: Mapping[str, str]) -> dict[str, Kept]:

@@ -20,6 +20,7 @@ from lambent.scenes.builtin.placing import at, block, thing
 from lambent.scenes.builtin.wood import wood
 from lambent.scenes.geometry import cylinder, extrusion, fan, lathe, placed, sphere, teapot, tube, turn
 from lambent.scenes.geometry.drape import Drape
+from lambent.scenes.geometry.teapot import lid_seat
 from lambent.scenes.scene import MaterialTextures, Mesh, SceneObject
 
 SIDES = 8
@@ -166,9 +167,7 @@ def _table() -> list[SceneObject]:
 
 def _tea() -> list[SceneObject]:
     """The teapot in the middle, three cups about it and a bowl of oranges."""
-    size = TEAPOT_LENGTH / 6.525  # metres per unit of Newell's tables
-    seat = lathe([[(1.42 * size, 2.385 * size), (1.28 * size, 2.385 * size)]], 72)  # closes the gap round the lid
-    pot = thing("teapot", "silver", teapot(TEAPOT_LENGTH, 16), seat, light_map_scale=4.0)
+    pot = thing("teapot", "silver", teapot(TEAPOT_LENGTH, 16), lid_seat(TEAPOT_LENGTH), light_map_scale=4.0)
     on_cloth: list[SceneObject] = at([pot], (0, 0, 0), turn("y", 14))
     for name, x, z, yaw_deg in (("white", 0.02, 0.21, 40.0), ("blue", 0.28, -0.1, -35.0), ("red", -0.25, 0.13, 160.0)):
         on_cloth += at(_cup(name), (x, 0, z), turn("y", yaw_deg))

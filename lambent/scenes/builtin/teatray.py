@@ -14,7 +14,8 @@ from lambent.materials.document import Lobe, Material
 from lambent.scenes.builtin.painted import painted
 from lambent.scenes.builtin.placing import POLISHED_SCALE, at, thing
 from lambent.scenes.builtin.wood import wood
-from lambent.scenes.geometry import fan, grid, lathe, merge, placed, smooth_curve, sphere, teapot_parts, tube, turn
+from lambent.scenes.geometry import fan, grid, merge, placed, smooth_curve, sphere, teapot_parts, tube, turn
+from lambent.scenes.geometry.teapot import lid_seat
 from lambent.scenes.scene import MaterialTextures, Mesh, SceneObject
 
 HALF_X, HALF_Z, CORNER = 0.187, 0.13, 0.047  # of the tray's outline, metres
@@ -46,8 +47,7 @@ def textured() -> dict[str, tuple[Material, MaterialTextures]]:
 
 def _teapot() -> list[SceneObject]:
     parts = teapot_parts(TEAPOT_LENGTH, 18)
-    size = TEAPOT_LENGTH / 6.525  # metres per unit of Newell's tables
-    seat = lathe([[(1.42 * size, 2.385 * size), (1.28 * size, 2.385 * size)]], 72)  # closes the gap round the lid
+    seat = lid_seat(TEAPOT_LENGTH)
     return [
         thing("teapot", "glaze", *(parts[name] for name in ("rim", "body", "lid", "bottom")), seat),
         thing("teapot_spout", "glaze", parts["spout"]),

@@ -12,6 +12,7 @@ import numpy as np
 from lambent.core.directions import Floats, normalize
 from lambent.scenes.geometry import bezier
 from lambent.scenes.geometry.grid import grid, merge, transformed
+from lambent.scenes.geometry.shapes import lathe
 from lambent.scenes.mesh import Mesh
 
 KAPPA = 0.56  # Newell's handle length of a quarter circle, by radius
@@ -103,6 +104,12 @@ def teapot(length: float = 0.25, steps: int = 12) -> Mesh:
     `steps` quads along each side of a patch. Brushed round the body, and along handle and spout.
     """
     return merge(teapot_parts(length, steps).values())
+
+
+def lid_seat(length: float) -> Mesh:
+    """The ring that closes the gap round the lid of a `teapot`."""
+    unit = length / LENGTH
+    return lathe([[(1.42 * unit, 2.385 * unit), (1.28 * unit, 2.385 * unit)]], 72)
 
 
 def teapot_parts(length: float = 0.25, steps: int = 12) -> dict[str, Mesh]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -82,14 +81,6 @@ def read(path: Path) -> Floats:
     return text.indexed(count) if text.is_indexed() else text.patches(count)
 
 
-@dataclass
-class _Word:
-    """A number as written, and where."""
-
-    text: str
-    line: int
-
-
 class _Numbers:
     """The numbers of a file, taken one after the other."""
 
@@ -101,10 +92,8 @@ class _Numbers:
         except ValueError:
             self._values = np.zeros(0)
         if len(self._values) != _words_in(self._data):  # "1.2.3" would be read as two numbers
-            bad = self._word(lambda _, word: not _is_number(word))
-            raise UserError(
-                "has a word that is not a number", file=path, field=f"line {bad.line}", got=repr(bad.text[:40])
-            )
+            text, line = self._word(lambda _, word: NUMBER.fullmatch(word) is None)
+            raise UserError("has a word that is not a number", file=path, field=f"line {line}", got=repr(text[:40]))
 
     def integer(self, what: str, *, least: int, most: int | None = None) -> int:
         """The next number, which must be whole and within bounds."""
@@ -163,26 +152,22 @@ class _Numbers:
             self._refuse(f"has numbers after its last {what}", "the end of the file")
 
     def _refuse(self, fault: str, expected: str) -> None:
-        bad = self._word(lambda number, _: number == self._at)
-        raise UserError(fault, file=self._path, field=f"line {bad.line}", got=bad.text[:40], expected=expected)
+        text, line = self._word(lambda number, _: number == self._at)
+        raise UserError(fault, file=self._path, field=f"line {line}", got=text[:40], expected=expected)
 
-    def _word(self, wanted: Callable[[int, bytes], bool]) -> _Word:
-        """The first word that is wanted by its number and text, or the last one: found again only for an error."""
+    def _word(self, wanted: Callable[[int, bytes], bool]) -> tuple[str, int]:
+        """The first word that is wanted by its number and text, or the last one, and its line; for errors only."""
         place = None
         for number, place in enumerate(re.finditer(rb"\S+", self._data)):
             if wanted(number, place.group()):
                 break
         if place is None:
-            return _Word("", 1)
+            return "", 1
         line = self._data[: place.start()].replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
-        return _Word(place.group().decode("latin-1"), line)
+        return place.group().decode("latin-1"), line
 
 
 def _words_in(data: bytes) -> int:
     """The number of words between white space."""
     letters = ~np.isin(np.frombuffer(data, np.uint8), np.frombuffer(b" \t\n\r\v\f", np.uint8))
     return int(np.count_nonzero(letters[1:] & ~letters[:-1])) + int(letters[:1].sum())
-
-
-def _is_number(word: bytes) -> bool:
-    return NUMBER.fullmatch(word) is not None

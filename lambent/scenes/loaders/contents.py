@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -96,23 +95,3 @@ def emission_warnings(objects: Sequence[SceneObject], variants: Mapping[str, Seq
         others = [o.name for o, now in zip(objects, changed, strict=True) if now.emission != o.emission]
         if others:
             yield f"variant {variant}: {', '.join(others[:2])} would change emission, which is ignored"
-
-
-class UniqueNames:
-    """Makes names unique; those in `taken` are in use already."""
-
-    def __init__(self, taken: Iterable[str] = ()) -> None:
-        self._taken = set(taken)
-        self._tried: Counter[str] = Counter()
-
-    def unique(self, name: str) -> str:
-        """`name`, or the first free one of name_2, name_3...
-
-        The search resumes where it ended, so that the thousandth object of a name costs as much as the second.
-        """
-        candidate = name
-        while candidate in self._taken:
-            self._tried[name] += 1
-            candidate = f"{name}_{self._tried[name] + 1}"
-        self._taken.add(candidate)
-        return candidate

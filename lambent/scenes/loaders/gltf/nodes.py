@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.camera import Camera
+from lambent.core.camera import FARTHEST_M, Camera
 from lambent.core.ceilings import NODES, TRIANGLES, VARIANTS
 from lambent.core.directions import Floats, normalize
 from lambent.core.errors import UserError
 from lambent.core.photometry import radiometric
-from lambent.core.plain import Triple, triple
+from lambent.core.plain import Triple, UniqueNames, triple
 from lambent.scenes.geometry import copies_under
-from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions, UniqueNames
+from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
 from lambent.scenes.loaders.gltf.container import Gltf, read
 from lambent.scenes.loaders.gltf.luminaires import Luminaires
 from lambent.scenes.loaders.gltf.materials import surface_of
@@ -29,7 +29,6 @@ from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.loaders.surfaces.material_builder import MaterialBuilder
 from lambent.scenes.scene import DirectionalLight, Light, Mesh, PointLight, SceneObject
 
-FAR = 1e9  # metres
 WIDEST_RAD = 3.1  # exclusive, of cameras
 _Key = tuple[int, int, int, tuple[float, ...], int]  # of a mesh: its number, primitive, uv set, morph weights, skin
 DRACO = "KHR_draco_mesh_compression"
@@ -147,7 +146,7 @@ class _Reading:
                 last = matrices[index, 3].tolist()
                 raise gltf.error("not an affine matrix", f"{field}.matrix", last, "a last row of 0 0 0 1")
             world = parent @ matrices[index]
-            if not np.abs(world).max() < FAR:
+            if not np.abs(world).max() < FARTHEST_M:
                 raise UserError("transform is not finite or too large", file=gltf.path, field=field)
             if index in joints:
                 self._joints[index] = world

@@ -16,7 +16,8 @@ from lambent.core.camera import Camera
 from lambent.core.ceilings import TRIANGLES
 from lambent.core.directions import Floats, normalize, rotation_about
 from lambent.core.errors import UserError
-from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions, UniqueNames
+from lambent.core.plain import UniqueNames
+from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
 from lambent.scenes.loaders.mitsuba import lights
 from lambent.scenes.loaders.mitsuba.bsdfs import surface_of
 from lambent.scenes.loaders.mitsuba.document import read

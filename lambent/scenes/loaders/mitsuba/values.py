@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.camera import Camera, camera_axes
+from lambent.core.camera import FARTHEST_M, Camera, camera_axes
 from lambent.core.ceilings import XML_NESTING, XML_PLUGINS
 from lambent.core.directions import Floats, normalize, rotation_about
 from lambent.core.errors import did_you_mean
@@ -22,7 +22,6 @@ OBJECTS = {
     "bsdf", "texture", "shape", "emitter", "sensor", "film", "sampler", "rfilter", "medium", "phase", "volume",
     "integrator", "subsurface",
 }  # fmt: skip
-FAR = 1e9
 # Filters, caches, samplers: settings of Mitsuba unrelated to the scene.
 MACHINERY = {
     "filter_type", "max_anisotropy", "cache", "sample_visible", "format", "accel", "sampling_weight", "variant",
@@ -145,8 +144,11 @@ class Plugin:
         if element.tag == "animation":
             self.note("its motion is ignored: it stays at its first place")
             element = next((e for e in element.children if e.tag == "transform"), element)
-        matrix = transform_of(element)
-        if not (np.abs(matrix) < FAR).all():
+        matrix: Floats = np.eye(4)
+        with np.errstate(over="ignore", invalid="ignore"):  # nonfinite results are refused below
+            for part in element.children:  # the first one is applied first
+                matrix = _part(part) @ matrix
+        if not (np.abs(matrix) < FARTHEST_M).all():
             raise element.error("transform is not finite or too large")
         return matrix
 
@@ -168,15 +170,6 @@ class Plugin:
         """The file of a parameter; it need not exist."""
         field = f"line {self.element.line} <{self.element.tag}> {name}"
         return self.reading.files.path(self.text(name), self.element.file, field)
-
-
-def transform_of(element: Element) -> Floats:
-    """(4, 4) of a transform: the product of its parts, the first one applied first."""
-    matrix: Floats = np.eye(4)
-    with np.errstate(over="ignore", invalid="ignore"):  # the caller refuses nonfinite results
-        for part in element.children:
-            matrix = _part(part) @ matrix
-    return matrix
 
 
 def _part(part: Element) -> Floats:

@@ -11,7 +11,8 @@ import numpy as np
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.ceilings import MATERIALS, TRIANGLES
 from lambent.core.errors import UserError
-from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions, UniqueNames
+from lambent.core.plain import UniqueNames
+from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
 from lambent.scenes.loaders.meshes.polygons import smooth_normals, triangulate
 from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.loaders.obj.mtl import Library

@@ -8,8 +8,9 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from lambent.core.errors import UserError, did_you_mean
+from lambent.core.plain import UniqueNames
 from lambent.materials.document import Material
-from lambent.scenes.loaders.contents import Contents, UniqueNames
+from lambent.scenes.loaders.contents import Contents
 from lambent.scenes.scene import MaterialTextures, SceneObject
 
 NAMES_HINT = "see the names with `lambent inspect`"

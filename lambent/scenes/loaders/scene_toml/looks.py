@@ -10,7 +10,7 @@ from typing import Any
 
 from lambent.core.errors import UserError
 from lambent.core.light_mix import GroupMix, mix_of
-from lambent.materials.document import Material, material_from
+from lambent.materials.document import material_from
 from lambent.materials.recolour import hex_colour
 from lambent.scenes.loaders.scene_toml.assembly import check_material
 from lambent.scenes.loaders.scene_toml.material_files import LookFiles
@@ -102,9 +102,5 @@ def _look(
                 "not a colour", file=path, field=f"{field}.{COLOUR}", got=numbers[COLOUR], expected="#rrggbb"
             )
         del numbers[COLOUR]
-    return replace(now, material=material_from(_with_numbers(now.material, numbers), f"{path}: {field}"))
-
-
-def _with_numbers(material: Material, numbers: Mapping[str, Any]) -> dict[str, Any]:
-    """A document with some keys replaced; its provenance no longer applies and is removed."""
-    return {**material.model_dump(mode="json", exclude={"provenance"}), **numbers}
+    document = now.material.model_dump(mode="json", exclude={"provenance"})  # which no longer applies
+    return replace(now, material=material_from({**document, **numbers}, f"{path}: {field}"))
