@@ -46,12 +46,11 @@ def baked(
     return replace(found, irradiance=0 * found.irradiance, irradiance_back=back, sun=sun, unit=1.0)
 
 
-@pytest.mark.parametrize("radius_deg", [0.5, 4.0])
-def test_no_sun_gets_into_a_closed_room_of_sheets(tmp_path: Path, device: Any, radius_deg: float) -> None:
+def test_no_sun_gets_into_a_closed_room_of_sheets(tmp_path: Path, device: Any) -> None:
     """Walls and ceiling without thickness; a plane outside makes the texels of the shadow map 2 cm wide."""
     room = placed(turned_inwards(box((4, 3, 4))), (0, 1.5, 0))
     plane = placed(floor(200.0), (0, -0.01, 0))
-    found = baked(tmp_path, {"room": room, "plane": plane}, radius_deg, INSIDE)
+    found = baked(tmp_path, {"room": room, "plane": plane}, 4.0, INSIDE)
     assert drawn(device, replace(found, sunlit=None), INSIDE, frames=4).max() > 0, "the shadow map alone leaks"
     assert drawn(device, found, INSIDE, frames=4).max() == 0
     assert drawn(device, found, INSIDE, alone=True).max() == 0
@@ -62,7 +61,7 @@ def test_penumbras_are_not_cut(tmp_path: Path, device: Any, radius_deg: float) -
     """Texels of the light map are larger than the penumbra of the opening, or smaller."""
     found = baked(tmp_path, {"floor": floor(), "plate": plate()}, radius_deg, DOWN)
     assert found.sun is not None
-    with_map, without = (drawn(device, one) for one in (found, replace(found, sunlit=None)))
+    with_map, without = (drawn(device, one, frames=4) for one in (found, replace(found, sunlit=None)))
     expected = traced(places(DOWN), np.degrees(found.sun.radius_rad))
     assert np.array_equal(with_map[expected > 0], without[expected > 0])
 
