@@ -19,14 +19,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from PIL import Image
 
-from lambent.core import metrics
-from lambent.core.colour import filmic, srgb_encode
-from lambent.core.exposure import exposure_of
-from lambent.core.images import read_encoded, read_image, to_bytes
+from lambent.core.light.colour import filmic, srgb_encode
+from lambent.core.light.exposure import exposure_of
+from lambent.core.pictures import metrics
+from lambent.core.pictures.images import read_encoded, read_image, to_bytes
 
 if TYPE_CHECKING:
-    from lambent.bench.light_field_view import LightFieldView
-    from lambent.core.light_field import LightField
+    from lambent.baked.light_fields.light_field import LightField
+    from lambent.bench.scenes.light_field_view import LightFieldView
 
 PICTURES = Path(__file__).parent / "pictures"
 LIMIT_BYTES = 300_000
@@ -71,9 +71,9 @@ def edit() -> None:
 
     from lambent.bake.bake import bake
     from lambent.bake.quality import quality_named
-    from lambent.bake.view import View
-    from lambent.editing.operators import Region
-    from lambent.editing.session import Session
+    from lambent.bake.transport.view import View
+    from lambent.editing.curves.operators import Region
+    from lambent.editing.session.session import Session
     from lambent.editing.stored import edited_picture
     from lambent.scenes import load_scene
 
@@ -97,14 +97,14 @@ def interreflections(samples: int = 512) -> None:
     from tempfile import TemporaryDirectory
 
     from lambent.bake.bake import bake
-    from lambent.bake.bounces import Bounces
+    from lambent.bake.interreflection.settings import Bounces
     from lambent.bake.quality import quality_named
     from lambent.bake.reference.path_traced import render_reference
-    from lambent.bake.view import View
+    from lambent.bake.transport.view import View
+    from lambent.editing.curves.operators import Region
     from lambent.editing.interreflection.stored import interreflections as stored
     from lambent.editing.interreflection.whole import WholePicture
-    from lambent.editing.operators import Region
-    from lambent.editing.session import Session
+    from lambent.editing.session.session import Session
     from lambent.editing.stored import edited_picture
     from lambent.scenes import load_scene
 
@@ -146,7 +146,7 @@ def light_groups(store: Path | None = None) -> None:
     from tempfile import TemporaryDirectory
 
     from lambent.bake.bake import bake
-    from lambent.core.light_mix import parse_light
+    from lambent.core.light.light_mix import parse_light
     from lambent.render import Settings, images
     from lambent.scenes import load_scene
     from lambent.store.contract import scene_record
@@ -165,8 +165,8 @@ def light_fields() -> None:
     """What the teapot of `builtin:pavilion` mirrors: one of its maps; by one map, by B_n, marched, and traced."""
     from tempfile import TemporaryDirectory
 
-    from lambent.bench.light_field_view import LightFieldView
     from lambent.bench.oslf import FULL
+    from lambent.bench.scenes.light_field_view import LightFieldView
     from lambent.scenes import load_scene
 
     with TemporaryDirectory() as folder:
@@ -178,8 +178,8 @@ def light_fields() -> None:
 
 def light_field_row(view: LightFieldView, field: LightField, single: LightField) -> np.ndarray:
     """The pictures of `light_fields` in a row, in a common exposure."""
-    from lambent.bench.light_field_view import Compared
     from lambent.bench.oslf import methods
+    from lambent.bench.scenes.light_field_view import Compared
 
     compared = Compared.of(view.shown.pixel, view.size, view.truth)
     place = view.place(field)

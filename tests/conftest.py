@@ -40,7 +40,7 @@ def or_skip(start: Callable[[], object]) -> None:
 @pytest.fixture(scope="session")
 def adapter() -> None:
     """A graphics adapter, hardware or software; tests that draw skip without one."""
-    from lambent.realtime.device import choose_adapter
+    from lambent.realtime.gpu.device import choose_adapter
 
     or_skip(choose_adapter)
 

@@ -1,7 +1,7 @@
 """Plant random defects in the package and see which ones the tests of their room notice.
 
     .venv/bin/python tools/plant.py -n 200 --seed 1 --json planted.json
-    .venv/bin/python tools/plant.py --at lambent/core/answer.py:303
+    .venv/bin/python tools/plant.py --at lambent/baked/answering/answer.py:303
 
 A defect is a wrong sign, factor, index, bound, comparison or order of arguments, `min` for `max`, or one off. Each is
 planted in a copy of the working tree, never in the checkout, and the tests of its room (`tests/<room>`) run there until

@@ -17,26 +17,26 @@ from pathlib import Path
 from typing import cast
 
 from lambent.bake import artefacts
-from lambent.bake.backs import find_backs
-from lambent.bake.bounces import Bounces
 from lambent.bake.context import Artefact, BakeContext
-from lambent.bake.cuts import cut_for_viewers
+from lambent.bake.interreflection.settings import Bounces
 from lambent.bake.light_fields import request
-from lambent.bake.memory import check_memory
 from lambent.bake.methods import METHODS, check_groups, chosen
 from lambent.bake.probes.division import divided
 from lambent.bake.quality import Quality, quality_named
-from lambent.bake.sight import Sight
-from lambent.bake.timing import Stopwatch
-from lambent.bake.view import View
-from lambent.bake.watch import Watch
-from lambent.bake.workers import InProcess, Workers
+from lambent.bake.running.memory import check_memory
+from lambent.bake.running.timing import Stopwatch
+from lambent.bake.running.watch import Watch
+from lambent.bake.running.workers import InProcess, Workers
+from lambent.bake.surfaces.backs import find_backs
+from lambent.bake.surfaces.cuts import cut_for_viewers
+from lambent.bake.surfaces.visible_triangles import Sight
+from lambent.bake.transport.view import View
 from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.factored.terms import Editable
+from lambent.scenes.looks.textures import prepared
 from lambent.scenes.scene import ImageEnvironment, Scene
-from lambent.scenes.textures import prepared
 from lambent.store.source import changed_inputs, inputs_of, write_source
 from lambent.store.store import Store
 
@@ -104,7 +104,7 @@ def bake(
     environment : ImageEnvironment, optional
         Lights the views instead of the scene's own environment.
     workers : Workers, optional
-        Trace "interreflection", tile by tile: see `lambent.bake.cluster.opened`. By default this process.
+        Trace "interreflection", tile by tile: see `lambent.bake.running.cluster.opened`. By default this process.
     watch : Watch, optional
         Notified of finished artefacts, and of regions of the light map before that.
 

@@ -19,16 +19,16 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
-from lambent.bake.backs import backs_of, crossed_by_light
-from lambent.bake.bounces import Bounces
 from lambent.bake.engine import engine
+from lambent.bake.interreflection.settings import Bounces
 from lambent.bake.quality import Quality
-from lambent.bake.sight import Sight
+from lambent.bake.running.timing import Timed, untimed
+from lambent.bake.running.watch import Watch
+from lambent.bake.running.workers import InProcess, Workers
 from lambent.bake.surfaces.atlas import Atlas, separated
-from lambent.bake.timing import Timed, untimed
-from lambent.bake.view import View
-from lambent.bake.watch import Watch
-from lambent.bake.workers import InProcess, Workers
+from lambent.bake.surfaces.backs import backs_of, crossed_by_light
+from lambent.bake.surfaces.visible_triangles import Sight
+from lambent.bake.transport.view import View
 from lambent.core.progress import Progress, silent
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable

@@ -26,18 +26,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lambent.bench.answer_times import Edit, changed, darkened, dragged, timed
-from lambent.bench.bake_context import context_of
-from lambent.bench.views import given_or_baked
-from lambent.core.answer import answered, upsampled
+from lambent.baked.answering.albedos import edited_albedos
+from lambent.baked.answering.answer import answered, upsampled
+from lambent.baked.answering.stored import StoredAnswer, answer_name, read_answer
+from lambent.bench.measuring.answer_times import Edit, changed, darkened, dragged, timed
+from lambent.bench.measuring.bake_context import context_of
+from lambent.bench.scenes.views import given_or_baked
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
-from lambent.materials.diffuse_albedos import edited_albedos
 from lambent.materials.document import Material
 from lambent.scenes.scene import Scene
-from lambent.store.answer import StoredAnswer, answer_name, read_answer
 from lambent.store.contract import PROCESSOR_TIMINGS, TIMINGS
 from lambent.store.store import Store
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.quality import Quality, quality_named
-from lambent.core.colour import luminance
+from lambent.core.light.colour import luminance
 from lambent.core.progress import Cancelled, Progress, silent
 from lambent.scenes import load_scene
 from lambent.scenes.scene import Scene

@@ -24,18 +24,18 @@ import numpy as np
 
 from lambent.bake.bake import bake
 from lambent.bake.quality import quality_named
-from lambent.bake.view import View
-from lambent.bench.reference import Reference, path_traced
-from lambent.bench.sum_over_lights import errors_of_sums
+from lambent.bake.transport.view import View
+from lambent.bench.measuring.reference import Reference, path_traced
+from lambent.bench.measuring.sum_over_lights import errors_of_sums
 from lambent.core.arrays import Flags, Floats
 from lambent.core.files import folder_bytes
-from lambent.core.metrics import display_exposure, displayed
+from lambent.core.pictures.metrics import display_exposure, displayed
 from lambent.core.plain import triple
 from lambent.core.progress import Progress, silent, tracked
-from lambent.editing.operators import Region
+from lambent.editing.curves.operators import Region
 from lambent.editing.picture import EditedPicture, Part
 from lambent.editing.rows import Rows
-from lambent.editing.session import Session
+from lambent.editing.session.session import Session
 from lambent.editing.stored import edited_picture
 from lambent.materials.document import Material
 from lambent.materials.factored.curve import Curve

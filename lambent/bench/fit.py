@@ -18,21 +18,21 @@ from typing import Any
 
 import numpy as np
 
-from lambent.bench.below_zero import DARK, spoilt_tables
-from lambent.bench.known_answers import KNOWN, setup_of
-from lambent.bench.retro_tapes import TAPES, Tape
-from lambent.core.directions import direction
+from lambent.bench.scenes.below_zero import DARK, spoilt_tables
+from lambent.bench.scenes.known_answers import KNOWN, setup_of
+from lambent.bench.scenes.retro_tapes import TAPES, Tape
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import direction
 from lambent.core.progress import Cancelled, Progress, silent
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.materials.fitting import gradient
 from lambent.materials.fitting.account import lambertian_errors
 from lambent.materials.fitting.fit import FitResult, Search, fit
-from lambent.materials.measured.metrics import errors_of
+from lambent.materials.measured.inspecting.metrics import errors_of
+from lambent.materials.measured.inspecting.synthetic import synthesise
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 from lambent.materials.measured.registry import load
-from lambent.materials.measured.synthetic import synthesise
 from lambent.published import grid_search
 from lambent.published.merl_fits import Published, read_fits
 

@@ -30,21 +30,21 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.bake import bake
-from lambent.bake.bounces import Bounces
+from lambent.bake.interreflection.settings import Bounces
 from lambent.bake.quality import quality_named
-from lambent.bake.view import View
+from lambent.bake.transport.view import View
 from lambent.bench.direct_edit import MIB, held_bytes
-from lambent.bench.gi_edit_states import KINDS, flip_between, interior, relative_mse, setting, summed_up
-from lambent.bench.reference import path_traced
+from lambent.bench.measuring.reference import path_traced
+from lambent.bench.scenes.gi_edit_states import KINDS, flip_between, interior, relative_mse, setting, summed_up
 from lambent.core.arrays import Flags, Floats
 from lambent.core.errors import UserError
 from lambent.core.files import folder_bytes
 from lambent.core.progress import Progress, silent, tracked
+from lambent.editing.curves.operators import Region
 from lambent.editing.interreflection.picture import FrozenPicture
 from lambent.editing.interreflection.stored import Interreflections, PartLight, interreflections
 from lambent.editing.interreflection.whole import WholePicture
-from lambent.editing.operators import Region
-from lambent.editing.session import Session
+from lambent.editing.session.session import Session
 from lambent.editing.stored import edited_picture
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable

@@ -18,14 +18,14 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.quality import Quality
-from lambent.bench.light_field_caches import caches
-from lambent.bench.light_field_view import Compared, LightFieldView
-from lambent.core import light_field_lookup as look
+from lambent.baked.light_fields import lookup as look
+from lambent.baked.light_fields.blocks.blocks import in_blocks
+from lambent.baked.light_fields.light_field import NO_POINT, LightField, Sky
+from lambent.baked.light_fields.lookup import March, Place
+from lambent.baked.light_fields.maps import radiance_along
+from lambent.bench.measuring.light_field_caches import caches
+from lambent.bench.scenes.light_field_view import Compared, LightFieldView
 from lambent.core.arrays import Floats
-from lambent.core.light_field import NO_POINT, LightField, Sky
-from lambent.core.light_field_blocks import in_blocks
-from lambent.core.light_field_lookup import March, Place
-from lambent.core.light_field_maps import radiance_along
 from lambent.core.progress import Progress, part_of, silent
 from lambent.published.distance_impostors import fixed_point
 from lambent.published.surface_light_fields import Basis, basis_weights, surface

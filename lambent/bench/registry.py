@@ -1,10 +1,10 @@
 """Benches, found by discovery, with a common interface.
 
-A bench is a module of this package with `NAME`, its efforts `FULL` and `QUICK` (instances of its own frozen dataclass),
-and `run(effort, progress=silent)`, which returns {"rows": [...], "summary": {...}}. If it reads files, `run` also takes
-`inputs`; if it compares with published figures, `against`; with finished pictures, `reference`; if it draws random
-settings, `settings`. docs/performance.md defines names, rows and fields; times are medians of at least five alternating
-runs, reported with their spread.
+A bench is a module of this package, or of `pictures`, with `NAME`, its efforts `FULL` and `QUICK` (instances of its own
+frozen dataclass), and `run(effort, progress=silent)`, which returns {"rows": [...], "summary": {...}}. If it reads
+files, `run` also takes `inputs`; if it compares with published figures, `against`; with finished pictures, `reference`;
+if it draws random settings, `settings`. docs/performance.md defines names, rows and fields; times are medians of at
+least five alternating runs, reported with their spread.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import Any
 
 from lambent import bench
+from lambent.bench import pictures
 from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
 from lambent.core.inputs import sha256_of
@@ -26,7 +27,8 @@ from lambent.core.progress import Progress, silent
 
 def benches() -> dict[str, ModuleType]:
     """Module of every bench by its name, sorted; imports all of them."""
-    return dict(sorted((module.NAME, module) for module in modules_in(bench, having="NAME").values()))
+    modules = [*modules_in(bench, having="NAME").values(), *modules_in(pictures, having="NAME").values()]
+    return dict(sorted((module.NAME, module) for module in modules))
 
 
 def run_bench(
@@ -86,7 +88,7 @@ def run_bench(
 
 def machine() -> dict[str, Any]:
     """cpu, cores; adapter, adapter_type and driver, or None without one; the path tracer's variant if it runs."""
-    from lambent.realtime.device import adapter_info, choose_adapter
+    from lambent.realtime.gpu.device import adapter_info, choose_adapter
 
     try:
         info = adapter_info(choose_adapter())

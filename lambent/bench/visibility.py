@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from lambent.bench.visibility_scenes import CASES
+from lambent.bench.scenes.visibility_scenes import CASES
 from lambent.core.arrays import Flags
 from lambent.core.progress import Progress, silent, tracked
 

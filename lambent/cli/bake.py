@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from lambent.bake import artefacts
-from lambent.bake.bounces import Bounces
+from lambent.bake.interreflection.settings import Bounces
 from lambent.bake.methods import LightGroupMethod, LightMapMethod, ProbeMethod
 from lambent.bake.quality import QualityName
 from lambent.cli.console import CreaseAngle, Json, progress_bar, say, show, table
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from lambent.bake.interreflection.proposal import Proposal
-    from lambent.bake.workers import Workers
+    from lambent.bake.running.workers import Workers
     from lambent.core.progress import Progress
-    from lambent.editing.document import SessionDocument
     from lambent.editing.interreflection.noise import PassNoise
-    from lambent.editing.session import Session
+    from lambent.editing.session.document import SessionDocument
+    from lambent.editing.session.session import Session
     from lambent.scenes.scene import Scene
 
     Kind = str
@@ -129,10 +129,10 @@ def command(
     """
     from lambent.bake.bake import bake
     from lambent.bake.light_fields.request import light_fields_of
-    from lambent.editing.session import Session
+    from lambent.editing.session.session import Session
     from lambent.scenes import load_scene
-    from lambent.scenes.clear_sky import daylight_in_words
     from lambent.scenes.scene import SunSky
+    from lambent.scenes.sky.clear_sky import daylight_in_words
     from lambent.store.contract import LAST_RUN, TIMINGS
 
     if output is None and not propose:
@@ -289,7 +289,7 @@ def _workers(count: int | None, address: str | None, unused: bool) -> AbstractCo
         raise UserError("--workers and --cluster exclude each other", field="--cluster", hint="leave out one")
     if unused or (count is None and address is None):
         return nullcontext()
-    from lambent.bake.cluster import opened
+    from lambent.bake.running.cluster import opened
 
     return opened(count, address)
 
@@ -298,8 +298,8 @@ def _edited(
     scene: Scene, store: Path | None, names: list[str], session: Session | None
 ) -> tuple[dict[str, Any], frozenset[str]]:
     """Arguments of `bake` for the named views or a session's view, and the names of the edited materials."""
-    from lambent.bake.view import View, view_named
-    from lambent.store.views import read_views
+    from lambent.bake.transport.view import View, view_named
+    from lambent.store.kept.views import read_views
 
     saved = read_views(store).cameras if store is not None else ()
     views = [view_named(name, (*saved, *scene.cameras)) for name in names]

@@ -11,12 +11,12 @@ from lambent.cli.console import Between, Force, Json, metric_errors, progress_ba
 from lambent.core.errors import UserError, did_you_mean
 
 if TYPE_CHECKING:
-    from lambent.materials.check import CheckReport
-    from lambent.materials.check_table import TableReport
+    from lambent.materials.checking.check import CheckReport
+    from lambent.materials.checking.check_table import TableReport
+    from lambent.materials.checking.normalise import Normalisation
     from lambent.materials.document import Material
     from lambent.materials.measured.protocol import MeasuredTable
     from lambent.materials.models.model import Model
-    from lambent.materials.normalise import Normalisation
 
 
 def command(
@@ -48,8 +48,8 @@ def command(
 
     Example: lambent check ward --set mx=0.05 --set my=0.3
     """
-    from lambent.materials.check import check
-    from lambent.materials.check_table import check_table
+    from lambent.materials.checking.check import check
+    from lambent.materials.checking.check_table import check_table
     from lambent.materials.document import Material
     from lambent.materials.models.model import Model
 
@@ -73,9 +73,9 @@ def _normalise(
 ) -> None:
     """Write the energy-conserving version of a material document, if it needs one."""
     from lambent.core.outputs import check_output
+    from lambent.materials.checking.normalise import normalisation
     from lambent.materials.document import Material
     from lambent.materials.models.model import Model
-    from lambent.materials.normalise import normalisation
 
     if not asked or output is None:
         lacking = "-o" if output is None else "--normalise"
@@ -125,7 +125,7 @@ def _value(text: str) -> tuple[str, object]:
 
 def describe(report: CheckReport | TableReport) -> str:
     """The figures, then the faults, then the verdict."""
-    from lambent.materials.check import CheckReport
+    from lambent.materials.checking.check import CheckReport
 
     energy = report.furnace
     albedo, theta_deg, phi_deg = energy.highest

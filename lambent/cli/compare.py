@@ -25,10 +25,10 @@ def command(
 
     Example: lambent compare reference.exr frame.exr -o difference.png
     """
-    from lambent.core.colour import srgb_decode
-    from lambent.core.images import HDR_SUFFIXES, read_image, write_image
-    from lambent.core.metrics import compare
+    from lambent.core.light.colour import srgb_decode
     from lambent.core.outputs import check_output
+    from lambent.core.pictures.images import HDR_SUFFIXES, read_image, write_image
+    from lambent.core.pictures.metrics import compare
 
     if output is not None:
         check_output(output, (".png",), force=force, inputs=[reference, test])

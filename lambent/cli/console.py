@@ -74,7 +74,7 @@ def words(value: object) -> str:
 
 def metric_errors(errors: Mapping[str, float], share: Mapping[str, float]) -> str:
     """Table of errors under every metric: absolute, with unit, and as a share of the subject's norm."""
-    from lambent.materials.measured.metrics import METRICS
+    from lambent.materials.measured.inspecting.metrics import METRICS
 
     rows = ((name, f"{value:.3g}", METRICS[name].unit, f"{share[name]:.2%}") for name, value in errors.items())
     return table([("error", "absolute", "unit", "relative"), *rows])

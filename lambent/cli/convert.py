@@ -29,7 +29,7 @@ def command(
     """
     from lambent.core.outputs import check_output
     from lambent.materials.export.registry import writer_for
-    from lambent.materials.export.resampled import read_back
+    from lambent.materials.export.resampling.resampled import read_back
     from lambent.materials.measured.registry import is_known
 
     writer = writer_for(output, as_)

@@ -52,7 +52,7 @@ PACKAGES = {
 _ASK_GRAPHICS = """
 import json
 from dataclasses import asdict
-from lambent.realtime.device import adapter_info, open_device
+from lambent.realtime.gpu.device import adapter_info, open_device
 print("answer " + json.dumps(asdict(adapter_info(open_device()))))
 """
 _ASK_WINDOW = """

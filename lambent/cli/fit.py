@@ -71,8 +71,8 @@ def command(
     from lambent.materials.fitting.account import below_zero
     from lambent.materials.fitting.fit import fit
     from lambent.materials.fitting.parameters import parse_fix, parse_ranges
-    from lambent.materials.fitting.plot import plot_files, save_plots
-    from lambent.materials.measured.metrics import METRICS
+    from lambent.materials.fitting.shown.plot import plot_files, save_plots
+    from lambent.materials.measured.inspecting.metrics import METRICS
 
     inputs = [file, *([] if environment is None else [environment])]
     plotted = () if plot is None else (plot, *plot_files(plot.parent, plot.stem))
@@ -117,7 +117,7 @@ def command(
 
 def _check_environment(file: Path, report: Path | None) -> None:
     """Raise `UserError` for an unusable image before the fit."""
-    from lambent.core.images import read_image
+    from lambent.core.pictures.images import read_image
 
     if report is None:
         raise UserError("lights the previews of a report only", field="--environment", hint="add --report PAGE.html")
@@ -134,7 +134,7 @@ def _count(lobes: str) -> int | Literal["auto"]:
 
 def describe(result: FitResult) -> str:
     """Parameters with units, errors beside those of a Lambertian surface, and the albedo where it is furthest off."""
-    from lambent.materials.measured.metrics import METRICS
+    from lambent.materials.measured.inspecting.metrics import METRICS
 
     rows = [("error", "fit", "Lambertian", "unit")]
     for name, value in result.errors.items():

@@ -31,11 +31,11 @@ def command(
 
     Example: lambent glare room.store --camera entrance -o glare.png
     """
-    from lambent.core.glare import glare
-    from lambent.core.images import read_image, write_shown
+    from lambent.core.light.glare import glare
+    from lambent.core.light.radiance_views import read_view
     from lambent.core.outputs import check_output
-    from lambent.core.projections import Projection
-    from lambent.core.radiance_views import read_view
+    from lambent.core.pictures.images import read_image, write_shown
+    from lambent.core.views.projections import Projection
 
     if output is not None:
         check_output(output, (".png",), force=force, inputs=[what])
@@ -55,7 +55,7 @@ def command(
         view, radiance = read_view(what), read_image(what)
     found = glare(radiance, view, threshold)
     if output is not None:
-        from lambent.core.glare_picture import marked
+        from lambent.core.light.glare_picture import marked
 
         write_shown(output, marked(radiance, found))
     facts = {key: getattr(found, key) for key in ("dgp", "ugr", "comfort", "illuminance_lx", "background")}

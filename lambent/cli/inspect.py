@@ -75,7 +75,7 @@ def inspector_of(file: str) -> Callable[..., Facts]:
 def inspect_table(file: str, plot: Path | None = None, reconstruction: Between = "auto") -> Facts:
     """A measured table: its description, usable share, albedo and faults."""
     from lambent.materials import measured
-    from lambent.materials.measured import inspection
+    from lambent.materials.measured.inspecting import inspection
 
     measurement = measured.load(Path(file), reconstruction)
     if plot is not None:
@@ -90,7 +90,7 @@ def inspect_material(file: str, plot: Path | None = None) -> Facts:
     """A material document: its numbers, its albedo, its source."""
     import numpy as np
 
-    from lambent.core.directions import direction
+    from lambent.core.geometry.directions import direction
     from lambent.materials.bsdf import MaterialBSDF
     from lambent.materials.document import load_material
 
@@ -118,9 +118,9 @@ def inspect_material(file: str, plot: Path | None = None) -> Facts:
 def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:
     """A scene: its contents, and the repairs of its loader."""
     from lambent.scenes import load_scene
-    from lambent.scenes.clear_sky import daylight_in_words
     from lambent.scenes.light_groups import groups_before_bake
     from lambent.scenes.scene import SunSky
+    from lambent.scenes.sky.clear_sky import daylight_in_words
 
     scene = load_scene(file, crease_deg)
     low, high = scene.bounds
@@ -145,8 +145,8 @@ def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:
 def inspect_store(file: str) -> Facts:
     """A store: its arrays, complete or not, and whether every chunk on disk is sound."""
     from lambent.store.contract import SCENE
+    from lambent.store.kept.states import variants_of
     from lambent.store.light_groups import light_groups
-    from lambent.store.states import variants_of
     from lambent.store.store import Store
 
     store = Store.open(Path(file))
@@ -185,8 +185,8 @@ def _reflectors(store: Any) -> list[str]:
 
 def inspect_picture(file: str) -> Facts:
     """An image: size and range of its linear values."""
-    from lambent.core.colour import luminance
-    from lambent.core.images import read_image
+    from lambent.core.light.colour import luminance
+    from lambent.core.pictures.images import read_image
 
     image = read_image(Path(file))
     return {

@@ -35,10 +35,10 @@ def command(
 
     Example: lambent relight room.store --environment grace.hdr --turn 90 -o grace.png
     """
-    from lambent.core.colour import shown
-    from lambent.core.exposure import metered
-    from lambent.core.images import WRITABLE, to_bytes, write_image, write_shown
+    from lambent.core.light.colour import shown
+    from lambent.core.light.exposure import metered
     from lambent.core.outputs import check_output
+    from lambent.core.pictures.images import WRITABLE, to_bytes, write_image, write_shown
     from lambent.editing.relit_view import RelitView
     from lambent.scenes.scene import ImageEnvironment
     from lambent.store.store import Store

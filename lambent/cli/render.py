@@ -12,7 +12,7 @@ from lambent.cli.console import Force, Json, parse_size, progress_bar, say, show
 from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
-    from lambent.core.false_colour import Range
+    from lambent.core.light.false_colour import Range
     from lambent.render import Settings
 
 SHEET_SIZE = "640x360"  # of each picture in a sheet
@@ -201,14 +201,14 @@ def command(
     Example: lambent render tray.store --edit tray.edits.json -o tray.png
     """
     from lambent import render
-    from lambent.core.film import FILM, SEQUENCES, check_pictures
-    from lambent.core.images import WRITABLE
-    from lambent.core.light_mix import parse_light
+    from lambent.core.light.light_mix import parse_light
     from lambent.core.outputs import check_output
-    from lambent.core.projections import Projection
+    from lambent.core.pictures.film import FILM, SEQUENCES, check_pictures
+    from lambent.core.pictures.images import WRITABLE
+    from lambent.core.views.projections import Projection
     from lambent.materials.recolour import parse_recolours
+    from lambent.scenes.looks.retexturing import parse_textures
     from lambent.scenes.replacement import parse_replacements
-    from lambent.scenes.retexturing import parse_textures
 
     exposure_ev, exposures = parse_exposure(exposure, variants=variants)
     if ev100 is not None:
@@ -318,7 +318,7 @@ def parse_exposure(text: str | None, *, variants: bool) -> tuple[float | None, s
 
 def _exposure_of(ev100: float, exposure: str | None) -> float:
     """Convert an EV100 to stops on radiance."""
-    from lambent.core.exposure import ev100_of, exposure_of
+    from lambent.core.light.exposure import ev100_of, exposure_of
     from lambent.render.images import MOST_EV
 
     if exposure is not None:
@@ -332,7 +332,7 @@ def _exposure_of(ev100: float, exposure: str | None) -> float:
 
 def parse_range(text: str, *, log: bool) -> Range:
     """Parse a range such as "10:500"; `log`: a logarithmic scale."""
-    from lambent.core.false_colour import Range
+    from lambent.core.light.false_colour import Range
 
     low, _, high = text.partition(":")
     try:

@@ -26,21 +26,21 @@ from typing import Any
 from lambent.bake.bake import bake
 from lambent.bake.quality import Quality, quality_named
 from lambent.bake.reference.goniophotometer import measure
-from lambent.core.camera import Camera, CameraPath
-from lambent.core.colour import srgb_decode
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
-from lambent.core.images import write_image, write_shown
-from lambent.core.metrics import compare
+from lambent.core.light.colour import srgb_decode
+from lambent.core.pictures.images import write_image, write_shown
+from lambent.core.pictures.metrics import compare
 from lambent.core.plain import plain
 from lambent.core.progress import Progress, part_of
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.materials import measured
 from lambent.materials.document import load_material
 from lambent.materials.fitting.fit import fit
-from lambent.materials.fitting.plot import save_plots
-from lambent.materials.measured.gonio_text import write_gonio
-from lambent.realtime.device import adapter_info, open_device
+from lambent.materials.fitting.shown.plot import save_plots
+from lambent.materials.measured.parts.gonio_text import write_gonio
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.device import adapter_info, open_device
 from lambent.realtime.renderer import Renderer
 from lambent.render import Settings, images, write_frames
 from lambent.scenes import load_scene

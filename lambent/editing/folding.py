@@ -11,8 +11,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.baked.transport.wavelets import TAPS
 from lambent.core.arrays import Floats
-from lambent.core.wavelets import TAPS
 from lambent.editing.packed_light import add_light
 from lambent.editing.products import Halves, half_of_float
 

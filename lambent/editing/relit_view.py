@@ -8,12 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from lambent.core.arrays import Image
-from lambent.core.camera import Camera, pixel_rays
 from lambent.core.errors import UserError
+from lambent.core.views.camera import Camera, pixel_rays
 from lambent.editing.sparse_rows import SparseRows
-from lambent.scenes.environment_images import environment_picture, orientation, seen_at
 from lambent.scenes.scene import Environment, ImageEnvironment
-from lambent.scenes.triangle_wavelets import CHILDREN, FACES, TriangleTree, TurningLight
+from lambent.scenes.sky.environment_images import environment_picture, orientation, seen_at
+from lambent.scenes.sky.triangle_wavelets import CHILDREN, FACES, TriangleTree, TurningLight
 from lambent.store.contract import ViewRecord, baked_views, view_artefact_name
 from lambent.store.store import Store
 

@@ -12,8 +12,8 @@ from typing import Protocol
 
 import numpy as np
 
+from lambent.baked.transport.wavelets import transformed
 from lambent.core.arrays import Floats
-from lambent.core.wavelets import transformed
 from lambent.editing.products import Halves
 from lambent.materials.factored.curve import Curve
 

@@ -16,7 +16,7 @@ from lambent.editing.canvas import Canvas, HostCanvas
 from lambent.editing.folding import folded
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
 from lambent.editing.rows import PairTransport, Rows
-from lambent.editing.session import Session
+from lambent.editing.session.session import Session
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.store.contract import TRANSPORT_BASIS, scene_record, transport_lights, view_artefact_name

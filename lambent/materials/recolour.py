@@ -8,9 +8,9 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from lambent.core.colour import srgb_decode
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
+from lambent.core.light.colour import srgb_decode
 from lambent.core.plain import Triple, triple
 from lambent.materials.document import Material
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from lambent.baked.light_fields.light_field import LightField, Sky
+from lambent.baked.light_fields.lookup import March, Marched, Place, combined
+from lambent.baked.light_fields.maps import nearness_along
 from lambent.core.arrays import Floats
-from lambent.core.light_field import LightField, Sky
-from lambent.core.light_field_lookup import March, Marched, Place, combined
-from lambent.core.light_field_maps import nearness_along
 
 
 def fixed_point(field: LightField, place: Place, w: Floats, rounds: int = 4, edges: Sky | None = None) -> Marched:

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.baked.light_fields.light_field import NO_POINT
+from lambent.baked.light_fields.lookup import Place
+from lambent.baked.light_fields.map_cache import POLICIES, MapCache, misses
 from lambent.core.arrays import Floats
-from lambent.core.cubemap import on_face
-from lambent.core.light_field import NO_POINT
-from lambent.core.light_field_lookup import Place
-from lambent.core.map_cache import POLICIES, MapCache, misses
+from lambent.core.geometry.cubemap import on_face
 
 NEVER = 1 << 62
 FACE_TEXELS = 128  # along a face of the thesis's cube maps

@@ -27,9 +27,9 @@ from typing import ClassVar
 import numpy as np
 
 from lambent.core.ceilings import FITS_BYTES
-from lambent.core.directions import Floats, half_vector
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import Floats, half_vector
 from lambent.core.inputs import read_bytes
 from lambent.core.plain import Triple, triple
 from lambent.materials.fresnel import conductor, schlick_weight

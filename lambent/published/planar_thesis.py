@@ -10,9 +10,9 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.materials.document import Lobe
-from lambent.realtime import patterns
-from lambent.realtime.integrators import Integrator
-from lambent.realtime.planar_integrators import PLANAR
+from lambent.realtime.integrators import patterns
+from lambent.realtime.integrators.integrators import Integrator
+from lambent.realtime.planar.planar_integrators import PLANAR
 
 MOST_RINGS = 3
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lambent.core.directions import FLIP_Z, Floats, direction
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import FLIP_Z, Floats, direction
 from lambent.materials.measured.protocol import RETRO_PROPOSAL, MeasuredTable, quadrature
 
 CANDIDATES_LIMIT = 200_000  # per photon, before rejection gives up

@@ -9,11 +9,11 @@ from typing import Literal
 
 import numpy as np
 
+from lambent.baked.light_fields.light_field import LightField
+from lambent.baked.light_fields.lookup import POWER, Place, cosine_weights
+from lambent.baked.light_fields.maps import nearness_along, radiance_along
 from lambent.core.arrays import Flags, Floats
-from lambent.core.directions import normalize
-from lambent.core.light_field import LightField
-from lambent.core.light_field_lookup import POWER, Place, cosine_weights
-from lambent.core.light_field_maps import nearness_along, radiance_along
+from lambent.core.geometry.directions import normalize
 
 Basis = Literal["nearest", "angle", "average", "reflection", "normal"]
 CONES_DEG = (65.0, 75.0)  # half angles about the normal of the cones tried in order for a point

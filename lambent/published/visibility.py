@@ -20,11 +20,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.tiles import slices
+from lambent.bake.running.tiles import slices
 from lambent.bake.tracing.rays import array_of, has_holes, in_shadow, intersect, leaving, vectors
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.octahedral import texel_directions, to_square
+from lambent.core.geometry.octahedral import texel_directions, to_square
 
 TABLE = 512  # texels along a side of the octahedral map for looking up cells
 SPACING = 16  # pixels of the coarsest grid

@@ -8,18 +8,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lambent.core.camera import Camera, clip_from_world, image_plane
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
-from lambent.core.false_colour import Range
-from lambent.core.light_mix import Factors
-from lambent.core.photometry import ILLUMINANCE, LUMINANCE, NOISE, Quantity
-from lambent.core.sequences import radical_inverse
+from lambent.core.geometry.sequences import radical_inverse
+from lambent.core.light.false_colour import Range
+from lambent.core.light.light_mix import Factors
+from lambent.core.light.photometry import ILLUMINANCE, LUMINANCE, NOISE, Quantity
+from lambent.core.views.camera import Camera, clip_from_world, image_plane
 from lambent.materials.document import Material
-from lambent.realtime.integrators import integrator
-from lambent.realtime.patterns import N_MAX, automatic_n
-from lambent.realtime.planar_integrators import AUTO, MOST_SHARED, TILE, planar_integrator
-from lambent.realtime.structs import FRAME_DTYPE, Record
+from lambent.realtime.gpu.structs import FRAME_DTYPE, Record
+from lambent.realtime.integrators.integrators import integrator
+from lambent.realtime.integrators.patterns import N_MAX, automatic_n
+from lambent.realtime.planar.planar_integrators import AUTO, MOST_SHARED, TILE, planar_integrator
 
 LIGHT_MAP = "light-map"  # irradiance in place of radiance
 LIGHT_MAP_NOISE = "noise"  # relative standard error of the irradiance before denoising

@@ -17,37 +17,37 @@ import wgpu
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
-from lambent.core.colour import srgb_decode, srgb_encode
 from lambent.core.errors import UserError
-from lambent.core.images import to_bytes
+from lambent.core.geometry.sequences import hammersley
+from lambent.core.light.colour import srgb_decode, srgb_encode
+from lambent.core.pictures.images import to_bytes
 from lambent.core.progress import Progress, silent
-from lambent.core.sequences import hammersley
-from lambent.realtime.baked import BakedScene, read_baked
-from lambent.realtime.clusters import Clusters
-from lambent.realtime.context import FrameContext, Pass
-from lambent.realtime.discs import Discs
-from lambent.realtime.draws import draws_of, panes_of
+from lambent.realtime.display.display import SmoothPass, TonemapPass
 from lambent.realtime.frame_state import LIGHT_MAP_NOISE, QMC_N, SHOW, FrameState, frame_data
-from lambent.realtime.given import Given
-from lambent.realtime.integrators import integrator
-from lambent.realtime.layouts import Layouts
-from lambent.realtime.light_mixer import LightMixer
-from lambent.realtime.outline import Outline
+from lambent.realtime.gpu.layouts import Layouts
+from lambent.realtime.gpu.structs import FRAME_DTYPE, Record
+from lambent.realtime.gpu.targets import PassTimer, Targets, pixels
+from lambent.realtime.integrators.integrators import integrator
+from lambent.realtime.light.baked import BakedScene, read_baked
+from lambent.realtime.light.light_mixer import LightMixer
+from lambent.realtime.light_fields.streaming import Streaming
+from lambent.realtime.objects.clusters import Clusters
+from lambent.realtime.objects.draws import draws_of, panes_of
+from lambent.realtime.overlays.computed_picture import Given
+from lambent.realtime.overlays.discs import Discs
+from lambent.realtime.overlays.outline import Outline
 from lambent.realtime.passes.accumulate import AccumulatePass
 from lambent.realtime.passes.base import BasePass
+from lambent.realtime.passes.context import FrameContext, Pass
 from lambent.realtime.passes.cover import CoverPass
 from lambent.realtime.passes.depth import DepthPass
-from lambent.realtime.passes.display import SmoothPass, TonemapPass
 from lambent.realtime.passes.light import LightPass
-from lambent.realtime.passes.planar import PlanarPass
-from lambent.realtime.passes.sun import SunPass
-from lambent.realtime.planar_integrators import planar_integrator
-from lambent.realtime.planar_view import MOST_REFLECTORS, PlanarView, planar_views
-from lambent.realtime.reflector_faces import ReflectorFaces
+from lambent.realtime.planar.planar_integrators import planar_integrator
+from lambent.realtime.planar.planar_pass import PlanarPass
+from lambent.realtime.planar.planar_view import MOST_REFLECTORS, PlanarView, planar_views
+from lambent.realtime.planar.reflector_faces import ReflectorFaces
 from lambent.realtime.resources import SceneResources
-from lambent.realtime.streaming import Streaming
-from lambent.realtime.structs import FRAME_DTYPE, Record
-from lambent.realtime.targets import PassTimer, Targets, pixels
+from lambent.realtime.sun.sun_pass import SunPass
 from lambent.store.store import Store
 
 SUPERSAMPLES = 16  # frames of a still: below, thin lines come out dotted

@@ -11,24 +11,24 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.core.plain import Triple
-from lambent.realtime.baked import DARK, BakedScene, Probe
-from lambent.realtime.clusters import Ranges, merged
-from lambent.realtime.cube_mips import finite
-from lambent.realtime.device import WEBGPU_LIMITS
+from lambent.realtime.gpu.cube_mips import finite
+from lambent.realtime.gpu.device import WEBGPU_LIMITS
+from lambent.realtime.gpu.layouts import Layouts
+from lambent.realtime.gpu.pipelines import VERTEX_FLOATS
+from lambent.realtime.gpu.structs import OBJECT_DTYPE
+from lambent.realtime.gpu.uploads import half, upload, with_alpha
 from lambent.realtime.incident import LookUp, brings_light, look_ups
-from lambent.realtime.integrators import Cube
-from lambent.realtime.layouts import Layouts
-from lambent.realtime.material_buffers import MaterialBuffers
-from lambent.realtime.parts import WITHIN, neighbouring_faces
-from lambent.realtime.pipelines import VERTEX_FLOATS
-from lambent.realtime.probe_light import ProbeLight, kind_of
-from lambent.realtime.structs import OBJECT_DTYPE
-from lambent.realtime.sun import SunLight, sun_light
-from lambent.realtime.sun_disc import without_sun
-from lambent.realtime.textures import TextureCache
-from lambent.realtime.uploads import half, upload, with_alpha
+from lambent.realtime.integrators.integrators import Cube
+from lambent.realtime.light.baked import DARK, BakedScene, Probe
+from lambent.realtime.light.probe_light import ProbeLight, kind_of
+from lambent.realtime.materials.material_buffers import MaterialBuffers
+from lambent.realtime.materials.textures import TextureCache
+from lambent.realtime.objects.clusters import Ranges, merged
+from lambent.realtime.objects.parts import WITHIN, neighbouring_faces
+from lambent.realtime.sun.sun import SunLight, sun_light
+from lambent.realtime.sun.sun_disc import without_sun
+from lambent.scenes.looks.variants import textures_in_look
 from lambent.scenes.scene import ImageTexture, Look
-from lambent.scenes.variants import textures_in_look
 from lambent.store.contract import MOST_BORDERS, ObjectRecord
 
 EVEN_NICHES = 9  # index, in a shader object's `irradiance`, of the flag for `Probe.even_niches`

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import cached_property
 
+from lambent.baked.answering.stored import NO_ANSWER, has_answer, read_answer
 from lambent.core.plain import Triple
 from lambent.materials.document import Material
-from lambent.realtime.answer_shown import AnswerShown
-from lambent.realtime.answering import AnsweredLight
-from lambent.realtime.group_arrays import FIELDS_FOLLOW
+from lambent.realtime.answering.answer_shown import AnswerShown
+from lambent.realtime.answering.answering import AnsweredLight
+from lambent.realtime.answering.texture_detail import without_uv
+from lambent.realtime.light.group_arrays import FIELDS_FOLLOW
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.texture_detail import without_uv
 from lambent.render.edits import edits_of
+from lambent.scenes.looks.variants import textures_in_look
 from lambent.scenes.scene import Look
-from lambent.scenes.variants import textures_in_look
-from lambent.store.answer import NO_ANSWER, has_answer, read_answer
 from lambent.store.contract import needs_probe
 from lambent.store.store import Store
 

@@ -11,12 +11,12 @@ import numpy as np
 
 from lambent.bake.artefacts.visibility import SETTINGS
 from lambent.core.arrays import Image
-from lambent.core.camera import Camera
 from lambent.core.errors import UserError
-from lambent.core.images import WRITABLE, check_writable
+from lambent.core.pictures.images import WRITABLE, check_writable
 from lambent.core.progress import Progress, silent
+from lambent.core.views.camera import Camera
 from lambent.editing.interreflection.whole import ALL_HITS, WholePicture, whole_picture
-from lambent.editing.session import Session
+from lambent.editing.session.session import Session
 from lambent.editing.stored import NotBaked
 from lambent.render.images import Images, Settings
 from lambent.render.output import DEFAULT, Rendered, displayed_as, exposed, write_still

@@ -9,9 +9,9 @@ from lambent.core.errors import UserError
 from lambent.core.plain import Triple
 from lambent.materials.document import Material
 from lambent.materials.recolour import recoloured
-from lambent.scenes.retexturing import NO_UV, NO_UV_HINT, retextured
+from lambent.scenes.looks.retexturing import NO_UV, NO_UV_HINT, retextured
+from lambent.scenes.looks.variants import looks_as_loaded
 from lambent.scenes.scene import ImageTexture, Look, MaterialTextures
-from lambent.scenes.variants import looks_as_loaded
 
 
 @dataclass(frozen=True)

@@ -11,23 +11,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.baked.light_fields.map_cache import LEAST_RECENT
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera
-from lambent.core.colour import shown
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
-from lambent.core.exposure import ev100_of, metered
-from lambent.core.false_colour import Range, false_colour, fitting_range, with_scale
-from lambent.core.images import to_bytes
-from lambent.core.light_mix import MixTrack
-from lambent.core.map_cache import LEAST_RECENT
-from lambent.core.photometry import LUMINANCE, Quantity, photometric
+from lambent.core.light.colour import shown
+from lambent.core.light.exposure import ev100_of, metered
+from lambent.core.light.false_colour import Range, false_colour, fitting_range, with_scale
+from lambent.core.light.light_mix import MixTrack
+from lambent.core.light.photometry import LUMINANCE, Quantity, photometric
+from lambent.core.pictures.images import to_bytes
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
-from lambent.core.projections import Projection, View
+from lambent.core.views.camera import Camera
+from lambent.core.views.projections import Projection, View
 from lambent.realtime.frame_state import check_shown
-from lambent.realtime.integrators import INTEGRATORS
-from lambent.scenes.look_track import LookTrack
+from lambent.realtime.integrators.integrators import INTEGRATORS
+from lambent.scenes.looks.look_track import LookTrack
 from lambent.scenes.replacement import Replacement
 from lambent.scenes.scene import Variant
 

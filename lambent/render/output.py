@@ -12,25 +12,25 @@ from typing import Any, TypeVar
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError, did_you_mean
-from lambent.core.exposure import ev100_of
-from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted
-from lambent.core.images import WRITABLE, check_writable, write_image, write_shown
-from lambent.core.light_mix import LightMix, MixTrack
+from lambent.core.light.exposure import ev100_of
+from lambent.core.light.light_mix import LightMix, MixTrack
+from lambent.core.pictures.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted
+from lambent.core.pictures.images import WRITABLE, check_writable, write_image, write_shown
 from lambent.core.progress import Progress, silent, tracked
-from lambent.core.projections import Projection
+from lambent.core.views.camera import Camera, CameraPath
+from lambent.core.views.projections import Projection
 from lambent.realtime.frame_state import LIGHT_MAP, LIGHT_MAP_NOISE
 from lambent.render.images import DRAWN, TRACED, Images, Settings
 from lambent.render.projected import Projected, faces_settings
 from lambent.scenes.camera_paths import camera_at
 from lambent.scenes.loaders.keyframes import Known, read_keyframes
-from lambent.scenes.variants import looks_as_loaded, variant_named
+from lambent.scenes.looks.variants import looks_as_loaded, variant_named
 from lambent.store.contract import SceneRecord, scene_record
+from lambent.store.kept.states import says_light, variants_of
+from lambent.store.kept.views import read_views, with_views
 from lambent.store.light_groups import light_groups
-from lambent.store.states import says_light, variants_of
 from lambent.store.store import Store
-from lambent.store.views import read_views, with_views
 from lambent.traced.room import why_untraceable
 
 Named = TypeVar("Named", Camera, CameraPath)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lambent.core.around import Around, face_px
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera
 from lambent.core.progress import Progress, part_of, silent
-from lambent.core.projections import Projection
+from lambent.core.views.around import Around, face_px
+from lambent.core.views.camera import Camera
+from lambent.core.views.projections import Projection
 from lambent.render.images import ANYWHERE, Images, Settings
 from lambent.scenes.scene import Variant
 

@@ -10,30 +10,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.baked.answering.stored import read_answer
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
-from lambent.core.light_mix import WHITE, MixTrack
+from lambent.core.light.light_mix import WHITE, MixTrack
 from lambent.core.progress import Progress, silent
-from lambent.realtime.baked import read_baked
-from lambent.realtime.device import open_device
+from lambent.core.views.camera import Camera
 from lambent.realtime.frame_state import FrameState, quantity_of
-from lambent.realtime.group_arrays import BAKE_GROUPS, FIELDS_FOLLOW, NO_GROUPS
+from lambent.realtime.gpu.device import open_device
 from lambent.realtime.incident import AUTO, look_ups
 from lambent.realtime.incident.light_field import check_serves
-from lambent.realtime.integrators import integrator
-from lambent.realtime.planar_integrators import CHOICES as PLANARS
+from lambent.realtime.integrators.integrators import integrator
+from lambent.realtime.light.baked import read_baked
+from lambent.realtime.light.group_arrays import BAKE_GROUPS, FIELDS_FOLLOW, NO_GROUPS
+from lambent.realtime.objects.replaced import with_replacements
+from lambent.realtime.planar.planar_integrators import CHOICES as PLANARS
 from lambent.realtime.renderer import SUPERSAMPLES, Renderer
-from lambent.realtime.replaced import with_replacements
-from lambent.realtime.turned_sky import under_turned_sky
+from lambent.realtime.sun.turned_sky import under_turned_sky
 from lambent.render.applied_materials import AppliedMaterials
 from lambent.render.images import NOISE, Images, Settings
+from lambent.scenes.looks.variants import variant_named
 from lambent.scenes.scene import Look, Variant
-from lambent.scenes.variants import variant_named
-from lambent.store.answer import read_answer
 from lambent.store.contract import SIDES, noise_name
-from lambent.store.states import variants_of
+from lambent.store.kept.states import variants_of
 from lambent.store.store import Store
 
 METERED_PX = 256  # longer side of the picture for metering

@@ -11,23 +11,23 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.camera import Camera
+from lambent.baked.answering.stored import has_answer
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
-from lambent.core.exposure import ev100_of
-from lambent.core.images import check_writable, write_shown
-from lambent.core.light_mix import LightMix
+from lambent.core.light.exposure import ev100_of
+from lambent.core.light.light_mix import LightMix
+from lambent.core.pictures.images import check_writable, write_shown
 from lambent.core.plain import printable
 from lambent.core.progress import Progress, part_of, silent
+from lambent.core.views.camera import Camera
 from lambent.render.images import PATH_TRACER, Settings
 from lambent.render.output import DEFAULT, Note, Rendered, displayed_as, ignore, images, opened_with_views, view_of
+from lambent.scenes.looks.variants import NO_VARIANTS, NO_VARIANTS_HINT
 from lambent.scenes.scene import Variant
-from lambent.scenes.variants import NO_VARIANTS, NO_VARIANTS_HINT
-from lambent.store.answer import has_answer
+from lambent.store.kept.states import says_light, variants_of
+from lambent.store.kept.views import read_views
 from lambent.store.light_groups import light_groups
-from lambent.store.states import says_light, variants_of
 from lambent.store.store import Store
-from lambent.store.views import read_views
 
 AS_BAKED = "as baked"
 MOST_PIXELS = 1 << 27  # largest sheet
@@ -170,7 +170,7 @@ def laid_out(
     """Pictures (H, W, 3) of one size in rows, with captions: a name, shortened if too long, and a note."""
     from PIL import Image, ImageDraw
 
-    from lambent.core.captions import caption_font
+    from lambent.render.captions import caption_font
 
     height, width = pictures[0].shape[:2]
     size = max(LEAST_INK_PX, height // 20)

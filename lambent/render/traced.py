@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from lambent.baked.answering.stored import NO_ANSWER
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera
 from lambent.core.interruption import is_interruption
-from lambent.core.light_mix import WHITE, MixTrack
+from lambent.core.light.light_mix import WHITE, MixTrack
 from lambent.core.progress import Cancelled, Progress, silent
+from lambent.core.views.camera import Camera
 from lambent.render.edits import Edits, edits_of
 from lambent.render.images import PATH_TRACER, Images, Settings
-from lambent.scenes.retexturing import materials_without_uv
+from lambent.scenes.looks.retexturing import materials_without_uv
+from lambent.scenes.looks.variants import variant_named
 from lambent.scenes.scene import Look, Variant
-from lambent.scenes.variants import variant_named
-from lambent.store.answer import NO_ANSWER
+from lambent.store.kept.states import variants_of
 from lambent.store.source import changed_inputs, scene_of
-from lambent.store.states import variants_of
 from lambent.store.store import Store
 from lambent.traced.picture import TracedPicture
 from lambent.traced.room import room_of_paths, room_of_store

@@ -11,16 +11,16 @@ import numpy as np
 
 from lambent.core.arrays import Flags, Floats
 from lambent.core.errors import UserError
-from lambent.core.images import to_bytes
 from lambent.core.inputs import sha256_of
+from lambent.core.pictures.images import to_bytes
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
-from lambent.materials.fitting import plot
 from lambent.materials.fitting.account import PEAK_SHARE, evaluate, peak_share
 from lambent.materials.fitting.fit import FitResult
-from lambent.materials.fitting.incidence import Incidence, incidences
-from lambent.materials.fitting.slices import slices
-from lambent.materials.measured.metrics import METRICS, Metric
+from lambent.materials.fitting.shown import plot
+from lambent.materials.fitting.shown.incidence import Incidence, incidences
+from lambent.materials.fitting.shown.slices import slices
+from lambent.materials.measured.inspecting.metrics import METRICS, Metric
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable, negative_readings
 from lambent.report import page
 from lambent.scenes.scene import Environment

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.camera import Camera, CameraPath
-from lambent.core.directions import Floats, normalize
+from lambent.core.geometry.directions import Floats, normalize
 from lambent.core.plain import triple
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.scenes.geometry.curves import catmull_rom, centripetal_knots
 
 STEPS = 256  # chords per segment that measure the curve's length

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from lambent.core.arrays import Flags, Floats
-from lambent.core.camera import Camera, overview
 from lambent.core.plain import triple
+from lambent.core.views.camera import Camera, overview
 from lambent.scenes.mesh import boxes_of, corners_of
 from lambent.scenes.scene import EYE_HEIGHT_M, SceneObject
 

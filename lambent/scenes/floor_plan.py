@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label, maximum_filter, uniform_filter
 
 from lambent.core.arrays import Flags, Floats
-from lambent.core.directions import basis
-from lambent.core.geometry import cross_2d
+from lambent.core.geometry.directions import basis
+from lambent.core.geometry.triangles import cross_2d
 
 CELLS = 600  # at most, per size of the reflector, the square root of its area
 FEWEST_CELLS = 32  # for a scene with very many reflectors
@@ -115,7 +115,7 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CE
     `corners` (F, 3, 3) are the triangles of the scene, `cells` the number of cells per size of the reflector. A wall
     stands on an edge where triangles cross the planes at both HEIGHTS above the reflector, within NEAR of the edge.
     """
-    from lambent.core.plan_cells import (
+    from lambent.core.geometry.plan_cells import (
         filled,
         inner,
         share_filled,
@@ -165,7 +165,7 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CE
 
 def _without_strips(covered: Flags, standing: Flags, width: float) -> Flags:
     """`covered` without strips along its edge, up to `width` cells wide on average, that `standing` cuts off."""
-    from lambent.core.plan_cells import without_strips
+    from lambent.core.geometry.plan_cells import without_strips
 
     if not (covered & standing).any():
         return covered

@@ -16,8 +16,8 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from lambent.core.colour import luminance
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.triangles import triangle_areas
+from lambent.core.light.colour import luminance
 from lambent.core.plain import Triple
 from lambent.scenes.scene import DirectionalLight, IesLight, Light, LightGroup, PointLight, Scene, SunSky
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.triangles import triangle_areas
 
 Array = NDArray[np.floating]
 TRIANGLES_AT_ONCE = 1 << 20

@@ -26,8 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.directions import basis
-from lambent.core.geometry import triangle_areas, triangle_normals
+from lambent.core.geometry.directions import basis
+from lambent.core.geometry.triangles import triangle_areas, triangle_normals
 from lambent.core.progress import Progress, silent, tracked
 from lambent.materials.document import Material
 from lambent.scenes.floor_plan import FloorPlan, Surroundings, floor_plan, may_have_walls, shared_cells

@@ -17,10 +17,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.camera import Camera, CameraPath
-from lambent.core.light_mix import LightMix
+from lambent.core.light.light_mix import LightMix
 from lambent.core.plain import Triple
 from lambent.core.surroundings import Axis, Layout
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.materials.document import Material
 from lambent.scenes.ies import Photometry
 from lambent.scenes.mesh import Mesh as Mesh  # most users of scenes want it too
@@ -33,6 +33,8 @@ IDENTITY: UvTransform = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 EYE_HEIGHT_M = 1.6  # of a standing person
 SUN_RADIUS_DEG = 0.2679  # Mitsuba's aperture of .5358 degrees
 LEAST_SUN_DEG, MOST_SUN_DEG = 0.05, 30.0
+MOST_POINTS = 0xFFFF  # gather points of a light field: their numbers have 16 bits
+LEAST_TEXELS, MOST_TEXELS = 8, 1024  # along a side of a light field's map
 Ground = Literal["diffuse", "black"]
 
 

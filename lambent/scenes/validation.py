@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.directions import Floats
-from lambent.core.geometry import area_vectors, cross_2d, triangle_areas
+from lambent.core.geometry.directions import Floats
+from lambent.core.geometry.triangles import area_vectors, cross_2d, triangle_areas
 from lambent.scenes.first_view import content_bounds
 from lambent.scenes.scene import Mesh, Scene
 

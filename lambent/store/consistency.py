@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.camera import FARTHEST_M, Camera
+from lambent.core.views.camera import FARTHEST_M, Camera
 from lambent.store.artefact import Array
 from lambent.store.store import Store
 

@@ -123,11 +123,11 @@ from typing import Any
 import numpy as np
 from pydantic import Field, ValidationError
 
-from lambent.core.camera import Camera, CameraPath
-from lambent.core.colour import MOST_UNIT
 from lambent.core.errors import UserError, invalid
+from lambent.core.light.colour import MOST_UNIT
 from lambent.core.plain import Triple, triple
 from lambent.core.strict import Strict
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.materials.document import Material
 from lambent.scenes.scene import Border, Variant
 from lambent.store.consistency import check_record, numbers_of

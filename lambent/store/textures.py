@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from lambent.scenes.looks.textures import CHANNELS, check, digest, parts
 from lambent.scenes.scene import MaterialTextures, Texture
-from lambent.scenes.textures import CHANNELS, check, digest, parts
 from lambent.store.contract import SceneRecord, TexturesRecord, texture_name
 from lambent.store.store import Store
 

@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lambent.baked.answering.stored import has_answer, read_answer
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
-from lambent.core.light_mix import Factors
+from lambent.core.light.light_mix import Factors
 from lambent.materials.document import Material
-from lambent.realtime.baked import read_baked
-from lambent.realtime.group_arrays import BAKE_GROUPS, NO_GROUPS, GroupArrays
+from lambent.realtime.light.baked import read_baked
+from lambent.realtime.light.group_arrays import BAKE_GROUPS, NO_GROUPS, GroupArrays
 from lambent.scenes.scene import MaterialTextures
-from lambent.store.answer import has_answer, read_answer
 from lambent.store.store import Store
 
 if TYPE_CHECKING:
     from lambent.bake.pictures.tracer import LightMap
-    from lambent.realtime.answering import AnsweredLight, Lit
+    from lambent.realtime.answering.answering import AnsweredLight, Lit
 
 Worn = Mapping[str, MaterialTextures | None]  # exchanged textures, by material
 
@@ -68,7 +68,7 @@ class StoredLight:
 
     @cached_property
     def _answer(self) -> AnsweredLight:
-        from lambent.realtime.answering import AnsweredLight  # imports what draws
+        from lambent.realtime.answering.answering import AnsweredLight  # imports what draws
 
         return AnsweredLight(self._baked, read_answer(self._store))
 

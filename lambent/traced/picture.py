@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera
-from lambent.core.colour import luminance
+from lambent.core.light.colour import luminance
+from lambent.core.views.camera import Camera
 
 if TYPE_CHECKING:
     from lambent.bake.pictures.tracer import Kind, Tracer

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from lambent.bake.engine import engine
 from lambent.core.errors import UserError
-from lambent.core.light_mix import Factors, factors_of
+from lambent.core.light.light_mix import Factors, factors_of
 from lambent.materials.document import Material
+from lambent.scenes.looks.textures import prepared
+from lambent.scenes.looks.variants import textures_in_look, textures_in_looks
 from lambent.scenes.replacement import Replacement, with_replacements
 from lambent.scenes.scene import Look, Scene
-from lambent.scenes.textures import prepared
-from lambent.scenes.turned_sky import under_turned_sky
-from lambent.scenes.variants import textures_in_look, textures_in_looks
+from lambent.scenes.sky.turned_sky import under_turned_sky
 from lambent.store.contract import SIDES
 from lambent.store.source import SOURCE
 from lambent.store.store import Store

@@ -10,7 +10,7 @@ from typing import Any
 from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
 from lambent.viewer import modes
-from lambent.viewer.lost import kept
+from lambent.viewer.background.lost import kept
 from lambent.viewer.screen import Screen
 
 

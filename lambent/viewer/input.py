@@ -10,11 +10,11 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from lambent.core.camera import Camera
 from lambent.core.plain import Triple
-from lambent.viewer import cameras
-from lambent.viewer.edits import MaterialEdits
-from lambent.viewer.navigation import Navigation
+from lambent.core.views.camera import Camera
+from lambent.viewer.cameras import cameras
+from lambent.viewer.cameras.navigation import Navigation
+from lambent.viewer.edits.edits import MaterialEdits
 from lambent.viewer.screen import Screen
 
 CLICK_PX = 4.0  # a press that moves less than this is a click, not a drag

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from lambent.core.camera import Camera
-from lambent.core.false_colour import Range
-from lambent.core.photometry import Quantity
+from lambent.core.light.false_colour import Range
+from lambent.core.light.photometry import Quantity
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
 from lambent.realtime.frame_state import FALSE_COLOUR, LIGHT_MAP_NOISE, SHOW, FrameState, quantity_of
 from lambent.realtime.frame_state import VIEW_TRANSFORMS as ALL_TRANSFORMS
 from lambent.realtime.incident import AUTO, look_ups
-from lambent.realtime.integrators import INTEGRATORS as ALL_INTEGRATORS
-from lambent.realtime.patterns import RINGS
+from lambent.realtime.integrators.integrators import INTEGRATORS as ALL_INTEGRATORS
+from lambent.realtime.integrators.patterns import RINGS
 
 # Choices of the panels; the first is the default.
 INTEGRATORS = tuple(name for name, how in ALL_INTEGRATORS.items() if how.specular)

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
-from lambent.core.false_colour import with_scale
-from lambent.core.images import write_image, write_shown
-from lambent.realtime.device import adapter_info
+from lambent.core.light.false_colour import with_scale
+from lambent.core.pictures.images import write_image, write_shown
 from lambent.realtime.frame_state import FrameState, quantity_of
-from lambent.realtime.planar_integrators import OFF
+from lambent.realtime.gpu.device import adapter_info
+from lambent.realtime.gpu.targets import DISPLAY_FORMAT
+from lambent.realtime.planar.planar_integrators import OFF
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.targets import DISPLAY_FORMAT
-from lambent.viewer.edits import unused
+from lambent.viewer.edits.edits import unused
 from lambent.viewer.mode import Drawing
 from lambent.viewer.pacing import Pacer, Plan
 from lambent.viewer.screen import Rect, Screen, Statistics, least

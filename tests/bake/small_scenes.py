@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from lambent.bake.quality import quality_named
-from lambent.core.images import write_image
+from lambent.core.pictures.images import write_image
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import Mesh, Scene, SceneObject

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.core.answer import Albedos, solved
+from lambent.baked.answering.albedos import edited_albedos
+from lambent.baked.answering.answer import Albedos, solved
+from lambent.baked.answering.stored import has_answer, read_answer
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
-from lambent.materials.diffuse_albedos import edited_albedos
 from lambent.materials.document import Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import Scene, SceneObject
-from lambent.store.answer import has_answer, read_answer
 from lambent.store.store import Store
 from tests.bake.small_scenes import BLACK, TINY, furnace, room_with_step
 

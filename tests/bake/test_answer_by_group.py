@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.core.camera import Camera
+from lambent.baked.answering.stored import has_answer, read_answer
+from lambent.core.views.camera import Camera
 from lambent.materials.recolour import recoloured
-from lambent.realtime.answering import AnsweredLight, answered_scene
-from lambent.realtime.baked import BakedScene, read_baked
-from lambent.realtime.device import open_device
+from lambent.realtime.answering.answering import AnsweredLight, answered_scene
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.device import open_device
+from lambent.realtime.light.baked import BakedScene, read_baked
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import DirectionalLight, Scene, SceneObject
-from lambent.store.answer import has_answer, read_answer
 from lambent.store.contract import SIDES
 from lambent.store.light_groups import group_name, light_groups
 from lambent.store.store import Store

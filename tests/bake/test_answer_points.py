@@ -18,7 +18,7 @@ from lambent.bake.answering.points import (
 )
 from lambent.bake.answering.spots import LEAST, Spots
 from lambent.bake.answering.transfer import AROUND, chosen_rays, sender_means, texels_around, transfer_of
-from lambent.core.answer_rays import BYTE, Rays, packed_rays
+from lambent.baked.answering.rays import BYTE, Rays, packed_rays
 from lambent.materials.document import Material
 from lambent.scenes.scene import Scene
 

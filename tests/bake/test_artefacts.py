@@ -18,7 +18,7 @@ from lambent.bake.context import BakeContext
 from lambent.bake.methods import chosen
 from lambent.bake.quality import quality_named
 from lambent.core.errors import UserError
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.progress import Cancelled, silent
 from lambent.scenes.scene import ConstantEnvironment, MaterialTextures, PointLight, Scene, Texture
 from lambent.store.store import Store
@@ -27,9 +27,9 @@ from tests.bake.small_scenes import MIRROR, TINY, plane, room_with_step
 TOY = '''
 """Areas of triangles."""
 
-from lambent.bake.keys import key_of
-from lambent.bake.tiles import run_tiles
-from lambent.core.geometry import triangle_areas
+from lambent.bake.running.keys import key_of
+from lambent.bake.running.tiles import run_tiles
+from lambent.core.geometry.triangles import triangle_areas
 
 KIND = "areas"
 NEEDS = ("geometry",)

@@ -10,7 +10,7 @@ import pytest
 from lambent.bake.surfaces.atlas import merged, object_records, separated, unwrap
 from lambent.bake.surfaces.charts import PIECE_FACES
 from lambent.bake.surfaces.texels import chart_labels, texels_of
-from lambent.core.geometry import cross_2d
+from lambent.core.geometry.triangles import cross_2d
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import sphere
 from lambent.scenes.scene import Scene, SceneObject

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.bake.backs import backs_of
 from lambent.bake.bake import bake
 from lambent.bake.engine import engine
-from lambent.bake.sight import Sight
+from lambent.bake.surfaces.backs import backs_of
 from lambent.bake.surfaces.texels import texels_of
-from lambent.core.camera import Camera
+from lambent.bake.surfaces.visible_triangles import Sight
+from lambent.core.views.camera import Camera
 from lambent.scenes.geometry import box, patch, placed
 from lambent.scenes.scene import ConstantEnvironment, Scene, SceneObject
 from lambent.store.store import Store
@@ -74,7 +74,7 @@ def test_the_back_of_a_strip_that_fills_little_of_the_view_is_lit(tmp_path: Path
     strip = SceneObject("strip", patch((-0.015, 1.0, 0.5), (0.03, 0, 0), (0, 0, -0.03)), "black")
     few = replace(scene(), objects=(*scene().objects, strip), cameras=scene().cameras[:1])
     engine()
-    from lambent.bake.tracing.viewed import seen_from_behind
+    from lambent.bake.tracing.seen.viewed import seen_from_behind
 
     assert seen_from_behind(Sight(few), 2e-4) == ["crate", "shelf"]
     assert backs_of(bake(few, tmp_path / "s", quality=LIGHT, only=("geometry",))) == {"crate", "shelf", "strip"}

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from lambent.bake import memory
 from lambent.bake.bake import bake
+from lambent.bake.running import memory
 from lambent.core.errors import UserError
 from lambent.scenes.geometry import placed, sphere
 from lambent.scenes.scene import Scene, SceneObject

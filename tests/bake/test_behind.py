@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from lambent.bake.behind import AHEAD, behind
+from lambent.bake.running.in_background import AHEAD, behind
 
 
 def test_work_is_done_in_order() -> None:

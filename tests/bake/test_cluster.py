@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.bounces import Bounces
-from lambent.bake.cluster import DaskWorkers, opened
 from lambent.bake.interreflection.series import bins_of, tails_of
+from lambent.bake.interreflection.settings import Bounces
 from lambent.bake.interreflection.tiles import Job, TileTracer
-from lambent.bake.view import View
-from lambent.bake.workers import Workers
+from lambent.bake.running.cluster import DaskWorkers, opened
+from lambent.bake.running.workers import Workers
+from lambent.bake.transport.view import View
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
@@ -142,7 +142,7 @@ def test_a_job_that_kills_its_workers_is_given_up() -> None:
 
 
 def test_a_worker_with_other_libraries_is_refused(two: DaskWorkers, monkeypatch: pytest.MonkeyPatch) -> None:
-    from lambent.bake import cluster
+    from lambent.bake.running import cluster
 
     ours = cluster.made_with()
     monkeypatch.setattr(cluster, "made_with", lambda: {**ours, "mitsuba": "2.0"})
@@ -155,7 +155,7 @@ def test_workers_that_there_are_none_of(monkeypatch: pytest.MonkeyPatch) -> None
     for mistake in ({}, {"count": 1, "address": "tcp://127.0.0.1:1"}, {"count": 0}):
         with pytest.raises(UserError, match="workers"), opened(**mistake):  # type: ignore[arg-type]
             pass
-    monkeypatch.setattr("lambent.bake.cluster.SECONDS", 1.0)
+    monkeypatch.setattr("lambent.bake.running.cluster.SECONDS", 1.0)
     for nowhere in ("tcp://127.0.0.1:1", "nonsense", "smoke://a:1"):
         with pytest.raises(UserError, match="no worker answered"), opened(address=nowhere):
             pass

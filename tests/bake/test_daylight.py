@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.colour import luminance
-from lambent.core.directions import normalize
-from lambent.core.photometry import photometric
-from lambent.scenes.clear_sky import air_mass, cie_clear_sky, efficacies, esra, kittler_sun
+from lambent.core.geometry.directions import normalize
+from lambent.core.light.colour import luminance
+from lambent.core.light.photometry import photometric
 from lambent.scenes.scene import SunSky
+from lambent.scenes.sky.clear_sky import air_mass, cie_clear_sky, efficacies, esra, kittler_sun
 
 HEIGHTS_DEG, TURBIDITIES = (10.0, 20.0, 45.0, 70.0), (2.0, 4.0, 6.0)
 

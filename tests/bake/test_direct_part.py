@@ -10,7 +10,7 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.light.direct import direct_part
 from lambent.bake.light.sampling import variance_of
-from lambent.store.answer import read_answer
+from lambent.baked.answering.stored import read_answer
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, furnace, room_with_step
 

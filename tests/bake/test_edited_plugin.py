@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_lobes import of_material

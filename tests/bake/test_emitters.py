@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from lambent.bake.reference.path_traced import render_reference
-from lambent.bake.tracing.emitters import FLOOR, balance_emitters
+from lambent.bake.tracing.lights.emitters import FLOOR, balance_emitters
 from lambent.bake.tracing.scene_builder import SceneBuilder
-from lambent.core.camera import Camera
-from lambent.core.images import write_image
+from lambent.core.pictures.images import write_image
+from lambent.core.views.camera import Camera
 from lambent.scenes.scene import ConstantEnvironment, ImageEnvironment, PointLight, Scene
 from tests.bake.small_scenes import GREY, plane
 

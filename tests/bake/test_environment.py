@@ -10,12 +10,12 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.sky.cube import environment_cube
-from lambent.core.cubemap import face_directions, sample, texel_solid_angles
-from lambent.core.directions import normalize
-from lambent.core.images import write_image
+from lambent.core.geometry.cubemap import face_directions, sample, texel_solid_angles
+from lambent.core.geometry.directions import normalize
+from lambent.core.pictures.images import write_image
 from lambent.core.surroundings import Axis, Layout
-from lambent.scenes.environment_images import orientation
 from lambent.scenes.scene import ImageEnvironment, SunSky
+from lambent.scenes.sky.environment_images import orientation
 from lambent.store.contract import sun_beside
 from tests.bake.small_scenes import TINY, plane
 

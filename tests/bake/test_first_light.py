@@ -14,12 +14,12 @@ from lambent.bake.engine import engine
 from lambent.bake.sky.daylight import radiance_from
 from lambent.bake.sky.sun import sun_of
 from lambent.bake.tracing import path_tracer
-from lambent.bake.tracing.emitters import balance_emitters
 from lambent.bake.tracing.first_light import FirstLight, sky_without
+from lambent.bake.tracing.lights.emitters import balance_emitters
+from lambent.bake.tracing.lights.sun import Sun
 from lambent.bake.tracing.rays import array_of, independent, vectors
 from lambent.bake.tracing.scene_builder import SceneBuilder
-from lambent.bake.tracing.sun import Sun
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import DirectionalLight, PointLight, Scene, SceneObject
 from tests.bake.small_scenes import GREY

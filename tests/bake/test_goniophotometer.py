@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from lambent.bake.reference.goniophotometer import SPECIMENS, measure
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured import load
-from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC
+from lambent.materials.measured.inspecting.synthetic import ANISOTROPIC, ISOTROPIC
+from lambent.materials.measured.parts.gonio_text import write_gonio
 
 COARSE = replace(ISOTROPIC, step_deg=5, fine_deg=2.5, floor=0.0)
 WI = direction(np.radians([5, 33, 61]), 0.0)

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection.series import SMOOTH_ANGLES
-from lambent.bake.view import View
-from lambent.core.camera import Camera
+from lambent.bake.interreflection.settings import Bounces
+from lambent.bake.transport.view import View
+from lambent.baked.shared_exponent import unpacked_rgb
+from lambent.baked.transport.tails import FIXED, Tails
 from lambent.core.errors import UserError
-from lambent.core.shared_exponent import unpacked_rgb
+from lambent.core.views.camera import Camera
 from lambent.editing.interreflection.powers import bands_of
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo
@@ -23,7 +24,6 @@ from lambent.materials.factored.terms import Editable
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.store import Store
-from lambent.store.tails import FIXED, Tails
 from tests.bake.small_scenes import turned_inwards
 from tests.editing.dense_rows import second_coefficients
 from tests.tools.z_test import assert_same_image

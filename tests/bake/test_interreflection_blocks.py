@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection import tiles
 from lambent.bake.interreflection.series import bins_of, tails_of
+from lambent.bake.interreflection.settings import Bounces
 from lambent.bake.interreflection.sums import Sorted, Sums, _add, compile_sums
 from lambent.bake.interreflection.tiles import Job, Tile, TileTracer
+from lambent.bake.transport.view import View
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.bake.transport.view_tracer import ViewTracer
-from lambent.bake.view import View
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.scene import Scene
 from tests.bake.test_interreflection import FIRST, FROM_ABOVE, INSIDE, corner, furnace, of_scene

@@ -7,8 +7,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
-from lambent.materials.chi_square import chi_square
+from lambent.core.geometry.directions import direction
+from lambent.materials.checking.chi_square import chi_square
 from tests.tools.in_mitsuba import vectors
 
 

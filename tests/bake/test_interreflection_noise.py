@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.bounces import Bounces
-from lambent.bake.view import View
-from lambent.core.colour import luminance
+from lambent.bake.interreflection.settings import Bounces
+from lambent.bake.transport.view import View
 from lambent.core.errors import UserError
+from lambent.core.light.colour import luminance
 from lambent.core.progress import silent
 from lambent.editing.interreflection.noise import PassNoise, light_of, noted_noise
 from lambent.editing.interreflection.stored import interreflections

@@ -13,13 +13,13 @@ import pytest
 
 from lambent.bake.artefacts import interreflection
 from lambent.bake.bake import bake
-from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection import paths, trial
 from lambent.bake.interreflection.proposal import Proposal, held_by, propose, propose_all, same_materials
+from lambent.bake.interreflection.settings import Bounces
 from lambent.bake.interreflection.trial import Cost, passes
-from lambent.bake.view import View
-from lambent.core.camera import Camera
+from lambent.bake.transport.view import View
 from lambent.core.errors import UserError
+from lambent.core.views.camera import Camera
 from lambent.editing.interreflection.stored import interreflections
 from lambent.materials.document import Material
 from lambent.materials.factored.of_lobes import of_material

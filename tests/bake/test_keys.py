@@ -14,17 +14,18 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import found
-from lambent.bake.bounces import Bounces
 from lambent.bake.context import BakeContext
+from lambent.bake.interreflection.settings import Bounces
 from lambent.bake.methods import chosen
 from lambent.bake.quality import Quality
-from lambent.bake.view import View
-from lambent.core.camera import Camera, CameraPath
-from lambent.core.images import write_image
+from lambent.bake.transport.view import View
+from lambent.core.pictures.images import write_image
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.materials.document import Lobe, Material, Provenance
 from lambent.materials.factored.of_models import editable
 from lambent.materials.models.phong import Phong
 from lambent.scenes.geometry import patch, placed, sphere
+from lambent.scenes.looks.textures import CHANNELS
 from lambent.scenes.scene import (
     ComputedEnvironment,
     ConstantEnvironment,
@@ -43,7 +44,6 @@ from lambent.scenes.scene import (
     Texture,
     Variant,
 )
-from lambent.scenes.textures import CHANNELS
 from lambent.store.store import Store
 from tests.bake.small_scenes import GREY, MIRROR, TINY
 

@@ -1,6 +1,6 @@
 """Smooth normals across hard edges: where one turns from a viewer whom its face sees, it is bent back to him.
 
-The path tracer (bake/bsdfs) bends as the renderer does (`shading_frame` of realtime/shaders/shade.wgsl).
+The path tracer (bake/bsdfs) bends as the renderer does (`shading_frame` of realtime/shading/shade.wgsl).
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import lambent.realtime
-from lambent.core.camera import Camera
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
+from lambent.core.views.camera import Camera
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.scene import ConstantEnvironment, Mesh, Scene, SceneObject

@@ -14,13 +14,13 @@ from lambent.bake.bake import bake
 from lambent.bake.light_fields.choice import SHARE, WORTH, chosen, worth_trying
 from lambent.bake.light_fields.request import as_asked, light_fields_of, noted
 from lambent.bake.light_fields.trial import COUNTS, PROBE, Option, ProbeLight, Trial, helps, options_of
-from lambent.core.camera import Camera
-from lambent.core.cubemap import face_directions
-from lambent.core.directions import normalize
+from lambent.baked.light_fields.stored import read_light_field
 from lambent.core.errors import UserError
+from lambent.core.geometry.cubemap import face_directions
+from lambent.core.geometry.directions import normalize
+from lambent.core.views.camera import Camera
 from lambent.scenes.geometry import box, placed
 from lambent.scenes.scene import LightFieldWish, Scene, SceneObject, SunSky
-from lambent.store.light_fields import read_light_field
 from tests.bake.small_scenes import MIRROR, TINY, room_with_step
 
 MB = 64**2 * 8 / 1e6  # of a point with maps of 64 texels a side

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.bake import bake
-from lambent.core.camera import Camera
-from lambent.core.light_field import NO_POINT
+from lambent.baked.light_fields.light_field import NO_POINT
+from lambent.baked.light_fields.stored import read_light_field
+from lambent.core.views.camera import Camera
 from lambent.scenes.scene import LightFieldWish, Scene
-from lambent.store.light_fields import read_light_field
 from tests.bake.small_scenes import TINY, coloured_room, turned_inwards
 
 SMALL = TINY.changed("small", light_field={"points": 24, "texels": 16, "strata": 1})

@@ -10,11 +10,11 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera
-from lambent.core.light_mix import Factors
-from lambent.realtime.baked import read_baked
-from lambent.realtime.device import open_device
+from lambent.core.light.light_mix import Factors
+from lambent.core.views.camera import Camera
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.device import open_device
+from lambent.realtime.light.baked import read_baked
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import LightFieldWish, Scene, SceneObject

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.core.directions import normalize
-from lambent.core.light_field import NO_POINT
-from lambent.core.octahedral import from_square, texel_directions, texel_solid_angles
+from lambent.baked.light_fields.light_field import NO_POINT
+from lambent.baked.light_fields.stored import read_light_field
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.octahedral import from_square, texel_directions, texel_solid_angles
 from lambent.core.progress import Cancelled
 from lambent.materials.document import Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import ConstantEnvironment, LightFieldWish, Scene, SceneObject, SunSky
 from lambent.store.contract import light_field_name
-from lambent.store.light_fields import read_light_field
 from lambent.store.store import Store
 from tests.bake.small_scenes import BLACK, COLOURS, TINY, coloured_room, room_with_step
 
@@ -250,8 +250,8 @@ def test_the_disc_of_the_sun_is_left_out(mi: Any) -> None:
     """Pixels add it. Seen from an open place, maps with and without it differ by the irradiance that it has."""
     from lambent.bake.light_fields.acquisition import Around, radiance_maps
     from lambent.bake.sky.sun import sun_of
+    from lambent.bake.tracing.lights.sun import Sun
     from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.tracing.sun import Sun
 
     floor = SceneObject("floor", patch((-1, -5, 1), (2, 0, 0), (0, 0, -2)), "black")
     scene = Scene("s", (floor,), {"black": BLACK}, environment=SunSky((0.39, 0.86, -0.32)))

@@ -17,7 +17,7 @@ from lambent.bake.light_fields.sampling import (
     thinned,
 )
 from lambent.core.errors import UserError
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.triangles import triangle_areas
 from lambent.materials.document import Material
 from lambent.scenes.geometry import box, merge, patch, placed, sphere
 from lambent.scenes.geometry.teapot import teapot

@@ -13,10 +13,10 @@ from lambent.bake.light_fields.sample_map import (
     sample_map,
     with_gutters,
 )
+from lambent.baked.light_fields.light_field import CANDIDATES, NO_POINT
+from lambent.baked.light_fields.nearest_points import HORIZON_DEG, nearest_points
 from lambent.core.arrays import Floats
-from lambent.core.directions import normalize
-from lambent.core.light_field import CANDIDATES, NO_POINT
-from lambent.core.nearest_points import HORIZON_DEG, nearest_points
+from lambent.core.geometry.directions import normalize
 
 
 def by_brute_force(places: Floats, normals: Floats, points: Floats) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.irradiance import irradiance_of
+from lambent.baked.probes.irradiance import irradiance_of
 from lambent.materials.document import Lobe, Material
 from tests.bake.small_scenes import coloured_room
 

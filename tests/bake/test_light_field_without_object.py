@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
+from lambent.baked.light_fields.light_field import LightField
+from lambent.baked.light_fields.stored import read_light_field
 from lambent.core.errors import UserError
-from lambent.core.light_field import LightField
-from lambent.core.octahedral import texel_directions
+from lambent.core.geometry.octahedral import texel_directions
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import box
 from lambent.scenes.scene import LightFieldWish, Scene, SceneObject
-from lambent.store.light_fields import read_light_field
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, coloured_room
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.core.camera import Camera
 from lambent.core.errors import UserError
-from lambent.core.light_mix import GroupMix
+from lambent.core.light.light_mix import GroupMix
+from lambent.core.views.camera import Camera
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import ConstantEnvironment, LightGroup, PointLight, Scene, SceneObject, SunSky
 from lambent.store.light_groups import light_groups
@@ -49,9 +49,9 @@ def sums_at_points(scene: Scene, *, whole: bool = False, sun_left_out: bool = Tr
     from lambent.bake.tracing import path_tracer
     from lambent.bake.tracing.first_light import FirstLight, sky_without
     from lambent.bake.tracing.group_tally import Direct, GroupTally, Sorting
+    from lambent.bake.tracing.lights.sun import Sun
     from lambent.bake.tracing.rays import block_sums, independent, vectors
     from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.tracing.sun import Sun
     from lambent.scenes.light_groups import sorted_lights
 
     builder = SceneBuilder(scene)

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.cuts import cut_for_viewers, longest_piece
 from lambent.bake.engine import engine
-from lambent.bake.sight import Sight
 from lambent.bake.surfaces.atlas import Atlas, merged, unwrap
 from lambent.bake.surfaces.coverage import texel_areas
+from lambent.bake.surfaces.cuts import cut_for_viewers, longest_piece
 from lambent.bake.surfaces.cutting import cut, lengths_of
 from lambent.bake.surfaces.texels import texels_of
-from lambent.core.camera import Camera
-from lambent.core.geometry import cross_2d, triangle_areas
+from lambent.bake.surfaces.visible_triangles import Sight
+from lambent.core.geometry.triangles import cross_2d, triangle_areas
+from lambent.core.views.camera import Camera
 from lambent.scenes.geometry import box, merge, patch, placed, sphere
 from lambent.scenes.scene import Mesh, Scene, SceneObject
 from lambent.store.store import Store
@@ -54,7 +54,7 @@ def texels_of_objects(atlas: Atlas) -> dict[str, tuple[float, float]]:
 
 def seen_atlas(scene: Scene, folder: Path) -> Atlas:
     engine()
-    from lambent.bake.tracing.viewed import texel_sizes
+    from lambent.bake.tracing.seen.viewed import texel_sizes
 
     with Store.create(folder / "s", {}) as store:
         sight = cut_for_viewers(Sight(scene), store)
@@ -75,7 +75,7 @@ def test_a_plain_leaves_texels_to_the_room_that_stands_on_it(half_m: float, tmp_
 
 def test_an_object_whose_texels_are_too_coarse_is_named(caplog: pytest.LogCaptureFixture) -> None:
     engine()
-    from lambent.bake.tracing.viewed import texel_sizes
+    from lambent.bake.tracing.seen.viewed import texel_sizes
 
     with caplog.at_level(logging.WARNING):
         uncut = room_on_a_plain(100.0)

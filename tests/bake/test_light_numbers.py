@@ -11,8 +11,8 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.engine import engine
 from lambent.bake.light.sampling import relative_noise
-from lambent.core.colour import luminance
-from lambent.core.directions import basis, normalize
+from lambent.core.geometry.directions import basis, normalize
+from lambent.core.light.colour import luminance
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Material
 from lambent.scenes.scene import DirectionalLight, SunSky

@@ -11,10 +11,10 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 from lambent.bake.bake import bake
-from lambent.core.photometry import LM_PER_W, photometric
+from lambent.core.light.photometry import LM_PER_W, photometric
 from lambent.scenes.ies import Photometry
 from lambent.scenes.scene import DirectionalLight, IesLight, PointLight
-from lambent.scenes.triangle_lights import joined, small_lights
+from lambent.scenes.sky.triangle_lights import joined, small_lights
 from tests.bake.small_scenes import TINY, plane
 from tests.scenes.test_gltf import document, loaded
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bsdfs.material_plugin import PLUGIN, material_dict
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from tests.tools.in_mitsuba import interaction

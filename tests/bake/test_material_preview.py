@@ -9,10 +9,10 @@ import pytest
 
 from lambent.bake.reference import material_preview
 from lambent.bake.reference.material_preview import FOV_DEG, preview
-from lambent.core.images import write_image
+from lambent.core.pictures.images import write_image
 from lambent.materials.document import Lobe, Material
-from lambent.materials.measured.half_vector_grid import GridShape
-from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, synthesise
+from lambent.materials.measured.inspecting.synthetic import ANISOTROPIC, ISOTROPIC, synthesise
+from lambent.materials.measured.tables.half_vector_grid import GridShape
 from lambent.scenes.scene import ImageEnvironment
 
 SMALL = {"size_px": 48, "spp": 16}

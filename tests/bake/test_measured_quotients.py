@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.engine import engine
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import components
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.of_textures import of_textures
@@ -17,7 +17,7 @@ from lambent.materials.factored.quotients import Grooves
 from lambent.materials.factored.tabulated import Grid, Tabulated
 from lambent.materials.lobes import NUMPY
 from lambent.materials.measured.homomorphic import HomomorphicTable
-from lambent.scenes.triangle_lights import environment_triangles
+from lambent.scenes.sky.triangle_lights import environment_triangles
 from tests.bake.test_transport import GLOSSY, ball_on_floor, environment, view
 
 RNG = np.random.default_rng(5)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.fresnel import conductor
 from lambent.materials.models import model_named
 from tests.tools.in_mitsuba import f_cos

@@ -11,7 +11,7 @@ from lambent.bake.engine import engine
 from lambent.bake.photons.density import Kernel
 from lambent.bake.photons.shooting import shoot
 from lambent.bake.tracing.scene_builder import SceneBuilder
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
 from lambent.materials.document import Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import DirectionalLight, Mesh, Scene, SceneObject

@@ -13,8 +13,8 @@ from lambent.bake.surfaces.coverage import texel_areas
 from lambent.bake.surfaces.texels import texels_of
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
-from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.synthetic import Setup, synthesise
+from lambent.materials.measured.inspecting.synthetic import Setup, synthesise
+from lambent.materials.measured.parts.gonio_text import write_gonio
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject

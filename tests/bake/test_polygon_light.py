@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from lambent.bake.transport.polygon_light import cosine_integral, highest_part
-from lambent.core.camera import Camera
-from lambent.core.sequences import r2
+from lambent.core.geometry.sequences import r2
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.lobes import NUMPY
 from lambent.scenes.geometry import box, patch
 from lambent.scenes.scene import Scene, SceneObject
-from lambent.scenes.triangle_lights import surface_triangles
+from lambent.scenes.sky.triangle_lights import surface_triangles
 from tests.bake.small_scenes import turned_inwards
 from tests.bake.test_transport import view
 

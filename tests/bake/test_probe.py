@@ -14,10 +14,10 @@ from lambent.bake.probes.planes import bounding_planes
 from lambent.bake.probes.probe import MOST, Surroundings, _blocks_needed, bake_probe, bake_small
 from lambent.bake.reference.path_traced import render_reference
 from lambent.bake.tracing.scene_builder import SceneBuilder
-from lambent.core.camera import Camera
-from lambent.core.cubemap import face_directions, sample
-from lambent.core.directions import normalize
+from lambent.core.geometry.cubemap import face_directions, sample
+from lambent.core.geometry.directions import normalize
 from lambent.core.plain import Triple
+from lambent.core.views.camera import Camera
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import box, cylinder, merge, patch, placed, sphere

@@ -11,12 +11,12 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.engine import engine
-from lambent.bake.sight import Sight
+from lambent.bake.surfaces.visible_triangles import Sight
 from lambent.bake.tracing.solids import closed
-from lambent.core.camera import Camera
-from lambent.core.cubemap import texel_solid_angles
-from lambent.core.geometry import triangle_areas
-from lambent.realtime.baked import read_baked
+from lambent.core.geometry.cubemap import texel_solid_angles
+from lambent.core.geometry.triangles import triangle_areas
+from lambent.core.views.camera import Camera
+from lambent.realtime.light.baked import read_baked
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.contract import scene_record, whole_objects

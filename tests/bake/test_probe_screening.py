@@ -10,7 +10,7 @@ import pytest
 
 from lambent.bake.surfaces.cutting import cut_across
 from lambent.bake.tracing.solids import closed
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.triangles import triangle_areas
 from lambent.scenes.geometry import box, merge, patch, placed, signed_volume, sphere
 from lambent.scenes.scene import Mesh, Scene, SceneObject
 from tests.bake.small_scenes import BLACK, GREY, MIRROR, turned_inwards

@@ -20,10 +20,10 @@ from lambent.bake.probes.selection import (
     judged,
     specular_occlusion,
 )
-from lambent.core.camera import Camera
-from lambent.core.cubemap import face_directions
-from lambent.core.directions import normalize
-from lambent.core.probe_lookups import distance_lookup, inverse_depth
+from lambent.baked.probes.lookups import distance_lookup, inverse_depth
+from lambent.core.geometry.cubemap import face_directions
+from lambent.core.geometry.directions import normalize
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import merge, patch, sphere
 from lambent.scenes.scene import ImageEnvironment, Scene, SceneObject

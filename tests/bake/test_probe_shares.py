@@ -9,10 +9,10 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.engine import engine
-from lambent.core.camera import Camera
-from lambent.core.cubemap import sample
-from lambent.core.directions import normalize
-from lambent.core.probe_lookups import distance_lookup, inverse_depth, planes_lookup
+from lambent.baked.probes.lookups import distance_lookup, inverse_depth, planes_lookup
+from lambent.core.geometry.cubemap import sample
+from lambent.core.geometry.directions import normalize
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import ImageEnvironment, Scene, SceneObject

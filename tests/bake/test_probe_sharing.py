@@ -10,10 +10,10 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.probes.sharing import MOST, _grouped, _largest, _reach
-from lambent.core.camera import Camera
 from lambent.core.errors import UserError
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.baked import read_baked
+from lambent.realtime.light.baked import read_baked
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import ConstantEnvironment, Scene, SceneObject
 from lambent.store.contract import probe_name, scene_record, shared_probes

@@ -9,8 +9,8 @@ import pytest
 
 from lambent.bake.engine import engine
 from lambent.bake.reference.path_traced import render_reference
-from lambent.core.camera import Camera
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
+from lambent.core.views.camera import Camera
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import patch

@@ -10,11 +10,11 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.quality import quality_named
-from lambent.bake.view import View
-from lambent.core.camera import Camera
+from lambent.bake.transport.view import View
 from lambent.core.errors import UserError
-from lambent.core.images import write_image
-from lambent.core.latlong import lat_long_directions
+from lambent.core.geometry.latlong import lat_long_directions
+from lambent.core.pictures.images import write_image
+from lambent.core.views.camera import Camera
 from lambent.editing.relit_view import RelitView
 from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import ConstantEnvironment, ImageEnvironment, PointLight, Scene, SceneObject, SunSky
@@ -190,7 +190,7 @@ def test_what_cannot_be_is_said(store: Store, view: RelitView) -> None:
 
 def test_the_command_draws_what_python_draws(store: Store, view: RelitView, folder: Path) -> None:
     from lambent.cli.main import run
-    from lambent.core.images import read_image
+    from lambent.core.pictures.images import read_image
 
     picture, out = sky(folder, "b.exr", 2), folder / "out.exr"
     assert run(["relight", str(store.folder), "-o", str(out), "--environment", str(picture), "--up", "+x",

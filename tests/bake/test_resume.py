@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.core.camera import Camera
 from lambent.core.errors import UserError
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
 from lambent.scenes.scene import Scene
 from lambent.store.contract import scene_record

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection.as_baked import (
     is_lambertian,
     over_albedo,
@@ -18,7 +17,8 @@ from lambent.bake.interreflection.as_baked import (
     unlike_documents,
 )
 from lambent.bake.interreflection.series import bins_of, tails_of
-from lambent.core.camera import Camera
+from lambent.bake.interreflection.settings import Bounces
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo
 from lambent.materials.factored.of_lobes import of_material
@@ -61,7 +61,7 @@ def room(materials: dict[str, Material]) -> Scene:
 def compared(scene: Scene, later: dict[str, Editable], folder: Path, series: tuple[int, ...]) -> None:
     """The wall of a store and of the path tracer: pixel by pixel, and in the mean, within the noise of both."""
     from lambent.bake.bake import bake
-    from lambent.bake.view import View
+    from lambent.bake.transport.view import View
 
     view, passes, bounces = View(AT_WALL, SIZE, SIZE), [], Bounces(series, samples=1024)
     for seed in range(2):
@@ -202,8 +202,8 @@ def test_another_process_traces_the_same() -> None:
 
     engine()
     from lambent.bake.interreflection.tiles import Job, TileTracer
+    from lambent.bake.transport.view import View
     from lambent.bake.transport.view_tracer import ViewTracer
-    from lambent.bake.view import View
 
     scene, few = room(GLOSSY), Bounces((4, 1, 1))
     editables = {**of_scene(scene), **MODELS}

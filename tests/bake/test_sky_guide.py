@@ -14,9 +14,9 @@ from scipy.stats import chi2
 from lambent.bake.engine import engine
 from lambent.bake.sky.bins import BINS, SUB, SkyBins, alias_tables
 from lambent.bake.tracing import path_tracer
-from lambent.bake.tracing.emitters import balance_emitters
+from lambent.bake.tracing.lights.emitters import balance_emitters
 from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
-from lambent.core.images import write_image
+from lambent.core.pictures.images import write_image
 from lambent.scenes.geometry import merge, patch
 from lambent.scenes.scene import ConstantEnvironment, ImageEnvironment, Scene, SceneObject
 from tests.bake.small_scenes import BLACK, plane

@@ -13,7 +13,7 @@ from lambent.bake.bake import bake
 from lambent.bake.reference.path_traced import render_reference
 from lambent.cli.main import run
 from lambent.core.errors import UserError
-from lambent.core.images import read_image
+from lambent.core.pictures.images import read_image
 from lambent.materials.document import Material
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import box

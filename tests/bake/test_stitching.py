@@ -14,7 +14,7 @@ from lambent.bake.light.sampling import cleaned
 from lambent.bake.light.stitching import Cuts, cuts_of, stitched
 from lambent.bake.surfaces.atlas import merged, unwrap
 from lambent.bake.surfaces.texels import BEYOND, chart_labels, texels_of
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
 from lambent.scenes.geometry import box, grid, merge, patch, placed, sphere
 from lambent.scenes.scene import ConstantEnvironment, Mesh, Scene, SceneObject
 from tests.bake.small_scenes import BLACK, GREY, TINY

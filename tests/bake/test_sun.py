@@ -17,13 +17,13 @@ from lambent.bake.photons.shooting import shoot
 from lambent.bake.sky.daylight import lone_emitter, radiance_from
 from lambent.bake.sky.sun import FoundSun, sun_in, sun_of
 from lambent.bake.tracing import path_tracer
+from lambent.bake.tracing.lights.sun import Sun, SunRays
 from lambent.bake.tracing.rays import array_of, independent, vectors
 from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
-from lambent.bake.tracing.sun import Sun, SunRays
-from lambent.core.directions import normalize
-from lambent.core.images import write_image
-from lambent.core.latlong import lat_long_direction
-from lambent.realtime.baked import read_baked
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.latlong import lat_long_direction
+from lambent.core.pictures.images import write_image
+from lambent.realtime.light.baked import read_baked
 from lambent.scenes.geometry import box, patch, placed
 from lambent.scenes.scene import DirectionalLight, ImageEnvironment, Scene, SceneObject, SunSky
 from lambent.store.contract import sun_beside
@@ -183,7 +183,7 @@ def test_photons_leave_out_the_same_light(tmp_path: Path) -> None:
 
 def photon_flux_of_the_sun(scene: Scene, found: FoundSun) -> Floats:
     """(3,) W of the sun on the fronts of all surfaces, shadows counted by rays from points on them."""
-    from lambent.core.geometry import points_on_triangles, triangle_areas, triangle_normals
+    from lambent.core.geometry.triangles import points_on_triangles, triangle_areas, triangle_normals
 
     whole = SceneBuilder(scene).build()
     corners = scene.corners

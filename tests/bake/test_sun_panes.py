@@ -15,9 +15,9 @@ from lambent.bake.engine import engine
 from lambent.bake.photons.shooting import shoot
 from lambent.bake.sky.sun import sun_of
 from lambent.bake.tracing import path_tracer
+from lambent.bake.tracing.lights.sun import Sun, SunRays
 from lambent.bake.tracing.rays import array_of, independent, vectors
 from lambent.bake.tracing.scene_builder import SceneBuilder
-from lambent.bake.tracing.sun import Sun, SunRays
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import DirectionalLight, MaterialTextures, Mesh, Scene, SceneObject, Texture

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from lambent.bake.bsdfs.table_plugin import table_dict
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF, components
-from lambent.materials.chi_square import chi_square
+from lambent.materials.checking.chi_square import chi_square
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured import load
-from lambent.materials.measured.half_vector_grid import GridShape
-from lambent.materials.measured.half_vector_resampling import grid_of
-from lambent.materials.measured.klems import KLEMS_HALF, AngleBasis, PatchMatrix
 from lambent.materials.measured.lbnl_xml import LbnlTable
-from lambent.materials.measured.patch_sheet import lookup_of
+from lambent.materials.measured.parts.klems import KLEMS_HALF, AngleBasis, PatchMatrix
 from lambent.materials.measured.protocol import TableInfo
+from lambent.materials.measured.tables.half_vector_grid import GridShape
+from lambent.materials.measured.tables.half_vector_resampling import grid_of
+from lambent.materials.measured.tables.patch_sheet import lookup_of
 from tests.tools.in_mitsuba import interaction
 
 SMALL = GridShape(8, 8, 64, 32)
@@ -227,7 +227,7 @@ def test_an_rgl_file_is_mitsubas_own_measured(mi, shared_data):
 
 def test_a_retro_reflector_in_the_path_tracer(mi):
     """Value, density and samples of the two grids are the same in numpy and in Mitsuba."""
-    from lambent.bench.retro_tapes import TAPES
+    from lambent.bench.scenes.retro_tapes import TAPES
 
     lookup = lookup_of(TAPES[1].measured(10.0), GridShape(12, 1, 64, 16))
     bsdf = mi.load_dict(table_dict(lookup))

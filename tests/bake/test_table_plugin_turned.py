@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from lambent.bake.bsdfs.table_plugin import table_dict
-from lambent.core.directions import direction, normalize
+from lambent.core.geometry.directions import direction, normalize
 from lambent.materials.bsdf import MaterialBSDF, components
-from lambent.materials.chi_square import chi_square
+from lambent.materials.checking.chi_square import chi_square
 from lambent.materials.document import Lobe, Material
-from lambent.materials.measured.half_vector_grid import GridShape
-from lambent.materials.measured.half_vector_resampling import grid_of
 from lambent.materials.measured.protocol import TableInfo
+from lambent.materials.measured.tables.half_vector_grid import GridShape
+from lambent.materials.measured.tables.half_vector_resampling import grid_of
 from tests.tools.chi_square import LEVEL
 from tests.tools.in_mitsuba import vectors
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import IDENTITY, DirectionalLight, MaterialTextures, Scene, SceneObject, Texture

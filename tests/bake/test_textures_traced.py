@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
+from lambent.core.views.camera import Camera
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import patch
@@ -180,8 +180,8 @@ def test_diffuse_light_on_bumps_is_that_of_path_tracing(adapter, tmp_path) -> No
     """A wall whose halves' normals lean to the left and to the right, between a lamp and a lit wall."""
     from lambent.bake.bake import bake
     from lambent.bake.reference.path_traced import render_reference
-    from lambent.realtime.device import open_device
     from lambent.realtime.frame_state import FrameState
+    from lambent.realtime.gpu.device import open_device
     from lambent.realtime.renderer import Renderer
 
     bumps = np.zeros((2, 2, 3), np.float16)

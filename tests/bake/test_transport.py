@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
-from lambent.core.directions import normalize
-from lambent.core.latlong import lat_long_directions
-from lambent.core.shared_exponent import unpacked_rgb
+from lambent.baked.shared_exponent import unpacked_rgb
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.latlong import lat_long_directions
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.curve import END_RAD, Curve
 from lambent.materials.factored.of_lobes import of_material
@@ -21,7 +21,7 @@ from lambent.materials.factored.terms import Editable
 from lambent.materials.lobes import NUMPY
 from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
-from lambent.scenes.triangle_lights import TriangleLights, environment_triangles, solid_angles, surface_triangles
+from lambent.scenes.sky.triangle_lights import TriangleLights, environment_triangles, solid_angles, surface_triangles
 from tests.bake.small_scenes import GREY
 from tests.tools.pair_numbers import pair_numbers
 
@@ -219,8 +219,8 @@ def test_no_pixel_looks_through_a_surface() -> None:
     from lambent.bake.engine import engine
 
     engine()
+    from lambent.bake.transport.view import View as BakedView
     from lambent.bake.transport.view_tracer import ViewTracer
-    from lambent.bake.view import View as BakedView
     from lambent.scenes import load_scene
 
     scene = load_scene("builtin:teatray")

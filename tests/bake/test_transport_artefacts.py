@@ -11,12 +11,12 @@ import pytest
 from lambent.bake.artefacts.transport import Settings
 from lambent.bake.bake import bake
 from lambent.bake.quality import quality_named
-from lambent.bake.view import View
+from lambent.bake.transport.view import View
+from lambent.baked.shared_exponent import unpacked_rgb
+from lambent.baked.transport.wavelets import transformed
 from lambent.core.errors import UserError
-from lambent.core.images import write_image
+from lambent.core.pictures.images import write_image
 from lambent.core.progress import Cancelled
-from lambent.core.shared_exponent import unpacked_rgb
-from lambent.core.wavelets import transformed
 from lambent.materials.document import Material
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable

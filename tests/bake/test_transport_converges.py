@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.bake.view import View as BakedView
-from lambent.core.camera import Camera
-from lambent.core.directions import normalize
+from lambent.bake.transport.view import View as BakedView
+from lambent.core.geometry.directions import normalize
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.of_lobes import of_material
 from lambent.scenes.geometry import patch, placed, sphere
@@ -24,7 +24,7 @@ from lambent.scenes.scene import (
     SceneObject,
     SunSky,
 )
-from lambent.scenes.triangle_lights import joined, small_lights
+from lambent.scenes.sky.triangle_lights import joined, small_lights
 from tests.bake.test_luminaires import LAMP
 from tests.bake.test_transport import View
 from tests.tools.z_test import assert_same_image

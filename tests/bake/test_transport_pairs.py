@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
-from lambent.core.directions import normalize
-from lambent.core.shared_exponent import ONES, unpacked_rgb
+from lambent.baked.shared_exponent import ONES, unpacked_rgb
+from lambent.core.geometry.directions import normalize
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.of_lobes import of_material
-from lambent.scenes.triangle_lights import (
+from lambent.scenes.sky.triangle_lights import (
     TriangleLights,
     environment_triangles,
     joined,

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
+from lambent.core.views.camera import Camera
 from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.of_lobes import of_material
@@ -96,9 +96,9 @@ def test_holes_show_and_light_what_lies_behind() -> None:
     from lambent.bake.engine import engine
 
     engine()
+    from lambent.bake.transport.view import View
     from lambent.bake.transport.view_tracer import ViewTracer
     from lambent.bake.transport.visibility import visibility
-    from lambent.bake.view import View
 
     sheet = SceneObject("sheet", patch((-1, 1, 1), (2, 0, 0), (0, 0, -2)), "leaf")
     floor = SceneObject("floor", patch((-9, 0, 9), (18, 0, 0), (0, 0, -18)), "dull")

@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from lambent.bake.bake import bake
-from lambent.realtime.baked import read_baked
+from lambent.realtime.light.baked import read_baked
+from lambent.scenes.looks.variants import VariantByObject, with_variants
 from lambent.scenes.scene import Look
-from lambent.scenes.variants import VariantByObject, with_variants
 from tests.bake.small_scenes import MIRROR, TINY, room_with_step
 
 

@@ -11,8 +11,8 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.surfaces.texels import BEYOND, POINTS, Texels
 from lambent.bake.tracing.scene_builder import SceneBuilder
-from lambent.bake.tracing.visibility import seen, viewing_places, without_hidden
-from lambent.core.camera import Camera
+from lambent.bake.tracing.seen.visibility import seen, viewing_places, without_hidden
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import ImageEnvironment, Scene, SceneObject

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.watch import Watch
+from lambent.bake.running.watch import Watch
 from lambent.scenes import load_scene
-from lambent.viewer.modes.walk.arrivals import Arrivals, Region
+from lambent.viewer.modes.walk.rebake.arrivals import Arrivals, Region
 from tests.bake.small_scenes import TINY
 
 IN_TILES = TINY.changed("tiles", light_map={"tile_texels": 16})

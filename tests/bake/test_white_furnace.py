@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.bake.bounces import Bounces
+from lambent.bake.interreflection.settings import Bounces
 from lambent.bake.quality import quality_named
-from lambent.bake.view import View
-from lambent.core.camera import Camera
+from lambent.bake.transport.view import View
+from lambent.core.views.camera import Camera
 from lambent.editing.interreflection.whole import whole_picture
-from lambent.editing.session import Session
+from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import box
 from lambent.scenes.scene import Scene, SceneObject

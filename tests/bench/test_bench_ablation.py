@@ -10,14 +10,15 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.light import sampling
 from lambent.bake.quality import quality_named
-from lambent.bench import ablation
+from lambent.bench.measuring.switches import BAKE, SWITCHES, TRACE, Switch, is_frozen, switched
+from lambent.bench.pictures import ablation
 from lambent.bench.registry import run_bench
-from lambent.bench.switches import BAKE, SWITCHES, TRACE, Switch, is_frozen, switched
 from lambent.core.errors import UserError
-from lambent.core.images import write_image
-from lambent.realtime import cube_mips, lamps, probe_light, shader_source
+from lambent.core.pictures.images import write_image
+from lambent.realtime.gpu import cube_mips, shader_source
 from lambent.realtime.incident import planes
-from lambent.realtime.integrators import INTEGRATORS
+from lambent.realtime.integrators.integrators import INTEGRATORS
+from lambent.realtime.light import lamps, probe_light
 from lambent.render import Settings, images
 from lambent.scenes import load_scene
 from lambent.store.contract import scene_record
@@ -25,23 +26,25 @@ from lambent.store.store import Store
 
 COARSE = quality_named("preview").changed("coarse", geometry={"texels": 64}, environment={"texels": 32})
 WHITE = Switch("colour.wgsl:srgb_encode", "    return vec3f(1.0);")
-UNREAD = Switch("lambent.realtime.outline.REACH_PX", 7)
+UNREAD = Switch("lambent.realtime.overlays.outline.REACH_PX", 7)
 FROZEN = Switch("lambent.bake.surfaces.clusters.MIXED", 0.0)
 
 
 def test_a_name_changes_wherever_it_was_imported() -> None:
     before = cube_mips.smooth_chain
-    with switched(Switch("lambent.realtime.cube_mips.smooth_chain", cube_mips.mip_chain)):
+    with switched(Switch("lambent.realtime.gpu.cube_mips.smooth_chain", cube_mips.mip_chain)):
         assert cube_mips.smooth_chain is lamps.smooth_chain is probe_light.smooth_chain is cube_mips.mip_chain
     assert cube_mips.smooth_chain is lamps.smooth_chain is probe_light.smooth_chain is before
 
 
 def test_attributes_items_and_several_places_change() -> None:
     before = INTEGRATORS["lamps"].lamps
-    with switched(Switch("lambent.realtime.integrators.INTEGRATORS.lamps.lamps", None)):
+    with switched(Switch("lambent.realtime.integrators.integrators.INTEGRATORS.lamps.lamps", None)):
         assert INTEGRATORS["lamps"].lamps is None
     assert INTEGRATORS["lamps"].lamps == before
-    with switched(Switch("lambent.realtime.lamps.FIRST lambent.realtime.lamps.LAST", lambda value: 2 * value)):
+    with switched(
+        Switch("lambent.realtime.light.lamps.FIRST lambent.realtime.light.lamps.LAST", lambda value: 2 * value)
+    ):
         assert (lamps.FIRST, lamps.LAST) == (0.94, 1.08)
     with pytest.raises(ZeroDivisionError), switched(Switch("lambent.realtime.incident.planes.PREFERENCE", -1)):
         assert planes.PREFERENCE == -1
@@ -60,7 +63,7 @@ def test_shaders_change_where_they_include_the_file() -> None:
 
 
 @pytest.mark.parametrize(
-    "place", ["lambent.realtime.lamps.FIRSTS", "lambent.nowhere.X", "smooth.wgsl:DETAILS", "nowhere.wgsl:X"]
+    "place", ["lambent.realtime.light.lamps.FIRSTS", "lambent.nowhere.X", "smooth.wgsl:DETAILS", "nowhere.wgsl:X"]
 )
 def test_a_place_that_is_not_there_is_named(place: str) -> None:
     with pytest.raises(UserError, match="no such constant or function"), switched(Switch(place, 0)):
@@ -69,7 +72,7 @@ def test_a_place_that_is_not_there_is_named(place: str) -> None:
 
 def test_a_constant_that_no_function_reads_is_frozen() -> None:
     assert is_frozen(FROZEN)
-    assert not is_frozen(Switch("lambent.realtime.lamps.FAINT", 0.0)) and not is_frozen(WHITE)
+    assert not is_frozen(Switch("lambent.realtime.light.lamps.FAINT", 0.0)) and not is_frozen(WHITE)
 
 
 def test_switches_are_of_what_there_is() -> None:

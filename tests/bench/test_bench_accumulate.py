@@ -12,10 +12,10 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.quality import quality_named
-from lambent.bench import accumulate, edits
+from lambent.bench.pictures import accumulate, edits
 from lambent.bench.registry import run_bench
 from lambent.core.errors import UserError
-from lambent.core.images import write_image
+from lambent.core.pictures.images import write_image
 from lambent.scenes import load_scene
 from lambent.store.store import Store
 from lambent.traced.room import TracedRoom

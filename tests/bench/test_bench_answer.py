@@ -10,8 +10,9 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.quality import quality_named
-from lambent.bench import answer, answer_times
+from lambent.bench import answer
 from lambent.bench.answer import most_relative
+from lambent.bench.measuring import answer_times
 from lambent.core.errors import UserError
 from lambent.scenes import builtin, load_scene
 from tests.viewer.small_store import write_small_store

@@ -8,7 +8,7 @@ import pytest
 
 from lambent.bench import direct_edit
 from lambent.bench.direct_edit import CASES, Effort, held_bytes, run
-from lambent.bench.reference import path_traced
+from lambent.bench.measuring.reference import path_traced
 
 SMALL = Effort(48, (60,), frames=4, edits=10, reference_spp=64, rival_s=0.5, checked=4)
 

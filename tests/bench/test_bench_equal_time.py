@@ -9,10 +9,10 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.quality import quality_named
-from lambent.bench import equal_time
+from lambent.bench.pictures import equal_time
 from lambent.bench.registry import run_bench
 from lambent.core.errors import UserError
-from lambent.core.images import write_image
+from lambent.core.pictures.images import write_image
 from lambent.render import Settings, images
 from lambent.scenes import load_scene
 from lambent.store.contract import scene_record

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from lambent.bench.below_zero import SIZE
 from lambent.bench.fit import METRICS, MODELS, QUICK, run
-from lambent.bench.known_answers import KNOWN
-from lambent.bench.retro_tapes import TAPES
+from lambent.bench.scenes.below_zero import SIZE
+from lambent.bench.scenes.known_answers import KNOWN
+from lambent.bench.scenes.retro_tapes import TAPES
 from lambent.core.errors import UserError
-from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.synthetic import synthesise
+from lambent.materials.measured.inspecting.synthetic import synthesise
+from lambent.materials.measured.parts.gonio_text import write_gonio
 from tests.materials.fitting.known_answers import FEW, PAINT
 
 WARD = "paint = Aggregate(Lambertian(albedo = [.2, .2, .2]), NganWard(albedo = [.04, .03, .02], roughness = .15))\n"

@@ -12,9 +12,9 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.engine import engine
 from lambent.bake.quality import quality_named
-from lambent.bench import flicker
-from lambent.bench.reprojection import reprojected
-from lambent.core.camera import Camera, pixel_rays
+from lambent.bench.measuring.reprojection import reprojected
+from lambent.bench.pictures import flicker
+from lambent.core.views.camera import Camera, pixel_rays
 from lambent.realtime.renderer import Renderer
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import merge, patch

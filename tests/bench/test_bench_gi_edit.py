@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from lambent.bench.gi_edit import CASES, FULL, QUICK, run
-from lambent.bench.gi_edit_states import KINDS, WHITEST, flip_between, relative_mse, setting, summed_up
 from lambent.bench.registry import run_bench
+from lambent.bench.scenes.gi_edit_states import KINDS, WHITEST, flip_between, relative_mse, setting, summed_up
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo

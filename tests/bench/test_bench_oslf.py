@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from lambent.bench import oslf
-from lambent.bench.light_field_view import Compared, LightFieldView
+from lambent.bench.scenes.light_field_view import Compared, LightFieldView
 from lambent.published.surface_light_fields import surface
 from lambent.scenes import load_scene
 

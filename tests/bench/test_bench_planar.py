@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bench import planar_quality, planar_scene, walk_planar
-from lambent.bench.planar_scene import floor_state
-from lambent.core import metrics
-from lambent.realtime.device import open_device
+from lambent.bench.pictures import planar_quality, walk_planar
+from lambent.bench.scenes import planar_scene
+from lambent.bench.scenes.planar_scene import floor_state
+from lambent.core.pictures import metrics
+from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
 
 

@@ -9,19 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.bench import frame_times, quality, walk_cube
-from lambent.bench.quality_inputs import MATERIALS, read_inputs
+from lambent.bench.measuring import frame_times
+from lambent.bench.pictures import quality, walk_cube
 from lambent.bench.registry import run_bench
-from lambent.core.cubemap import face_directions
-from lambent.core.directions import normalize
+from lambent.bench.scenes.quality_inputs import MATERIALS, read_inputs
 from lambent.core.errors import UserError
-from lambent.core.images import write_image
+from lambent.core.geometry.cubemap import face_directions
+from lambent.core.geometry.directions import normalize
+from lambent.core.pictures.images import write_image
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.objects.unbaked import CAMERA, unbaked_scene
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.unbaked import CAMERA, unbaked_scene
-from lambent.scenes.environments import dusk, from_lat_long, night, studio
 from lambent.scenes.geometry import sphere
+from lambent.scenes.sky.environments import dusk, from_lat_long, night, studio
 
 pytestmark = pytest.mark.usefixtures("adapter")
 
@@ -78,8 +79,8 @@ def test_a_measured_table_is_fitted_first(shared_data: Path) -> None:
 
 def test_the_path_tracer_sees_the_same_image() -> None:
     """A lone sphere has nothing to reflect but the environment: qmc and path tracing agree, the right way round."""
-    from lambent.bench.specular_scene import path_traced
-    from lambent.realtime.device import open_device
+    from lambent.bench.scenes.specular_scene import path_traced
+    from lambent.realtime.gpu.device import open_device
 
     material = MATERIALS[8]  # anisotropic: the brushing direction counts
     meshes = {"sphere": sphere(1.0)}

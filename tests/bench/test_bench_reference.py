@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.bench.reference import Reference
+from lambent.bench.measuring.reference import Reference
 
 
 def test_errors_count_where_few_pixels_are_compared() -> None:

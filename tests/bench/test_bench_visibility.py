@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lambent.bench import visibility as bench
-from lambent.bench.visibility_scenes import CASES
+from lambent.bench.scenes.visibility_scenes import CASES
 
 SIZE, LIGHTS = 33, 50
 

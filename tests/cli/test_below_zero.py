@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from lambent.cli.check import describe
-from lambent.materials import check, check_table
+from lambent.materials.checking import check, check_table
 from lambent.materials.measured import load
-from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.half_vector_grid import GridShape
-from lambent.materials.measured.synthetic import synthesise
+from lambent.materials.measured.inspecting.synthetic import synthesise
+from lambent.materials.measured.parts.gonio_text import write_gonio
+from lambent.materials.measured.tables.half_vector_grid import GridShape
 from tests.materials.fitting.known_answers import FEW, PAINT
 from tests.materials.measured.measured_files import rgl_fields, tensor_bytes
 

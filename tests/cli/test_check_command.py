@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from lambent.materials import check, check_table
+from lambent.materials.checking import check, check_table
 from lambent.materials.document import Lobe, Material, load_material
-from lambent.materials.measured import half_vector_resampling
-from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.half_vector_grid import GridShape
-from lambent.materials.measured.synthetic import Setup, synthesise
+from lambent.materials.measured.inspecting.synthetic import Setup, synthesise
+from lambent.materials.measured.parts.gonio_text import write_gonio
+from lambent.materials.measured.tables import half_vector_resampling
+from lambent.materials.measured.tables.half_vector_grid import GridShape
 
 
 @pytest.fixture(autouse=True)

@@ -64,8 +64,8 @@ def test_the_order_does_not_matter(tmp_path):
 
 
 def test_environments_are_named_and_found(tmp_path):
-    from lambent.core.images import write_image
-    from lambent.scenes.environments import dusk
+    from lambent.core.pictures.images import write_image
+    from lambent.scenes.sky.environments import dusk
 
     Material(name="a", kd=0.5).save(tmp_path / "a.json")
     write_image(tmp_path / "beside.hdr", dusk(4)[0])

@@ -12,10 +12,10 @@ import pytest
 
 from lambent import __version__, cli
 from lambent.core.discovery import names_in
-from lambent.core.images import write_image
+from lambent.core.pictures.images import write_image
 from lambent.materials.document import Lobe, Material, load_material
-from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.synthetic import Setup, synthesise
+from lambent.materials.measured.inspecting.synthetic import Setup, synthesise
+from lambent.materials.measured.parts.gonio_text import write_gonio
 
 COMMANDS = [name for name in names_in(cli) if name not in ("main", "console")]
 NEEDS_ARGUMENTS = [name for name in COMMANDS if name not in ("doctor", "demo")]
@@ -169,7 +169,7 @@ def test_an_interruption_is_one_line_and_130(lambent, monkeypatch, material, cau
     def interrupt(*_, **__):
         raise KeyboardInterrupt if cause is None else cause from KeyboardInterrupt()
 
-    monkeypatch.setattr("lambent.materials.check.check", interrupt)
+    monkeypatch.setattr("lambent.materials.checking.check.check", interrupt)
     outcome = lambent("check", material)
     assert (outcome.code, outcome.out) == (130, "")
     assert outcome.err.splitlines()[-1] == "lambent: interrupted; finished work is kept"
@@ -222,7 +222,7 @@ def test_a_disk_that_takes_no_file_is_one_line(lambent, monkeypatch, pictures, t
     def full(*_, **__):
         raise OSError(*error)
 
-    monkeypatch.setattr("lambent.core.images.write_image", full)
+    monkeypatch.setattr("lambent.core.pictures.images.write_image", full)
     outcome = lambent("compare", *pictures, "-o", tmp_path / "d.png")
     assert (outcome.code, outcome.err) == (2, f"lambent: error: {said}\n")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.images import write_image, write_shown
+from lambent.core.pictures.images import write_image, write_shown
 
 SHOWN_MEAN = 0.3  # of a reference that holds radiance
 BYTE = 128

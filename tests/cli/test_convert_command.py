@@ -8,7 +8,7 @@ import pytest
 
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured import load
-from lambent.materials.measured.metrics import METRICS
+from lambent.materials.measured.inspecting.metrics import METRICS
 from tests.materials.measured.measured_files import zemax_text
 
 

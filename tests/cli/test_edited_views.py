@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.images import read_image, write_image
-from lambent.editing.document import Surroundings
-from lambent.editing.session import Session
+from lambent.core.pictures.images import read_image, write_image
+from lambent.editing.session.document import Surroundings
+from lambent.editing.session.session import Session
 from lambent.materials.models import model_named
 from lambent.scenes import load_scene
 from lambent.store.contract import baked_views
+from lambent.store.kept.views import change_views
 from lambent.store.store import Store
-from lambent.store.views import change_views
 
 SIZE = (24, 16)
 SCENE = """

@@ -9,8 +9,8 @@ import pytest
 
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured import load
-from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.synthetic import ISOTROPIC, synthesise
+from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, synthesise
+from lambent.materials.measured.parts.gonio_text import write_gonio
 from tests.materials.measured.lbnl_files import lbnl_xml, words
 
 PAINT = Material(name="paint", kd=0.2, lobes=(Lobe(k=(0.7,) * 3, mx=0.15, my=0.15, r0=(0.06,) * 3, alpha=0.3),))

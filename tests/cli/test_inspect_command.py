@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.images import read_image
+from lambent.core.pictures.images import read_image
 from tests.materials.measured.measured_files import zemax_text
 
 

@@ -17,7 +17,7 @@ def test_an_error_of_memory_is_one_line(refused, monkeypatch, tmp_path: Path, er
         raise error
 
     Image.new("L", (8, 8)).save(tmp_path / "a.png")
-    monkeypatch.setattr("lambent.core.images.read_image", fails)
+    monkeypatch.setattr("lambent.core.pictures.images.read_image", fails)
     assert "out of memory" in refused("inspect", tmp_path / "a.png")
 
 
@@ -26,7 +26,7 @@ def test_another_import_that_fails_is_a_bug(lambent, monkeypatch, tmp_path: Path
         raise ImportError("no module named x")
 
     Image.new("L", (8, 8)).save(tmp_path / "a.png")
-    monkeypatch.setattr("lambent.core.images.read_image", fails)
+    monkeypatch.setattr("lambent.core.pictures.images.read_image", fails)
     with pytest.raises(ImportError, match="no module"):
         lambent("inspect", tmp_path / "a.png")
 

@@ -12,8 +12,8 @@ import pytest
 from PIL import Image
 
 from lambent.bake.bake import bake
-from lambent.core.camera import Camera, CameraPath
-from lambent.core.images import read_encoded, read_image
+from lambent.core.pictures.images import read_encoded, read_image
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.materials.document import Material
 from lambent.scenes.geometry import placed, sphere
 from lambent.scenes.scene import Look, Scene, SceneObject, Variant

@@ -13,8 +13,8 @@ from lambent.bake import bake as baking
 from lambent.bake.quality import quality_named
 from lambent.demo.flow import DRAFT, SPECIMEN_OF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.synthetic import Setup, synthesise
+from lambent.materials.measured.inspecting.synthetic import Setup, synthesise
+from lambent.materials.measured.parts.gonio_text import write_gonio
 
 ROOT = Path(__file__).parents[2]
 MINUTES = (ROOT / "README.md").read_text("utf-8").split("## Your own result in five minutes")[1].split("\n## ")[0]

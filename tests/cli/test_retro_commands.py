@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from lambent.bench.retro_tapes import TAPES
+from lambent.bench.scenes.retro_tapes import TAPES
 from lambent.materials.document import Lobe, Material, load_material
 from lambent.materials.export import gonio_text
 

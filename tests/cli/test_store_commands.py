@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.false_colour import Range, false_colour
-from lambent.core.images import read_encoded, read_image
-from lambent.core.photometry import LM_PER_W, photometric
+from lambent.core.light.false_colour import Range, false_colour
+from lambent.core.light.photometry import LM_PER_W, photometric
+from lambent.core.pictures.images import read_encoded, read_image
 from tests.viewer.small_store import write_small_store
 
 
@@ -104,7 +104,7 @@ def test_noise_of_the_light_map(lambent, refused, store, tmp_path):
 
 
 def test_saved_views_can_be_rendered(lambent, refused, store, tmp_path):
-    from lambent.store.views import change_views
+    from lambent.store.kept.views import change_views
     from tests.viewer.small_store import SIDE
 
     saved = replace(SIDE, name="my/view")

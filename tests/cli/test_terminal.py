@@ -16,11 +16,11 @@ import pytest
 from lambent.cli import console
 from lambent.cli.console import progress_bar, table
 from lambent.core.errors import UserError
-from lambent.core.images import write_shown
+from lambent.core.pictures.images import write_shown
 from lambent.core.plain import printable
 from lambent.materials.document import Lobe, Material
-from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.synthetic import Setup, synthesise
+from lambent.materials.measured.inspecting.synthetic import Setup, synthesise
+from lambent.materials.measured.parts.gonio_text import write_gonio
 
 ESCAPES = "\x1b]0;title\x07\x1b[31mred\u202e\r"
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals and file names are of POSIX")
@@ -149,7 +149,7 @@ class Late:
     def __del__(self):
         raise KeyboardInterrupt
 import time
-import lambent.materials.check as module
+import lambent.materials.checking.check as module
 was = module.check
 def check(*arguments, **options):
     Late()
@@ -160,7 +160,9 @@ module.check = check
 
 
 @posix
-@pytest.mark.parametrize("name", ["typer", "lambent.cli.fit", "lambent.materials.check", "numpy", "scipy.special", ""])
+@pytest.mark.parametrize(
+    "name", ["typer", "lambent.cli.fit", "lambent.materials.checking.check", "numpy", "scipy.special", ""]
+)
 def test_ctrl_c_is_clean_while_libraries_are_imported(name):
     """Among the modules: those of the command line itself, and those of a command that has begun."""
     program = INTERRUPTED_IMPORT.format(name=name, before="" if name else AT_THE_END_OF_AN_OBJECT)
@@ -175,7 +177,7 @@ import signal, sys
 from lambent.cli.console import progress_bar
 from lambent.core.errors import UserError
 from lambent.core.inputs import foreign_bytes
-import lambent.materials.check as module
+import lambent.materials.checking.check as module
 def dropped():
     try:
         signal.raise_signal(signal.SIGINT)

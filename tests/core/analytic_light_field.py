@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from lambent.baked.light_fields.light_field import NO_POINT, LightField
+from lambent.baked.light_fields.lookup import Place
 from lambent.core.arrays import Flags, Floats
-from lambent.core.directions import normalize
-from lambent.core.light_field import NO_POINT, LightField
-from lambent.core.light_field_lookup import Place
-from lambent.core.octahedral import texel_directions
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.octahedral import texel_directions
 
 BALL, OFFSET = 0.2, 0.02  # radius of the ball about the origin, and how far off it the points are, metres
 OWN = np.array([0.3, 0.2, 0.1])  # radiance of the ball

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.answer import (
+from lambent.baked.answering.answer import (
     MOST_EXCESS,
     MOST_SHARES,
     Albedos,
@@ -20,7 +20,7 @@ from lambent.core.answer import (
     solved,
     upsampled,
 )
-from lambent.core.answer_rays import MOST_POINTS, Rays, gathered, last_points, packed_rays
+from lambent.baked.answering.rays import MOST_POINTS, Rays, gathered, last_points, packed_rays
 
 
 def patches(groups: int = 2, count: int = 30, paired: bool = False) -> Patches:

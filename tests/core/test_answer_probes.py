@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.answer_probes import change
+from lambent.baked.answering.probes import change
 
 
 def test_a_probe_sees_both_states_of_both_sides() -> None:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.core.answer import Neighbours, Points, smoothed
-from lambent.core.answer_rays import Rays, gathered, packed_rays
-from lambent.core.answer_smoothing import alike
+from lambent.baked.answering.answer import Neighbours, Points, smoothed
+from lambent.baked.answering.rays import Rays, gathered, packed_rays
+from lambent.baked.answering.smoothing import alike
 
 GATHERING, SENDING, RAYS = 40, 400, 256
 

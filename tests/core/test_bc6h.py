@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.bc6h import LARGEST, decoded, encoded
+from lambent.baked.light_fields.blocks.bc6h import LARGEST, decoded, encoded
 
 Y, X = np.mgrid[0:64, 0:64] / 64
 RNG = np.random.default_rng(3)
@@ -76,8 +76,8 @@ def test_the_adapter_decodes_the_same_bits(adapter: None) -> None:
     """Every mode, with all values of indices and ends."""
     import wgpu
 
-    from lambent.realtime.device import BLOCKS, open_device
-    from lambent.realtime.targets import pixels
+    from lambent.realtime.gpu.device import BLOCKS, open_device
+    from lambent.realtime.gpu.targets import pixels
 
     device: Any = open_device()
     if BLOCKS not in device.features:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera, camera_axes, clip_from_world, overview, pixel_rays, rays_through
+from lambent.core.views.camera import Camera, camera_axes, clip_from_world, overview, pixel_rays, rays_through
 
 OBLIQUE = Camera("oblique", (1.5, 0.8, 2.0), (0.2, 0.1, 0.0), fov_y_deg=50.0)
 ODD = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.cubemap import directions_at, face_directions, on_face, sample, texel_solid_angles
+from lambent.core.geometry.cubemap import directions_at, face_directions, on_face, sample, texel_solid_angles
 
 # WebGPU, "Texture views": the axis of each face, and where its columns and rows run.
 FACES = {

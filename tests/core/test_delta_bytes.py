@@ -7,7 +7,7 @@ import zlib
 import numpy as np
 import pytest
 
-from lambent.core.delta_bytes import delta_bytes, from_delta_bytes
+from lambent.baked.answering.delta_bytes import delta_bytes, from_delta_bytes
 
 
 @pytest.mark.parametrize("shape", [(0,), (1,), (5, 8), (6, 4, 4)])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lambent.core.directions import (
+from lambent.core.geometry.directions import (
     FLIP_Z,
     HALF_TURN,
     angles,

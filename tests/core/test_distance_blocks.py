@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.distance_blocks import decoded, encoded
-from lambent.core.light_field_blocks import (
+from lambent.baked.light_fields.blocks.blocks import (
     MapsInBlocks,
     distance_blocks_of,
     distance_blocks_shape,
     distances_in_blocks,
     distances_of,
 )
-from lambent.core.light_field_tiles import pool_rows
+from lambent.baked.light_fields.blocks.distances import decoded, encoded
+from lambent.baked.light_fields.blocks.tiles import pool_rows
 
 N = 96
 Y, X = np.mgrid[0:N, 0:N] / N

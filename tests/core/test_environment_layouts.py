@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.cubemap import texel_solid_angles
-from lambent.core.directions import normalize
-from lambent.core.environment_layouts import as_lat_long, layout_of
 from lambent.core.errors import UserError
-from lambent.core.latlong import lat_long_direction, lat_long_directions
+from lambent.core.geometry.cubemap import texel_solid_angles
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.latlong import lat_long_direction, lat_long_directions
+from lambent.core.pictures.environment_layouts import as_lat_long, layout_of
 from lambent.core.surroundings import Layout
 
 N = 16  # texels of a face
@@ -117,7 +117,7 @@ def test_what_is_not_clear_is_an_error() -> None:
 
 def test_the_probe_of_the_test_data_shows_its_window_upright(shared_data: Path) -> None:
     """The kitchen's window is before the viewer and above the table."""
-    from lambent.core.images import read_image
+    from lambent.core.pictures.images import read_image
 
     path = shared_data / "environments" / "kitchen_probe.hdr"
     picture = read_image(path)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lambent.core.exposure import KEY, LIMIT_EV, ev100_of, exposure_of, metered
-from lambent.core.photometry import LM_PER_W
+from lambent.core.light.exposure import KEY, LIMIT_EV, ev100_of, exposure_of, metered
+from lambent.core.light.photometry import LM_PER_W
 
 
 def test_ev100_is_that_of_photographers():

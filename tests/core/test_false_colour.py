@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from lambent.core.colour import neutral, shown
 from lambent.core.errors import UserError
-from lambent.core.false_colour import STOPS, Range, SignedRange, false_colour, fitting_range, number, with_scale
-from lambent.core.photometry import photometric
+from lambent.core.light.colour import neutral, shown
+from lambent.core.light.false_colour import STOPS, Range, SignedRange, false_colour, fitting_range, number, with_scale
+from lambent.core.light.photometry import photometric
 
 
 def test_white_of_one_watt_is_179_candela():

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.film import even_size, film_writer
+from lambent.core.pictures.film import even_size, film_writer
 
 
 def test_colours_and_length_survive(tmp_path: Path) -> None:
@@ -41,7 +41,7 @@ def test_even_size() -> None:
 
 def test_a_film_without_its_end_is_none(tmp_path):
     """ffmpeg says nothing where the disk fills up at the end."""
-    from lambent.core.film import _is_whole
+    from lambent.core.pictures.film import _is_whole
 
     with film_writer(tmp_path / "a.mp4", 32, 32) as write:
         for value in range(4):

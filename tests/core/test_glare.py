@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core import rgbe
-from lambent.core.camera import Camera
 from lambent.core.errors import UserError
-from lambent.core.glare import Glare, glare, position_index
-from lambent.core.photometry import LM_PER_W
-from lambent.core.projections import Projection, View
+from lambent.core.light.glare import Glare, glare, position_index
+from lambent.core.light.photometry import LM_PER_W
+from lambent.core.pictures import rgbe
+from lambent.core.views.camera import Camera
+from lambent.core.views.projections import Projection, View
 
 SIDE = 500
 EYE = Camera("eye", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))

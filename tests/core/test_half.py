@@ -5,8 +5,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from lambent.core.colour import HALF_MAX
-from lambent.core.half import half_bits, put_sums
+from lambent.core.light.colour import HALF_MAX
+from lambent.core.pictures.half import half_bits, put_sums
 
 
 @numba.njit

@@ -15,9 +15,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lambent.core import colour, exr, rgbe
 from lambent.core.errors import UserError
-from lambent.core.images import check_writable, read_encoded, read_image, write_image
+from lambent.core.light import colour
+from lambent.core.pictures import exr, rgbe
+from lambent.core.pictures.images import check_writable, read_encoded, read_image, write_image
 
 RNG = np.random.default_rng(7)
 PICTURE = (RNG.random((20, 37, 3)) ** 4 * 50).astype(np.float32)

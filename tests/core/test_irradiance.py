@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.cubemap import face_directions
-from lambent.core.directions import normalize
-from lambent.core.irradiance import basis_of, irradiance_of
+from lambent.baked.probes.irradiance import basis_of, irradiance_of
+from lambent.core.geometry.cubemap import face_directions
+from lambent.core.geometry.directions import normalize
 
 
 def test_irradiance_of_a_cube_against_its_integral() -> None:

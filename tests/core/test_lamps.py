@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.cubemap import face_directions, texel_solid_angles
-from lambent.core.directions import normalize
-from lambent.core.lamps import MOST, find_lamps, neighbours, texel_at
+from lambent.baked.lamps.lamps import MOST, find_lamps, neighbours, texel_at
+from lambent.core.geometry.cubemap import face_directions, texel_solid_angles
+from lambent.core.geometry.directions import normalize
 
 N = 64
 W = normalize(face_directions(N))

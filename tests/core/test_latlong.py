@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.latlong import lat_long_direction, lat_long_directions, lat_long_uv
+from lambent.core.geometry.latlong import lat_long_direction, lat_long_directions, lat_long_uv
 
 
 def test_pixels_are_where_they_say() -> None:

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core import light_field_maps
-from lambent.core.directions import normalize
-from lambent.core.light_field import NO_POINT, LightField
-from lambent.core.light_field_lookup import March, Place, blended, marched, normal_weights
-from lambent.core.light_field_maps import nearest_points, nearness_along, radiance_along, whole_texels
-from lambent.core.octahedral import bordered, texel_directions, to_square
+from lambent.baked.light_fields import maps as light_field_maps
+from lambent.baked.light_fields.light_field import NO_POINT, LightField
+from lambent.baked.light_fields.lookup import March, Place, blended, marched, normal_weights
+from lambent.baked.light_fields.maps import nearest_points, nearness_along, radiance_along, whole_texels
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.octahedral import bordered, texel_directions, to_square
 from tests.core.analytic_light_field import ball_field, errors, on_ball, places, seen, sky_light
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.directions import normalize, rotation_about
-from lambent.core.light_field_lookup import marched
-from lambent.core.light_field_shading import turned, under_sky
+from lambent.baked.light_fields.lookup import marched
+from lambent.baked.light_fields.shading import turned, under_sky
+from lambent.core.geometry.directions import normalize, rotation_about
 from tests.core.analytic_light_field import ball_field, places, sky_light
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from lambent.core.colour import luminance
 from lambent.core.errors import UserError
-from lambent.core.light_mix import AS_BAKED, GroupMix, LightMix, MixTrack, black_body, parse_light
+from lambent.core.light.colour import luminance
+from lambent.core.light.light_mix import AS_BAKED, GroupMix, LightMix, MixTrack, black_body, parse_light
 from lambent.scenes.loaders.mitsuba.colours import colour_of
 from lambent.scenes.loaders.mitsuba.document import Element
 

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from lambent.core.map_cache import POLICIES, Adaptive, LeastRecent, ReadLast, misses
+from lambent.baked.light_fields.map_cache import POLICIES, Adaptive, LeastRecent, ReadLast, misses
 
 
 def test_least_recent_by_hand() -> None:

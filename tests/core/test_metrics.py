@@ -8,7 +8,8 @@ from colour import XYZ_to_Lab, XYZ_to_xy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lambent.core import colour, metrics
+from lambent.core.light import colour
+from lambent.core.pictures import metrics
 
 
 def test_white_and_black_in_lab() -> None:

@@ -6,7 +6,7 @@ from itertools import permutations, product
 
 import pytest
 
-from lambent.core.multisets import Multisets
+from lambent.baked.transport.multisets import Multisets
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lambent.core.directions import normalize
-from lambent.core.octahedral import bordered, from_square, texel_directions, texel_solid_angles, to_square
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.octahedral import bordered, from_square, texel_directions, texel_solid_angles, to_square
 
 
 def test_directions_come_back():

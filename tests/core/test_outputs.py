@@ -16,9 +16,9 @@ import pytest
 from lambent.core import files
 from lambent.core.errors import UserError
 from lambent.core.files import atomic_path, check_place, remove_left_over, write_text
-from lambent.core.film import check_pictures, film_writer
-from lambent.core.images import read_image, write_image, write_shown
 from lambent.core.outputs import check_output, is_marked
+from lambent.core.pictures.film import check_pictures, film_writer
+from lambent.core.pictures.images import read_image, write_image, write_shown
 from lambent.materials.plots import new_figure, save_figure
 from lambent.report.page import page
 
@@ -88,9 +88,9 @@ def test_an_error_leaves_the_former_file_and_nothing_else(tmp_path: Path) -> Non
 
 WRITERS: dict[str, str] = {
     "a.json": "from lambent.materials.document import Material; Material(name='x' * 9000).save(path)",
-    "a.png": "from lambent.core.images import write_image; write_image(path, np.random.rand(64, 64, 3))",
-    "a.exr": "from lambent.core.images import write_image; write_image(path, np.random.rand(64, 64, 3))",
-    "a.mp4": "from lambent.core.film import film_writer\n"
+    "a.png": "from lambent.core.pictures.images import write_image; write_image(path, np.random.rand(64, 64, 3))",
+    "a.exr": "from lambent.core.pictures.images import write_image; write_image(path, np.random.rand(64, 64, 3))",
+    "a.mp4": "from lambent.core.pictures.film import film_writer\n"
     "with film_writer(path, 64, 64) as write: [write(np.random.randint(0, 255, (64, 64, 3), np.uint8)) for _ in '12']",
     "a.pdf": "from lambent.materials.plots import new_figure, save_figure; save_figure(new_figure(2, 2), path)",
 }

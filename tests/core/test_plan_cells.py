@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import binary_erosion, distance_transform_edt, label
 
-from lambent.core.plan_cells import filled, inner, share_filled, within, without_strips
+from lambent.core.geometry.plan_cells import filled, inner, share_filled, within, without_strips
 from lambent.scenes.floor_plan import Surroundings, floor_plan
 from lambent.scenes.geometry import box, patch, placed
 

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lambent.core import rgbe
-from lambent.core.camera import Camera, pixel_rays
 from lambent.core.errors import UserError
-from lambent.core.projections import Projection, View
-from lambent.core.radiance_views import read_view, view_of
+from lambent.core.light.radiance_views import read_view, view_of
+from lambent.core.pictures import rgbe
+from lambent.core.views.camera import Camera, pixel_rays
+from lambent.core.views.projections import Projection, View
 
 CAMERA = Camera("eye", (1.0, 2.0, 3.0), (1.0, 2.0, 2.0), fov_y_deg=50.0)
 

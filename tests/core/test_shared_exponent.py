@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.shared_exponent import LARGEST, ONES, packed_rgb, unpacked_rgb
+from lambent.baked.shared_exponent import LARGEST, ONES, packed_rgb, unpacked_rgb
 
 
 def test_known_words() -> None:

@@ -5,8 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import normalize
-from lambent.core.thin_glass import eta_of, exits_beside, mirrored_back, refracted, sideways, through_glass
+from lambent.baked.light_fields.thin_glass import (
+    eta_of,
+    exits_beside,
+    mirrored_back,
+    refracted,
+    sideways,
+    through_glass,
+)
+from lambent.core.geometry.directions import normalize
 
 ETA, DEPTH = 1.5, 0.02
 

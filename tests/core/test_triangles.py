@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.geometry import cross_2d, points_on_triangles, triangle_areas, triangle_normals
+from lambent.core.geometry.triangles import cross_2d, points_on_triangles, triangle_areas, triangle_normals
 
 
 def test_areas_and_normals() -> None:

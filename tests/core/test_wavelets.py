@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.wavelets import TAPS, transformed
+from lambent.baked.transport.wavelets import TAPS, transformed
 
 
 def test_taps_are_the_published_ones() -> None:

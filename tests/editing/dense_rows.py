@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lambent.core.wavelets import transformed
+from lambent.baked.transport.tails import Tails
+from lambent.baked.transport.wavelets import transformed
 from lambent.editing.interreflection.powers import bands_of
 from lambent.editing.rows import LARGEST, Rows
 from lambent.materials.factored.terms import Editable
-from lambent.store.tails import Tails
 
 
 def rows_of(bands: np.ndarray) -> Rows:

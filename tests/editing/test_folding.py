@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.shared_exponent import packed_rgb, unpacked_rgb
-from lambent.core.wavelets import transformed
+from lambent.baked.shared_exponent import packed_rgb, unpacked_rgb
+from lambent.baked.transport.wavelets import transformed
 from lambent.editing.folding import folded
 from lambent.editing.incremental import IncrementalPicture
 from lambent.editing.products import HostProducts

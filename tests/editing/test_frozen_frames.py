@@ -121,8 +121,8 @@ def test_a_drag_freezes_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_on_a_gpu_frames_are_the_same(adapter: None) -> None:
-    from lambent.realtime.device import open_device
-    from lambent.viewer.edited import ShadedCanvas
+    from lambent.realtime.gpu.device import open_device
+    from lambent.viewer.edits.edited import ShadedCanvas
 
     source, black = light(SLOW), np.zeros((*SIZE, 3), np.float32)
     canvases = [HostCanvas(black), ShadedCanvas(open_device(), black)]

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
-from lambent.core.shared_exponent import packed_rgb, unpacked_rgb
+from lambent.baked.shared_exponent import packed_rgb, unpacked_rgb
+from lambent.baked.transport.tails import FIXED, SecondBands, Tails
+from lambent.core.views.camera import Camera
 from lambent.editing.canvas import HostCanvas, viewed
 from lambent.editing.interreflection.entries import TermLight
 from lambent.editing.interreflection.noise import light_of, noise
@@ -28,7 +29,6 @@ from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable, Term
 from lambent.store.contract import view_artefact_name
 from lambent.store.store import Store
-from lambent.store.tails import FIXED, SecondBands, Tails
 from tests.editing.dense_rows import DensePairs, second_coefficients
 
 SIZE = (7, 5)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lambent.editing.history import History
+from lambent.editing.session.history import History
 
 
 def test_undo_and_redo_have_no_limit() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.wavelets import transformed
+from lambent.baked.transport.wavelets import transformed
 from lambent.editing.incremental import IncrementalPicture
 from lambent.editing.products import HostProducts, add_rows
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.shared_exponent import packed_rgb, unpacked_rgb
-from lambent.core.wavelets import transformed
+from lambent.baked.shared_exponent import packed_rgb, unpacked_rgb
+from lambent.baked.transport.wavelets import transformed
 from lambent.editing.interreflection.entries import Entries, TermLight
 from lambent.editing.interreflection.folding import Cells, rows
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from lambent.editing.operators import (
+from lambent.editing.curves.operators import (
     STEEPEST,
     Kind,
     Operator,

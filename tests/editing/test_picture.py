@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
 from lambent.core.errors import UserError
-from lambent.editing.operators import Region
+from lambent.core.views.camera import Camera
+from lambent.editing.curves.operators import Region
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
 from lambent.editing.rows import Rows
-from lambent.editing.session import Session
+from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_lobes import of_material

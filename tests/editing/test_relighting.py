@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
 from lambent.editing.sparse_rows import SparseRows
-from lambent.scenes.triangle_lights import icosahedron
-from lambent.scenes.triangle_wavelets import FACES, TriangleTree, TurningLight
+from lambent.scenes.sky.triangle_lights import icosahedron
+from lambent.scenes.sky.triangle_wavelets import FACES, TriangleTree, TurningLight
 
 
 def directions(count: int, seed: int = 1) -> np.ndarray:

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
 from lambent.core.errors import UserError
-from lambent.editing.document import Drawn, Surroundings
-from lambent.editing.operators import Operator, Region, layered, translation
-from lambent.editing.session import Session
+from lambent.core.views.camera import Camera
+from lambent.editing.curves.operators import Operator, Region, layered, translation
+from lambent.editing.session.document import Drawn, Surroundings
+from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.curve import Curve, angles_rad
 from lambent.materials.factored.of_models import editable

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
+from lambent.baked.shared_exponent import packed_rgb
+from lambent.baked.transport.wavelets import transformed
 from lambent.core.errors import UserError
-from lambent.core.images import read_image
-from lambent.core.shared_exponent import packed_rgb
-from lambent.core.wavelets import transformed
-from lambent.editing.operators import Region
-from lambent.editing.session import Session
+from lambent.core.pictures.images import read_image
+from lambent.core.views.camera import Camera
+from lambent.editing.curves.operators import Region
+from lambent.editing.session.session import Session
 from lambent.editing.stored import edited_picture
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.of_lobes import of_material

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF, components, selection, specular_only
 from lambent.materials.document import Lobe, Material
 from tests.tools.chi_square import assert_sampler

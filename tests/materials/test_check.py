@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from lambent.materials import check as module
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.check import check, check_sampler, furnace
+from lambent.materials.checking import check as module
+from lambent.materials.checking.check import check, check_sampler, furnace
 from lambent.materials.document import Lobe, Material
 
 FOIL = Material(

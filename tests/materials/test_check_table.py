@@ -8,17 +8,17 @@ import re
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
-from lambent.materials import check
-from lambent.materials import check_table as module
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.check_table import check_table
+from lambent.materials.checking import check
+from lambent.materials.checking import check_table as module
+from lambent.materials.checking.check_table import check_table
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import lbnl_xml
 from lambent.materials.measured import load
-from lambent.materials.measured.half_vector_grid import GridShape
 from lambent.materials.measured.protocol import MeasuredTable, TableInfo, collect
-from lambent.materials.measured.scattered import ScatteredTable
+from lambent.materials.measured.tables.half_vector_grid import GridShape
+from lambent.materials.measured.tables.scattered import ScatteredTable
 
 SMALL = GridShape(24, 1, 64, 32)
 GLOSSY = Material(kd=(0.1, 0.2, 0.3), lobes=(Lobe(mx=0.2, my=0.2, k=0.5, r0=0.5, alpha=0.2),))

@@ -8,7 +8,7 @@ import pytest
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.clear import MOST, MOST_TERMS, STRAIGHT, clear_terms, transmittance
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.shader_source import assemble
+from lambent.realtime.gpu.shader_source import assemble
 from tests.tools.shader_parity import assert_parity, run_wgsl
 
 SHEET = Lobe(side="transmission", mx=0.003, my=0.003, r0=0.04, k=(0.9, 0.5, 0.2), alpha=0.52, distribution="ggx")

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF, coupling, under_fresnel
-from lambent.materials.check import check, check_sampler
+from lambent.materials.checking.check import check, check_sampler
 from lambent.materials.document import Lobe, Material, load_material, material_from
 from lambent.materials.lobes import fresnel
 

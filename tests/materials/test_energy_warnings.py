@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF, more_than_arrives
 from lambent.materials.fitting.fit import fit
 from tests.materials.fitting.known_answers import FEW, PAINT, grey

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.lamp_light import lamp_response
-from lambent.realtime.shader_source import assemble
+from lambent.realtime.gpu.shader_source import assemble
 from tests.materials.test_lobes_shader import declared
 from tests.tools.shader_parity import assert_parity, run_wgsl
 

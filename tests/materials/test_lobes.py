@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core import directions
-from lambent.core.directions import direction
+from lambent.core.geometry import directions
+from lambent.core.geometry.directions import direction
 from lambent.materials import lobes
 from lambent.materials.bsdf import MaterialBSDF, components
-from lambent.materials.check import RECIPROCITY_LIMIT, reciprocity_error
+from lambent.materials.checking.check import RECIPROCITY_LIMIT, reciprocity_error
 from lambent.materials.document import Lobe, Material
 from tests.tools.chi_square import assert_sampler, sampler_test
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
-from lambent.materials import check
+from lambent.core.geometry.directions import direction
+from lambent.materials.checking import check
 from lambent.materials.models import model_named, models
 from lambent.materials.models.model import PROPERTIES, Model
 from tests.tools.furnace import assert_lossless, assert_passive

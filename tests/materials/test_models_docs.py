@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials import models as package
 from lambent.materials.models import model_named
 from tests.tools.shader_parity import assert_parity, run_wgsl

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.fresnel import conductor
 from lambent.materials.models import model_named
 from lambent.published.merl_fits import MERL_CHANNELS, Published

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.materials import check
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.check import check_sampler, furnace
+from lambent.materials.checking import check
+from lambent.materials.checking.check import check_sampler, furnace
+from lambent.materials.checking.normalise import NOTE, change, normalisation, normalised, with_less_alpha, with_less_k
 from lambent.materials.document import Lobe, Material, Provenance
-from lambent.materials.normalise import NOTE, change, normalisation, normalised, with_less_alpha, with_less_k
 from tests.materials.test_check import BRUSHED, FOIL
 
 STEEP = Material(lobes=(Lobe(mx=0.5, my=0.5, r0=1, alpha=1),))

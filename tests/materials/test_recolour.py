@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.answer import MOST_ALBEDO
+from lambent.baked.answering.albedos import albedos_of, edited_albedos
+from lambent.baked.answering.answer import MOST_ALBEDO
 from lambent.core.errors import UserError
-from lambent.materials.diffuse_albedos import albedos_of, edited_albedos
 from lambent.materials.document import Lobe, Material
 from lambent.materials.recolour import parse_recolours, recoloured
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.core.light_field_lookup import blended, normal_weights
+from lambent.baked.light_fields.lookup import blended, normal_weights
 from lambent.published.distance_impostors import fixed_point
 from tests.core.analytic_light_field import ball_field, errors, places
 

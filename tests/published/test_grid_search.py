@@ -12,7 +12,7 @@ from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.parameters import box_of, to_search
 from lambent.materials.fitting.problem import Mixture, problem_of
-from lambent.materials.measured.metrics import METRICS
+from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.published.grid_search import Schedule, fit_lobes, search
 from tests.materials.fitting.known_answers import FEW, PAINT, grey
 

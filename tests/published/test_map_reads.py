@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.map_cache import POLICIES, LeastRecent, misses
+from lambent.baked.light_fields.map_cache import POLICIES, LeastRecent, misses
 from lambent.published.map_reads import KnownFuture, fewest_misses, partial_misses
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import direction
 from lambent.published.merl_fits import MERL_CHANNELS, Published, read_fits
 
 WARD = "a-b = Aggregate(Lambertian(albedo = [.1, 0.2, 3e-1]), NganWard(albedo = [0.01, 0.02, 0.03], roughness = 0.1))"

@@ -10,10 +10,10 @@ import pytest
 
 from lambent.materials.document import Lobe
 from lambent.published.planar_thesis import multi_ring_table, offered
-from lambent.realtime.baked import Probe
-from lambent.realtime.device import open_device
-from lambent.realtime.patterns import radius
-from lambent.realtime.planar_integrators import PLANAR
+from lambent.realtime.gpu.device import open_device
+from lambent.realtime.integrators.patterns import radius
+from lambent.realtime.light.baked import Probe
+from lambent.realtime.planar.planar_integrators import PLANAR
 from lambent.realtime.renderer import Renderer
 from tests.realtime.test_realtime_planar import HEIGHT, mirror, scene_of, state
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.chi_square import chi_square
+from lambent.materials.checking.chi_square import chi_square
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.protocol import MeasuredTable, TableInfo
 from lambent.published import rejection

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.light_field import NO_POINT, LightField
-from lambent.core.light_field_lookup import Place
+from lambent.baked.light_fields.light_field import NO_POINT, LightField
+from lambent.baked.light_fields.lookup import Place
 from lambent.published.surface_light_fields import Basis, basis_weights, surface
 from tests.core.analytic_light_field import BALL, OWN, ball_field, on_ball, places
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from lambent.core.arrays import Flags
-from lambent.core.camera import Camera
-from lambent.core.directions import normalize
-from lambent.core.latlong import lat_long_directions
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.latlong import lat_long_directions
+from lambent.core.views.camera import Camera
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
-from lambent.scenes.triangle_lights import TriangleLights, environment_triangles
+from lambent.scenes.sky.triangle_lights import TriangleLights, environment_triangles
 from tests.bake.small_scenes import GREY
 
 OUTSIDE = -1

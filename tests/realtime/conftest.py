@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from lambent.realtime.device import open_device
+from lambent.realtime.gpu.device import open_device
 
 
 @pytest.fixture(scope="session")

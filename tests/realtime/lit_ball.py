@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.camera import Camera, image_plane
-from lambent.core.directions import normalize, reflect
-from lambent.core.light_field import CANDIDATES, NO_POINT, LightField
-from lambent.core.light_field_blocks import blocks_of, distance_blocks_of
-from lambent.core.octahedral import texel_directions
-from lambent.core.sequences import hammersley
+from lambent.baked.light_fields.blocks.blocks import blocks_of, distance_blocks_of
+from lambent.baked.light_fields.light_field import CANDIDATES, NO_POINT, LightField
+from lambent.baked.light_fields.stored import BLOCKS, DISTANCES
+from lambent.core.geometry.directions import normalize, reflect
+from lambent.core.geometry.octahedral import texel_directions
+from lambent.core.geometry.sequences import hammersley
+from lambent.core.views.camera import Camera, image_plane
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.baked import BakedScene
-from lambent.realtime.unbaked import unbaked_scene
+from lambent.realtime.light.baked import BakedScene
+from lambent.realtime.objects.unbaked import unbaked_scene
 from lambent.scenes.geometry import sphere
 from lambent.store.contract import light_field_name, write_scene_record
-from lambent.store.light_fields import BLOCKS, DISTANCES
 from lambent.store.store import Store
 from tests.realtime.lit_wall import cube_of
 

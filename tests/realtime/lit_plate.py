@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.camera import Camera, image_plane
-from lambent.core.directions import normalize, reflect
-from lambent.core.light_field import CANDIDATES, NO_POINT, LightField
-from lambent.core.light_field_lookup import Place
-from lambent.core.octahedral import texel_directions
+from lambent.baked.light_fields.light_field import CANDIDATES, NO_POINT, LightField
+from lambent.baked.light_fields.lookup import Place
+from lambent.core.geometry.directions import normalize, reflect
+from lambent.core.geometry.octahedral import texel_directions
+from lambent.core.views.camera import Camera, image_plane
 from lambent.materials.document import Material
-from lambent.realtime.baked import BakedScene
-from lambent.realtime.unbaked import unbaked_scene
+from lambent.realtime.light.baked import BakedScene
+from lambent.realtime.objects.unbaked import unbaked_scene
 from lambent.scenes.geometry import patch
 from tests.realtime.lit_ball import HALF, MIRROR, seen
 from tests.realtime.lit_wall import cube_of, smooth_light

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.camera import Camera
-from lambent.core.cubemap import face_directions
-from lambent.core.directions import normalize
+from lambent.core.geometry.cubemap import face_directions
+from lambent.core.geometry.directions import normalize
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
-from lambent.realtime.baked import BakedScene
-from lambent.realtime.unbaked import unbaked_scene
+from lambent.realtime.light.baked import BakedScene
+from lambent.realtime.objects.unbaked import unbaked_scene
 from lambent.scenes.geometry import patch
 
 Floats = NDArray[np.floating]

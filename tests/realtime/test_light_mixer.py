@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.light_mix import Factors
-from lambent.realtime.baked import BakedScene, read_baked
+from lambent.core.light.light_mix import Factors
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.group_light import GroupLight
-from lambent.realtime.light_mixer import MAP
+from lambent.realtime.light.baked import BakedScene, read_baked
+from lambent.realtime.light.group_light import GroupLight
+from lambent.realtime.light.light_mixer import MAP
 from lambent.realtime.renderer import Renderer
 from lambent.store.contract import scene_record, write_scene_record
 from lambent.store.store import Store

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.core.camera import Camera
-from lambent.core.directions import normalize
-from lambent.core.irradiance import basis_of
+from lambent.baked.answering.stored import read_answer
+from lambent.baked.probes.irradiance import basis_of
+from lambent.core.geometry.directions import normalize
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe
 from lambent.materials.recolour import recoloured
-from lambent.realtime.answer_shown import AnswerShown, answered
-from lambent.realtime.answering import AnsweredLight, answered_scene
-from lambent.realtime.baked import read_baked
+from lambent.realtime.answering.answer_shown import AnswerShown, answered
+from lambent.realtime.answering.answering import AnsweredLight, answered_scene
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.light.baked import read_baked
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.resources import light_layers
-from lambent.store.answer import read_answer
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, room_with_step
 
@@ -71,7 +71,7 @@ def test_the_error_of_some_texels_stands_for_that_of_all(store: Store, monkeypat
     answer, other = AnsweredLight(baked, stored), AnsweredLight(baked, stored)
     light = answer.lit(recoloured(baked.record.materials, {"grey": (0.5, 0.05, 0.05)}))
     of_all = answer.likely_error(light)
-    monkeypatch.setattr("lambent.realtime.answering.ERROR_TEXELS", len(stored.texels) // 3)
+    monkeypatch.setattr("lambent.realtime.answering.answering.ERROR_TEXELS", len(stored.texels) // 3)
     assert other.likely_error(light) == pytest.approx(of_all, rel=0.3) and other.likely_error(light) != of_all
 
 
@@ -117,6 +117,6 @@ def test_shown_answers_come_and_go(store: Store) -> None:
 
 
 def _renderer(store: Store) -> Renderer:
-    from lambent.realtime.device import open_device
+    from lambent.realtime.gpu.device import open_device
 
     return Renderer(open_device(), store)

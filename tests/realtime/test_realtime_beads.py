@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
-from lambent.core.camera import Camera
-from lambent.core.cubemap import face_directions
-from lambent.core.directions import normalize
+from lambent.core.geometry.cubemap import face_directions
+from lambent.core.geometry.directions import normalize
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.integrators import INTEGRATORS, Integrator
-from lambent.realtime.patterns import rings_table
+from lambent.realtime.integrators.integrators import INTEGRATORS, Integrator
+from lambent.realtime.integrators.patterns import rings_table
+from lambent.realtime.objects.unbaked import unbaked_scene as baked_scene
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.unbaked import unbaked_scene as baked_scene
 from lambent.scenes.geometry import sphere
 
 LIMIT = {0.05: 0.1, 0.1: 0.05, 0.25: 0.15, 0.4: 0.13}  # by m

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.realtime import textures as on_gpu
 from lambent.realtime.frame_state import LIGHT_MAP_NOISE, FrameState
 from lambent.realtime.incident import look_ups
-from lambent.realtime.integrators import INTEGRATORS
+from lambent.realtime.integrators.integrators import INTEGRATORS
+from lambent.realtime.materials import textures as on_gpu
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.scene import MaterialTextures, Texture
 from tests.realtime.lit_plate import plate_field

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.bake import bake
-from lambent.core.camera import Camera
-from lambent.core.metrics import display_pair, flip_error
+from lambent.core.pictures.metrics import display_pair, flip_error
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.baked import BakedScene, read_baked
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.light.baked import BakedScene, read_baked
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.geometry import box, merge, patch, placed, sphere
 from lambent.scenes.scene import Mesh, ReflectorRule, Scene, SceneObject

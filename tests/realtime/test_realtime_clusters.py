@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera, clip_from_world
-from lambent.realtime.clusters import CLUSTER_FACES, Clusters
+from lambent.core.views.camera import Camera, clip_from_world
+from lambent.realtime.objects.clusters import CLUSTER_FACES, Clusters
 from lambent.scenes.geometry import sphere
 from lambent.store.contract import ObjectRecord
 

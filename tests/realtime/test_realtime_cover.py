@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
-from lambent.core.colour import srgb_decode
+from lambent.core.light.colour import srgb_decode
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
-from lambent.realtime.clusters import Clusters
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.shader_source import assemble
+from lambent.realtime.objects.clusters import Clusters
+from lambent.realtime.objects.unbaked import unbaked_scene
 from lambent.realtime.passes.cover import PLACES
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.shader_source import assemble
-from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import patch
 from lambent.store.contract import ObjectRecord
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.colour import HALF_MAX
-from lambent.core.cubemap import texel_solid_angles
-from lambent.realtime.cube_mips import SMOOTH_AREA, finite, mip_chain, smooth_chain
+from lambent.core.geometry.cubemap import texel_solid_angles
+from lambent.core.light.colour import HALF_MAX
+from lambent.realtime.gpu.cube_mips import SMOOTH_AREA, finite, mip_chain, smooth_chain
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 64])

@@ -12,13 +12,13 @@ import wgpu
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.device import WEBGPU_LIMITS, adapter_info, choose_adapter, open_device
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.device import WEBGPU_LIMITS, adapter_info, choose_adapter, open_device
+from lambent.realtime.gpu.shader_source import assemble
+from lambent.realtime.gpu.targets import PassTimer, Targets
+from lambent.realtime.objects.unbaked import CAMERA
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.resources import device_needs
-from lambent.realtime.shader_source import assemble
-from lambent.realtime.targets import PassTimer, Targets
-from lambent.realtime.unbaked import CAMERA
 from tests.realtime.lit_wall import wall_scene
 
 GLOSS = Material(name="m", kd=0.5, lobes=(Lobe(mx=0.1, my=0.1), Lobe(mx=0.2, my=0.2, side="transmission")))
@@ -59,7 +59,7 @@ def test_a_real_gpu_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
 def test_opengl_is_not_started() -> None:
     """Listing its adapters starts EGL, which aborts the process at times."""
-    code = "from lambent.realtime.device import open_device; open_device(); print(open('/proc/self/maps').read())"
+    code = "from lambent.realtime.gpu.device import open_device; open_device(); print(open('/proc/self/maps').read())"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "vulkan" in done.stdout and "libEGL" not in done.stdout
 
@@ -77,7 +77,7 @@ def test_a_large_scene_asks_for_what_it_needs(device) -> None:
 
 
 def test_includes_come_once_and_in_order(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lambent.realtime.shader_source.FOLDERS", (tmp_path,))
+    monkeypatch.setattr("lambent.realtime.gpu.shader_source.FOLDERS", (tmp_path,))
     (tmp_path / "a.wgsl").write_text("const A = 1;\n")
     (tmp_path / "b.wgsl").write_text('#include "a.wgsl"\nconst B = A;\n')
     (tmp_path / "c.wgsl").write_text('#include "b.wgsl"\n#include "a.wgsl"\nconst C = B;\n')

@@ -17,7 +17,7 @@ from lambent.realtime.edited import commands, products
 from lambent.realtime.edited.canvas import FORMAT, GpuCanvas
 from lambent.realtime.edited.commands import OutOfGpuMemory
 from lambent.realtime.edited.layer import GpuLayer
-from lambent.realtime.targets import pixels
+from lambent.realtime.gpu.targets import pixels
 from tests.editing.test_folding import sparse
 
 BLACK = np.zeros((4, 8, 3), np.float32)

@@ -7,19 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bench.specular_scene import sphere_and_torus
-from lambent.core.camera import Camera, clip_from_world, pixel_rays
-from lambent.core.colour import filmic, srgb_decode, srgb_encode
+from lambent.bench.scenes.specular_scene import sphere_and_torus
 from lambent.core.errors import UserError
+from lambent.core.light.colour import filmic, srgb_decode, srgb_encode
+from lambent.core.views.camera import Camera, clip_from_world, pixel_rays
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.baked import BakedScene
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.light.baked import BakedScene
+from lambent.realtime.objects.unbaked import CAMERA
+from lambent.realtime.objects.unbaked import unbaked_scene as baked_scene
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.unbaked import CAMERA
-from lambent.realtime.unbaked import unbaked_scene as baked_scene
-from lambent.scenes.environments import studio
 from lambent.scenes.geometry import patch, sphere
+from lambent.scenes.sky.environments import studio
 from tests.realtime.lit_wall import cube_of, smooth_light, wall_scene
 
 FORWARD = Camera(name="forward", position=(0.0, 0.0, 2.0), target=(0.0, 0.0, 0.0), fov_y_deg=60.0)

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.cubemap import sample
-from lambent.core.light_field import NO_EXIT, Glass, LightField
-from lambent.core.light_field_lookup import March, Place, marched
-from lambent.core.octahedral import texel_directions
-from lambent.core.thin_glass import exits_beside, mirrored_back, sideways, through_glass
+from lambent.baked.light_fields.light_field import NO_EXIT, Glass, LightField
+from lambent.baked.light_fields.lookup import March, Place, marched
+from lambent.baked.light_fields.thin_glass import exits_beside, mirrored_back, sideways, through_glass
+from lambent.core.geometry.cubemap import sample
+from lambent.core.geometry.octahedral import texel_directions
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame_state import FrameState

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lambent.core.camera import Camera
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.baked import BakedScene
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.light.baked import BakedScene
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.geometry import box, patch, placed
 from lambent.scenes.scene import MaterialTextures, Mesh, Texture

@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core import probe_lookups
-from lambent.core.directions import normalize
+from lambent.baked.probes import lookups as probe_lookups
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import normalize
 from lambent.materials.document import Lobe, Material
 from lambent.realtime import incident
-from lambent.realtime.baked import Probe
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.shader_source import assemble
 from lambent.realtime.incident import look_up_of, look_ups, shader_of
+from lambent.realtime.light.baked import Probe
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.shader_source import assemble
 from tests.realtime.lit_wall import OBLIQUE, cube_of, smooth_light, wall_scene
 from tests.tools.shader_parity import assert_parity, run_wgsl
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera, pixel_rays
-from lambent.core.cubemap import sample as sample_cube
+from lambent.core.geometry.cubemap import sample as sample_cube
+from lambent.core.views.camera import Camera, pixel_rays
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.albedo import albedo_table
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.integrators.albedo import albedo_table
 from lambent.realtime.renderer import Renderer
 from tests.realtime.lit_wall import OBLIQUE, cube_of, smooth_light, wall_scene
 
@@ -136,8 +136,8 @@ def box_hit(x: np.ndarray, w: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("lookup, tolerance", [("planes", 0.01), ("distance", 0.02), ("plain", 0.01)])
 def test_lookups_meet_the_room(device, lookup: str, tolerance: float) -> None:
     """A mirror in a box: where the reflected rays end, seen from the probe's centre."""
-    from lambent.core.cubemap import face_directions
-    from lambent.core.directions import normalize
+    from lambent.core.geometry.cubemap import face_directions
+    from lambent.core.geometry.directions import normalize
 
     mirror = material((Lobe(mx=0.001, my=0.001, r0=1.0, alpha=0.5),))
     texels = normalize(face_directions(128))

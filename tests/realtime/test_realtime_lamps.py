@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
-from lambent.core.cubemap import face_directions
-from lambent.core.directions import normalize
+from lambent.core.geometry.cubemap import face_directions
+from lambent.core.geometry.directions import normalize
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe
-from lambent.realtime.draws import draws_of
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.shader_source import assemble
 from lambent.realtime.incident import look_ups
-from lambent.realtime.lamps import GROUPS, HEAD_ROWS, LAMP_ROWS, ProbeLamps, group_of, groups_out
+from lambent.realtime.light.lamps import GROUPS, HEAD_ROWS, LAMP_ROWS, ProbeLamps, group_of, groups_out
+from lambent.realtime.objects.draws import draws_of
+from lambent.realtime.objects.unbaked import unbaked_scene
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.shader_source import assemble
-from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import sphere
 from tests.materials.test_lobes_shader import declared
 from tests.realtime.lit_wall import OBLIQUE, cube_of, smooth_light, wall_scene

@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lambent.baked.light_fields.blocks.tiles import Tiles
+from lambent.baked.light_fields.light_field import LightField
+from lambent.baked.light_fields.stored import read_light_field
 from lambent.core.errors import UserError
-from lambent.core.images import read_image
-from lambent.core.light_field import LightField
-from lambent.core.light_field_tiles import Tiles
-from lambent.core.octahedral import texel_directions, texel_solid_angles
-from lambent.realtime import light_field_atlas
-from lambent.realtime.baked import read_baked
-from lambent.realtime.device import BLOCKS
+from lambent.core.geometry.octahedral import texel_directions, texel_solid_angles
+from lambent.core.pictures.images import read_image
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.light_field_atlas import MOST_TEXELS, Layout, coding
+from lambent.realtime.gpu.device import BLOCKS
+from lambent.realtime.light.baked import read_baked
+from lambent.realtime.light_fields import light_field_atlas
+from lambent.realtime.light_fields.light_field_atlas import MOST_TEXELS, Layout, coding
 from lambent.realtime.renderer import Renderer
 from lambent.render import Settings, still
-from lambent.store.light_fields import read_light_field
 from tests.realtime.lit_ball import CAMERA, HALF, ball_scene, light_field, mirrored, put_ball, seen
 from tests.realtime.lit_wall import cube_of
 from tests.viewer.small_store import write_small_store

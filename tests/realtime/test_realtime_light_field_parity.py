@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core import light_field_lookup as numpy_twin
-from lambent.core.cubemap import sample
-from lambent.core.light_field import NO_POINT, LightField
-from lambent.core.light_field_blocks import in_blocks
+from lambent.baked.light_fields import lookup as numpy_twin
+from lambent.baked.light_fields.blocks.blocks import in_blocks
+from lambent.baked.light_fields.light_field import NO_POINT, LightField
+from lambent.core.geometry.cubemap import sample
 from lambent.materials.document import Lobe, Material
-from lambent.realtime import light_field_atlas
-from lambent.realtime.device import BLOCKS
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.device import BLOCKS
 from lambent.realtime.incident.light_field import filled
+from lambent.realtime.light_fields import light_field_atlas
 from lambent.realtime.renderer import Renderer
 from tests.realtime.lit_plate import CAMERA, mirrored, plate_field, plate_scene
 from tests.realtime.lit_wall import cube_of, smooth_light

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core import light_field_lookup as numpy_twin
-from lambent.core.cubemap import face_directions
-from lambent.core.directions import normalize
-from lambent.realtime.baked import DARK
+from lambent.baked.light_fields import lookup as numpy_twin
+from lambent.core.geometry.cubemap import face_directions
+from lambent.core.geometry.directions import normalize
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.light.baked import DARK
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.sun_disc import without_sun
+from lambent.realtime.sun.sun_disc import without_sun
 from lambent.store.contract import SunRecord
 from tests.realtime.lit_plate import CAMERA, mirrored, plate_field, plate_scene
 

@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera, pixel_rays
-from lambent.core.colour import luminance
-from lambent.core.directions import normalize, reflect
-from lambent.core.irradiance import basis_of
+from lambent.baked.probes.irradiance import basis_of
+from lambent.core.geometry.directions import normalize, reflect
+from lambent.core.light.colour import luminance
+from lambent.core.views.camera import Camera, pixel_rays
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
 from lambent.materials.shader_layout import lobe_shader
-from lambent.realtime.baked import Probe
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.probe_light import ProbeLight
+from lambent.realtime.gpu.shader_source import assemble
+from lambent.realtime.light.baked import Probe
+from lambent.realtime.light.probe_light import ProbeLight
+from lambent.realtime.materials.textures import opacity_levels
+from lambent.realtime.objects.unbaked import irradiance, unbaked_scene, with_diffuse_light
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.shader_source import assemble
-from lambent.realtime.textures import opacity_levels
-from lambent.realtime.unbaked import irradiance, unbaked_scene, with_diffuse_light
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import MaterialTextures, Texture
 from tests.realtime.lit_wall import cube_of, smooth_light, wall_scene

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera, pixel_rays
+from lambent.core.views.camera import Camera, pixel_rays
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.outline import REACH_PX
+from lambent.realtime.gpu.targets import DISPLAY_FORMAT, target_texture
+from lambent.realtime.overlays.outline import REACH_PX
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.targets import DISPLAY_FORMAT, target_texture
 from lambent.store.contract import ObjectRecord, whole_objects
 from lambent.store.store import Store
-from lambent.viewer.picking import Geometry
+from lambent.viewer.cameras.picking import Geometry
 from tests.viewer.small_store import MATERIALS, write_small_store
 
 # The ball stands before the wall and hides a part of it; the second camera has the ball at the picture's edge.

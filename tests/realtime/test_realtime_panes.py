@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lambent.core.camera import Camera
+from lambent.core.views.camera import Camera
 from lambent.materials.clear import clear_terms, transmittance
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.baked import BakedScene
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.light.baked import BakedScene
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import MaterialTextures, Mesh, Texture

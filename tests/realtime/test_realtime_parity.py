@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core import colour
-from lambent.core.directions import normalize, reflect
-from lambent.core.false_colour import STOPS, Range, false_colour
-from lambent.core.octahedral import from_square
-from lambent.core.photometry import LM_PER_W
+from lambent.core.geometry.directions import normalize, reflect
+from lambent.core.geometry.octahedral import from_square
+from lambent.core.light import colour
+from lambent.core.light.false_colour import STOPS, Range, false_colour
+from lambent.core.light.photometry import LM_PER_W
 from lambent.materials.shader_layout import lobe_shader
-from lambent.realtime import albedo
-from lambent.realtime.passes import planar
-from lambent.realtime.shader_source import assemble
+from lambent.realtime.gpu.shader_source import assemble
+from lambent.realtime.integrators import albedo
+from lambent.realtime.planar import planar_pass as planar
 from lambent.store import contract
 from tests.tools.shader_parity import assert_parity, run_wgsl
 

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera, pixel_rays
+from lambent.core.views.camera import Camera, pixel_rays
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.baked import BakedScene, Probe
-from lambent.realtime.clusters import Seen
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.parts import neighbouring_faces, reaches
+from lambent.realtime.light.baked import BakedScene, Probe
+from lambent.realtime.objects.clusters import Seen
+from lambent.realtime.objects.parts import neighbouring_faces, reaches
+from lambent.realtime.objects.unbaked import unbaked_scene
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import patch
 from lambent.store.contract import ReflectorPart, ReflectorRecord
 

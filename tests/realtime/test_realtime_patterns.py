@@ -9,7 +9,7 @@ import pytest
 from scipy.special import erfinv
 
 from lambent.materials.document import Lobe, Material
-from lambent.realtime import patterns
+from lambent.realtime.integrators import patterns
 
 NS = (3, 5, 7, 9, 11, 13, 15, 17, 19, 40)
 

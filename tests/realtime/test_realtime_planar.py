@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera, clip_from_world, image_plane
 from lambent.core.errors import UserError
+from lambent.core.views.camera import Camera, clip_from_world, image_plane
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.planar_integrators import interleaved_table
-from lambent.realtime.planar_view import (
+from lambent.realtime.gpu.structs import FRAME_DTYPE
+from lambent.realtime.light.baked import BakedScene, Probe
+from lambent.realtime.objects.unbaked import unbaked_scene
+from lambent.realtime.planar.planar_integrators import interleaved_table
+from lambent.realtime.planar.planar_view import (
     MOST_MARGIN,
     STEP_PX,
     covered_share,
@@ -23,8 +25,6 @@ from lambent.realtime.planar_view import (
     planar_views,
 )
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.structs import FRAME_DTYPE
-from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.floor_plan import floor_plan
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.store.contract import PlanRecord, ReflectorPart, ReflectorRecord

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.camera import Camera, image_plane
-from lambent.realtime.albedo import gains
-from lambent.realtime.baked import Probe
+from lambent.core.views.camera import Camera, image_plane
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.patterns import lobe_points
+from lambent.realtime.integrators.albedo import gains
+from lambent.realtime.integrators.patterns import lobe_points
+from lambent.realtime.light.baked import Probe
 from lambent.realtime.renderer import Renderer
 from tests.realtime.test_realtime_planar import HEIGHT, WIDTH, mirror, scene_of
 

@@ -6,8 +6,8 @@ import re
 
 import numpy as np
 
-from lambent.core.directions import basis, normalize
-from lambent.realtime.shader_source import assemble
+from lambent.core.geometry.directions import basis, normalize
+from lambent.realtime.gpu.shader_source import assemble
 from tests.tools.shader_parity import run_wgsl
 
 FOCAL_PX = 300.0

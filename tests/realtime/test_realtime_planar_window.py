@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-import lambent.realtime.planar_view
-from lambent.core.camera import Camera
-from lambent.realtime.draws import draws_of
+import lambent.realtime.planar.planar_view
+from lambent.core.views.camera import Camera
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.integrators import INTEGRATORS
-from lambent.realtime.passes.planar_buffer import mirrored_by
-from lambent.realtime.planar_view import MARGIN_PX, STEP_PX, on_screen, planar_views
+from lambent.realtime.integrators.integrators import INTEGRATORS
+from lambent.realtime.objects.draws import draws_of
+from lambent.realtime.planar.planar_buffer import mirrored_by
+from lambent.realtime.planar.planar_view import MARGIN_PX, STEP_PX, on_screen, planar_views
 from lambent.realtime.renderer import Renderer
 from lambent.store.contract import ReflectorPart, ReflectorRecord
 from tests.realtime.test_realtime_planar import CAMERA, FLOOR, frame_of, mirror, scene_of
@@ -35,7 +35,9 @@ def test_a_small_reflector_has_a_small_part_of_the_whole_buffer(m: float, monkey
     """Its texels are those of the whole buffer, blocks of a coarse level included; a frame's pixels keep their rays."""
     frame, lobes = frame_of(CAMERA, WIDTH, HEIGHT), {"tray": m}
     (part,) = planar_views(frame, [TRAY], WIDTH, HEIGHT, 4, lobes)
-    monkeypatch.setattr(lambent.realtime.planar_view, "_window", partial(_whole, lambent.realtime.planar_view._window))
+    monkeypatch.setattr(
+        lambent.realtime.planar.planar_view, "_window", partial(_whole, lambent.realtime.planar.planar_view._window)
+    )
     (whole,) = planar_views(frame, [TRAY], WIDTH, HEIGHT, 4, lobes)
     assert np.prod(part.size) < 0.3 * np.prod(whole.size)
     moved = whole.uniform["offset"] - part.uniform["offset"]
@@ -61,7 +63,9 @@ def test_a_tray_is_as_with_the_whole_buffer(device: Any, m: float, monkeypatch: 
     renderer = Renderer(device, replace(baked, record=narrow))
     state = FrameState(CAMERA, 480, 320, antialias=False, show="specular", n=5)
     part = renderer.image(state)
-    monkeypatch.setattr(lambent.realtime.planar_view, "_window", partial(_whole, lambent.realtime.planar_view._window))
+    monkeypatch.setattr(
+        lambent.realtime.planar.planar_view, "_window", partial(_whole, lambent.realtime.planar.planar_view._window)
+    )
     whole = renderer.image(state)
     shown = (on_screen(frame_of(CAMERA, 480, 320), np.array(TRAY.outline)) * [1, -1] + 1) / 2 * [480, 320]
     (left, top), (right, bottom) = shown.min(axis=0).astype(int) + 4, shown.max(axis=0).astype(int) - 4

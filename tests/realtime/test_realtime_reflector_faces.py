@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
-from lambent.realtime.planar_view import covered_share, on_screen
-from lambent.realtime.reflector_faces import ReflectorFaces, outline_triangles, shares_on_screen
+from lambent.core.views.camera import Camera
+from lambent.realtime.planar.planar_view import covered_share, on_screen
+from lambent.realtime.planar.reflector_faces import ReflectorFaces, outline_triangles, shares_on_screen
 from lambent.realtime.renderer import Renderer
 from tests.realtime.test_realtime_planar import CAMERA, FLOOR, frame_of, mirror, scene_of, state
 

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.directions import normalize
+from lambent.baked.light_fields.light_field import NO_POINT, LightField
+from lambent.baked.probes.irradiance_volume import IrradianceVolume
 from lambent.core.errors import UserError
-from lambent.core.irradiance_volume import IrradianceVolume
-from lambent.core.light_field import NO_POINT, LightField
-from lambent.core.octahedral import texel_directions
-from lambent.core.sequences import cosine_hemisphere, hammersley
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.octahedral import texel_directions
+from lambent.core.geometry.sequences import cosine_hemisphere, hammersley
 from lambent.materials.document import Material
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.objects.replaced import with_replacements
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.replaced import with_replacements
 from lambent.scenes.geometry import box, merge, placed, sphere, subdivided
 from lambent.scenes.replacement import Replacement, fitted
 from lambent.scenes.scene import Mesh

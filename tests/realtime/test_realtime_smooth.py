@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import wgpu
 
-from lambent.realtime.layouts import Layouts
-from lambent.realtime.passes.display import SmoothPass
-from lambent.realtime.pipelines import cover
-from lambent.realtime.targets import DISPLAY_FORMAT
+from lambent.realtime.display.display import SmoothPass
+from lambent.realtime.gpu.layouts import Layouts
+from lambent.realtime.gpu.pipelines import cover
+from lambent.realtime.gpu.targets import DISPLAY_FORMAT
 
 SIZE = 64
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera, pixel_rays
-from lambent.core.directions import normalize, reflect
+from lambent.core.geometry.directions import normalize, reflect
+from lambent.core.views.camera import Camera, pixel_rays
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame_state import FrameState

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.camera import clip_from_world
+from lambent.baked.light_fields.light_field import NO_POINT, LightField
+from lambent.baked.light_fields.maps import nearest_points
 from lambent.core.errors import UserError
-from lambent.core.geometry import area_vectors
-from lambent.core.light_field import NO_POINT, LightField
-from lambent.core.light_field_maps import nearest_points
-from lambent.realtime.baked import BakedScene
+from lambent.core.geometry.triangles import area_vectors
+from lambent.core.views.camera import clip_from_world
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.needed_points import NeededPoints
+from lambent.realtime.light.baked import BakedScene
+from lambent.realtime.light_fields.needed_points import NeededPoints
+from lambent.realtime.light_fields.resident_maps import ResidentMaps, filled
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.resident_maps import ResidentMaps, filled
 from lambent.render import Settings, still
 from tests.realtime.lit_ball import CAMERA, ball_scene, light_field, put_ball
 

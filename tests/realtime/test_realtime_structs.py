@@ -11,8 +11,8 @@ import pytest
 import wgpu
 
 from lambent.materials.shader_layout import wgsl_dtype
-from lambent.realtime.shader_source import FOLDERS
-from lambent.realtime.structs import STRUCTS
+from lambent.realtime.gpu.shader_source import FOLDERS
+from lambent.realtime.gpu.structs import STRUCTS
 from tests.tools.shader_parity import gpu_device
 
 WGSL = "\n".join(path.read_text() for folder in FOLDERS for path in sorted(folder.glob("*.wgsl")))

@@ -12,17 +12,17 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
-from lambent.core.camera import Camera, pixel_rays
-from lambent.core.cubemap import face_directions
-from lambent.core.directions import basis, normalize
-from lambent.core.sequences import hammersley
+from lambent.core.geometry.cubemap import face_directions
+from lambent.core.geometry.directions import basis, normalize
+from lambent.core.geometry.sequences import hammersley
+from lambent.core.views.camera import Camera, pixel_rays
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.baked import BakedScene
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.light.baked import BakedScene
+from lambent.realtime.objects.unbaked import unbaked_scene
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.sun import BLOCK, block_ranges
-from lambent.realtime.sun_squares import MIDDLE, squares_of
-from lambent.realtime.unbaked import unbaked_scene
+from lambent.realtime.sun.sun import BLOCK, block_ranges
+from lambent.realtime.sun.sun_squares import MIDDLE, squares_of
 from lambent.scenes.geometry import box, merge, patch, placed, sphere
 from lambent.scenes.scene import Mesh
 from lambent.store.contract import SunRecord

@@ -10,20 +10,20 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
-from lambent.core.camera import Camera, pixel_rays
-from lambent.core.colour import luminance
-from lambent.core.cubemap import face_directions, texel_solid_angles
-from lambent.core.directions import basis, normalize
-from lambent.core.irradiance import basis_of
-from lambent.core.sequences import hammersley
+from lambent.baked.probes.irradiance import basis_of
+from lambent.core.geometry.cubemap import face_directions, texel_solid_angles
+from lambent.core.geometry.directions import basis, normalize
+from lambent.core.geometry.sequences import hammersley
+from lambent.core.light.colour import luminance
+from lambent.core.views.camera import Camera, pixel_rays
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.baked import BakedScene, Probe
-from lambent.realtime.cube_mips import finite
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.cube_mips import finite
+from lambent.realtime.light.baked import BakedScene, Probe
+from lambent.realtime.objects.unbaked import unbaked_scene
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.sun_disc import without_sun
-from lambent.realtime.unbaked import unbaked_scene
+from lambent.realtime.sun.sun_disc import without_sun
 from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import DirectionalLight, Scene, SceneObject
 from lambent.store.contract import SunRecord

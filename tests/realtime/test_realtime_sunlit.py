@@ -11,11 +11,11 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.quality import Quality
-from lambent.core.camera import Camera
-from lambent.core.images import write_image
+from lambent.core.pictures.images import write_image
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
-from lambent.realtime.baked import BakedScene, read_baked
-from lambent.realtime.turned_sky import under_turned_sky
+from lambent.realtime.light.baked import BakedScene, read_baked
+from lambent.realtime.sun.turned_sky import under_turned_sky
 from lambent.scenes.geometry import box, placed, sphere
 from lambent.scenes.scene import ImageEnvironment, Mesh, Scene, SceneObject
 from lambent.store.store import Store

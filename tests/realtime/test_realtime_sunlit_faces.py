@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.passes import sun as sun_pass
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.sunlit_faces import sunlit_faces
+from lambent.realtime.sun import sun_pass
+from lambent.realtime.sun.sunlit_faces import sunlit_faces
 from lambent.scenes.geometry import box, placed
 from tests.bake.small_scenes import turned_inwards
 from tests.realtime.test_realtime_sun import DOWN, floor, plate

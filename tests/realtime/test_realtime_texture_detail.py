@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lambent.bake.again import bake_again
 from lambent.bake.bake import bake
+from lambent.bake.running.again import bake_again
+from lambent.baked.answering.stored import StoredAnswer, read_answer
 from lambent.core.arrays import Floats
-from lambent.realtime.answering import AnsweredLight
-from lambent.realtime.baked import BakedScene, read_baked
-from lambent.realtime.texture_detail import Textures, filtered, with_own_albedos, without_uv
+from lambent.realtime.answering.answering import AnsweredLight
+from lambent.realtime.answering.texture_detail import Textures, filtered, with_own_albedos, without_uv
+from lambent.realtime.light.baked import BakedScene, read_baked
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import box, patch, placed, sphere
-from lambent.scenes.image_textures import mean_and_detail, with_image
+from lambent.scenes.looks.image_textures import mean_and_detail, with_image
 from lambent.scenes.scene import ImageTexture, MaterialTextures, Texture
-from lambent.store.answer import StoredAnswer, read_answer
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY
 

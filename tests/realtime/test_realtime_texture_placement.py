@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.objects.unbaked import unbaked_scene
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import IDENTITY, MaterialTextures, Texture
 from tests.realtime.lit_wall import cube_of, smooth_light

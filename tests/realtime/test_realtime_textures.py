@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
-from lambent.core.colour import srgb_decode
+from lambent.core.light.colour import srgb_decode
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
-from lambent.realtime import textures as on_gpu
-from lambent.realtime.draws import draws_of
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.materials import textures as on_gpu
+from lambent.realtime.objects.draws import draws_of
+from lambent.realtime.objects.unbaked import unbaked_scene
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import patch
+from lambent.scenes.looks.textures import doubled_angle, halved, slopes
 from lambent.scenes.scene import MaterialTextures, Scene, SceneObject, Texture
-from lambent.scenes.textures import doubled_angle, halved, slopes
 from tests.realtime.lit_wall import cube_of, smooth_light, wall_scene
 
 LETTER = np.array([[1, 1, 1, 1], [1, 0, 0, 0], [1, 1, 1, 0], [1, 0, 0, 0], [1, 0, 0, 0]], np.float16)  # an F
@@ -187,7 +187,7 @@ def test_drawn_images_equal_path_traced_ones(device, mi, tmp_path) -> None:
     """All of a gloss at once - colour, roughness, bumps, brushing, a hole - under light from afar."""
     from lambent.bake.reference.path_traced import render_reference
     from lambent.bake.sky.cube import environment_cube
-    from lambent.core.images import write_image
+    from lambent.core.pictures.images import write_image
     from lambent.scenes.scene import ImageEnvironment
 
     theta, phi = np.meshgrid((np.arange(32) + 0.5) * np.pi / 32, (np.arange(64) + 0.5) * np.pi / 32, indexing="ij")

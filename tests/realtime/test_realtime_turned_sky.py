@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.core import light_field_lookup as numpy_twin
-from lambent.core.cubemap import face_directions, sample
+from lambent.baked.light_fields import lookup as numpy_twin
+from lambent.baked.light_fields.shading import turned, under_sky
 from lambent.core.errors import UserError
-from lambent.core.light_field_shading import turned, under_sky
-from lambent.realtime.baked import Probe, read_baked
+from lambent.core.geometry.cubemap import face_directions, sample
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.light.baked import Probe, read_baked
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.turned_sky import under_turned_sky
+from lambent.realtime.sun.turned_sky import under_turned_sky
 from lambent.render import Settings
 from lambent.scenes.geometry import turn
 from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, ImageEnvironment, Scene, SunSky
-from lambent.scenes.turned_sky import under_turned_sky as scene_under_turned_sky
+from lambent.scenes.sky.turned_sky import under_turned_sky as scene_under_turned_sky
 from lambent.store.contract import FAR, SunRecord
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, plane

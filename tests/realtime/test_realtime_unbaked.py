@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.cubemap import face_directions
-from lambent.core.directions import normalize
+from lambent.core.geometry.cubemap import face_directions
+from lambent.core.geometry.directions import normalize
 from lambent.materials.document import Material
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.objects.unbaked import CAMERA, irradiance, unbaked_scene, with_diffuse_light
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.unbaked import CAMERA, irradiance, unbaked_scene, with_diffuse_light
-from lambent.scenes.environments import daylight
 from lambent.scenes.geometry import patch, sphere
+from lambent.scenes.sky.environments import daylight
 
 EVEN = np.full((6, 32, 32, 3), 0.5, np.float32)
 ABOVE = np.where(normalize(face_directions(32))[..., 1:2] > 0, np.ones(3), np.zeros(3)).astype(np.float32)

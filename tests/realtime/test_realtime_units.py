@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.colour import HALF_MAX, in_halves
-from lambent.core.false_colour import Range
-from lambent.realtime.baked import BakedScene, read_baked
+from lambent.core.light.colour import HALF_MAX, in_halves
+from lambent.core.light.false_colour import Range
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.light.baked import BakedScene, read_baked
 from lambent.realtime.renderer import Renderer
 from lambent.store.contract import probe_name, scene_record, write_scene_record
 from lambent.store.store import Store

@@ -14,26 +14,27 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from lambent.core import exr, rgbe
-from lambent.core.colour import luminance
-from lambent.core.directions import direction
-from lambent.core.images import read_encoded, read_image
+from lambent.core.geometry.directions import direction
+from lambent.core.light.colour import luminance
+from lambent.core.pictures import exr, rgbe
+from lambent.core.pictures.images import read_encoded, read_image
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material, Provenance, load_material
-from lambent.materials.measured import inspection, load
+from lambent.materials.measured import load
+from lambent.materials.measured.inspecting import inspection
 from lambent.published.merl_fits import read_fits
 from lambent.scenes import load_scene, sample_path, validate
-from lambent.scenes.environments import from_lat_long
 from lambent.scenes.loaders.load import formats
+from lambent.scenes.looks.textures import digest, parts, prepared
 from lambent.scenes.reflectors import find_reflectors
 from lambent.scenes.scene import ImageEnvironment, MaterialTextures, Scene, Texture
-from lambent.scenes.textures import digest, parts, prepared
+from lambent.scenes.sky.environments import from_lat_long
 from lambent.store.contract import SceneRecord, baked_views, scene_record, write_scene_record
+from lambent.store.kept.views import read_views, with_views
 from lambent.store.plans import plan_of
 from lambent.store.source import inputs_of
 from lambent.store.store import Store
 from lambent.store.textures import read_textures, texture_records, write_textures
-from lambent.store.views import read_views, with_views
 from tests.materials.measured import sound_files
 from tests.reliability import scene_seeds
 from tests.viewer.small_store import write_small_store

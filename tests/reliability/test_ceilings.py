@@ -24,15 +24,15 @@ import lambent
 from lambent.core import ceilings
 from lambent.core.ceilings import Ceiling
 from lambent.core.errors import UserError
-from lambent.core.images import read_encoded, read_image
 from lambent.core.inputs import open_input, parse_json, read_bytes, read_head, sha256_of
+from lambent.core.pictures.images import read_encoded, read_image
 from lambent.materials.document import load_material
 from lambent.materials.measured.registry import load
 from lambent.published.merl_fits import read_fits
 from lambent.scenes import load_scene
 from lambent.scenes.loaders.gltf.container import read as read_gltf
-from lambent.store.session import read_session
-from lambent.store.views import read_views
+from lambent.store.kept.session import read_session
+from lambent.store.kept.views import read_views
 from lambent.viewer.editor.files import kind_of
 from tests.reliability.scene_seeds import gltf_parts, obj
 from tests.scenes.test_gltf import document
@@ -136,16 +136,16 @@ def _raw_opens() -> Iterator[str]:
 
 OWN_FILES = {
     "bake/engine.py: file.read_text": "the cache of what Mitsuba can do here",
-    "core/exr.py: open": "the null device",
+    "core/pictures/exr.py: open": "the null device",
     "core/files.py: beside.open": "a file that is being written",
     "core/files.py: os.open": "a file that is about to be written",
-    "core/film.py: path.open": "the film that was just written",
+    "core/pictures/film.py: path.open": "the film that was just written",
     "cli/main.py: os.open": "the null device",
     "core/machine.py: info.read_text": "what the system says of the processor",
     "materials/models/model.py: file.read_text": "the package's shader",
     "materials/shader_layout.py: files('lambent.materials').joinpath('lobes.wgsl').read_text": "the package's shader",
     "realtime/incident/__init__.py: Path(look_up.__file__).with_suffix('.wgsl').read_text": "the package's shader",
-    "realtime/shader_source.py: path.read_text": "the package's shader",
+    "realtime/gpu/shader_source.py: path.read_text": "the package's shader",
     "viewer/modes/walk/comparison.py: np.load": "what its own worker wrote",
     "viewer/modes/walk/comparison.py: words.read_text": "what its own worker wrote",
 }
@@ -333,7 +333,7 @@ def test_pictures_that_claim_too_much(tmp_path: Path) -> None:
 _PEAK = """
 import resource, sys
 from pathlib import Path
-from lambent.core.images import read_image
+from lambent.core.pictures.images import read_image
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 assert read_image(Path(sys.argv[1])).shape == (4096, 4096, 3)
 print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024)

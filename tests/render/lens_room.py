@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.camera import Camera, image_plane
-from lambent.core.directions import normalize
-from lambent.core.thin_glass import refracted
+from lambent.baked.light_fields.thin_glass import refracted
+from lambent.core.geometry.directions import normalize
+from lambent.core.views.camera import Camera, image_plane
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import lathe, merge, patch, placed, turn

@@ -9,10 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera, CameraPath
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.realtime.frame_state import FrameState
 from lambent.render import Settings, film, output
-from lambent.viewer.modes.walk.filming import Filming
+from lambent.viewer.modes.walk.views.filming import Filming
 from tests.viewer.small_store import write_small_store
 
 SECONDS, LENGTH_M = 2.0, 6.0

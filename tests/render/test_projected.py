@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera, pixel_rays
 from lambent.core.errors import UserError
-from lambent.core.projections import Projection, View
+from lambent.core.views.camera import Camera, pixel_rays
+from lambent.core.views.projections import Projection, View
 from lambent.render.images import Images, Settings
 from lambent.render.projected import Projected, faces_settings
 

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.camera import CameraPath
-from lambent.core.colour import srgb_encode
 from lambent.core.errors import UserError
-from lambent.core.exposure import KEY, ev100_of
-from lambent.core.false_colour import fitting_range
-from lambent.core.images import read_encoded, read_image, to_bytes
-from lambent.core.photometry import photometric
-from lambent.realtime.device import open_device
+from lambent.core.light.colour import srgb_encode
+from lambent.core.light.exposure import KEY, ev100_of
+from lambent.core.light.false_colour import fitting_range
+from lambent.core.light.photometry import photometric
+from lambent.core.pictures.images import read_encoded, read_image, to_bytes
+from lambent.core.views.camera import CameraPath
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.render import Settings, film, images, still, write_frames
 from lambent.store.contract import scene_record, write_scene_record

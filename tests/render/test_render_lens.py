@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.core.camera import Camera
-from lambent.core.images import read_image
-from lambent.core.metrics import flip_error
+from lambent.core.pictures.images import read_image
+from lambent.core.pictures.metrics import flip_error
+from lambent.core.views.camera import Camera
 from lambent.render import Settings, still
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY

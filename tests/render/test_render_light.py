@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.images import read_image
-from lambent.core.light_mix import GroupMix, LightMix, parse_light
+from lambent.core.light.light_mix import GroupMix, LightMix, parse_light
+from lambent.core.pictures.images import read_image
 from lambent.render import Settings, film, still
-from lambent.store.views import change_views
+from lambent.store.kept.views import change_views
 from tests.viewer.small_store import FRONT, with_light_groups, write_small_store
 
 SMALL = Settings(48, 32, integrator="rings")

@@ -11,9 +11,9 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.core.errors import UserError
-from lambent.core.images import read_image
-from lambent.core.light_mix import parse_light
-from lambent.core.projections import Projection
+from lambent.core.light.light_mix import parse_light
+from lambent.core.pictures.images import read_image
+from lambent.core.views.projections import Projection
 from lambent.render import Settings, film, images, still
 from lambent.scenes import load_scene
 from lambent.store.contract import scene_record

@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.core.camera import Camera, CameraPath
-from lambent.core.captions import caption_font
 from lambent.core.errors import UserError
-from lambent.core.images import read_encoded, read_image, write_shown
-from lambent.core.light_mix import GroupMix, LightMix, parse_light
+from lambent.core.light.light_mix import GroupMix, LightMix, parse_light
+from lambent.core.pictures.images import read_encoded, read_image, write_shown
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.render import Settings, film, sheet, still
+from lambent.render.captions import caption_font
 from lambent.render.sheet import Exposures, laid_out, shape_of, with_the_baked_state
-from lambent.scenes.image_textures import mean_and_detail
-from lambent.scenes.look_track import LookTrack
+from lambent.scenes.looks.image_textures import mean_and_detail
+from lambent.scenes.looks.look_track import LookTrack
 from lambent.scenes.scene import ImageTexture, Look, MaterialTextures, Texture, Variant
 from lambent.store.contract import scene_record, write_scene_record
-from lambent.store.images import kept_image
-from lambent.store.session import FILE, RoomState, WalkSession, write_session
-from lambent.store.states import variants_of
+from lambent.store.kept.images import kept_image
+from lambent.store.kept.session import FILE, RoomState, WalkSession, write_session
+from lambent.store.kept.states import variants_of
+from lambent.store.kept.views import Views, change_views
 from lambent.store.store import Store
-from lambent.store.views import Views, change_views
 from tests.bake.small_scenes import TINY, room_with_step
 from tests.viewer.small_store import MATERIALS, with_light_groups, write_small_store
 

@@ -15,9 +15,9 @@ from lambent.core.progress import Cancelled
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.account import evaluate, peak_share
 from lambent.materials.fitting.fit import fit
-from lambent.materials.fitting.slices import slices
-from lambent.materials.measured.half_vector_grid import GridShape
-from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, synthesise
+from lambent.materials.fitting.shown.slices import slices
+from lambent.materials.measured.inspecting.synthetic import ANISOTROPIC, ISOTROPIC, synthesise
+from lambent.materials.measured.tables.half_vector_grid import GridShape
 from lambent.report import fit_report
 from lambent.report.fit_report import report
 from tests.report.test_report_page import check

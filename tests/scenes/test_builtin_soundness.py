@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.geometry import triangle_normals
+from lambent.core.geometry.triangles import triangle_normals
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.scenes import builtin, load_scene, validate
 from lambent.scenes.geometry import signed_volume

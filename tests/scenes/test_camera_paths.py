@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera, CameraPath
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.scenes import sample_path
 from lambent.scenes.camera_paths import camera_at, path_length
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import normalize
-from lambent.core.geometry import triangle_normals
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.triangles import triangle_normals
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import box, cylinder, sphere
 from lambent.scenes.loaders.meshes.creases import creased, deviating_faces

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from lambent.core.ceilings import Ceiling
-from lambent.core.cubemap import face_directions, texel_solid_angles
-from lambent.core.directions import normalize
 from lambent.core.errors import UserError
-from lambent.core.images import write_image
-from lambent.scenes import environment_images
-from lambent.scenes.environment_images import read_lat_long
-from lambent.scenes.environments import daylight, from_lat_long
+from lambent.core.geometry.cubemap import face_directions, texel_solid_angles
+from lambent.core.geometry.directions import normalize
+from lambent.core.pictures.images import write_image
+from lambent.scenes.sky import environment_images
+from lambent.scenes.sky.environment_images import read_lat_long
+from lambent.scenes.sky.environments import daylight, from_lat_long
 
 N = 16
 

@@ -8,16 +8,16 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from lambent.core.directions import normalize
-from lambent.core.environment_layouts import layout_of
 from lambent.core.errors import UserError
-from lambent.core.images import read_image
+from lambent.core.geometry.directions import normalize
+from lambent.core.pictures.environment_layouts import layout_of
+from lambent.core.pictures.images import read_image
 from lambent.scenes import load_scene
-from lambent.scenes.environment_images import read_lat_long
 from lambent.scenes.ies import parse_ies
 from lambent.scenes.loaders.contents import Contents
 from lambent.scenes.loaders.scene_toml.placing import placed
 from lambent.scenes.scene import DirectionalLight, IesLight, PointLight
+from lambent.scenes.sky.environment_images import read_lat_long
 from tests.scenes.test_gltf import _worn as worn
 from tests.scenes.test_gltf import document, loaded
 from tests.scenes.test_gltf_luminaires import DATA, UNEVEN, candela

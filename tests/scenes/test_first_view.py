@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.camera import clip_from_world
+from lambent.core.views.camera import clip_from_world
 from lambent.scenes import load_scene
 from lambent.scenes.first_view import content_bounds, first_views, inside
 from lambent.scenes.geometry.shapes import box

@@ -16,7 +16,7 @@ import trimesh
 
 from lambent.core.ceilings import TRIANGLES
 from lambent.core.errors import UserError
-from lambent.core.photometry import ILLUMINANCE, photometric
+from lambent.core.light.photometry import ILLUMINANCE, photometric
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.scenes import load_scene, validate

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.photometry import photometric
+from lambent.core.light.photometry import photometric
 from lambent.scenes.scene import IesLight, PointLight, Scene
 from tests.scenes.test_gltf import document, loaded
 from tests.scenes.test_ies import ies

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.sequences import cosine_hemisphere, hammersley
+from lambent.core.geometry.sequences import cosine_hemisphere, hammersley
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.scenes.loaders.surfaces.material_builder import masking

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
 from lambent.scenes.scene import PointLight
 from tests.scenes.test_gltf import TRIANGLE, document, loaded
 from tests.scenes.test_gltf import _png as png

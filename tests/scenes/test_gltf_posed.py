@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.directions import normalize
 from lambent.core.errors import UserError
-from lambent.core.geometry import triangle_normals
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.triangles import triangle_normals
 from lambent.scenes.geometry import box, copies_under, sphere, transformed
 from lambent.scenes.loaders.meshes.creases import deviating_faces
 from lambent.scenes.mesh import areas_of, boxes_of, corners_of

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.latlong import lat_long_direction, lat_long_directions
+from lambent.core.geometry.latlong import lat_long_direction, lat_long_directions
 from lambent.scenes import load_scene
-from lambent.scenes.computed import COMPUTED, HEIGHT, lat_long_image
-from lambent.scenes.interiors import INTERIORS
 from lambent.scenes.scene import ComputedEnvironment
+from lambent.scenes.sky.computed import COMPUTED, HEIGHT, lat_long_image
+from lambent.scenes.sky.interiors import INTERIORS
 
 HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
 
@@ -60,8 +60,8 @@ def test_a_scene_names_an_interior(tmp_path: Path) -> None:
 
 def test_the_path_tracer_sees_the_interior(mi: Any) -> None:
     from lambent.bake.sky.cube import environment_cube
-    from lambent.core.cubemap import face_directions
-    from lambent.core.directions import normalize
+    from lambent.core.geometry.cubemap import face_directions
+    from lambent.core.geometry.directions import normalize
 
     n = 48
     cube = environment_cube(ComputedEnvironment("gallery"), n).astype(float)

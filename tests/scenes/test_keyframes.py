@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.images import write_shown
-from lambent.core.light_mix import GroupMix, LightMix
+from lambent.core.light.light_mix import GroupMix, LightMix
+from lambent.core.pictures.images import write_shown
 from lambent.materials.between import between
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.loaders.keyframes import Keyframes, Known, read_keyframes
-from lambent.scenes.look_track import LookTrack
+from lambent.scenes.looks.look_track import LookTrack
 from lambent.scenes.scene import ImageTexture, Look, Variant
 
 WALL, OAK = Material(name="wall", kd=0.8), Material(name="oak", kd=(0.4, 0.3, 0.2))

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.plain import triple
+from lambent.core.views.camera import Camera
 from lambent.materials.factored.of_lobes import of_material
 from lambent.scenes import load_scene
 from lambent.scenes.builtin import cornell, loft, ring, vase

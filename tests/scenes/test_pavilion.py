@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.latlong import lat_long_directions
+from lambent.core.geometry.latlong import lat_long_directions
 from lambent.scenes import load_scene
 from lambent.scenes.builtin import pavilion
-from lambent.scenes.computed import lat_long_image
-from lambent.scenes.gardens import SUN
 from lambent.scenes.scene import Scene
+from lambent.scenes.sky.computed import lat_long_image
+from lambent.scenes.sky.gardens import SUN
 
 
 @pytest.fixture(scope="module")

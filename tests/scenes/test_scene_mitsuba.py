@@ -10,9 +10,9 @@ import pytest
 
 from lambent.bake.engine import engine
 from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
-from lambent.core.camera import Camera, camera_axes
-from lambent.core.directions import normalize
-from lambent.core.images import write_image
+from lambent.core.geometry.directions import normalize
+from lambent.core.pictures.images import write_image
+from lambent.core.views.camera import Camera, camera_axes
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.scenes import load_scene, validate
 from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, ImageEnvironment, PointLight, Scene, SunSky

@@ -13,7 +13,7 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.measured.spectral import rgb_of_spectra
+from lambent.materials.measured.parts.spectral import rgb_of_spectra
 from lambent.scenes import load_scene
 from lambent.scenes.loaders.mitsuba.fresnel import fresnel
 from lambent.scenes.loaders.mitsuba.metals import METALS

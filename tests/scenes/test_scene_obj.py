@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from lambent.core.errors import UserError
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.triangles import triangle_areas
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import signed_volume

@@ -10,7 +10,8 @@ import pytest
 from PIL import Image
 
 from lambent.core.errors import UserError
-from lambent.scenes import load_scene, textures
+from lambent.scenes import load_scene
+from lambent.scenes.looks import textures
 from lambent.scenes.scene import MaterialTextures, Texture
 
 

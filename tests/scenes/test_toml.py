@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.exposure import exposure_of
-from lambent.core.geometry import triangle_areas
-from lambent.core.photometry import photometric
+from lambent.core.geometry.triangles import triangle_areas
+from lambent.core.light.exposure import exposure_of
+from lambent.core.light.photometry import photometric
 from lambent.materials.document import Material
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import normalize
-from lambent.core.geometry import triangle_areas, triangle_normals
-from lambent.core.latlong import lat_long_directions
-from lambent.scenes.triangle_lights import (
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.latlong import lat_long_directions
+from lambent.core.geometry.triangles import triangle_areas, triangle_normals
+from lambent.scenes.sky.triangle_lights import (
     TriangleLights,
     environment_triangles,
     icosahedron,

@@ -8,13 +8,19 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.images import write_shown
-from lambent.core.light_mix import GroupMix
+from lambent.core.light.light_mix import GroupMix
+from lambent.core.pictures.images import write_shown
 from lambent.materials.document import Material
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch
+from lambent.scenes.looks.variants import (
+    VariantByObject,
+    scene_in_variant,
+    textures_in_looks,
+    variant_named,
+    with_variants,
+)
 from lambent.scenes.scene import ImageTexture, Look, MaterialTextures, Scene, SceneObject, Texture
-from lambent.scenes.variants import VariantByObject, scene_in_variant, textures_in_looks, variant_named, with_variants
 
 HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
 PAINTED = """

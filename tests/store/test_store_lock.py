@@ -15,9 +15,9 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.store.contract import SceneRecord, write_scene_record
+from lambent.store.kept.views import change_views, read_views
 from lambent.store.lock import FILE, WriterLock
 from lambent.store.store import Store
-from lambent.store.views import change_views, read_views
 
 ONE = np.ones(3, np.float32)
 RECORD = SceneRecord(name="s", objects=(), materials={}, cameras=(), bounds=((0, 0, 0), (1, 1, 1)))

@@ -17,10 +17,10 @@ import pytest
 from numcodecs import Zstd
 
 from lambent.cli.inspect import inspect_store
-from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.baked import read_baked
+from lambent.realtime.light.baked import read_baked
 from lambent.scenes.floor_plan import FloorPlan
 from lambent.scenes.scene import MaterialTextures, Texture
 from lambent.store.chunk_files import content_size
@@ -35,10 +35,10 @@ from lambent.store.contract import (
     view_meta,
     write_scene_record,
 )  # fmt: skip
+from lambent.store.kept.views import Views, change_views, read_views, with_views
 from lambent.store.plans import plan_of, plan_record
 from lambent.store.store import Store
 from lambent.store.textures import texture_records, write_textures
-from lambent.store.views import Views, change_views, read_views, with_views
 
 ALARM_S = 10
 FRONT = Camera("front", (0.0, 1.0, 3.0), (0.0, 1.0, 0.0))

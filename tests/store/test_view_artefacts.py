@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
 from lambent.core.errors import UserError
+from lambent.core.views.camera import Camera
 from lambent.store.contract import ViewRecord, baked_views, view_artefact_name, view_key, view_meta
 from lambent.store.store import Store
 

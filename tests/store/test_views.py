@@ -6,11 +6,11 @@ from threading import Thread
 
 import pytest
 
-from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.scenes.camera_paths import camera_at
 from lambent.store.contract import SceneRecord
-from lambent.store.views import FILE, Views, change_views, checked_name, free_name, read_views, with_views
+from lambent.store.kept.views import FILE, Views, change_views, checked_name, free_name, read_views, with_views
 
 A = Camera(name="a", position=(0, 1, 0), target=(0, 1, -1))
 B = Camera(name="b", position=(2, 1, 0), target=(2, 1, -1), fov_y_deg=60)

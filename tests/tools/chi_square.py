@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import direction
-from lambent.materials.check import Scatters
-from lambent.materials.chi_square import ChiSquare, chi_square
+from lambent.core.geometry.directions import direction
+from lambent.materials.checking.check import Scatters
+from lambent.materials.checking.chi_square import ChiSquare, chi_square
 
 LEVEL = 1e-4  # per test: a suite of a hundred fails by chance once in a hundred seeds, and the seeds are fixed
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.materials.check import Scatters, furnace
+from lambent.materials.checking.check import Scatters, furnace
 
 
 def assert_passive(bsdf: Scatters, *, tolerance: float = 3e-3) -> None:

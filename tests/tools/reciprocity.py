@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lambent.materials.check import RECIPROCITY_LIMIT, Scatters, reciprocity_error
+from lambent.materials.checking.check import RECIPROCITY_LIMIT, Scatters, reciprocity_error
 
 
 def assert_reciprocal(bsdf: Scatters, *, limit: float = RECIPROCITY_LIMIT, seed: int = 0) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.core.camera import Camera
 from lambent.core.errors import UserError
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.replacement import Replacement

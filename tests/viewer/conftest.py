@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera, CameraPath
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.materials.document import Lobe, Material
 from lambent.store.contract import ObjectRecord, SceneRecord
+from lambent.viewer.cameras.picking import Geometry
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.picking import Geometry
 from lambent.viewer.screen import Rect, Screen
 
 

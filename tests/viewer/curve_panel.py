@@ -2,8 +2,8 @@
 
 from imgui_bundle import imgui
 
-from lambent.core.camera import Camera
-from lambent.editing.session import Session
+from lambent.core.views.camera import Camera
+from lambent.editing.session.session import Session
 from lambent.viewer import layout
 from lambent.viewer.modes.edit.curves.editor import CurveEditor
 from tests.viewer import panel_driver

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.core.camera import Camera
-from lambent.core.shared_exponent import packed_rgb
-from lambent.core.wavelets import transformed
-from lambent.editing.session import Session
+from lambent.baked.shared_exponent import packed_rgb
+from lambent.baked.transport.wavelets import transformed
+from lambent.core.views.camera import Camera
+from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import Scene, SceneObject

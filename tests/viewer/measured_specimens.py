@@ -2,8 +2,8 @@
 
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.synthetic import Setup, record
+from lambent.materials.measured.inspecting.synthetic import Setup, record
+from lambent.materials.measured.parts.gonio_text import write_gonio
 
 BRASS = Material(
     name="brass", kd=(0.05, 0.04, 0.03), lobes=(Lobe(mx=0.15, my=0.15, r0=(0.6, 0.6, 0.6), k=(0.9, 0.8, 0.5)),)

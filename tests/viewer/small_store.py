@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from lambent.core.camera import Camera, CameraPath
-from lambent.core.cubemap import face_directions
-from lambent.core.directions import normalize
+from lambent.core.geometry.cubemap import face_directions
+from lambent.core.geometry.directions import normalize
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.materials.document import Lobe, Material
-from lambent.scenes.environments import studio
 from lambent.scenes.geometry import merge, patch, placed, sphere
+from lambent.scenes.sky.environments import studio
 from lambent.store.contract import ObjectRecord, SceneRecord, write_scene_record
 from lambent.store.store import Store
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import wgpu
 
-from lambent.core.false_colour import Range
-from lambent.editing.operators import Region
+from lambent.core.light.false_colour import Range
+from lambent.editing.curves.operators import Region
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.of_lobes import of_material
-from lambent.realtime.device import AdapterInfo, open_device
-from lambent.realtime.targets import pixels
-from lambent.viewer import edited
+from lambent.realtime.gpu.device import AdapterInfo, open_device
+from lambent.realtime.gpu.targets import pixels
+from lambent.viewer.edits import edited
 from lambent.viewer.modes.edit import painter
 from lambent.viewer.modes.edit.drawing import EditDrawing
 from lambent.viewer.modes.edit.painter import Painter, Wish, checked

@@ -6,9 +6,9 @@ import time
 
 import pytest
 
-from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection.proposal import Proposal, Row
-from lambent.editing.session import Session
+from lambent.bake.interreflection.settings import Bounces
+from lambent.editing.session.session import Session
 from lambent.viewer.modes.edit import baking
 from lambent.viewer.modes.edit.baking import Baking, Passes, Stage
 from tests.viewer.edited_view import CAMERA, SIZE, TRAY

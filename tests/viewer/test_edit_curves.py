@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
 from lambent.core.errors import UserError
-from lambent.editing.operators import Region
-from lambent.editing.session import Session
+from lambent.core.views.camera import Camera
+from lambent.editing.curves.operators import Region
+from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.curve import KNOTS, Curve, angles_rad
 from lambent.materials.models import model_named

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui, implot
 
-from lambent.core.camera import Camera
-from lambent.editing.session import Session
+from lambent.core.views.camera import Camera
+from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.curve import KNOTS, Curve
 from lambent.materials.models import model_named

@@ -10,11 +10,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection.proposal import Proposal, Row
-from lambent.core.camera import Camera
+from lambent.bake.interreflection.settings import Bounces
 from lambent.core.errors import UserError
-from lambent.editing.session import Session
+from lambent.core.views.camera import Camera
+from lambent.editing.session.session import Session
 from lambent.materials.document import Material
 from lambent.viewer.modes.edit import interreflections
 from lambent.viewer.modes.edit.interreflections import Bounced

@@ -9,14 +9,14 @@ import time
 import numpy as np
 import pytest
 
-from lambent.core.colour import shown
 from lambent.core.errors import UserError
-from lambent.core.false_colour import Range, false_colour
-from lambent.core.images import to_bytes
-from lambent.core.photometry import photometric
-from lambent.editing.operators import Region
+from lambent.core.light.colour import shown
+from lambent.core.light.false_colour import Range, false_colour
+from lambent.core.light.photometry import photometric
+from lambent.core.pictures.images import to_bytes
+from lambent.editing.curves.operators import Region
 from lambent.editing.picture import EditedPicture
-from lambent.editing.session import Session
+from lambent.editing.session.session import Session
 from lambent.editing.stored import parts_of
 from lambent.materials.document import load_material
 from lambent.store.store import Store

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.images import write_image
-from lambent.editing.document import Surroundings
-from lambent.editing.session import Session
+from lambent.core.pictures.images import write_image
+from lambent.editing.session.document import Surroundings
+from lambent.editing.session.session import Session
 from lambent.materials.document import Material
 from lambent.scenes.scene import ImageEnvironment
 from lambent.store.source import SURROUNDINGS

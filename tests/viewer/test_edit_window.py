@@ -2,8 +2,8 @@
 
 import pytest
 
-from lambent.core.images import read_image
-from lambent.editing.session import Session
+from lambent.core.pictures.images import read_image
+from lambent.editing.session.session import Session
 from lambent.store.contract import baked_views, transport_lights
 from lambent.store.store import Store
 from tests.viewer.window_session import VirtualScreen, WindowSession, missing_tools

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.directions import angles
+from lambent.core.geometry.directions import angles
 from lambent.materials.document import Lobe, Material
-from lambent.materials.fitting.incidence import incidences
+from lambent.materials.fitting.shown.incidence import incidences
 from lambent.materials.fitting.symmetry import mirrored
 from lambent.materials.measured import load
 from lambent.viewer.editor.editor import Editor
 from lambent.viewer.editor.readings import UNKNOWN, Disks, Incident, white_of
-from lambent.viewer.edits import MaterialEdits
+from lambent.viewer.edits.edits import MaterialEdits
 from tests.viewer.measured_specimens import BRASS, BRUSHED, FEW, TURNED, write_measurement
 
 LACQUER = Material(name="lacquer", kd=0.004, lobes=(Lobe(mx=0.02, my=0.02, r0=(0.04, 0.04, 0.04)),))

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.fitting.disks import disk_directions
-from lambent.materials.measured.metrics import METRICS
-from lambent.materials.measured.synthetic import synthesise
+from lambent.materials.fitting.shown.disks import disk_directions
+from lambent.materials.measured.inspecting.metrics import METRICS
+from lambent.materials.measured.inspecting.synthetic import synthesise
 from lambent.viewer.editor import readings
 from lambent.viewer.editor.matrix import matrix
 from lambent.viewer.editor.measurement import read_measurement, thinned

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.cubemap import texel_solid_angles
-from lambent.core.images import write_image
+from lambent.core.geometry.cubemap import texel_solid_angles
+from lambent.core.pictures.images import write_image
 from lambent.materials.document import Material
 from lambent.viewer.modes.material.preview import CAMERA, LAMP_SHARE, MEAN_RADIANCE, SHAPES, Preview, with_lamp
 
@@ -49,10 +49,10 @@ def test_the_lamp_is_in_proportion_to_the_environment() -> None:
 
 
 def test_a_picture_is_in_proportion_to_its_light(adapter: None) -> None:
-    from lambent.realtime.device import open_device
     from lambent.realtime.frame_state import FrameState
+    from lambent.realtime.gpu.device import open_device
+    from lambent.realtime.objects.unbaked import unbaked_scene, with_diffuse_light
     from lambent.realtime.renderer import Renderer
-    from lambent.realtime.unbaked import unbaked_scene, with_diffuse_light
 
     device: Any = open_device()
     paper, light = Material(name="paper", kd=0.4, kt_d=0.4), with_lamp(Preview().light("dusk"))

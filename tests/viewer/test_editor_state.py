@@ -8,12 +8,12 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
 from lambent.materials.document import Lobe, Material, Provenance, load_material
+from lambent.viewer.background.work import Work
 from lambent.viewer.editor.editor import Editor
 from lambent.viewer.editor.measurement import read_measurement, start_material
 from lambent.viewer.editor.restrictions import Restrictions, lobe_names
 from lambent.viewer.editor.subject import same_numbers
-from lambent.viewer.edits import MaterialEdits
-from lambent.viewer.work import Work
+from lambent.viewer.edits.edits import MaterialEdits
 from tests.viewer.measured_specimens import BRASS, FROSTED, write_measurement
 
 PATIENCE_S = 180.0

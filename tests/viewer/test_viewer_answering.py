@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.core.camera import Camera
-from lambent.realtime.answer_shown import answered
-from lambent.realtime.answering import answered_scene
-from lambent.realtime.baked import read_baked
-from lambent.realtime.device import open_device
+from lambent.baked.answering.stored import read_answer
+from lambent.core.views.camera import Camera
+from lambent.realtime.answering.answer_shown import answered
+from lambent.realtime.answering.answering import answered_scene
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.probe_light import ProbeLight
+from lambent.realtime.gpu.device import open_device
+from lambent.realtime.light.baked import read_baked
+from lambent.realtime.light.probe_light import ProbeLight
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.geometry import placed, sphere
 from lambent.scenes.scene import SceneObject
-from lambent.store.answer import read_answer
 from lambent.store.store import Store
-from lambent.viewer.modes.walk import answering
-from lambent.viewer.modes.walk.answering import WITHOUT, Answering, AnsweringLight
+from lambent.viewer.modes.walk.light import answering
+from lambent.viewer.modes.walk.light.answering import WITHOUT, Answering, AnsweringLight
 from tests.bake.small_scenes import GREY, TINY, room_with_step
 from tests.viewer.small_store import write_small_store
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lambent.core.camera import Camera
-from lambent.viewer import cameras
+from lambent.core.views.camera import Camera
+from lambent.viewer.cameras import cameras
 
 ROOM = ((-3.0, 0.0, -4.0), (3.0, 2.6, 4.0))
 EYE = Camera(name="eye", position=(0, 1.6, 2), target=(0, 1.6, -1), fov_y_deg=50)

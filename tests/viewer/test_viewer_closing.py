@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from lambent.materials.document import load_material
-from lambent.store.views import read_views
+from lambent.store.kept.views import read_views
 from tests.viewer.panel_driver import PanelDriver
 from tests.viewer.test_viewer_panels import walk_mode
 

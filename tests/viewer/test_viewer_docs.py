@@ -5,14 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from lambent.viewer import cameras, pacing
 from lambent.viewer import input as viewer_input
+from lambent.viewer import pacing
+from lambent.viewer.cameras import cameras
 from lambent.viewer.editor import measurement
 from lambent.viewer.modes.edit import baking, painter
 from lambent.viewer.modes.edit import mode as edit
 from lambent.viewer.modes.material import mode as material
 from lambent.viewer.modes.walk import input as walk
-from lambent.viewer.modes.walk import walls
+from lambent.viewer.modes.walk.views import walls
 
 TEXT = (Path(__file__).parents[2] / "docs" / "window.md").read_text(encoding="utf-8")
 

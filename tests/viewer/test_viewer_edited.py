@@ -17,10 +17,10 @@ from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_models import editable
 from lambent.materials.factored.terms import Editable
 from lambent.materials.models import model_named
-from lambent.realtime.device import AdapterInfo, open_device
-from lambent.realtime.targets import pixels
-from lambent.viewer import edited
-from lambent.viewer.edited import Backend, SentCanvas, ShadedCanvas, backend, on_device, texture_of
+from lambent.realtime.gpu.device import AdapterInfo, open_device
+from lambent.realtime.gpu.targets import pixels
+from lambent.viewer.edits import edited
+from lambent.viewer.edits.edited import Backend, SentCanvas, ShadedCanvas, backend, on_device, texture_of
 from tests.editing.dense_rows import DensePairs, rows_of
 from tests.editing.test_folding import sparse
 

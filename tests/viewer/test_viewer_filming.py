@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.realtime.frame_state import FrameState
-from lambent.viewer.modes.walk import filming
-from lambent.viewer.modes.walk.filming import LONGEST_FRAMES, Filming
+from lambent.viewer.modes.walk.views import filming
+from lambent.viewer.modes.walk.views.filming import LONGEST_FRAMES, Filming
 from tests.viewer.conftest import Clock
 
 PIXELS = np.zeros((4, 6, 3), np.uint8)

@@ -7,12 +7,12 @@ from itertools import product
 import numpy as np
 import pytest
 
-from lambent.core.camera import camera_axes
-from lambent.viewer import cameras
-from lambent.viewer.framing import framed
+from lambent.core.views.camera import camera_axes
+from lambent.viewer.cameras import cameras
+from lambent.viewer.cameras.framing import framed
+from lambent.viewer.cameras.navigation import PathPlay
 from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.markers import projected
-from lambent.viewer.navigation import PathPlay
 
 
 @pytest.fixture

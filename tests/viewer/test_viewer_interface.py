@@ -2,7 +2,7 @@
 
 from wgpu.utils.imgui import imgui_backend
 
-from lambent.realtime.device import open_device
+from lambent.realtime.gpu.device import open_device
 from lambent.viewer import interface
 
 

@@ -5,11 +5,11 @@ import json
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.light_mix import GroupMix, LightMix
+from lambent.core.light.light_mix import GroupMix, LightMix
 from lambent.materials.document import Material
-from lambent.store.session import FILE, UNSAVED_FILE, RoomState, WalkSession, read_session, write_session
-from lambent.viewer.edits import MaterialEdits
-from lambent.viewer.modes.walk.keeping import BACK, ELSEWHERE, QUIET_S, SessionKeeper
+from lambent.store.kept.session import FILE, UNSAVED_FILE, RoomState, WalkSession, read_session, write_session
+from lambent.viewer.edits.edits import MaterialEdits
+from lambent.viewer.modes.walk.session.keeping import BACK, ELSEWHERE, QUIET_S, SessionKeeper
 from lambent.viewer.screen import Rect, Screen
 from tests.viewer.conftest import Clock
 
@@ -202,7 +202,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(tmp_path, monkeypatch):
     def refused(*_, **__):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("lambent.store.session.os.open", refused)
+    monkeypatch.setattr("lambent.store.kept.session.os.open", refused)
     opened = Window(tmp_path)
     assert opened.lines == (f"the session cannot be saved: {tmp_path}: cannot be written (Permission denied)",)
     opened.paint(RED)

@@ -4,16 +4,16 @@ from dataclasses import replace
 
 import pytest
 
-from lambent.core.light_mix import GroupMix, LightMix, MixTrack
+from lambent.core.light.light_mix import GroupMix, LightMix, MixTrack
+from lambent.store.kept.views import read_views
 from lambent.store.light_groups import LightGroupRecord
-from lambent.store.views import read_views
+from lambent.viewer.cameras.navigation import PathPlay
 from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.walk.input import WalkInput
-from lambent.viewer.modes.walk.light_keys import key_times, mix_at, with_key, without_key
-from lambent.viewer.modes.walk.lights import RecordedLight
+from lambent.viewer.modes.walk.light.light_keys import key_times, mix_at, with_key, without_key
+from lambent.viewer.modes.walk.light.lights import RecordedLight
 from lambent.viewer.modes.walk.mode import WalkMode
-from lambent.viewer.modes.walk.views import SavedViews
-from lambent.viewer.navigation import PathPlay
+from lambent.viewer.modes.walk.views.views import SavedViews
 from tests.viewer.panel_driver import PanelDriver
 
 GROUPS = (

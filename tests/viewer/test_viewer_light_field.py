@@ -5,21 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.camera import camera_axes
-from lambent.core.light_field import LightField
-from lambent.core.octahedral import texel_directions
-from lambent.realtime.device import open_device
+from lambent.baked.light_fields.light_field import LightField
+from lambent.core.geometry.octahedral import texel_directions
+from lambent.core.views.camera import camera_axes
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
+from lambent.viewer.cameras.picking import Geometry
 from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.walk.input import WalkInput
-from lambent.viewer.modes.walk.light_fields import FieldView, colours_of, map_image
+from lambent.viewer.modes.walk.light.light_fields import FieldView, colours_of, map_image
 from lambent.viewer.modes.walk.markers import projected
 from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.panels.light_field import without
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.picking import Geometry
 from lambent.viewer.screen import Rect
 from tests.realtime.lit_ball import CAMERA, ball_scene, light_field
 from tests.viewer.drawn_frames import drawn

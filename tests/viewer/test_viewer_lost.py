@@ -7,11 +7,11 @@ import signal
 
 import pytest
 
-from lambent.core.camera import Camera
+from lambent.core.views.camera import Camera
 from lambent.materials.document import load_material
-from lambent.store.session import UNSAVED_FILE, read_session
-from lambent.store.views import Views
-from lambent.viewer.lost import kept
+from lambent.store.kept.session import UNSAVED_FILE, read_session
+from lambent.store.kept.views import Views
+from lambent.viewer.background.lost import kept
 from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.mode import WalkMode

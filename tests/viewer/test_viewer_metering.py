@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera
 from lambent.core.errors import UserError
-from lambent.core.exposure import KEY
-from lambent.core.metrics import flip_error
-from lambent.core.photometry import LM_PER_W
+from lambent.core.light.exposure import KEY
+from lambent.core.light.photometry import LM_PER_W
+from lambent.core.pictures.metrics import flip_error
 from lambent.core.progress import Cancelled, silent
-from lambent.realtime.baked import Probe
+from lambent.core.views.camera import Camera
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.light.baked import Probe
 from lambent.viewer.modes.walk.comparison import Comparison, difference, flip_beside
-from lambent.viewer.modes.walk.filming import film_file
-from lambent.viewer.modes.walk.glare import GlareDrawing, GlareMeter
+from lambent.viewer.modes.walk.light.glare import GlareDrawing, GlareMeter
+from lambent.viewer.modes.walk.light.metering import read
 from lambent.viewer.modes.walk.markers import Marks, mirror_ball, outline, projected
-from lambent.viewer.modes.walk.metering import read
+from lambent.viewer.modes.walk.views.filming import film_file
 
 CAMERA = Camera(name="c", position=(0, 1, 5), target=(0, 1, 0), fov_y_deg=90)
 

@@ -25,7 +25,7 @@ def start(path, name, screen, **options):
     import wgpu
     from imgui_bundle import imgui
 
-    from lambent.realtime.device import open_device
+    from lambent.realtime.gpu.device import open_device
     from lambent.viewer.input import Input
 
     class Plain(Drawing):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.core.camera import Camera
-from lambent.core.images import write_image
+from lambent.core.pictures.images import write_image
+from lambent.core.views.camera import Camera
 from lambent.scenes import load_scene
 from lambent.viewer.modes.walk.mode import open_store
 from tests.bake.small_scenes import TINY

@@ -7,18 +7,18 @@ import pytest
 from imgui_bundle import imgui
 from PIL import Image
 
-from lambent.core.false_colour import Range
+from lambent.core.light.false_colour import Range
 from lambent.materials.document import Lobe, load_material
 from lambent.scenes.scene import ImageTexture
 from lambent.store.contract import ReflectorPart, ReflectorRecord
-from lambent.store.views import read_views
+from lambent.store.kept.views import read_views
 from lambent.viewer import layout
 from lambent.viewer.look import SAMPLE_COUNTS
 from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.walk.comparison import Figures
 from lambent.viewer.modes.walk.input import WalkInput
+from lambent.viewer.modes.walk.light.metering import read
 from lambent.viewer.modes.walk.markers import Ball
-from lambent.viewer.modes.walk.metering import read
 from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.screen import Statistics

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lambent.core.camera import Camera, rays_through
+from lambent.core.views.camera import Camera, rays_through
 from lambent.store.contract import ObjectRecord
-from lambent.viewer.picking import Geometry, first_hit
+from lambent.viewer.cameras.picking import Geometry, first_hit
 
 TOP = Camera(name="top", position=(0, 3, 0), target=(0, 0, 0), up=(0, 0, -1), fov_y_deg=90)
 
@@ -35,7 +35,7 @@ def reordered(triangles):
 
 
 def test_a_box_is_entered_ahead_alone():
-    from lambent.viewer.picking import _box_entry
+    from lambent.viewer.cameras.picking import _box_entry
 
     box = np.array([[-1.0, -1, -1], [1, 1, 1]])
     ahead = np.array([0.0, 0, 1])

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.camera import CameraPath
-from lambent.core.false_colour import Range, false_colour
-from lambent.core.images import read_encoded, read_image
-from lambent.core.photometry import photometric
-from lambent.realtime.device import open_device
+from lambent.core.light.false_colour import Range, false_colour
+from lambent.core.light.photometry import photometric
+from lambent.core.pictures.images import read_encoded, read_image
+from lambent.core.views.camera import CameraPath
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.store.store import Store
 from lambent.viewer.modes.walk.pictures import Pictures
@@ -214,6 +214,8 @@ def test_a_folder_that_takes_no_files_is_said(renderer, state, monkeypatch):
         film(pictures, state, name)
         assert "no film: " in said[-1].text and "Permission denied" in said[-1].text
         assert state.films.under_way is None
-    monkeypatch.setattr("lambent.viewer.modes.walk.filming.check_place", lambda path: None)  # and is refused later
+    monkeypatch.setattr(
+        "lambent.viewer.modes.walk.views.filming.check_place", lambda path: None
+    )  # and is refused later
     film(pictures, state, "b.mp4")
     assert "no film: " in state.screen.messages[-1].text and state.films.under_way is None

@@ -10,21 +10,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bake.again import COPY_OF, bake_again, copy_beside
 from lambent.bake.bake import bake
-from lambent.core.camera import Camera
+from lambent.bake.running.again import COPY_OF, bake_again, copy_beside
 from lambent.core.errors import UserError
-from lambent.core.light_mix import GroupMix, LightMix
+from lambent.core.light.light_mix import GroupMix, LightMix
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe
-from lambent.realtime.device import open_device
+from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.scenes import load_scene
 from lambent.store.store import Store
-from lambent.viewer.modes.walk import rebaking
-from lambent.viewer.modes.walk.answering import AnsweringLight
-from lambent.viewer.modes.walk.arrivals import Arrived
+from lambent.viewer.modes.walk.light.answering import AnsweringLight
 from lambent.viewer.modes.walk.pictures import Pictures
-from lambent.viewer.modes.walk.rebaked_light import (
+from lambent.viewer.modes.walk.rebake import rebaking
+from lambent.viewer.modes.walk.rebake.arrivals import Arrived
+from lambent.viewer.modes.walk.rebake.rebaked_light import (
     FADE_STEPS,
     Rebaked,
     batches_of,
@@ -32,7 +32,7 @@ from lambent.viewer.modes.walk.rebaked_light import (
     texel_objects,
     texel_steps,
 )
-from lambent.viewer.modes.walk.rebaking import clock_time
+from lambent.viewer.modes.walk.rebake.rebaking import clock_time
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.screen import Rect
 from tests.bake.small_scenes import TINY
@@ -51,11 +51,11 @@ say(what="light map", done=1, total=4)
 {then}
 """
 BAKES = """
-from lambent.bake.again import bake_again
+from lambent.bake.running.again import bake_again
 from lambent.materials.document import Material
 from tests.bake.small_scenes import TINY
 materials = {name: Material.model_validate(one) for name, one in asked["materials"].items()}
-from lambent.viewer.modes.walk.rebaking_worker import StreamWatch
+from lambent.viewer.modes.walk.rebake.rebaking_worker import StreamWatch
 watch = StreamWatch(sys.stdout.buffer)
 watch.region_pause = 0.0
 bake_again(Path(sys.argv[1]), Path(sys.argv[2]), materials, quality=TINY, watch=watch)
@@ -63,9 +63,9 @@ watch.say(baked=True)
 """
 IN_TILES = """
 import time
-from lambent.bake.again import bake_again
+from lambent.bake.running.again import bake_again
 from lambent.materials.document import Material
-from lambent.viewer.modes.walk.rebaking_worker import StreamWatch
+from lambent.viewer.modes.walk.rebake.rebaking_worker import StreamWatch
 from tests.bake.small_scenes import TINY
 class Waits(StreamWatch):
     region_pause = 0.0
@@ -81,12 +81,12 @@ watch.say(baked=True)
 """
 ENDLESS = """
 import runpy, sys, time
-import lambent.bake.again
+import lambent.bake.running.again
 def endless(*_, **__):
     print("begun", flush=True)
     time.sleep(60)
-lambent.bake.again.bake_again = endless
-runpy.run_module("lambent.viewer.modes.walk.rebaking_worker", run_name="__main__", alter_sys=False)
+lambent.bake.running.again.bake_again = endless
+runpy.run_module("lambent.viewer.modes.walk.rebake.rebaking_worker", run_name="__main__", alter_sys=False)
 """
 
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from lambent.core.camera import Camera, CameraPath
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.scenes.camera_paths import camera_at
-from lambent.store.views import read_views
-from lambent.viewer.modes.walk.recording import KEY_S, Recording, smoothed
-from lambent.viewer.modes.walk.views import SavedViews
+from lambent.store.kept.views import read_views
+from lambent.viewer.modes.walk.views.recording import KEY_S, Recording, smoothed
+from lambent.viewer.modes.walk.views.views import SavedViews
 
 
 def at(x):

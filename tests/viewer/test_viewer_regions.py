@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from lambent.realtime.device import open_device
+from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.store.store import Store
-from lambent.viewer.modes.walk.arrivals import Arrived, Region
-from lambent.viewer.modes.walk.rebaked_light import FADE_STEPS, Rebaked, steps
+from lambent.viewer.modes.walk.rebake.arrivals import Arrived, Region
+from lambent.viewer.modes.walk.rebake.rebaked_light import FADE_STEPS, Rebaked, steps
 from tests.viewer.test_viewer_rebaking import SIZE, baked_box
 
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.realtime.baked import read_baked
-from lambent.realtime.device import open_device
+from lambent.realtime.gpu.device import open_device
+from lambent.realtime.light.baked import read_baked
 from lambent.realtime.renderer import Renderer
 from lambent.store.store import Store
 from lambent.viewer.modes.walk.pictures import Pictures

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.light_mix import GroupMix, LightMix
-from lambent.realtime.device import open_device
+from lambent.core.light.light_mix import GroupMix, LightMix
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
-from lambent.store.session import RoomState
+from lambent.store.kept.session import RoomState
 from lambent.store.store import Store
 from lambent.viewer.modes.walk.pictures import Pictures
+from lambent.viewer.modes.walk.session.states import AS_BAKED
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.modes.walk.states import AS_BAKED
 from lambent.viewer.screen import Rect
 from tests.viewer.drawn_frames import drawn
 from tests.viewer.small_store import MATERIALS, SIDE, with_light_groups, write_small_store

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lambent.materials.document import load_material
+from lambent.viewer.cameras.navigation import Navigation, PathPlay
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.navigation import Navigation, PathPlay
 from lambent.viewer.screen import MESSAGE_S
 
 

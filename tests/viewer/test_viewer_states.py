@@ -3,15 +3,15 @@
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.light_mix import GroupMix, LightMix
+from lambent.core.light.light_mix import GroupMix, LightMix
 from lambent.scenes.scene import Look, Variant
+from lambent.store.kept.session import RoomState
 from lambent.store.light_groups import LightGroupRecord
-from lambent.store.session import RoomState
 from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.mode import WalkMode
+from lambent.viewer.modes.walk.session.states import AS_BAKED
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.modes.walk.states import AS_BAKED
 from tests.viewer.panel_driver import PanelDriver
 
 OFF = LightMix({"lamp": GroupMix(on=False)})

@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lambent.core.colour import srgb_encode
 from lambent.core.errors import UserError
+from lambent.core.light.colour import srgb_encode
 from lambent.materials.diffuse_albedos import lobe_albedo
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.scene import ImageTexture, Look, MaterialTextures, Texture, Variant
 from lambent.store.contract import scene_record, write_scene_record
-from lambent.store.images import IMAGES, kept_image, readable, with_paths
-from lambent.store.session import FILE, RoomState, read_session
-from lambent.store.states import variants_of
+from lambent.store.kept.images import IMAGES, kept_image, readable, with_paths
+from lambent.store.kept.session import FILE, RoomState, read_session
+from lambent.store.kept.states import variants_of
 from lambent.store.store import Store
-from lambent.viewer.edits import MaterialEdits
-from lambent.viewer.modes.walk.keeping import SessionKeeper
-from lambent.viewer.modes.walk.texturing import NONE, OWN, Texturing
-from lambent.viewer.modes.walk.thumbnails import SIDE, thumbnail
-from lambent.viewer.modes.walk.tracing import Wish
+from lambent.viewer.edits.edits import MaterialEdits
+from lambent.viewer.modes.walk.at_rest.tracing import Wish
+from lambent.viewer.modes.walk.session.keeping import SessionKeeper
+from lambent.viewer.modes.walk.session.texturing import NONE, OWN, Texturing
+from lambent.viewer.modes.walk.session.thumbnails import SIDE, thumbnail
 from lambent.viewer.screen import Rect, Screen
 from tests.viewer.conftest import Clock
 from tests.viewer.small_store import write_small_store

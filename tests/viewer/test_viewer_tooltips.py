@@ -6,7 +6,7 @@ import pytest
 from imgui_bundle import imgui
 
 from lambent.bake.interreflection.proposal import Proposal, Row
-from lambent.core.camera import Camera
+from lambent.core.views.camera import Camera
 from lambent.materials.document import KINDS
 from lambent.store.contract import ReflectorPart, ReflectorRecord
 from lambent.store.light_groups import LightGroupRecord

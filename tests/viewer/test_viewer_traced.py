@@ -6,21 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bake.again import bake_again, copy_beside
 from lambent.bake.bake import bake
-from lambent.core.camera import CameraPath
-from lambent.core.images import read_image
-from lambent.core.light_mix import GroupMix, LightMix
-from lambent.realtime.device import open_device
+from lambent.bake.running.again import bake_again, copy_beside
+from lambent.core.light.light_mix import GroupMix, LightMix
+from lambent.core.pictures.images import read_image
+from lambent.core.views.camera import CameraPath
+from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.scenes import load_scene
 from lambent.store.store import Store
 from lambent.traced.picture import ENDED, TracedPicture
+from lambent.viewer.modes.walk.at_rest.traced import FADE_S, STILL_S
+from lambent.viewer.modes.walk.at_rest.tracing import Wish
+from lambent.viewer.modes.walk.at_rest.tracing_worker import Rooms
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.modes.walk.traced import FADE_S, STILL_S
-from lambent.viewer.modes.walk.tracing import Wish
-from lambent.viewer.modes.walk.tracing_worker import Rooms
 from lambent.viewer.screen import Rect
 from tests.bake.small_scenes import TINY
 from tests.viewer.drawn_frames import LONGEST_S, drawn, until

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.realtime.device import open_device
+from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.scene import ImageTexture
 from lambent.store.store import Store
+from lambent.viewer.background.work import POLL_S
+from lambent.viewer.modes.walk.at_rest.tracing import Tracing, Wish
+from lambent.viewer.modes.walk.at_rest.tracing_worker import GROWTH, PICTURE_S, Converging, Wishes
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.modes.walk.tracing import Tracing, Wish
-from lambent.viewer.modes.walk.tracing_worker import GROWTH, PICTURE_S, Converging, Wishes
-from lambent.viewer.work import POLL_S
 from tests.viewer.drawn_frames import drawn
 from tests.viewer.dying_worker import HEIGHT, WIDTH
 from tests.viewer.small_store import FRONT, MATERIALS, SIDE, write_small_store
@@ -73,7 +73,7 @@ class Sampled:
 @pytest.fixture
 def clock(monkeypatch):
     now = [0.0]
-    monkeypatch.setattr("lambent.viewer.modes.walk.tracing_worker.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("lambent.viewer.modes.walk.at_rest.tracing_worker.time.monotonic", lambda: now[0])
     return now
 
 
@@ -114,7 +114,7 @@ def reports(tracing, woken):
 
 def test_a_process_that_is_killed_while_it_writes_is_a_line(monkeypatch):
     """Every report wakes the window, the end as well, and none counts before the next `tick`."""
-    monkeypatch.setattr("lambent.viewer.modes.walk.tracing.WORKER", "tests.viewer.dying_worker")
+    monkeypatch.setattr("lambent.viewer.modes.walk.at_rest.tracing.WORKER", "tests.viewer.dying_worker")
     monkeypatch.chdir(ROOT)
     woken = queue.SimpleQueue()
     tracing = Tracing(Path("none.store"), 0.0, (), lambda: woken.put(None))

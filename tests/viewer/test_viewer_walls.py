@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lambent.viewer.modes.walk.walls import BODY_M, Walls, nearest_points
+from lambent.viewer.modes.walk.views.walls import BODY_M, Walls, nearest_points
 
 
 def block(low, high):

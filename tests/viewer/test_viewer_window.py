@@ -8,8 +8,8 @@ import sys
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.images import read_image
-from lambent.store.views import read_views
+from lambent.core.pictures.images import read_image
+from lambent.store.kept.views import read_views
 from tests.viewer.small_store import FRONT, write_small_store
 from tests.viewer.window_session import ROOT, VirtualScreen, WindowSession, missing_tools
 

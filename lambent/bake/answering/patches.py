@@ -15,7 +15,7 @@ import numpy as np
 
 from lambent.bake.answering.spots import Spots
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.colour import luminance
+from lambent.core.light.colour import luminance
 
 NORMAL_M = 0.5  # metres that a unit of the normal counts for
 LEAST_SHARE = 0.05  # of the mean weight, that every texel has

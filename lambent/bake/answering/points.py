@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.answering.spots import Spots
-from lambent.core.answer import Neighbours
-from lambent.core.answer_rays import BYTE, MOST_POINTS
+from lambent.baked.answering.answer import Neighbours
+from lambent.baked.answering.rays import BYTE, MOST_POINTS
 from lambent.core.arrays import Floats, Indices
-from lambent.core.colour import luminance
+from lambent.core.light.colour import luminance
 
 NEAR = 8
 SPREAD = 0.7  # of a block's size: distance at which a point counts by 1/e

@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 
 from lambent.bake.bsdfs.material_plugin import DIFFUSE_ATTRIBUTE
 from lambent.bake.tracing import rays
+from lambent.bake.tracing.lights.sun import SunRays
 from lambent.bake.tracing.rays import array_of, rays_from
 from lambent.bake.tracing.scene_builder import light_map_texel
-from lambent.bake.tracing.sun import SunRays
 from lambent.bake.tracing.traced_scene import TracedScene
+from lambent.baked.answering.stored import NO_SPOT
 from lambent.core.arrays import Floats
-from lambent.core.cubemap import face_directions
-from lambent.core.directions import normalize
+from lambent.core.geometry.cubemap import face_directions
+from lambent.core.geometry.directions import normalize
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Material
-from lambent.store.answer import NO_SPOT
 
 MOST_OWN = 64  # surfaces of its own object that a ray of a probe passes
 

@@ -22,8 +22,8 @@ from lambent.bake.tracing.rays import independent
 from lambent.bake.tracing.scene_builder import light_map_texel
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats, Indices
-from lambent.core.colour import luminance
-from lambent.core.sequences import hammersley
+from lambent.core.geometry.sequences import hammersley
+from lambent.core.light.colour import luminance
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Material
 

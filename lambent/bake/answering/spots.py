@@ -10,14 +10,14 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.bake.running.tiles import slices
 from lambent.bake.surfaces.texels import POINTS
-from lambent.bake.tiles import slices
+from lambent.bake.tracing.lights.sun import SunRays
 from lambent.bake.tracing.rays import array_of, vectors
-from lambent.bake.tracing.sun import SunRays
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.colour import luminance
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
+from lambent.core.light.colour import luminance
 from lambent.scenes.scene import Scene
 
 AT_ONCE = 1 << 19  # texels

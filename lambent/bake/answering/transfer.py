@@ -10,9 +10,9 @@ from lambent.bake.answering.patches import Clusters
 from lambent.bake.answering.points import GatherPoints
 from lambent.bake.answering.rays import NOWHERE, RayEnds
 from lambent.bake.answering.spots import Spots
+from lambent.bake.running.tiles import seed_of
 from lambent.bake.surfaces.texels import Sides
-from lambent.bake.tiles import seed_of
-from lambent.core.answer_rays import Rays, packed_rays, weights_of_bytes
+from lambent.baked.answering.rays import Rays, packed_rays, weights_of_bytes
 from lambent.core.arrays import Floats, Indices
 
 AROUND = 16  # texels that the rays of a point start from

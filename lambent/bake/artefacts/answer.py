@@ -13,14 +13,14 @@ from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, finished_groups,
 from lambent.bake.artefacts.probe import sharing
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
-from lambent.bake.keys import key_of
 from lambent.bake.methods import sorts_light
 from lambent.bake.quality import QualityName
-from lambent.bake.tiles import run_tiles
-from lambent.core.answer_rays import Rays
+from lambent.bake.running.keys import key_of
+from lambent.bake.running.tiles import run_tiles
+from lambent.baked.answering.delta_bytes import delta_bytes
+from lambent.baked.answering.rays import Rays
+from lambent.baked.answering.stored import DIRECT, NO_PATCH, answer_name, probe_spots_name
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.delta_bytes import delta_bytes
-from lambent.store.answer import DIRECT, NO_PATCH, answer_name, probe_spots_name
 from lambent.store.contract import SIDES, probe_name, shared_probes
 from lambent.store.light_groups import group_name
 from lambent.store.store import Writer

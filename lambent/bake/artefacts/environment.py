@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
-from lambent.bake.keys import environment_inputs, key_of
 from lambent.bake.quality import QualityName
-from lambent.core.colour import in_halves
+from lambent.bake.running.keys import environment_inputs, key_of
+from lambent.core.light.colour import in_halves
 
 KIND = "environment"
 NEEDS = ()

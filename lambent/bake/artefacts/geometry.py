@@ -6,17 +6,17 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 
 from lambent.bake.context import GEOMETRY, BakeContext
-from lambent.bake.cuts import longest_piece
 from lambent.bake.engine import engine
-from lambent.bake.keys import geometry_inputs, key_of
 from lambent.bake.quality import QualityName
-from lambent.bake.sight import Sight
+from lambent.bake.running.keys import geometry_inputs, key_of
 from lambent.bake.surfaces.atlas import merged, object_records, unwrap
+from lambent.bake.surfaces.cuts import longest_piece
+from lambent.bake.surfaces.visible_triangles import Sight
 from lambent.core.plain import triple
 from lambent.scenes.reflectors import Reflector, find_reflectors
 from lambent.scenes.scene import Scene
 from lambent.store.contract import SCENE, ReflectorPart, ReflectorRecord, SceneRecord, write_scene_record
-from lambent.store.images import with_kept_images
+from lambent.store.kept.images import with_kept_images
 from lambent.store.plans import plan_record
 from lambent.store.textures import texture_records, write_textures
 
@@ -43,7 +43,7 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 def bake(context: BakeContext) -> None:
     engine()  # before Mitsuba is imported
-    from lambent.bake.tracing.viewed import texel_sizes
+    from lambent.bake.tracing.seen.viewed import texel_sizes
 
     texels, longest_m = context.settings(KIND).texels, longest_piece(context.store)
     sight = context.sight or Sight(context.scene)

@@ -18,9 +18,9 @@ from lambent.bake.engine import engine
 from lambent.bake.interreflection.as_baked import SCATTERING_TEXTURES, shapes_of, state_of
 from lambent.bake.interreflection.series import Bins, bins_of, tails_of, worn
 from lambent.bake.interreflection.tiles import Job, Tile, TileTracer
-from lambent.bake.keys import key_of, light_inputs, texture_inputs
-from lambent.bake.tiles import slices
-from lambent.bake.view import View
+from lambent.bake.running.keys import key_of, light_inputs, texture_inputs
+from lambent.bake.running.tiles import slices
+from lambent.bake.transport.view import View
 from lambent.materials.factored.roughness import varies
 from lambent.materials.factored.terms import Editable
 from lambent.store.source import environment_note

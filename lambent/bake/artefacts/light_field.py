@@ -14,19 +14,19 @@ import numpy as np
 from lambent.bake.artefacts.light_map import finished_maps
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
-from lambent.bake.keys import key_of
 from lambent.bake.light_fields import request
 from lambent.bake.methods import ProbeMethod
 from lambent.bake.quality import QualityName
-from lambent.bake.tiles import run_tiles, seed_of
+from lambent.bake.running.keys import key_of
+from lambent.bake.running.tiles import run_tiles, seed_of
+from lambent.baked.light_fields.stored import BLOCKS, DISTANCES, EXITS
 from lambent.core.arrays import Floats, Indices
-from lambent.core.colour import halves
 from lambent.core.errors import UserError
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.triangles import triangle_areas
+from lambent.core.light.colour import halves
 from lambent.core.progress import Progress, part_of
 from lambent.scenes.scene import LightFieldWish
 from lambent.store.contract import LIGHT_FIELD_CHOICE, light_field_name, needs_probe
-from lambent.store.light_fields import BLOCKS, DISTANCES, EXITS
 from lambent.store.store import Array
 
 if TYPE_CHECKING:
@@ -240,7 +240,12 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
         inverse_distances,
         radiance_maps,
     )
-    from lambent.core.light_field_blocks import blocks_of, blocks_shape, distance_blocks_of, distance_blocks_shape
+    from lambent.baked.light_fields.blocks.blocks import (
+        blocks_of,
+        blocks_shape,
+        distance_blocks_of,
+        distance_blocks_shape,
+    )
 
     start, how = time.perf_counter(), settings_of(context, wish)
     seen = traced.seen(name, how, wish)
@@ -355,7 +360,7 @@ def _exits(context: BakeContext, name: str) -> Behind:
 def _glass(context: BakeContext, name: str) -> list[float]:
     """Index of refraction, share of light RGB, and power of the cosine of the glass of an object."""
     from lambent.bake.light_fields.glass import clearest, index_of_refraction
-    from lambent.core.thin_glass import normal_transmittance
+    from lambent.baked.light_fields.thin_glass import normal_transmittance
 
     material = context.scene.materials[context.scene.object(name).material]
     lobe = clearest(material)

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lambent.bake.backs import backs_of
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
-from lambent.bake.keys import group_inputs, key_of, light_inputs, material_inputs
 from lambent.bake.methods import LightMapMethod, sorts_light
 from lambent.bake.quality import QualityName
-from lambent.bake.tiles import run_tiles
+from lambent.bake.running.keys import group_inputs, key_of, light_inputs, material_inputs
+from lambent.bake.running.tiles import run_tiles
+from lambent.bake.surfaces.backs import backs_of
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.scenes.panes import panes_of
 from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, Scene

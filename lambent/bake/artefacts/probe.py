@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lambent.bake.artefacts.light_map import finished_groups, finished_maps
-from lambent.bake.backs import backs_of
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
-from lambent.bake.keys import geometry_inputs, key_of
 from lambent.bake.methods import ProbeMethod, sorts_light
 from lambent.bake.probes.division import HIDDEN
 from lambent.bake.quality import QualityName
-from lambent.bake.tiles import seed_of
+from lambent.bake.running.keys import geometry_inputs, key_of
+from lambent.bake.running.tiles import seed_of
+from lambent.bake.surfaces.backs import backs_of
 from lambent.core.plain import first_of
-from lambent.scenes.variants import documents_of
+from lambent.scenes.looks.variants import documents_of
 from lambent.store.contract import SHARED_PROBES, needs_probe, probe_name, shared_probes
 from lambent.store.store import Store
 

@@ -10,9 +10,9 @@ import numpy as np
 from lambent.bake.artefacts.light_map import finished_maps
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
-from lambent.bake.keys import key_of
-from lambent.bake.tiles import seed_of
-from lambent.core.colour import luminance
+from lambent.bake.running.keys import key_of
+from lambent.bake.running.tiles import seed_of
+from lambent.core.light.colour import luminance
 from lambent.store.contract import (
     needs_probe,
     probe_irradiance,

@@ -12,13 +12,13 @@ from lambent.bake.artefacts.transport import ENTRIES, append
 from lambent.bake.artefacts.view_points import points_key
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
-from lambent.bake.keys import environment_inputs, key_of, light_inputs, material_inputs
 from lambent.bake.quality import QualityName
-from lambent.bake.tiles import seed_of
-from lambent.bake.view import View
+from lambent.bake.running.keys import environment_inputs, key_of, light_inputs, material_inputs
+from lambent.bake.running.tiles import seed_of
+from lambent.bake.transport.view import View
 
 if TYPE_CHECKING:
-    from lambent.scenes.triangle_wavelets import TriangleTree
+    from lambent.scenes.sky.triangle_wavelets import TriangleTree
 
 KIND = "relighting"
 NEEDS = ("view_points",)
@@ -75,7 +75,7 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 def bake(context: BakeContext) -> None:
     engine()  # before Mitsuba is imported
-    from lambent.scenes.triangle_wavelets import PARTS, ROWS_OF_PARTS, TriangleTree, TurningLight
+    from lambent.scenes.sky.triangle_wavelets import PARTS, ROWS_OF_PARTS, TriangleTree, TurningLight
 
     tree = TriangleTree(context.settings(KIND).depth)
     for view in context.views:
@@ -103,7 +103,7 @@ def _lamps(context: BakeContext, view: View) -> np.ndarray:
 
 def _bake_transport(context: BakeContext, view: View, tree: TriangleTree) -> None:
     """Write wavelets by blocks of points, the entries of a block before its spans."""
-    from lambent.scenes.triangle_wavelets import FACES
+    from lambent.scenes.sky.triangle_wavelets import FACES
 
     points = len(context.view_tracer.points(view))
     blocks = -(-points // POINTS)

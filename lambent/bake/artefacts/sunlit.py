@@ -7,7 +7,7 @@ import numpy as np
 from lambent.bake.artefacts.light_map import may_have_sun
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
-from lambent.bake.keys import key_of
+from lambent.bake.running.keys import key_of
 from lambent.store.sunlit import GEOMETRY, SUNLIT
 
 KIND = "sunlit"
@@ -24,7 +24,7 @@ def keys(context: BakeContext) -> dict[str, str]:
 def bake(context: BakeContext) -> None:
     engine()  # before Mitsuba is imported
     from lambent.bake.light.sunlit import sunlit
-    from lambent.bake.tracing.sun import SunRays
+    from lambent.bake.tracing.lights.sun import SunRays
 
     traced, texels, sun = context.traced, context.traced.texels, context.traced.sun
     found = np.ones((texels.height, texels.width), np.uint8)

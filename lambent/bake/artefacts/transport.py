@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lambent.bake.artefacts.visibility import lights_key, trace
-from lambent.bake.behind import Behind, behind
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
-from lambent.bake.keys import key_of, texture_inputs
 from lambent.bake.quality import QualityName
-from lambent.bake.view import View
+from lambent.bake.running.in_background import Behind, behind
+from lambent.bake.running.keys import key_of, texture_inputs
+from lambent.bake.transport.view import View
 from lambent.core.progress import Progress
 from lambent.materials.factored.roughness import varies
 from lambent.materials.factored.terms import Factor, Term
@@ -25,7 +25,7 @@ from lambent.store.store import Store, Writer
 
 if TYPE_CHECKING:
     from lambent.bake.transport.view_points import ViewPoints
-    from lambent.scenes.triangle_lights import TriangleLights
+    from lambent.scenes.sky.triangle_lights import TriangleLights
 
 KIND = "transport"
 NEEDS = ("view_points", "visibility")

@@ -6,8 +6,8 @@ import numpy as np
 
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
-from lambent.bake.keys import geometry_inputs, key_of, light_inputs, texture_inputs
-from lambent.bake.view import View
+from lambent.bake.running.keys import geometry_inputs, key_of, light_inputs, texture_inputs
+from lambent.bake.transport.view import View
 from lambent.core.plain import triple
 from lambent.store.contract import SceneRecord, write_scene_record
 

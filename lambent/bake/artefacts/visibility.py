@@ -9,10 +9,10 @@ import numpy as np
 from lambent.bake.artefacts.view_points import points_key
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
-from lambent.bake.keys import key_of, light_inputs
 from lambent.bake.quality import QualityName
-from lambent.bake.tiles import run_tiles
-from lambent.bake.view import View
+from lambent.bake.running.keys import key_of, light_inputs
+from lambent.bake.running.tiles import run_tiles
+from lambent.bake.transport.view import View
 
 KIND = "visibility"
 NEEDS = ("view_points",)

@@ -14,13 +14,13 @@ import mitsuba as mi
 import numpy as np
 
 from lambent.materials.document import Lobe, Material
+from lambent.scenes.looks.textures import doubled_angle, parts, slopes
 from lambent.scenes.scene import MaterialTextures
-from lambent.scenes.textures import doubled_angle, parts, slopes
 
 INTERPOLATED = {"normal": slopes, "direction": doubled_angle}  # other parts are interpolated directly
 LAYOUT = "textures"
 IMAGE = "picture_"
-GRAZING = 0.1  # least cos_o of a normal, as in realtime/shaders/shade.wgsl: others are bent to the viewer
+GRAZING = 0.1  # least cos_o of a normal, as in realtime/shading/shade.wgsl: others are bent to the viewer
 SMALLEST_M, LARGEST_M = 0.001, 4.0  # of materials.document
 
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from lambent.bake.keys import key_of
+from lambent.bake.running.keys import key_of
 from lambent.core.arrays import Floats
 from lambent.materials.factored.albedo import albedo, term_albedo
 from lambent.materials.factored.of_lobes import of_material

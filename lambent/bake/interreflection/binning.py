@@ -17,11 +17,11 @@ from lambent.bake.tracing.array_ops import array_ops
 from lambent.bake.tracing.rays import vectors
 from lambent.bake.transport.bands import Bands
 from lambent.bake.transport.view_points import ViewPoints
+from lambent.baked.transport.tails import Tails
 from lambent.materials.factored.curve import END_RAD
 from lambent.materials.factored.parametrisations import angle_of
 from lambent.materials.factored.roughness import narrowed, thinned, varies
 from lambent.materials.factored.terms import Editable, Term, upper_pair
-from lambent.store.tails import Tails
 
 
 @dataclass(frozen=True)

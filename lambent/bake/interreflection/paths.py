@@ -22,8 +22,8 @@ from lambent.bake.tracing import rays
 from lambent.bake.tracing.rays import vectors
 from lambent.bake.tracing.shapes import ObjectNumbers
 from lambent.bake.transport.view_points import ViewPoints
+from lambent.baked.transport.tails import FIXED, Tails
 from lambent.core.arrays import Floats
-from lambent.store.tails import FIXED, Tails
 
 NONE = 255  # slot of a side that scatters nothing
 COSINE, BAKED, FIXED_BRDF = 0, 1, 2  # how a surface scatters: 1/pi, its baked BRDF over its albedo, its BRDF

@@ -14,20 +14,20 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lambent.bake.bounces import Bounces
 from lambent.bake.engine import engine
 from lambent.bake.interreflection.series import bins_of, tails_of, worn
-from lambent.bake.keys import material_inputs
-from lambent.bake.view import View
+from lambent.bake.interreflection.settings import Bounces
+from lambent.bake.running.keys import material_inputs
+from lambent.bake.transport.view import View
+from lambent.baked.transport.tails import FIXED, Tails
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
+from lambent.scenes.looks.textures import prepared
 from lambent.scenes.scene import Scene
-from lambent.scenes.textures import prepared
 from lambent.store.source import materials_in_views
 from lambent.store.store import MANIFEST, Store
-from lambent.store.tails import FIXED, Tails
 
 if TYPE_CHECKING:
     from lambent.bake.interreflection.trial import Cost

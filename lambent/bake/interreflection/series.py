@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lambent.bake.bounces import Bounces
+from lambent.bake.interreflection.settings import Bounces
+from lambent.baked.transport.tails import FIXED, SecondBands, Tails
 from lambent.materials.factored.terms import Editable, Factor, Term
 from lambent.scenes.scene import Scene
-from lambent.store.tails import FIXED, SecondBands, Tails
 
 SMOOTH, SMOOTH_OF_TWO = 4, 8  # bands of curves over angles without narrow peaks
 SMOOTH_ANGLES = ("theta_i", "theta_o", "theta_d")

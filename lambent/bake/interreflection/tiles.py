@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from lambent.bake.engine import engine
 from lambent.bake.interreflection.as_baked import shapes_of
 from lambent.bake.interreflection.series import Bins
-from lambent.bake.tiles import seed_of, slices
-from lambent.core.shared_exponent import LARGEST, packed_rgb, unpacked_rgb
+from lambent.bake.running.tiles import seed_of, slices
+from lambent.baked.shared_exponent import LARGEST, packed_rgb, unpacked_rgb
+from lambent.baked.transport.tails import SecondBands, Tails
 from lambent.scenes.scene import Scene
-from lambent.store.tails import SecondBands, Tails
 
 if TYPE_CHECKING:
     from lambent.bake.interreflection.binning import SecondTerm

@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from lambent.bake.artefacts.interreflection import POINTS, passes
-from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection.series import bins_of, tails_of
+from lambent.bake.interreflection.settings import Bounces
 from lambent.bake.interreflection.tiles import Job, Tile, TileTracer, paths_at_once, unpacked
+from lambent.bake.transport.view import View
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.bake.transport.view_tracer import ViewTracer
-from lambent.bake.view import View
-from lambent.core.colour import luminance
 from lambent.core.files import folder_bytes
+from lambent.core.light.colour import luminance
 from lambent.materials.factored.albedo import albedo
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene

@@ -9,9 +9,9 @@ import mitsuba as mi
 import numpy as np
 
 from lambent.bake.bsdfs.material_plugin import DIFFUSE_ATTRIBUTE
+from lambent.bake.tracing.lights.sun import SunRays
 from lambent.bake.tracing.path_tracer import Points
 from lambent.bake.tracing.scene_builder import SceneBuilder, light_map_uv
-from lambent.bake.tracing.sun import SunRays
 from lambent.core.arrays import Floats
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Material

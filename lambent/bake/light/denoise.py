@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.colour import luminance
+from lambent.core.light.colour import luminance
 
 RINGS = 16  # texels grown into gutters; look-ups reach no farther
 CONTRAST = 8.0  # brightness ratio at which the filter carries a neighbour's light across a gutter

@@ -11,7 +11,7 @@ import numpy as np
 
 from lambent.bake.light.noise import chart_means
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.colour import luminance
+from lambent.core.light.colour import luminance
 
 DOUBT = 4.0  # times their noise: smaller squared differences are noise, whose estimate has heavy tails
 DARK = 0.01  # relative to the mean light: lights below it are compared as if they had this much

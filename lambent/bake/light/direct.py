@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lambent.bake.light.denoise import denoise_charts, fill
 from lambent.bake.light.noise import chart_means
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.colour import luminance
+from lambent.core.light.colour import luminance
 
 MOST_BIAS = 1.5  # largest correction factor of a share
 MOST_RELATIVE = 1e6  # squared standard error by squared light

@@ -18,7 +18,7 @@ from lambent.bake.light.noise import chart_means
 from lambent.bake.light.sampling import Sampling
 from lambent.bake.tracing import path_tracer
 from lambent.core.arrays import Floats, Indices
-from lambent.core.colour import luminance
+from lambent.core.light.colour import luminance
 
 SAMPLES = 64  # per texel, before averaging with neighbours
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from lambent.bake.light.sampling import cleaned, sampled_halves, variance_of
 from lambent.bake.light.stitching import Cuts
+from lambent.bake.running.watch import Watch
 from lambent.bake.surfaces.texels import Texels
-from lambent.bake.watch import Watch
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.store.store import Store
 

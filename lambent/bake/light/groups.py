@@ -20,11 +20,11 @@ from lambent.bake.light.direct import direct_part
 from lambent.bake.light.sampling import SMOOTH, closed, denoised, relative_noise, sampled_halves, variance_of
 from lambent.bake.light.stitching import Cuts
 from lambent.bake.surfaces.texels import BEYOND, Texels
+from lambent.bake.tracing.lights.sun import SunRays
 from lambent.bake.tracing.rays import array_of, vectors
-from lambent.bake.tracing.sun import SunRays
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.colour import HALF_MAX, luminance
+from lambent.core.light.colour import HALF_MAX, luminance
 from lambent.core.progress import Progress
 from lambent.store.store import Array, Artefact, Chunk, Writer
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from lambent.bake.light.noise import chart_means
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.colour import luminance
+from lambent.core.light.colour import luminance
 
 REACH = 12  # texels to each side: 25 x 25
 SPREAD = 0.3  # standard deviation of true quotients about 1

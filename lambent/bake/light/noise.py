@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lambent.bake.light.denoise import fill
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.colour import HALF_MAX, luminance
+from lambent.core.light.colour import HALF_MAX, luminance
 
 REACH = 2  # texels to each side: 5 x 5
 

@@ -21,11 +21,11 @@ from lambent.bake.light.level import with_level
 from lambent.bake.light.stitching import Cuts, stitched
 from lambent.bake.surfaces.texels import POINTS, Sides, Texels, area_of_texels, covered_share
 from lambent.bake.tracing import path_tracer
+from lambent.bake.tracing.lights.sun import Sun
 from lambent.bake.tracing.rays import block_sums, independent, vectors
-from lambent.bake.tracing.sun import Sun
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.colour import HALF_MAX, luminance
-from lambent.core.sequences import hammersley, r2
+from lambent.core.geometry.sequences import hammersley, r2
+from lambent.core.light.colour import HALF_MAX, luminance
 
 GATHER_PASS = 64  # samples of a texel that are stratified together
 SMOOTH = 8  # rounds of averaging before texels grow into gutters: about 4 texels wide

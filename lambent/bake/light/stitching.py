@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from lambent.bake.surfaces.texels import BEYOND
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.colour import luminance
+from lambent.core.light.colour import luminance
 
 SMOOTH = 0.98  # least cosine between the normals on both sides of a cut; at sharper cuts light may change abruptly
 PER_TEXEL = 2.0  # samples along a cut

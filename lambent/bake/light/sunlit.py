@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.light.noise import chart_means
+from lambent.bake.running.tiles import seed_of
 from lambent.bake.surfaces.texels import POINTS, Texels
-from lambent.bake.tiles import seed_of
-from lambent.bake.tracing.sun import SunRays
+from lambent.bake.tracing.lights.sun import SunRays
 from lambent.core.arrays import Floats, Indices
 from lambent.core.progress import Progress, silent
 

@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.light.cache import LightMapCache
-from lambent.bake.tiles import slices
+from lambent.bake.running.tiles import slices
 from lambent.bake.tracing import path_tracer, rays
+from lambent.bake.tracing.lights.sun import Sun
 from lambent.bake.tracing.rays import array_of, block_sums, independent, vectors
-from lambent.bake.tracing.sun import Sun
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.colour import HALF_MAX
-from lambent.core.octahedral import bordered, texel_directions
+from lambent.core.geometry.octahedral import bordered, texel_directions
+from lambent.core.light.colour import HALF_MAX
 
 PATHS_AT_ONCE = 1 << 21
 CONTRAST = 0.2  # of the brighter of two texels beside each other: from there on both are traced in parts

@@ -17,11 +17,11 @@ from lambent.bake.light_fields.placing import Placing
 from lambent.bake.light_fields.trial import Option, ProbeLight, Trial, options_of, tried
 from lambent.bake.light_fields.watched import Watched, watched
 from lambent.bake.probes.selection import Scaling
-from lambent.bake.tiles import seed_of
+from lambent.bake.running.tiles import seed_of
 from lambent.core.arrays import Floats
-from lambent.core.colour import luminance
 from lambent.core.errors import UserError
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.triangles import triangle_areas
+from lambent.core.light.colour import luminance
 from lambent.core.progress import Progress, part_of
 from lambent.scenes.scene import Mesh, Scene
 from lambent.store.contract import (

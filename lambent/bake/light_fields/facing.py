@@ -10,8 +10,8 @@ import numpy as np
 from lambent.bake.light_fields.sampling import spread_evenly
 from lambent.bake.probes.selection import viewers_of
 from lambent.bake.tracing.rays import towards
+from lambent.baked.light_fields.nearest_points import Sees
 from lambent.core.arrays import Flags, Floats
-from lambent.core.nearest_points import Sees
 from lambent.scenes.scene import Mesh
 
 POINTS = 256

@@ -8,13 +8,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from lambent.bake.tiles import slices
+from lambent.bake.running.tiles import slices
 from lambent.bake.tracing.rays import array_of, leaving
 from lambent.bake.tracing.scene_builder import SceneBuilder
+from lambent.baked.light_fields.light_field import NO_EXIT
+from lambent.baked.light_fields.thin_glass import eta_of, normal_transmittance
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
-from lambent.core.light_field import NO_EXIT
-from lambent.core.thin_glass import eta_of, normal_transmittance
 from lambent.materials.document import Lobe, Material
 
 MOST_FACES = 8  # that light passes behind a surface

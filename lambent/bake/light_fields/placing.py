@@ -21,14 +21,14 @@ from lambent.bake.light_fields.sampling import (
     spread_evenly,
     thinned,
 )
-from lambent.bake.tiles import slices
+from lambent.bake.running.tiles import slices
 from lambent.bake.tracing.rays import distances, leaving, vectors
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.bake.tracing.solids import SolidTest
 from lambent.core.arrays import Flags, Floats
 from lambent.core.errors import UserError
-from lambent.core.geometry import triangle_areas
-from lambent.core.sequences import cosine_hemisphere, hammersley
+from lambent.core.geometry.sequences import cosine_hemisphere, hammersley
+from lambent.core.geometry.triangles import triangle_areas
 from lambent.scenes.scene import Mesh
 
 SPACINGS, DIAGONALS = 1 / 2, 1 / 16  # the usual offset is the lesser of these shares of the points' spacing and size

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.surfaces.texels import texels_of
+from lambent.baked.light_fields.light_field import CANDIDATES, NO_EXIT, NO_POINT
+from lambent.baked.light_fields.nearest_points import Sees, nearest_points
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.directions import normalize
-from lambent.core.geometry import cross_2d, triangle_areas
-from lambent.core.light_field import CANDIDATES, NO_EXIT, NO_POINT
-from lambent.core.nearest_points import Sees, nearest_points
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.triangles import cross_2d, triangle_areas
 
 FINER = 8  # texels to the spacing of the points, about
 MOST_TEXELS, LONGEST = 1 << 18, 8192  # of a sample map, and along its sides

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.directions import normalize
-from lambent.core.geometry import triangle_areas, triangle_normals
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.triangles import triangle_areas, triangle_normals
 from lambent.scenes.scene import Mesh
 
 CANDIDATES = 8  # for each point

@@ -9,11 +9,11 @@ import numpy as np
 
 from lambent.bake.light.cache import LightMapCache
 from lambent.bake.light_fields.acquisition import Around
+from lambent.bake.tracing.lights.sun import Sun, SunRays
 from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
-from lambent.bake.tracing.sun import Sun, SunRays
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
-from lambent.core.colour import unit_of_halves
+from lambent.core.light.colour import unit_of_halves
 from lambent.scenes.scene import Scene
 
 Maps = tuple[Floats, Floats | None]  # the light map's irradiance (H, W, 3), and that of the other sides

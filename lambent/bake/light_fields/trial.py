@@ -14,14 +14,14 @@ from lambent.bake.light_fields.facing import views_in
 from lambent.bake.light_fields.placing import Placed, Placing
 from lambent.bake.light_fields.watched import Watched
 from lambent.bake.probes.selection import PLAIN, Scaling
+from lambent.baked.light_fields.light_field import LightField
+from lambent.baked.light_fields.lookup import Place, marched
+from lambent.baked.light_fields.nearest_points import nearest_points
+from lambent.baked.probes.lookups import distance_lookup, inverse_depth, planes_lookup
 from lambent.core.arrays import Floats
-from lambent.core.cubemap import sample
-from lambent.core.directions import normalize
-from lambent.core.light_field import LEAST_TEXELS, LightField
-from lambent.core.light_field_lookup import Place, marched
-from lambent.core.nearest_points import nearest_points
-from lambent.core.probe_lookups import distance_lookup, inverse_depth, planes_lookup
-from lambent.scenes.scene import Mesh
+from lambent.core.geometry.cubemap import sample
+from lambent.core.geometry.directions import normalize
+from lambent.scenes.scene import LEAST_TEXELS, Mesh
 
 MOST_TEXELS = 190  # along a side of a trial's maps
 MOST_OF_FIELD = 1 << 24  # texels of all maps of a trial

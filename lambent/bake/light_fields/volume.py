@@ -15,8 +15,8 @@ from lambent.bake.tracing.rays import towards
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.bake.tracing.solids import SolidTest
 from lambent.core.arrays import Floats
-from lambent.core.directions import normalize
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import normalize
 from lambent.scenes.scene import Mesh
 
 MARGIN = 1 / 8  # of the box's longest side, that points lie around it

@@ -17,9 +17,9 @@ from lambent.bake.light_fields.sampling import spread_evenly
 from lambent.bake.probes.selection import light_along, spread_mirrored, viewers_of
 from lambent.bake.tracing.rays import array_of, leaving, rays_from, towards
 from lambent.core.arrays import Flags, Floats
-from lambent.core.colour import luminance
-from lambent.core.directions import normalize
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.triangles import triangle_areas
+from lambent.core.light.colour import luminance
 from lambent.materials.document import Lobe, Material
 from lambent.materials.lobes import fresnel
 from lambent.scenes.scene import Mesh

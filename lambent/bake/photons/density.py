@@ -13,7 +13,7 @@ import numpy as np
 
 from lambent.bake.surfaces.texels import Texels
 from lambent.core.arrays import Flags, Floats
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
 
 KERNEL, WIDE = 0.3, 0.7  # texels: standard deviation along the surface; WIDE for texels mostly off it
 LIFT = 0.3  # texels: standard deviation perpendicular to the surface

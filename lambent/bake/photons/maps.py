@@ -16,10 +16,10 @@ from lambent.bake.light.sampling import cleaned, relative_noise
 from lambent.bake.light.stitching import Cuts
 from lambent.bake.photons.density import Kernel, shares
 from lambent.bake.photons.shooting import learnt_sky, shoot
+from lambent.bake.running.tiles import run_tiles
 from lambent.bake.surfaces.coverage import texel_areas
 from lambent.bake.surfaces.texels import Sides, Texels
-from lambent.bake.tiles import run_tiles
-from lambent.bake.tracing.sun import Sun
+from lambent.bake.tracing.lights.sun import Sun
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.progress import Progress
 from lambent.scenes.scene import Scene

@@ -26,9 +26,9 @@ import numpy as np
 from lambent.bake.sky.guide import learn
 from lambent.bake.sky.photons import SkyPhotons, find_importance
 from lambent.bake.tracing import rays
+from lambent.bake.tracing.lights.sun import Sun
 from lambent.bake.tracing.rays import independent
 from lambent.bake.tracing.scene_builder import light_map_texel
-from lambent.bake.tracing.sun import Sun
 from lambent.core.arrays import Floats
 from lambent.scenes.scene import Scene
 

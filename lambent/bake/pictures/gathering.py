@@ -19,7 +19,7 @@ from lambent.bake.light.cache import LightMapCache
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.triangles import triangle_areas
 from lambent.materials.bsdf import coupling
 
 MAX_DEPTH = 16  # surfaces on the longest path of a picture, mirrors included

@@ -20,16 +20,16 @@ from numpy.typing import ArrayLike, NDArray
 from lambent.bake.bsdfs.material_plugin import DIFFUSE_ATTRIBUTE, NORMAL_ATTRIBUTE, SPECULAR_ATTRIBUTE
 from lambent.bake.light.cache import LightMapCache
 from lambent.bake.pictures.gathering import MAX_DEPTH, Gathering
-from lambent.bake.tiles import slices
+from lambent.bake.running.tiles import slices
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.rays import block_sums, has_holes, intersect
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.bake.tracing.sobol import SobolSampler
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera, image_plane
-from lambent.core.light_mix import WHITE
+from lambent.core.light.light_mix import WHITE
 from lambent.core.plain import triple
+from lambent.core.views.camera import Camera, image_plane
 from lambent.materials.document import Material
 from lambent.materials.factored.albedo import term_albedo
 from lambent.materials.factored.terms import Editable

@@ -19,9 +19,9 @@ from lambent.bake.tracing.rays import array_of, distances, rays_from
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.bake.tracing.solids import SolidTest
 from lambent.core.arrays import Floats
-from lambent.core.cubemap import face_directions
-from lambent.core.directions import basis, normalize
-from lambent.core.geometry import triangle_areas, triangle_normals
+from lambent.core.geometry.cubemap import face_directions
+from lambent.core.geometry.directions import basis, normalize
+from lambent.core.geometry.triangles import triangle_areas, triangle_normals
 from lambent.scenes.scene import EYE_HEIGHT_M, Mesh
 
 GRID = 5  # per side of a flat object: candidate points to place a probe above

@@ -11,9 +11,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from lambent.core.arrays import Floats
-from lambent.core.colour import luminance
-from lambent.core.probe_lookups import (
+from lambent.baked.probes.lookups import (
     NEARNESS_MIN,
     PLANE_ACTIVE_M,
     SECANTS,
@@ -21,6 +19,8 @@ from lambent.core.probe_lookups import (
     TINY,
     inverse_depth,
 )
+from lambent.core.arrays import Floats
+from lambent.core.light.colour import luminance
 
 PADDED = 6  # planes are padded to multiples of this
 

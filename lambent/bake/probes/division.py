@@ -18,12 +18,12 @@ import numpy as np
 
 from lambent.bake.artefacts.geometry import REVISION
 from lambent.bake.engine import engine
-from lambent.bake.keys import geometry_inputs, key_of
-from lambent.bake.sight import Sight
+from lambent.bake.running.keys import geometry_inputs, key_of
+from lambent.bake.running.timing import Timed, untimed
 from lambent.bake.surfaces.cutting import cut_across
-from lambent.bake.timing import Timed, untimed
+from lambent.bake.surfaces.visible_triangles import Sight
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.plain import quad
 from lambent.core.progress import Progress, silent
 from lambent.scenes.scene import Border, Mesh, Scene, SceneObject
@@ -78,8 +78,8 @@ def cuts_of(sight: Sight, progress: Progress = silent) -> dict[str, Cut]:
         return {}
     engine()  # before Mitsuba is imported
     from lambent.bake.tracing.scene_builder import SceneBuilder
+    from lambent.bake.tracing.seen.visibility import viewing_places
     from lambent.bake.tracing.solids import SolidTest
-    from lambent.bake.tracing.visibility import viewing_places
 
     progress(0, 1, "views of probes")
     places = viewing_places(scene, sight.everything)

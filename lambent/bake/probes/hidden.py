@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.tracing.rays import array_of, cosine_directions, distances, leaving, rays_from
+from lambent.baked.probes.lookups import planes_lookup
 from lambent.core.arrays import Flags, Floats
-from lambent.core.directions import normalize
-from lambent.core.geometry import points_on_triangles, triangle_areas, triangle_normals
-from lambent.core.probe_lookups import planes_lookup
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.triangles import points_on_triangles, triangle_areas, triangle_normals
 from lambent.scenes.scene import Mesh
 
 RAYS = 4096  # per object

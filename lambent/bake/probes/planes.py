@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats, Indices
-from lambent.core.cubemap import face_directions, texel_solid_angles
-from lambent.core.directions import normalize
+from lambent.core.geometry.cubemap import face_directions, texel_solid_angles
+from lambent.core.geometry.directions import normalize
 from lambent.store.contract import FAR
 
 FEWEST, MOST = 4, 8

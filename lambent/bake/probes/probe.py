@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.light.cache import LightMapCache
-from lambent.bake.tiles import slices
+from lambent.bake.running.tiles import slices
 from lambent.bake.tracing import path_tracer, rays
 from lambent.bake.tracing.rays import array_of, block_sums, vectors
 from lambent.core.arrays import Floats, Indices
-from lambent.core.colour import in_halves, luminance
-from lambent.core.cubemap import face_directions, faces_at
-from lambent.core.directions import normalize
+from lambent.core.geometry.cubemap import face_directions, faces_at
+from lambent.core.geometry.directions import normalize
+from lambent.core.light.colour import in_halves, luminance
 from lambent.store.contract import FAR
 
 PATHS_AT_ONCE = 1 << 22

@@ -31,7 +31,7 @@ from lambent.bake.tracing.path_tracer import Tally
 from lambent.bake.tracing.solids import SolidTest
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
-from lambent.core.colour import halves, in_halves
+from lambent.core.light.colour import halves, in_halves
 
 LEAST_POINTS = 512  # least number of mirrored rays per object that shares a probe...
 MOST_POINTS = 16384  # ...as long as the total does not exceed this

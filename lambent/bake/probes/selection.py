@@ -30,12 +30,12 @@ from lambent.bake.probes.probe import Probe
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.rays import array_of, independent, leaving, rays_from, towards
 from lambent.bake.tracing.shapes import ObjectNumbers
+from lambent.baked.probes.irradiance import basis_of, irradiance_of
+from lambent.baked.probes.lookups import distance_lookup, inverse_depth, planes_lookup
 from lambent.core.arrays import Flags, Floats
-from lambent.core.colour import luminance
-from lambent.core.cubemap import sample
-from lambent.core.directions import basis, normalize, reflect
-from lambent.core.irradiance import basis_of, irradiance_of
-from lambent.core.probe_lookups import distance_lookup, inverse_depth, planes_lookup
+from lambent.core.geometry.cubemap import sample
+from lambent.core.geometry.directions import basis, normalize, reflect
+from lambent.core.light.colour import luminance
 from lambent.materials.document import Material
 from lambent.materials.lobes import fresnel
 

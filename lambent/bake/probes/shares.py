@@ -33,11 +33,11 @@ from lambent.bake.light.sampling import points_of
 from lambent.bake.probes.device_lookup import DeviceProbe
 from lambent.bake.probes.probe import MIRROR_DEPTH
 from lambent.bake.probes.selection import Scaling, difference
+from lambent.bake.running.tiles import slices
 from lambent.bake.surfaces.texels import POINTS, Sides
-from lambent.bake.tiles import slices
 from lambent.bake.tracing import path_tracer, rays
+from lambent.bake.tracing.lights.sun import Sun
 from lambent.bake.tracing.rays import array_of, independent
-from lambent.bake.tracing.sun import Sun
 from lambent.core.arrays import Floats, Indices
 from lambent.core.progress import Progress, silent
 from lambent.materials.lobes import fresnel

@@ -35,8 +35,8 @@ from lambent.bake.probes.selection import viewers_of, widest_lobe
 from lambent.bake.tracing.rays import leaving, rays_from
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
-from lambent.core.directions import normalize, reflect
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.directions import normalize, reflect
+from lambent.core.geometry.triangles import triangle_areas
 from lambent.scenes.mesh import boxes_of
 from lambent.scenes.scene import Mesh
 

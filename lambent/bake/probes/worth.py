@@ -24,11 +24,11 @@ from lambent.bake.probes.selection import (
     widest_lobe,
 )
 from lambent.bake.tracing.rays import array_of, leaving
+from lambent.baked.probes.lookups import distance_lookup, inverse_depth, planes_lookup
 from lambent.core.arrays import Floats
-from lambent.core.colour import luminance
-from lambent.core.cubemap import sample
-from lambent.core.directions import normalize
-from lambent.core.probe_lookups import distance_lookup, inverse_depth, planes_lookup
+from lambent.core.geometry.cubemap import sample
+from lambent.core.geometry.directions import normalize
+from lambent.core.light.colour import luminance
 from lambent.materials.document import Material
 
 POINTS = 512  # per object

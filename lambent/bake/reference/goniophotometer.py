@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.engine import engine
-from lambent.core.directions import Floats
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import Floats
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
-from lambent.materials.measured.gonio import GonioTable
-from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, Evaluate, Setup, record, synthesise
+from lambent.materials.measured.inspecting.synthetic import ANISOTROPIC, ISOTROPIC, Evaluate, Setup, record, synthesise
+from lambent.materials.measured.tables.gonio import GonioTable
 
 _METAL = {"type": "roughconductor", "distribution": "beckmann"}
 _BROWN = {"type": "rgb", "value": [0.32, 0.14, 0.055]}

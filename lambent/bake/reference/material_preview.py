@@ -19,12 +19,12 @@ from lambent.bake.bsdfs.table_plugin import table_dict
 from lambent.bake.tracing.scene_builder import environment_dict
 from lambent.bake.tracing.shapes import mesh_of
 from lambent.core.arrays import Flags, Floats
-from lambent.core.directions import normalize
-from lambent.core.metrics import display_pair, flip, psnr, tile_means
+from lambent.core.geometry.directions import normalize
+from lambent.core.pictures.metrics import display_pair, flip, psnr, tile_means
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
-from lambent.materials.measured.half_vector_grid import ISOTROPIC, GridShape
 from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.tables.half_vector_grid import ISOTROPIC, GridShape
 from lambent.scenes.geometry import sphere, transformed, turn
 from lambent.scenes.scene import Environment, Mesh, SceneObject, SunSky
 

@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 
 from lambent.bake.light_fields.acquisition import Around, covered_distances, inverse_distances, radiance_maps
 from lambent.bake.light_fields.surroundings import Maps, around
-from lambent.bake.tiles import slices
+from lambent.bake.running.tiles import slices
 from lambent.bake.tracing import path_tracer, rays
 from lambent.bake.tracing.rays import array_of, rays_from
 from lambent.bake.tracing.scene_builder import light_map_uv
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats, Indices
-from lambent.core.camera import Camera, rays_through
-from lambent.core.colour import HALF_MAX, halves
-from lambent.core.directions import reflect
+from lambent.core.geometry.directions import reflect
+from lambent.core.light.colour import HALF_MAX, halves
+from lambent.core.views.camera import Camera, rays_through
 
 PATHS_AT_ONCE = 1 << 21
 DEPTH = 6  # glossy surfaces in a row

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 from lambent.bake.pictures.gathering import MAX_DEPTH
 from lambent.bake.pictures.tracer import Tracer, camera_rays
-from lambent.bake.tiles import seed_of
+from lambent.bake.running.tiles import seed_of
 from lambent.bake.tracing import path_tracer
-from lambent.bake.tracing.emitters import balance_emitters
+from lambent.bake.tracing.lights.emitters import balance_emitters
 from lambent.bake.tracing.rays import block_sums, independent
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera
 from lambent.core.progress import Progress, silent
+from lambent.core.views.camera import Camera
 from lambent.materials.factored.terms import Editable
+from lambent.scenes.looks.textures import prepared
 from lambent.scenes.scene import Scene
-from lambent.scenes.textures import prepared
 
 PATHS_AT_ONCE = 1 << 20
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.light.cache import LightMapCache
-from lambent.bake.tiles import slices
+from lambent.bake.running.tiles import slices
 from lambent.bake.tracing.rays import block_sums, vectors
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from lambent.bake.sky.daylight import radiance_from
 from lambent.core.arrays import Floats, Indices
-from lambent.core.colour import luminance
+from lambent.core.light.colour import luminance
 
 ROWS, COLUMNS = 16, 32
 BINS = ROWS * COLUMNS

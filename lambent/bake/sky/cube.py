@@ -11,8 +11,8 @@ from lambent.bake.engine import engine
 from lambent.bake.sky.daylight import lone_emitter, radiance_from
 from lambent.bake.tracing.scene_builder import environment_dict
 from lambent.core.arrays import Floats, Indices
-from lambent.core.cubemap import directions_at, face_directions
-from lambent.core.directions import normalize
+from lambent.core.geometry.cubemap import directions_at, face_directions
+from lambent.core.geometry.directions import normalize
 from lambent.scenes.scene import Environment, SunSky
 
 GRID, FINE_GRID = 4, 64  # samples per texel and axis; the fine grid covers texels that may show the sun

@@ -22,15 +22,15 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.tiles import slices
+from lambent.bake.running.tiles import slices
 from lambent.bake.tracing.rays import array_of, vectors
 from lambent.core.arrays import Floats
-from lambent.core.colour import luminance
-from lambent.core.directions import normalize
-from lambent.core.latlong import lat_long_direction
-from lambent.core.photometry import radiometric
-from lambent.scenes.clear_sky import sky_illuminance, sun_illuminance
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.latlong import lat_long_direction
+from lambent.core.light.colour import luminance
+from lambent.core.light.photometry import radiometric
 from lambent.scenes.scene import SunSky
+from lambent.scenes.sky.clear_sky import sky_illuminance, sun_illuminance
 
 WIDTH, HEIGHT, COARSE = 2048, 1024, 4
 LIMB_DARKENING = 0.6  # of the sun's edge relative to its centre, at 550 nm

@@ -20,13 +20,13 @@ import mitsuba as mi
 import numpy as np
 
 from lambent.bake.engine import once_per_variant
+from lambent.bake.running.tiles import seed_of, slices
 from lambent.bake.sky.bins import BIN_SR, BINS, COLUMNS, ROWS, SkyBins, middles
-from lambent.bake.tiles import seed_of, slices
 from lambent.bake.tracing import rays
 from lambent.bake.tracing.rays import independent, leaving, vectors
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.directions import normalize
-from lambent.core.geometry import points_on_triangles, triangle_areas, triangle_normals
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.triangles import points_on_triangles, triangle_areas, triangle_normals
 from lambent.scenes.scene import Scene
 
 CELL_M, MOST_CELLS, MOST_TABLES = 0.5, 1 << 16, 4096

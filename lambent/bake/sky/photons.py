@@ -23,7 +23,7 @@ from lambent.bake.tracing import rays
 from lambent.bake.tracing.rays import vectors
 from lambent.bake.tracing.scene_builder import light_map_texel
 from lambent.core.arrays import Floats, Indices
-from lambent.core.geometry import triangle_areas, triangle_normals
+from lambent.core.geometry.triangles import triangle_areas, triangle_normals
 from lambent.scenes.scene import Scene
 
 MOST_PATCHES = 1 << 18

@@ -13,9 +13,9 @@ import numpy as np
 
 from lambent.bake.tracing.scene_builder import environment_dict
 from lambent.core.arrays import Floats, Image, Indices
-from lambent.core.colour import luminance
-from lambent.core.directions import normalize
-from lambent.core.latlong import lat_long_direction
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.latlong import lat_long_direction
+from lambent.core.light.colour import luminance
 from lambent.core.plain import triple
 from lambent.scenes.panes import panes_of
 from lambent.scenes.scene import DirectionalLight, Environment, Light, Scene

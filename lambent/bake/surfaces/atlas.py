@@ -15,9 +15,9 @@ from lambent.bake.surfaces.packing import packed, snapped
 from lambent.core.arrays import Floats, Indices
 from lambent.core.plain import triple
 from lambent.core.progress import Progress, silent
+from lambent.scenes.looks.variants import documents_of
 from lambent.scenes.mesh import areas_of_faces, boxes_of
 from lambent.scenes.scene import Mesh, Scene
-from lambent.scenes.variants import documents_of
 from lambent.store.contract import ObjectRecord, needs_probe
 
 Sizes = Callable[[list[Piece], int], Floats]  # texel sizes on pieces, in metres, for a number of texels

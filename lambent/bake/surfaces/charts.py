@@ -18,9 +18,9 @@ from lambent.bake.surfaces.clusters import clusters_of
 from lambent.bake.surfaces.copies import Copies
 from lambent.bake.surfaces.layers import in_first_layer, layers_of, lie_flat
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.directions import normalize
 from lambent.core.errors import UserError
-from lambent.core.geometry import area_vectors, cross_2d, triangle_areas, triangle_normals
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.triangles import area_vectors, cross_2d, triangle_areas, triangle_normals
 from lambent.core.progress import Progress, silent
 from lambent.scenes.scene import Mesh, SceneObject
 

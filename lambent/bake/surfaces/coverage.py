@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.tiles import slices
+from lambent.bake.running.tiles import slices
 from lambent.core.arrays import Floats, Indices
-from lambent.core.geometry import cross_2d, triangle_areas
+from lambent.core.geometry.triangles import cross_2d, triangle_areas
 
 CANDIDATES_AT_ONCE = 1 << 20  # (triangle, texel) pairs tested at a time: about 200 MB
 PLACED_AT_ONCE = 1 << 16

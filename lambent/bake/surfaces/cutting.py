@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
 from lambent.scenes.mesh import Mesh, boxes_of
 
 LEAST_M = 10.0  # shorter triangles are never cut

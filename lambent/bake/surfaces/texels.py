@@ -17,8 +17,8 @@ import numpy as np
 
 from lambent.bake.surfaces.coverage import Pieces, corners_of, density_of, in_cell, pieces_of, placed
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.directions import normalize
-from lambent.core.geometry import area_vectors, cross_2d, triangle_areas
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.triangles import area_vectors, cross_2d, triangle_areas
 
 POINTS = 4  # per texel, an even number
 SLIVER = 0.02  # covered share of a texel below which its points also come from around it

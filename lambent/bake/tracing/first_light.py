@@ -14,7 +14,7 @@ import numpy as np
 
 from lambent.bake.sky.guide import guided_sky, learn
 from lambent.bake.sky.sun import FoundSun, SunPicture, is_sun
-from lambent.bake.tracing.emitters import brought_by
+from lambent.bake.tracing.lights.emitters import brought_by
 from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
 
 

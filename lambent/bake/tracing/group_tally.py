@@ -12,9 +12,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lambent.bake.tracing.lights.sun import Sun
 from lambent.bake.tracing.path_tracer import AllLight
 from lambent.bake.tracing.scene_builder import SceneBuilder
-from lambent.bake.tracing.sun import Sun
 from lambent.core.arrays import Floats
 from lambent.scenes.light_groups import SortedLights
 

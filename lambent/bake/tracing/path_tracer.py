@@ -16,7 +16,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lambent.bake.tracing import rays
-from lambent.bake.tracing.sun import Sun
+from lambent.bake.tracing.lights.sun import Sun
 
 ROULETTE_DEPTH = 2
 Cache = Callable[[Any, Any], Any]  # (surface interaction, active) -> diffuse radiance towards the ray's origin

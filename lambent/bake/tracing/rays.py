@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
-from lambent.core.directions import basis
-from lambent.core.sequences import cosine_hemisphere, r2
+from lambent.core.geometry.directions import basis
+from lambent.core.geometry.sequences import cosine_hemisphere, r2
 from lambent.materials.clear import MOST
 
 ALIGNED_BYTES = 64  # LLVM's longest vectors

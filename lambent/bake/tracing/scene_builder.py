@@ -17,13 +17,11 @@ from lambent.bake.bsdfs.edited_plugin import edited_dict
 from lambent.bake.bsdfs.material_plugin import material_dict, register_material_plugin
 from lambent.bake.bsdfs.table_plugin import table_dict
 from lambent.bake.sky.daylight import sky_image
-from lambent.bake.tracing.ies_emitter import ies_emitter
+from lambent.bake.tracing.lights.ies_emitter import ies_emitter
 from lambent.bake.tracing.shapes import UV2_ATTRIBUTE, ObjectNumbers, Shapes
 from lambent.core.arrays import Floats
 from lambent.materials.factored.terms import Editable
-from lambent.materials.measured.patch_sheet import Lookup
-from lambent.scenes.computed import lat_long_image
-from lambent.scenes.environment_images import read_lat_long, up_turn
+from lambent.materials.measured.tables.patch_sheet import Lookup
 from lambent.scenes.panes import is_clear
 from lambent.scenes.scene import (
     ComputedEnvironment,
@@ -37,6 +35,8 @@ from lambent.scenes.scene import (
     Scene,
     SunSky,
 )
+from lambent.scenes.sky.computed import lat_long_image
+from lambent.scenes.sky.environment_images import read_lat_long, up_turn
 
 Look = tuple[str, bool, int]  # document, whether it is clear glass, and id of the textures
 COARSE = 4  # pixels along each side that become one pixel of a coarse sky

@@ -10,12 +10,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from lambent.bake.tiles import slices
+from lambent.bake.running.tiles import slices
 from lambent.bake.tracing.rays import leaving, vectors
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Flags, Floats
-from lambent.core.geometry import triangle_normals
-from lambent.core.sequences import cosine_hemisphere, hammersley
+from lambent.core.geometry.sequences import cosine_hemisphere, hammersley
+from lambent.core.geometry.triangles import triangle_normals
 from lambent.scenes.geometry import merge
 from lambent.scenes.mesh import Mesh, batches_of
 from lambent.scenes.scene import Scene, SceneObject

@@ -13,26 +13,26 @@ from typing import Any
 
 import numpy as np
 
-from lambent.bake.backs import crossed_by_light
 from lambent.bake.light.cache import GroupedCache, LightMapCache
 from lambent.bake.light.stitching import Cuts, cuts_of
 from lambent.bake.sky.sun import FoundSun, is_sun, sun_of
 from lambent.bake.surfaces.atlas import Atlas
+from lambent.bake.surfaces.backs import crossed_by_light
 from lambent.bake.surfaces.texels import POINTS, Sides, Texels, chart_labels, texels_of
-from lambent.bake.tracing.emitters import balance_emitters
 from lambent.bake.tracing.first_light import FirstLight, sky_without
 from lambent.bake.tracing.group_tally import Direct, GroupTally, MixTally, Sorting
+from lambent.bake.tracing.lights.emitters import balance_emitters
+from lambent.bake.tracing.lights.sun import Sun, SunRays
 from lambent.bake.tracing.scene_builder import EmitterSampling, SceneBuilder
+from lambent.bake.tracing.seen.visibility import seen, viewing_places, without_hidden
 from lambent.bake.tracing.solids import SolidTest
-from lambent.bake.tracing.sun import Sun, SunRays
-from lambent.bake.tracing.visibility import seen, viewing_places, without_hidden
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.inputs import sha256_of
-from lambent.core.light_mix import WHITE
+from lambent.core.light.light_mix import WHITE
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
-from lambent.materials.measured.patch_sheet import Lookup, lookup_of
 from lambent.materials.measured.registry import load
+from lambent.materials.measured.tables.patch_sheet import Lookup, lookup_of
 from lambent.scenes.light_groups import SortedLights, sorted_lights
 from lambent.scenes.panes import panes_of
 from lambent.scenes.scene import Scene

@@ -25,11 +25,11 @@ from lambent.bake.transport.device_lights import lights_on_device
 from lambent.bake.transport.pieces import in_bands
 from lambent.bake.transport.sums import accumulate, add
 from lambent.bake.transport.view_points import ViewPoints
-from lambent.core.shared_exponent import LARGEST, ONES, packed
+from lambent.baked.shared_exponent import LARGEST, ONES, packed
 from lambent.materials.factored.parametrisations import angle_of
 from lambent.materials.factored.roughness import narrowed, thinned, varies
 from lambent.materials.factored.terms import Factor, Term
-from lambent.scenes.triangle_lights import TriangleLights
+from lambent.scenes.sky.triangle_lights import TriangleLights
 
 BLOCK = 1 << 14  # threads that Dr.Jit gives to one core at a time
 PAIRS_AT_ONCE = 1 << 24  # of points and pairs of bands: 128 MB

@@ -9,11 +9,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.tracing.candela import Candela
+from lambent.bake.tracing.lights.candela import Candela
 from lambent.bake.tracing.rays import vectors
 from lambent.bake.transport.pieces import solid_angle
 from lambent.bake.transport.polygon_light import highest_part
-from lambent.scenes.triangle_lights import TriangleLights
+from lambent.scenes.sky.triangle_lights import TriangleLights
 
 WIDE_SR = 1e-3  # lights of the scene with a larger solid angle are integrated over their extent
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from lambent.bake.sky.daylight import radiance_from
 from lambent.core.arrays import Floats
-from lambent.core.geometry import triangle_areas
-from lambent.core.latlong import lat_long_directions
+from lambent.core.geometry.latlong import lat_long_directions
+from lambent.core.geometry.triangles import triangle_areas
 from lambent.scenes.scene import DirectionalLight, Scene
-from lambent.scenes.triangle_lights import (
+from lambent.scenes.sky.triangle_lights import (
     TriangleLights,
     environment_triangles,
     joined,

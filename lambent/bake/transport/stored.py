@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.wavelets import transformed
+from lambent.baked.transport.wavelets import transformed
 
 STEPS = 256  # brightest light in stored units: leaves room for quotients above 1 at grazing angles
 STEPS_OF_FLOAT = 1024  # exponents of positive floats, with their first two fraction bits

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.rays import array_of, has_holes, in_shadow, independent, leaving, vectors
 from lambent.core.arrays import Floats, Indices
-from lambent.scenes.triangle_wavelets import CHILDREN, TriangleTree
+from lambent.scenes.sky.triangle_wavelets import CHILDREN, TriangleTree
 
 UNIT = 2.0**-24  # of random integers, 24 bits of which become numbers in [0, 1)
 STEPS = 1 / 1.22074408460575947536 ** np.arange(1, 4)  # of the additive sequence in three dimensions (Roberts 2018)

@@ -20,7 +20,7 @@ from lambent.bake.bsdfs.material_plugin import (
 )  # fmt: skip
 from lambent.bake.tracing.rays import array_of, has_holes, intersect, rays_from
 from lambent.bake.tracing.scene_builder import SceneBuilder
-from lambent.core.camera import Camera, pixel_rays
+from lambent.core.views.camera import Camera, pixel_rays
 
 Floats32 = NDArray[np.float32]
 

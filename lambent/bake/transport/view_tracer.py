@@ -17,13 +17,13 @@ from lambent.bake.tracing.rays import array_of, has_holes, intersect, rays_from
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.bake.tracing.shapes import ObjectNumbers
 from lambent.bake.transport.lights import Samples, environment_rows, environment_samples, scene_lights
+from lambent.bake.transport.view import View
 from lambent.bake.transport.view_points import ViewPoints, view_points
-from lambent.bake.view import View
-from lambent.core.camera import pixel_rays
+from lambent.core.views.camera import pixel_rays
 from lambent.materials.factored.terms import Editable
+from lambent.scenes.looks.textures import prepared
 from lambent.scenes.scene import Scene
-from lambent.scenes.textures import prepared
-from lambent.scenes.triangle_lights import TriangleLights
+from lambent.scenes.sky.triangle_lights import TriangleLights
 
 
 class ViewTracer:

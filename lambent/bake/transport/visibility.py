@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lambent.bake.tracing.rays import has_holes, hidden, in_shadow, leaving, vectors
 from lambent.bake.transport.polygon_light import highest_part
 from lambent.bake.transport.view_points import ViewPoints
-from lambent.scenes.triangle_lights import TriangleLights
+from lambent.scenes.sky.triangle_lights import TriangleLights
 
 BITS = 32
 

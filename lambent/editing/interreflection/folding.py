@@ -8,8 +8,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.baked.transport.wavelets import TAPS
 from lambent.core.arrays import Floats, Indices
-from lambent.core.wavelets import TAPS
 from lambent.editing.folding import TOGETHER, write_wavelets
 from lambent.editing.interreflection.entries import TermLight
 from lambent.editing.interreflection.powers import Powers

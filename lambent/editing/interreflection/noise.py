@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.camera import Camera
-from lambent.core.colour import luminance
+from lambent.core.light.colour import luminance
 from lambent.core.progress import Progress
+from lambent.core.views.camera import Camera
 from lambent.editing.interreflection.folding import Cells
 from lambent.editing.interreflection.picture import frozen_light
 from lambent.editing.interreflection.powers import powers

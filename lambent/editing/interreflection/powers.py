@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lambent.baked.transport.tails import FIXED, SecondBands, Tails
 from lambent.core.arrays import Floats, Indices
 from lambent.materials.factored.albedo import albedo
 from lambent.materials.factored.terms import Editable, Factor, Term
-from lambent.store.tails import FIXED, SecondBands, Tails
 
 Active = tuple[int | None, ...]  # for each term of a material, the factor whose curve is edited
 

@@ -9,16 +9,16 @@ from itertools import count, takewhile
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.baked.transport.tails import Tails
 from lambent.core.arrays import Indices
-from lambent.core.camera import Camera
 from lambent.core.errors import UserError
+from lambent.core.views.camera import Camera
 from lambent.editing.interreflection.entries import Entries, TermLight
-from lambent.editing.session import Session
+from lambent.editing.session.session import Session
 from lambent.materials.factored.terms import Editable
 from lambent.store.contract import view_artefact_name
 from lambent.store.source import environment_note
 from lambent.store.store import Store
-from lambent.store.tails import Tails
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from lambent.editing.incremental import TERMS
 from lambent.editing.interreflection.picture import BEYOND_DIRECT, FrozenPicture, Shown, changed
 from lambent.editing.interreflection.stored import Interreflections, interreflections, samples_of
 from lambent.editing.picture import EditedPicture
-from lambent.editing.session import Session
+from lambent.editing.session.session import Session
 from lambent.editing.stored import edited_picture
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.of_models import same_quotients

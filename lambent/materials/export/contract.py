@@ -19,7 +19,7 @@ from typing import Literal, Protocol
 
 from lambent.core.progress import Progress
 from lambent.materials.document import Material, Side
-from lambent.materials.export.verdict import Verdict, verdict_of
+from lambent.materials.export.matching.verdict import Verdict, verdict_of
 from lambent.materials.measured.protocol import MeasuredTable
 
 Subject = Material | MeasuredTable

@@ -20,14 +20,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.directions import Floats
 from lambent.core.files import atomic_path
+from lambent.core.geometry.directions import Floats
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
-from lambent.materials.export import match
 from lambent.materials.export.contract import Cost, Kind, Subject
-from lambent.materials.export.match import ALPHA_MAX, ALPHA_MIN, three
-from lambent.materials.export.pairs import CHECK_LOG2, FIT_LOG2, Pairs, is_isotropic, pairs_of
+from lambent.materials.export.matching import match
+from lambent.materials.export.matching.match import ALPHA_MAX, ALPHA_MIN, three
+from lambent.materials.export.resampling.pairs import CHECK_LOG2, FIT_LOG2, Pairs, is_isotropic, pairs_of
 from lambent.materials.fresnel import ior_of, r0_of
 
 NAME = "glTF 2.0"

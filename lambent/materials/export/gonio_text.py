@@ -11,15 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
 from lambent.materials.export.contract import Cost, Kind, Subject
-from lambent.materials.export.resampled import Scatterer, read_back, scatterer_of
-from lambent.materials.measured.gonio import GonioTable
-from lambent.materials.measured.gonio_text import write_gonio
+from lambent.materials.export.resampling.resampled import Scatterer, read_back, scatterer_of
+from lambent.materials.measured.inspecting.synthetic import Setup, record
+from lambent.materials.measured.parts.gonio_text import write_gonio
 from lambent.materials.measured.protocol import Quantity
-from lambent.materials.measured.synthetic import Setup, record
+from lambent.materials.measured.tables.gonio import GonioTable
 
 NAME = "gonio text"
 ENDINGS = (".txt", ".gonio")

@@ -11,19 +11,19 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import Floats
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
+from lambent.core.geometry.directions import Floats
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
 from lambent.materials.export.contract import Cost, Kind, Subject
-from lambent.materials.export.lbnl_layout import END, END_OF_BLOCK, block_head, head, losses
-from lambent.materials.export.pairs import is_grey
-from lambent.materials.export.patch_mean import patch_means
-from lambent.materials.export.proposal import knows_the_back, proposal_of
-from lambent.materials.export.resampled import Scatterer, read_back, scatterer_of
-from lambent.materials.measured.equal_energy import xyz_of_rgb
-from lambent.materials.measured.klems import KLEMS_FULL
+from lambent.materials.export.matching.proposal import knows_the_back, proposal_of
+from lambent.materials.export.resampling.lbnl_layout import END, END_OF_BLOCK, block_head, head, losses
+from lambent.materials.export.resampling.pairs import is_grey
+from lambent.materials.export.resampling.patch_mean import patch_means
+from lambent.materials.export.resampling.resampled import Scatterer, read_back, scatterer_of
+from lambent.materials.measured.parts.equal_energy import xyz_of_rgb
+from lambent.materials.measured.parts.klems import KLEMS_FULL
 
 NAME = "LBNL BSDF XML"
 ENDINGS = (".xml",)

@@ -18,11 +18,11 @@ from lambent.core.arrays import Floats
 from lambent.core.files import write_text
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
-from lambent.materials.export import sums
 from lambent.materials.export.contract import Cost, Kind, Subject
-from lambent.materials.export.match import material_of, rounded, shape_losses, three
-from lambent.materials.export.pairs import Pairs
-from lambent.materials.export.sums import Likeness, Part, Tool
+from lambent.materials.export.matching import sums
+from lambent.materials.export.matching.match import material_of, rounded, shape_losses, three
+from lambent.materials.export.matching.sums import Likeness, Part, Tool
+from lambent.materials.export.resampling.pairs import Pairs
 from lambent.materials.fresnel import ior_of, r0_of
 
 NAME = "MaterialX"

@@ -15,7 +15,7 @@ from lambent.core.arrays import Floats
 from lambent.core.files import atomic_path
 from lambent.core.progress import Progress, silent, tracked
 from lambent.materials.export.contract import Cost, Kind, Subject
-from lambent.materials.export.resampled import LOST_TRANSMISSION, Scatterer, read_back, scatterer_of
+from lambent.materials.export.resampling.resampled import LOST_TRANSMISSION, Scatterer, read_back, scatterer_of
 from lambent.materials.measured.merl import SCALES, bin_centres, directions_of
 
 NAME = "MERL binary"

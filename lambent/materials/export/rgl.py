@@ -13,15 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.colour import luminance
-from lambent.core.directions import Floats, direction, normalize, reflect
 from lambent.core.files import atomic_path
+from lambent.core.geometry.directions import Floats, direction, normalize, reflect
+from lambent.core.light.colour import luminance
 from lambent.core.progress import Progress, silent, tracked
 from lambent.materials.export.contract import Cost, Kind, Subject
-from lambent.materials.export.resampled import LOST_TRANSMISSION, Scatterer, read_back, scatterer_of
-from lambent.materials.measured.marginal import Corners, Warp
+from lambent.materials.export.resampling.resampled import LOST_TRANSMISSION, Scatterer, read_back, scatterer_of
+from lambent.materials.measured.parts.tensor_file import Tensors, tensor_bytes
 from lambent.materials.measured.rgl import d_wo_d_um, half_vectors_at
-from lambent.materials.measured.tensor_file import Tensors, tensor_bytes
+from lambent.materials.measured.tables.marginal import Corners, Warp
 
 NAME = "RGL tensor file"
 ENDINGS = (".bsdf",)

@@ -11,23 +11,23 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import HALF_TURN, Floats, raised, rotation_about
 from lambent.core.errors import UserError
 from lambent.core.files import atomic_path
+from lambent.core.geometry.directions import HALF_TURN, Floats, raised, rotation_about
 from lambent.core.progress import Progress, part_of, silent
 from lambent.materials.document import Material
 from lambent.materials.export.contract import Cost, Kind, Subject
-from lambent.materials.export.lbnl_layout import END, END_OF_BLOCK, block_head, head, losses
-from lambent.materials.export.pairs import is_grey
-from lambent.materials.export.proposal import knows_the_back, proposal_of
-from lambent.materials.export.resampled import Scatterer, read_back, scatterer_of, tuples_of
-from lambent.materials.export.tree_growth import TOLERANCE, Growth, Scouts
-from lambent.materials.export.tree_text import pieces_of
+from lambent.materials.export.matching.proposal import knows_the_back, proposal_of
+from lambent.materials.export.resampling.lbnl_layout import END, END_OF_BLOCK, block_head, head, losses
+from lambent.materials.export.resampling.pairs import is_grey
+from lambent.materials.export.resampling.resampled import Scatterer, read_back, scatterer_of, tuples_of
+from lambent.materials.export.resampling.tree_growth import TOLERANCE, Growth, Scouts
+from lambent.materials.export.resampling.tree_text import pieces_of
 from lambent.materials.lobes import COS_MIN
-from lambent.materials.measured.equal_energy import xyz_of_rgb
 from lambent.materials.measured.lbnl_xml import ISOTROPIC_WITHIN, LbnlTable
-from lambent.materials.measured.tensor_tree import Rank, TensorTree, coordinates, disk_of
-from lambent.materials.measured.tree_part import TreePart, on_sphere
+from lambent.materials.measured.parts.equal_energy import xyz_of_rgb
+from lambent.materials.measured.parts.tensor_tree import Rank, TensorTree, coordinates, disk_of
+from lambent.materials.measured.parts.tree_part import TreePart, on_sphere
 
 NAME = "LBNL BSDF XML, tensor tree"
 ENDINGS = (".xml",)

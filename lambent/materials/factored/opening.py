@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.directions import FLIP_Z
+from lambent.core.geometry.directions import FLIP_Z
 from lambent.core.inputs import read_head
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import MaterialBSDF

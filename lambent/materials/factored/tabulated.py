@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.directions import direction, normalize
+from lambent.core.geometry.directions import direction, normalize
 from lambent.materials.factored.parametrisations import angle_of
 from lambent.materials.factored.quotients import One
 from lambent.materials.factored.terms import Quotient

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from lambent.core.directions import Floats, direction
+from lambent.core.geometry.directions import Floats, direction
 from lambent.materials.bsdf import MaterialBSDF, more_than_arrives
 from lambent.materials.document import Kind, Material, Side
 from lambent.materials.fitting.least_squares import Bounds, minimise
@@ -14,7 +14,7 @@ from lambent.materials.fitting.parameters import LEGAL, RETRO_LEGAL, SHAPE, Box,
 from lambent.materials.fitting.problem import Candidate, Found, Mixture, Problem, problem_of, replace_metric
 from lambent.materials.fitting.scale import weighted_median
 from lambent.materials.fresnel import schlick_weight
-from lambent.materials.measured.metrics import METRICS, Metric, light_ratios
+from lambent.materials.measured.inspecting.metrics import METRICS, Metric, light_ratios
 from lambent.materials.measured.protocol import MeasuredSamples, negative_readings
 
 AT_BOUND = 0.005  # of the interval

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from lambent.core.arrays import Flags, Indices
-from lambent.core.directions import FLIP_Z, Floats, direction
+from lambent.core.geometry.directions import FLIP_Z, Floats, direction
 from lambent.materials.document import Material, Side
 from lambent.materials.fitting.account import evaluate
 from lambent.materials.fitting.problem import KeptAlbedo, Mixture, Problem, problem_of

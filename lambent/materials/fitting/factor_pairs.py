@@ -15,7 +15,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from lambent.core.arrays import Floats, Indices
-from lambent.materials.measured.metrics import CUBEROOT
+from lambent.materials.measured.inspecting.metrics import CUBEROOT
 
 ROUNDS = 40
 ENOUGH = 2e-3  # relative gain of a round below which the rounds end

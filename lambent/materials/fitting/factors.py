@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.directions import FLIP_Z, direction
+from lambent.core.geometry.directions import FLIP_Z, direction
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import components
 from lambent.materials.document import Side
@@ -27,7 +27,7 @@ from lambent.materials.factored.terms import Editable, Factor, Quotient, Term
 from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.factor_pairs import ROUNDS, Axis, Products, fit
 from lambent.materials.lobes import NUMPY
-from lambent.materials.measured.metrics import errors_and_shares
+from lambent.materials.measured.inspecting.metrics import errors_and_shares
 from lambent.materials.measured.protocol import GRAZING_DEG, MeasuredSamples, MeasuredTable
 
 FITTED, FITTED_ANISOTROPIC = Grid(90, 45, 24, turns_d=2), Grid(64, 24, 12, 12, turns_d=2)

@@ -24,9 +24,9 @@ from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.least_squares import Bounds
 from lambent.materials.fitting.parameters import BOUNDS, RETRO_BOUNDS, SHAPE, Box, Fixed, Ranges, parameter
 from lambent.materials.fitting.problem import Candidate, Found, Mixture, Problem, problem_of
-from lambent.materials.measured.metrics import Metric, errors_of, metric_named
+from lambent.materials.measured.inspecting.metrics import Metric, errors_of, metric_named
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
-from lambent.materials.measured.retro import towards_light
+from lambent.materials.measured.tables.retro import towards_light
 
 Search = Callable[[Problem, Bounds, Floats, Progress, int], Iterator[Mixture]]
 """A search for the model with one lobe, two, ...; arguments as in `gradient.fit_lobes`."""

@@ -20,7 +20,7 @@ from lambent.materials.document import Distribution, Side
 from lambent.materials.fitting.parameters import Box, from_search
 from lambent.materials.fitting.scale import Channel
 from lambent.materials.fresnel import schlick_weight
-from lambent.materials.measured.metrics import BLOCK, Metric
+from lambent.materials.measured.inspecting.metrics import BLOCK, Metric
 from lambent.materials.measured.protocol import MeasuredSamples
 
 MU, NU, R0, ALPHA = range(4)  # axes of the search coordinates

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lambent.core.arrays import Flags, Floats
-from lambent.materials.measured.metrics import Metric
+from lambent.materials.measured.inspecting.metrics import Metric
 
 TINY = 1e-30
 STEP_LIMIT = 1.5  # of ln k per Gauss-Newton step: far from the optimum the model is not linear in ln k

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.materials.fitting.incidence import Incidence
+from lambent.materials.fitting.shown.incidence import Incidence
 
 ALIKE_DEG = 1.0
 # Signs of x and y, and the azimuth that phi maps to: sign * phi + offset, in degrees.

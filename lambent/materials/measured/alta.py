@@ -21,12 +21,12 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.directions import angles
 from lambent.core.errors import UserError, did_you_mean
-from lambent.materials.measured.alta_directions import AZIMUTHS, PARAMETRISATIONS, SLICES, Parametrisation
+from lambent.core.geometry.directions import angles
 from lambent.materials.measured.columns import Layout, assemble, rows_of
+from lambent.materials.measured.parts.alta_directions import AZIMUTHS, PARAMETRISATIONS, SLICES, Parametrisation
+from lambent.materials.measured.parts.text_numbers import head_text, read_text, shown, without_comments
 from lambent.materials.measured.protocol import MeasuredTable, Quantity
-from lambent.materials.measured.text_numbers import head_text, read_text, shown, without_comments
 
 NAME = "ALTA text"
 _DIM = re.compile(rb"^#DIM[ \t]+(\d{1,3})[ \t]+(\d{1,3})[ \t]*$", re.MULTILINE)

@@ -26,15 +26,11 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import Floats, direction
 from lambent.core.errors import UserError
-from lambent.materials.measured.gonio import FORMAT
-from lambent.materials.measured.gonio_rows import LONGEST_NAME, check_angles, quantity_of, table_of, to_f
-from lambent.materials.measured.protocol import MeasuredTable, Quantity
-from lambent.materials.measured.scattered import ScatteredTable
-from lambent.materials.measured.spectral import rgb_of_measured, rgb_of_xyz
-from lambent.materials.measured.table import isotropic_brdf, require_values, sensible, unmarked, usable_values
-from lambent.materials.measured.text_numbers import (
+from lambent.core.geometry.directions import Floats, direction
+from lambent.materials.measured.parts.gonio_rows import LONGEST_NAME, check_angles, quantity_of, table_of, to_f
+from lambent.materials.measured.parts.spectral import rgb_of_measured, rgb_of_xyz
+from lambent.materials.measured.parts.text_numbers import (
     HINT_QUANTITY,
     head_text,
     numbers,
@@ -43,6 +39,10 @@ from lambent.materials.measured.text_numbers import (
     shown,
     without_comments,
 )
+from lambent.materials.measured.protocol import MeasuredTable, Quantity
+from lambent.materials.measured.tables.gonio import FORMAT
+from lambent.materials.measured.tables.scattered import ScatteredTable
+from lambent.materials.measured.tables.table import isotropic_brdf, require_values, sensible, unmarked, usable_values
 
 _OWN = re.compile(r"theta_i phi_i theta_o phi_o (?:(?:f|f_cos|p)|(f|f_cos|p)_r \1_g \1_b)")  # surely degrees on a grid
 _OUT = ("o", "out", "s", "r", "scat", "refl", "v", "view", "e")

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.ceilings import CORNELL_BYTES
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
-from lambent.materials.measured.scattered import ScatteredTable
-from lambent.materials.measured.spectral import rgb_of_measured
-from lambent.materials.measured.table import isotropic_brdf, require_values, sensible, unmarked, usable_values
-from lambent.materials.measured.text_numbers import numbers, read_text, without_comments
+from lambent.core.geometry.directions import direction
+from lambent.materials.measured.parts.spectral import rgb_of_measured
+from lambent.materials.measured.parts.text_numbers import numbers, read_text, without_comments
+from lambent.materials.measured.tables.scattered import ScatteredTable
+from lambent.materials.measured.tables.table import isotropic_brdf, require_values, sensible, unmarked, usable_values
 
 NAME = "Cornell / pbrt-v2 text"
 _COMMENT = re.compile(rb"\A\xef\xbb\xbf|#[^\r\n]*")  # and the byte order mark

@@ -22,10 +22,10 @@ import numpy as np
 from lambent.core.arrays import Floats, Indices
 from lambent.core.errors import UserError
 from lambent.core.plain import is_number
-from lambent.materials.measured.gonio import GonioTable
-from lambent.materials.measured.gonio_rows import check_angles, table_of
-from lambent.materials.measured.table import unmarked
-from lambent.materials.measured.text_numbers import begins_with, numbers, read_text, shown, without_comments
+from lambent.materials.measured.parts.gonio_rows import check_angles, table_of
+from lambent.materials.measured.parts.text_numbers import begins_with, numbers, read_text, shown, without_comments
+from lambent.materials.measured.tables.gonio import GonioTable
+from lambent.materials.measured.tables.table import unmarked
 
 NAME = "FRED BSDF text"
 _FIRST = re.compile(rb"\s*type\s+bsdf_data\b", re.IGNORECASE)

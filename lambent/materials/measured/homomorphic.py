@@ -20,15 +20,15 @@ from typing import Any
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
-from lambent.core.images import read_encoded
-from lambent.core.sequences import radical_inverse
+from lambent.core.geometry.directions import direction
+from lambent.core.geometry.sequences import radical_inverse
+from lambent.core.pictures.images import read_encoded
 from lambent.materials.bsdf import components
 from lambent.materials.lobes import NUMPY, Vector, half_vector
+from lambent.materials.measured.parts.text_numbers import head_text, read_text, shown, without_comments
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect
-from lambent.materials.measured.table import ReflectionTable
-from lambent.materials.measured.text_numbers import head_text, read_text, shown, without_comments
+from lambent.materials.measured.tables.table import ReflectionTable
 
 NAME = "homomorphic factors"
 LIMIT_BYTES = 1 << 16

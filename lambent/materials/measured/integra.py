@@ -37,13 +37,13 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
-from lambent.materials.measured.gonio import GonioTable
-from lambent.materials.measured.spectral import rgb_of_measured
-from lambent.materials.measured.specular_grids import SpecularGrid, specular_table
-from lambent.materials.measured.table import sensible
-from lambent.materials.measured.text_numbers import angles_after, counted, head_text, numbers, read_text, shown
+from lambent.core.geometry.directions import direction
+from lambent.materials.measured.parts.spectral import rgb_of_measured
+from lambent.materials.measured.parts.text_numbers import angles_after, counted, head_text, numbers, read_text, shown
+from lambent.materials.measured.tables.gonio import GonioTable
+from lambent.materials.measured.tables.specular_grids import SpecularGrid, specular_table
+from lambent.materials.measured.tables.table import sensible
 
 NAME = "Integra DDR/DDT text"
 HINT_SPECULAR = "load the diffuse distribution of the same material (.ddr or .ddt)"

@@ -17,13 +17,13 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.ceilings import MEASURED_BYTES
-from lambent.core.directions import HALF_TURN, Floats, raised
+from lambent.core.geometry.directions import HALF_TURN, Floats, raised
 from lambent.core.inputs import read_bytes
-from lambent.materials.measured import lbnl_document, lbnl_parts
-from lambent.materials.measured.lbnl_parts import Part, Side, Way, Where
+from lambent.materials.measured.parts import lbnl_document, lbnl_parts
+from lambent.materials.measured.parts.lbnl_parts import Part, Side, Way, Where
+from lambent.materials.measured.parts.text_numbers import shown
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable, TableInfo, collect
-from lambent.materials.measured.table import on_flat_pairs
-from lambent.materials.measured.text_numbers import shown
+from lambent.materials.measured.tables.table import on_flat_pairs
 
 NAME = "LBNL BSDF XML"
 ISOTROPIC_WITHIN = 0.02  # relative to the mean of f

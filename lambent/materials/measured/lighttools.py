@@ -34,8 +34,7 @@ from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.plain import is_number
 from lambent.materials.measured.columns import Layout, assemble
-from lambent.materials.measured.protocol import MeasuredTable
-from lambent.materials.measured.text_numbers import (
+from lambent.materials.measured.parts.text_numbers import (
     angles_after,
     counted,
     head_text,
@@ -43,6 +42,7 @@ from lambent.materials.measured.text_numbers import (
     shown,
     without_comments,
 )
+from lambent.materials.measured.protocol import MeasuredTable
 
 NAME = "LightTools BSDF text"
 LIGHT_AZIMUTH_DEG = 90.0

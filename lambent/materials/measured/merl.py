@@ -15,11 +15,11 @@ import numpy as np
 
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.ceilings import MEASURED_BYTES
-from lambent.core.directions import direction, elevation, half_vector, reflect
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import direction, elevation, half_vector, reflect
 from lambent.core.inputs import read_bytes
 from lambent.materials.measured.protocol import LARGEST_F, MeasuredSamples, collect
-from lambent.materials.measured.table import ReflectionTable, fill_holes, isotropic_brdf, require_values
+from lambent.materials.measured.tables.table import ReflectionTable, fill_holes, isotropic_brdf, require_values
 
 NAME = "MERL binary"
 SCALES = np.array([1.0, 1.15, 1.66]) / 1500

@@ -26,11 +26,11 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.plain import is_number
-from lambent.materials.measured.gonio import GonioTable
-from lambent.materials.measured.gonio_rows import check_angles, table_of, to_f
+from lambent.materials.measured.parts.gonio_rows import check_angles, table_of, to_f
+from lambent.materials.measured.parts.spectral import rgb_of_xyz
+from lambent.materials.measured.parts.text_numbers import head_text, numbers, read_text, refuse_decimal_commas, shown
 from lambent.materials.measured.protocol import Quantity
-from lambent.materials.measured.spectral import rgb_of_xyz
-from lambent.materials.measured.text_numbers import head_text, numbers, read_text, refuse_decimal_commas, shown
+from lambent.materials.measured.tables.gonio import GonioTable
 
 NAME = "pab-opto text"
 _FORMAT = re.compile(rb"^#[ \t]*format:[ \t]*theta[ \t]+phi[ \t]+\S", re.MULTILINE | re.IGNORECASE)

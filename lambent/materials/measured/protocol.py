@@ -17,7 +17,7 @@ import numpy as np
 
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.errors import UserError
-from lambent.core.sequences import radical_inverse
+from lambent.core.geometry.sequences import radical_inverse
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import SIDES, Lobe, Material, Side
 

@@ -17,11 +17,11 @@ from typing import Literal, Protocol
 from lambent.core.discovery import modules_in
 from lambent.core.errors import UserError
 from lambent.core.inputs import foreign_bytes, open_input
-from lambent.materials.measured.gonio import GonioTable
+from lambent.materials.measured.inspecting.unread import kind_of
+from lambent.materials.measured.parts.text_numbers import UTF16, is_utf16
 from lambent.materials.measured.protocol import MeasuredTable
-from lambent.materials.measured.reconstruction import AUTO, Reconstruction
-from lambent.materials.measured.text_numbers import UTF16, is_utf16
-from lambent.materials.measured.unread import kind_of
+from lambent.materials.measured.tables.gonio import GonioTable
+from lambent.materials.measured.tables.reconstruction import AUTO, Reconstruction
 
 HEAD_BYTES = 1 << 16
 

@@ -14,20 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Flags, Floats
-from lambent.core.directions import direction, elevation, half_vector, reflect
 from lambent.core.errors import UserError
-from lambent.materials.measured.azimuths import Azimuths
-from lambent.materials.measured.marginal import Corners, Warp, bilinear
+from lambent.core.geometry.directions import direction, elevation, half_vector, reflect
+from lambent.materials.measured.parts.azimuths import Azimuths
+from lambent.materials.measured.parts.spectral import rgb_of_spectra
+from lambent.materials.measured.parts.tensor_file import MAGIC, Tensors, read_tensors
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect
-from lambent.materials.measured.spectral import rgb_of_spectra
-from lambent.materials.measured.table import (
+from lambent.materials.measured.tables.marginal import Corners, Warp, bilinear
+from lambent.materials.measured.tables.table import (
     ReflectionTable,
     fill_holes,
     require_values,
     sensible,
     usable_values,
 )
-from lambent.materials.measured.tensor_file import MAGIC, Tensors, read_tensors
 
 NAME = "RGL tensor file"
 _DIMENSIONS = {"phi_i": 1, "theta_i": 1, "ndf": 2, "sigma": 2, "vndf": 4}

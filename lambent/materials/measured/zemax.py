@@ -19,15 +19,11 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.directions import direction
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
-from lambent.materials.measured.gonio import GonioTable
-from lambent.materials.measured.protocol import LARGEST_F
-from lambent.materials.measured.spectral import rgb_of_xyz
-from lambent.materials.measured.specular_grids import SpecularGrid, specular_table
-from lambent.materials.measured.table import unmarked
-from lambent.materials.measured.text_numbers import (
+from lambent.core.geometry.directions import direction
+from lambent.materials.measured.parts.spectral import rgb_of_xyz
+from lambent.materials.measured.parts.text_numbers import (
     angles_after,
     begins_with,
     counted,
@@ -35,6 +31,10 @@ from lambent.materials.measured.text_numbers import (
     shown,
     without_comments,
 )
+from lambent.materials.measured.protocol import LARGEST_F
+from lambent.materials.measured.tables.gonio import GonioTable
+from lambent.materials.measured.tables.specular_grids import SpecularGrid, specular_table
+from lambent.materials.measured.tables.table import unmarked
 
 NAME = "Zemax BSDF text"
 BELOW_90_DEG = float(np.nextafter(90, 0))

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from lambent.core.directions import normalize, raised
+from lambent.core.geometry.directions import normalize, raised
 from lambent.materials.fresnel import schlick
 from lambent.materials.models.model import Floats, Model, Parameter
 from lambent.materials.models.pairs import reflected, upper

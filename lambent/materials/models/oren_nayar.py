@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from lambent.core.directions import elevation
+from lambent.core.geometry.directions import elevation
 from lambent.materials.models.model import Floats, Model, Parameter
 from lambent.materials.models.pairs import cosine_pdf, sample_cosine, upper
 

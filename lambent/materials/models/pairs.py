@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lambent.core.arrays import Flags
-from lambent.core.directions import half_vector, normalize, raised, reflect
-from lambent.core.sequences import cosine_hemisphere
+from lambent.core.geometry.directions import half_vector, normalize, raised, reflect
+from lambent.core.geometry.sequences import cosine_hemisphere
 from lambent.materials.models.model import Floats
 
 LOWEST_COSINE = 1e-9  # keeps 1/cos finite

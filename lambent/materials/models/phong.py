@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from lambent.core.directions import HALF_TURN, basis
+from lambent.core.geometry.directions import HALF_TURN, basis
 from lambent.materials.models.model import Floats, Model, Parameter
 
 

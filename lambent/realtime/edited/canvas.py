@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Floats, Image, Indices
 from lambent.realtime.edited.commands import Commands
 from lambent.realtime.edited.layer import GpuLayer, texels
-from lambent.realtime.targets import pixels
+from lambent.realtime.gpu.targets import pixels
 
 FORMAT = "rgba32float"  # sunlight may exceed 65504, the largest half float
 TEXELS = 16  # rows are padded to a multiple: copies between buffers and textures need rows of a multiple of 256 bytes

@@ -11,12 +11,12 @@ import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
+from lambent.baked.transport.wavelets import TAPS
 from lambent.core.errors import UserError
-from lambent.core.wavelets import TAPS
-from lambent.realtime.layouts import Layouts
-from lambent.realtime.shader_source import assemble
-from lambent.realtime.targets import PassTimer
-from lambent.realtime.uploads import whole_words
+from lambent.realtime.gpu.layouts import Layouts
+from lambent.realtime.gpu.shader_source import assemble
+from lambent.realtime.gpu.targets import PassTimer
+from lambent.realtime.gpu.uploads import whole_words
 
 GROUP = 256  # threads of a workgroup, as in the shaders
 REACH = 64 << 10  # bytes of parameters visible to a dispatch

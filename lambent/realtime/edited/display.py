@@ -8,14 +8,14 @@ import numpy as np
 import wgpu
 
 from lambent.core.arrays import Image
-from lambent.core.false_colour import Range
-from lambent.core.photometry import LUMINANCE
+from lambent.core.light.false_colour import Range
+from lambent.core.light.photometry import LUMINANCE
 from lambent.realtime.edited.canvas import FORMAT
 from lambent.realtime.frame_state import VIEW_TRANSFORMS
-from lambent.realtime.layouts import Layouts
-from lambent.realtime.pipelines import cover, screen_pipeline
-from lambent.realtime.structs import FRAME_DTYPE
-from lambent.realtime.targets import DISPLAY_FORMAT
+from lambent.realtime.gpu.layouts import Layouts
+from lambent.realtime.gpu.pipelines import cover, screen_pipeline
+from lambent.realtime.gpu.structs import FRAME_DTYPE
+from lambent.realtime.gpu.targets import DISPLAY_FORMAT
 
 
 class Display:

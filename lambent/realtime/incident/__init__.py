@@ -17,7 +17,7 @@ from typing import Any, Protocol, cast
 
 from lambent.core.arrays import Floats
 from lambent.core.discovery import known, modules_in
-from lambent.realtime.baked import Probe
+from lambent.realtime.light.baked import Probe
 
 AUTO = "auto"
 

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from lambent.baked.probes.lookups import inverse_depth
 from lambent.core.arrays import Floats
-from lambent.core.colour import HALF_MAX
-from lambent.core.cubemap import sample
-from lambent.core.probe_lookups import inverse_depth
-from lambent.realtime.baked import Probe
-from lambent.realtime.uploads import cube_texture
+from lambent.core.geometry.cubemap import sample
+from lambent.core.light.colour import HALF_MAX
+from lambent.realtime.gpu.uploads import cube_texture
+from lambent.realtime.light.baked import Probe
 
 NAME, COST, PREFERENCE = "distance", 2, 1
 BINDINGS = ("cube",)

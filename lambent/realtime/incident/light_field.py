@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 import wgpu
 
+from lambent.baked.light_fields.light_field import NO_POINT
+from lambent.baked.light_fields.lookup import EDGE_STEEPNESS, March
 from lambent.core.arrays import Floats
-from lambent.core.cubemap import sample
 from lambent.core.errors import UserError
-from lambent.core.light_field import NO_POINT
-from lambent.core.light_field_lookup import EDGE_STEEPNESS, March
-from lambent.realtime.baked import BakedScene, Probe
-from lambent.realtime.cube_mips import finite, mip_chain
-from lambent.realtime.light_field_atlas import Atlas, coding
-from lambent.realtime.resident_maps import ResidentMaps, filled
-from lambent.realtime.structs import LIGHT_FIELD_DTYPE, Record
-from lambent.realtime.uploads import cube_texture, upload
+from lambent.core.geometry.cubemap import sample
+from lambent.realtime.gpu.cube_mips import finite, mip_chain
+from lambent.realtime.gpu.structs import LIGHT_FIELD_DTYPE, Record
+from lambent.realtime.gpu.uploads import cube_texture, upload
+from lambent.realtime.light.baked import BakedScene, Probe
+from lambent.realtime.light_fields.light_field_atlas import Atlas, coding
+from lambent.realtime.light_fields.resident_maps import ResidentMaps, filled
 
 
 @dataclass(frozen=True)

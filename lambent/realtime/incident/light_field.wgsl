@@ -1,5 +1,5 @@
 // Offset surface light fields: the points nearest to a pixel, by the sample map, each with a map of light and inverse
-// distance, through which rays march, as in core/light_field_lookup.py. Positions are in world space.
+// distance, through which rays march, as in baked/light_fields/lookup.py. Positions are in world space.
 
 #include "frame.wgsl"
 #include "light_field_record.wgsl"

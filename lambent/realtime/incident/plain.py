@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.realtime.baked import Probe
+from lambent.realtime.light.baked import Probe
 
 NAME, COST, PREFERENCE = "plain", 0, 0
 BINDINGS: tuple[str, ...] = ()

@@ -8,9 +8,9 @@ import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
+from lambent.baked.probes.lookups import distances_to_planes
 from lambent.core.arrays import Floats
-from lambent.core.probe_lookups import distances_to_planes
-from lambent.realtime.baked import Probe
+from lambent.realtime.light.baked import Probe
 
 NAME, COST, PREFERENCE = "planes", 1, 2
 BINDINGS = ("storage",)

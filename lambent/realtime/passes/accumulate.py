@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from lambent.realtime.context import FrameContext
-from lambent.realtime.layouts import Layouts
-from lambent.realtime.pipelines import screen_pipeline
-from lambent.realtime.targets import target_texture
+from lambent.realtime.gpu.layouts import Layouts
+from lambent.realtime.gpu.pipelines import screen_pipeline
+from lambent.realtime.gpu.targets import target_texture
+from lambent.realtime.passes.context import FrameContext
 
 MEAN_FORMAT = "rgba32float"
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from lambent.realtime.context import FrameContext
-from lambent.realtime.layouts import Layouts
-from lambent.realtime.pipelines import screen_pipeline
+from lambent.realtime.gpu.layouts import Layouts
+from lambent.realtime.gpu.pipelines import screen_pipeline
+from lambent.realtime.passes.context import FrameContext
 
 
 class BasePass:

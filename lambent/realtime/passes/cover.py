@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
-from lambent.realtime.context import FrameContext
 from lambent.realtime.frame_state import frame_data
-from lambent.realtime.layouts import Layouts
+from lambent.realtime.gpu.layouts import Layouts
+from lambent.realtime.gpu.pipelines import pipeline, screen_pipeline
+from lambent.realtime.gpu.shader_source import assemble
+from lambent.realtime.gpu.structs import FRAME_DTYPE
+from lambent.realtime.gpu.targets import DEPTH_FORMAT, Target, target_texture
+from lambent.realtime.passes.context import FrameContext
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.light import LightPass
-from lambent.realtime.pipelines import pipeline, screen_pipeline
-from lambent.realtime.shader_source import assemble
-from lambent.realtime.structs import FRAME_DTYPE
-from lambent.realtime.targets import DEPTH_FORMAT, Target, target_texture
 
 PLACES = (0.2, 0.4), (0.4, -0.2), (-0.2, -0.4), (-0.4, 0.2)  # px, as shaders/places.wgsl
 LIGHT_FORMAT, STEPS_FORMAT = "rgba16float", "r32uint"

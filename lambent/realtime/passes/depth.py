@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from lambent.realtime.clusters import Ranges, Seen
-from lambent.realtime.context import FrameContext
-from lambent.realtime.layouts import Layouts
-from lambent.realtime.pipelines import pipeline
+from lambent.realtime.gpu.layouts import Layouts
+from lambent.realtime.gpu.pipelines import pipeline
+from lambent.realtime.gpu.shader_source import assemble
+from lambent.realtime.objects.clusters import Ranges, Seen
+from lambent.realtime.passes.context import FrameContext
 from lambent.realtime.resources import SceneResources
-from lambent.realtime.shader_source import assemble
 
 
 class DepthPass:

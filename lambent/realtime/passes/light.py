@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from lambent.realtime.clusters import Seen
-from lambent.realtime.context import FrameContext
-from lambent.realtime.draws import Draw
 from lambent.realtime.frame_state import LIGHT_MAP_NOISE
+from lambent.realtime.gpu.layouts import Layouts
+from lambent.realtime.gpu.pipelines import pipeline, screen_pipeline
+from lambent.realtime.gpu.shader_source import assemble
 from lambent.realtime.incident import included
-from lambent.realtime.layouts import Layouts
+from lambent.realtime.light.probe_light import kind_of
+from lambent.realtime.objects.clusters import Seen
+from lambent.realtime.objects.draws import Draw
+from lambent.realtime.passes.context import FrameContext
 from lambent.realtime.passes.depth import draw_runs, set_geometry
-from lambent.realtime.pipelines import pipeline, screen_pipeline
-from lambent.realtime.probe_light import kind_of
-from lambent.realtime.shader_source import assemble
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.geometry.directions import Floats
 from lambent.core.plain import Triple
 from lambent.scenes.geometry import box, merge, placed
 from lambent.scenes.scene import Mesh, SceneObject

@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.geometry.directions import Floats
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.builtin.painted import painted
 from lambent.scenes.builtin.placing import POLISHED_SCALE, at, thing

@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 
-from lambent.core.directions import Floats, normalize
+from lambent.core.geometry.directions import Floats, normalize
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.builtin.painted import of_one_colour, painted
 from lambent.scenes.builtin.placing import block, thing

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.geometry.directions import Floats
 
 
 def catmull_rom(points: Floats, t: Floats, closed: bool = False, knots: Floats | None = None) -> tuple[Floats, Floats]:

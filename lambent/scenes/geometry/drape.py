@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.geometry.directions import Floats
 from lambent.scenes.geometry.grid import grid
 from lambent.scenes.scene import Mesh
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lambent.core.directions import Floats, basis, normalize
-from lambent.core.geometry import area_vectors, triangle_areas
+from lambent.core.geometry.directions import Floats, basis, normalize
+from lambent.core.geometry.triangles import area_vectors, triangle_areas
 from lambent.scenes.mesh import Mesh
 
 FLAT = 1e-10  # triangles below this share of their sheet's extent squared count as degenerate

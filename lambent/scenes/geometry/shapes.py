@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lambent.core.directions import Floats, normalize
+from lambent.core.geometry.directions import Floats, normalize
 from lambent.scenes.geometry.curves import smooth_curve
 from lambent.scenes.geometry.grid import build, grid, merge
 from lambent.scenes.scene import Mesh

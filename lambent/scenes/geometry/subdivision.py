@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
 from lambent.scenes.scene import Mesh
 
 

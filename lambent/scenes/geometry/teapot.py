@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.directions import Floats, normalize
+from lambent.core.geometry.directions import Floats, normalize
 from lambent.scenes.geometry import bezier
 from lambent.scenes.geometry.grid import grid, merge, transformed
 from lambent.scenes.geometry.shapes import lathe

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from lambent.core.camera import Camera
 from lambent.core.plain import Triple
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
 from lambent.scenes.first_view import first_views
+from lambent.scenes.looks.variants import VariantByObject, looks_as_loaded, with_variants
 from lambent.scenes.scene import DirectionalLight, Environment, Light, MaterialTextures, Scene, SceneObject, SunSky
-from lambent.scenes.variants import VariantByObject, looks_as_loaded, with_variants
 
 DAYLIGHT = SunSky(sun_direction=(0.4558, 0.7597, 0.4637))
 

@@ -13,15 +13,15 @@ from pydantic import Field, ValidationError
 from lambent.core.discovery import known
 from lambent.core.errors import UserError, invalid
 from lambent.core.inputs import foreign_bytes
-from lambent.core.light_mix import AS_BAKED, GroupMix, LightMix, MixTrack
+from lambent.core.light.light_mix import AS_BAKED, GroupMix, LightMix, MixTrack
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.looks import parse_looks, parse_mixes
 from lambent.scenes.loaders.scene_toml.material_files import LookFiles
 from lambent.scenes.loaders.scene_toml.sections import NotNegative, Section
 from lambent.scenes.loaders.scene_toml.text import toml_of
-from lambent.scenes.look_track import LookTrack
+from lambent.scenes.looks.look_track import LookTrack
+from lambent.scenes.looks.variants import variant_named
 from lambent.scenes.scene import Look, Variant
-from lambent.scenes.variants import variant_named
 
 MOST_KEYS = 1000
 

@@ -12,13 +12,13 @@ from typing import Any
 
 from lambent.core.progress import Progress
 from lambent.materials.fitting.choices import DISTRIBUTION, DistributionChoice
+from lambent.viewer.background.work import Work, pending
 from lambent.viewer.editor.files import Files
 from lambent.viewer.editor.measurement import Measurement
 from lambent.viewer.editor.shown import Plots, Shown
 from lambent.viewer.editor.subject import Subject
-from lambent.viewer.edits import MaterialEdits
+from lambent.viewer.edits.edits import MaterialEdits
 from lambent.viewer.screen import Screen
-from lambent.viewer.work import Work, pending
 
 LOBES = ("auto", "1", "2", "3", "4")
 

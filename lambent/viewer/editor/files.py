@@ -10,11 +10,11 @@ from lambent.core.errors import UserError
 from lambent.core.inputs import read_head
 from lambent.core.plain import plain_name
 from lambent.materials.document import Material, Provenance, load_material
+from lambent.viewer.background.work import Work, pending
 from lambent.viewer.editor.measurement import Measurement, read_measurement
 from lambent.viewer.editor.subject import Subject, same_numbers
-from lambent.viewer.edits import file_in
+from lambent.viewer.edits.edits import file_in
 from lambent.viewer.screen import Screen
-from lambent.viewer.work import Work, pending
 
 Kind = Literal["material", "environment", "measurement"]
 

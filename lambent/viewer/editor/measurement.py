@@ -16,10 +16,10 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import components, evaluate
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.diffuse import diffuse_mode
-from lambent.materials.fitting.incidence import Incidence, incidences
+from lambent.materials.fitting.shown.incidence import Incidence, incidences
 from lambent.materials.lobes import Vector
 from lambent.materials.measured import load
-from lambent.materials.measured.metrics import METRICS
+from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.materials.measured.protocol import MeasuredSamples
 from lambent.viewer.editor.readings import FINE_PX, Disks, incidents_of, single
 

@@ -13,12 +13,12 @@ from functools import cache
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.directions import direction
-from lambent.core.sequences import radical_inverse
+from lambent.core.geometry.directions import direction
+from lambent.core.geometry.sequences import radical_inverse
 from lambent.materials.bsdf import MaterialBSDF, components, evaluate
 from lambent.materials.document import Material
-from lambent.materials.fitting.disks import brightness, disk_directions, in_plane_directions, measured_disk
-from lambent.materials.fitting.incidence import Incidence
+from lambent.materials.fitting.shown.disks import brightness, disk_directions, in_plane_directions, measured_disk
+from lambent.materials.fitting.shown.incidence import Incidence
 from lambent.materials.fitting.symmetry import mirrored
 from lambent.materials.lobes import Vector
 from lambent.viewer.mode import Image

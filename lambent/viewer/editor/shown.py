@@ -10,13 +10,13 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.materials.document import Material
-from lambent.materials.fitting.disks import in_plane_tuples
+from lambent.materials.fitting.shown.disks import in_plane_tuples
+from lambent.viewer.background.work import Work, pending
 from lambent.viewer.editor import readings
 from lambent.viewer.editor.measurement import Measurement
 from lambent.viewer.editor.readings import FINE_PX, Disks, incidents_of, white_of
 from lambent.viewer.editor.subject import Subject
 from lambent.viewer.mode import Image
-from lambent.viewer.work import Work, pending
 
 COARSE_PX = 40  # diameter of a disk while a slider moves
 MOVING_VALUES = 30_000  # total pixels of all disks while a slider moves

@@ -8,7 +8,7 @@ from typing import Literal, cast, get_args
 
 from lambent.materials.document import Kind, Lobe, Material
 from lambent.viewer.editor.restrictions import Kept, Restrictions
-from lambent.viewer.edits import MaterialEdits
+from lambent.viewer.edits.edits import MaterialEdits
 
 B = Literal["nothing", "as loaded", "as saved", "before the last edit", "a document"]
 REFERENCES: tuple[B, ...] = get_args(B)

@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 
 from lambent.materials.document import KINDS, Lobe, Material
 from lambent.materials.fitting.choices import DISTRIBUTION_CHOICES
-from lambent.materials.measured.metrics import METRICS
+from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.materials.models.model import Parameter
 from lambent.viewer.editor.editor import LOBES, Editor
 from lambent.viewer.editor.restrictions import DIFFUSE, lobe_names

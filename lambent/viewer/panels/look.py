@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from lambent.core.exposure import ev100_of
-from lambent.core.false_colour import LEAST, MOST, Range
-from lambent.realtime.planar_integrators import CHOICES as PLANARS
+from lambent.core.light.exposure import ev100_of
+from lambent.core.light.false_colour import LEAST, MOST, Range
+from lambent.realtime.planar.planar_integrators import CHOICES as PLANARS
 from lambent.viewer.look import INTEGRATORS, LOOKUPS, SAMPLE_COUNTS, VIEW_TRANSFORMS, Look
 from lambent.viewer.pacing import BUDGET_S
 from lambent.viewer.panels.widgets import check, choice, explain, slider

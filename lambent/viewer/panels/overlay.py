@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from imgui_bundle import imgui
 
-from lambent.core.false_colour import Range, number, ramp
+from lambent.core.light.false_colour import Range, number, ramp
 from lambent.core.plain import triple
 from lambent.viewer.look import Look
 from lambent.viewer.screen import Rect, Screen

@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 from imgui_bundle import imgui
 
-from lambent.core.colour import srgb_decode, srgb_encode
+from lambent.core.light.colour import srgb_decode, srgb_encode
 from lambent.core.plain import Triple, triple
 
 Colour = tuple[float, float, float, float]

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from lambent.core.directions import Floats, normalize
-from lambent.materials.measured.metrics import errors_and_shares
+from lambent.core.geometry.directions import Floats, normalize
+from lambent.materials.measured.inspecting.metrics import errors_and_shares
 from lambent.materials.measured.protocol import MeasuredSamples
 
 

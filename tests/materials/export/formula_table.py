@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from lambent.core.directions import FLIP_Z, Floats
-from lambent.core.sequences import cosine_hemisphere
+from lambent.core.geometry.directions import FLIP_Z, Floats
+from lambent.core.geometry.sequences import cosine_hemisphere
 from lambent.materials.measured.protocol import LeftOut, MeasuredSamples, MeasuredTable, TableInfo
 
 Formula = Callable[[Floats, Floats], Floats]

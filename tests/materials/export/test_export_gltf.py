@@ -14,7 +14,7 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export.gltf import likeness, write
-from lambent.materials.measured.synthetic import Setup, synthesise
+from lambent.materials.measured.inspecting.synthetic import Setup, synthesise
 from tests.materials.export.export_materials import ALL, BRUSHED, GOLD, PLASTIC
 
 ROOT = Path(__file__).parents[3]

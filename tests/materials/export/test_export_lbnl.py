@@ -7,21 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.colour import luminance
-from lambent.core.directions import Floats, direction
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import Floats, direction
+from lambent.core.geometry.sequences import r2
+from lambent.core.light.colour import luminance
 from lambent.core.progress import Cancelled
-from lambent.core.sequences import r2
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.export import patch_mean
 from lambent.materials.export.lbnl_xml import write
+from lambent.materials.export.resampling import patch_mean
 from lambent.materials.measured import load
-from lambent.materials.measured.equal_energy import xyz_of_rgb
-from lambent.materials.measured.klems import KLEMS_FULL
+from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.materials.measured.lbnl_xml import LbnlTable, read
 from lambent.materials.measured.merl import directions_of
-from lambent.materials.measured.metrics import METRICS
+from lambent.materials.measured.parts.equal_energy import xyz_of_rgb
+from lambent.materials.measured.parts.klems import KLEMS_FULL
 from tests.materials.measured.lbnl_files import angles_away_from_borders, ask_radiance, lbnl_xml, needs_radiance, words
 from tests.materials.measured.measured_files import merl_bytes
 

@@ -7,7 +7,7 @@ import pytest
 
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.export.pairs import pairs_of
+from lambent.materials.export.resampling.pairs import pairs_of
 from lambent.materials.models import model_named
 from tests.materials.export.export_materials import BRUSHED, FOIL, PLASTIC
 

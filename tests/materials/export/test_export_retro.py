@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.bench.retro_tapes import TAPES
-from lambent.core.directions import direction
+from lambent.bench.scenes.retro_tapes import TAPES
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material, load_material, material_from
 from lambent.materials.export import gltf, gonio_text, lbnl_xml, materialx, merl, mitsuba
-from lambent.materials.export.match import without_retro
-from lambent.materials.export.resampled import read_back
-from lambent.materials.export.verdict import verdict_of
+from lambent.materials.export.matching.match import without_retro
+from lambent.materials.export.matching.verdict import verdict_of
+from lambent.materials.export.resampling.resampled import read_back
 from lambent.materials.measured import load
 
 RETRO = Lobe(retro=True, mx=0.03, my=0.03, r0=(1.0,) * 3, k=(0.4, 0.3, 0.2), alpha=-1.0)

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import gonio_text, merl, rgl
 from lambent.materials.measured import load
-from lambent.materials.measured.gonio import GonioTable
-from lambent.materials.measured.metrics import METRICS
-from lambent.materials.measured.synthetic import ISOTROPIC, record, synthesise
+from lambent.materials.measured.inspecting.metrics import METRICS
+from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, record, synthesise
+from lambent.materials.measured.tables.gonio import GonioTable
 from tests.tools.in_mitsuba import f_cos, interaction
 
 GLOSSY = Material(name="glossy", kd=(0.3, 0.2, 0.1), lobes=(Lobe(k=(0.4,) * 3, mx=0.2, my=0.2, r0=(0.3,) * 3),))
@@ -52,7 +52,7 @@ def test_merl_round_trip(tmp_path: Path, small_merl: None) -> None:
 
 
 def _against_black(material: Material):
-    from lambent.materials.export.resampled import tuples_of
+    from lambent.materials.export.resampling.resampled import tuples_of
 
     samples = tuples_of(material)
     return samples, 0 * samples.f

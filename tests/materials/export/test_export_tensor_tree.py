@@ -9,18 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.colour import luminance
-from lambent.core.directions import FLIP_Z, Floats, direction, normalize
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import FLIP_Z, Floats, direction, normalize
+from lambent.core.geometry.sequences import r2
+from lambent.core.light.colour import luminance
 from lambent.core.progress import Cancelled
-from lambent.core.sequences import r2
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.export import tensor_tree, tree_growth
-from lambent.materials.export.proposal import knows_the_back
+from lambent.materials.export import tensor_tree
+from lambent.materials.export.matching.proposal import knows_the_back
+from lambent.materials.export.resampling import tree_growth
 from lambent.materials.measured.lbnl_xml import read
-from lambent.materials.measured.tensor_tree import Rank, disk_of
-from lambent.materials.measured.tree_part import on_sphere
+from lambent.materials.measured.parts.tensor_tree import Rank, disk_of
+from lambent.materials.measured.parts.tree_part import on_sphere
 from tests.materials.export.export_materials import PLASTIC
 from tests.materials.export.formula_table import FormulaTable, lopsided
 from tests.materials.export.tree_by_hand import leaves_of, place_of, read_by_hand, value_at

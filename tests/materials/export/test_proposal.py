@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bench.retro_tapes import TAPES, Tape
-from lambent.core.directions import direction
+from lambent.bench.scenes.retro_tapes import TAPES, Tape
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.export.match import without_retro
-from lambent.materials.export.proposal import proposal_of
+from lambent.materials.export.matching.match import without_retro
+from lambent.materials.export.matching.proposal import proposal_of
+from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, synthesise
 from lambent.materials.measured.protocol import MeasuredTable
-from lambent.materials.measured.synthetic import ISOTROPIC, synthesise
 from tests.tools.chi_square import LEVEL, sampler_test
 
 GLOSS = Lobe(mx=0.1, my=0.1, r0=(0.6,) * 3, k=(0.8,) * 3)

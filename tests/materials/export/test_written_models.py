@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.core.directions import Floats
+from lambent.core.geometry.directions import Floats
 from lambent.materials.document import Material
 from lambent.materials.export import gltf, materialx, mitsuba
-from lambent.materials.export.pairs import CHECK_LOG2, pairs_of
+from lambent.materials.export.resampling.pairs import CHECK_LOG2, pairs_of
 from tests.materials.export.export_materials import BRUSHED, FOIL, GOLD, PAPER, PLASTIC, VARNISH
 from tests.materials.export.facets_by_hand import Geometry, assert_costs
 

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import Floats, direction
+from lambent.core.geometry.directions import Floats, direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.export import gonio_text, lbnl_xml, merl, patch_mean, rgl
+from lambent.materials.export import gonio_text, lbnl_xml, merl, rgl
+from lambent.materials.export.resampling import patch_mean
 from tests.materials.export.export_materials import FOIL
 from tests.materials.export.formula_table import FormulaTable, lopsided
 

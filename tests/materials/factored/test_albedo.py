@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.sequences import r2
+from lambent.core.geometry.sequences import r2
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo, term_albedo

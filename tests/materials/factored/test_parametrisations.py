@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import components
 from lambent.materials.factored.parametrisations import PARAMETRISATIONS, angle_of
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lambent.bench.known_answers import KNOWN, setup_of
+from lambent.bench.scenes.known_answers import KNOWN, setup_of
 from lambent.materials.document import Lobe, Material
+from lambent.materials.measured.inspecting.synthetic import ANISOTROPIC, ISOTROPIC, Setup, synthesise
 from lambent.materials.measured.protocol import MeasuredSamples
-from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, Setup, synthesise
 
 __all__ = ["ANISOTROPIC", "FEW", "FOIL", "ISOTROPIC", "KNOWN", "PAINT", "TWO_LOBES", "grey", "setup_of"]
 FOIL = KNOWN["white foil"]

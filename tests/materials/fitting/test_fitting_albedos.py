@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.directions import FLIP_Z, direction, normalize
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import FLIP_Z, direction, normalize
 from lambent.core.plain import plain
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
@@ -19,7 +19,7 @@ from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.least_squares import Bounds, _add_albedos, _moved, _unknowns
 from lambent.materials.fitting.parameters import box_of
 from lambent.materials.fitting.problem import Candidate, Mixture, problem_of
-from lambent.materials.measured.metrics import METRICS
+from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.materials.measured.protocol import MeasuredTable, TableInfo, collect
 
 COAT = Lobe(k=(0.8,) * 3, r0=(0.04,) * 3, mx=0.05, my=0.05, alpha=0.7)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import FLIP_Z, Floats, direction
+from lambent.core.geometry.directions import FLIP_Z, Floats, direction
 from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.curve import KNOTS

@@ -9,7 +9,7 @@ from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.fitting.fit import fit
-from lambent.materials.measured.metrics import METRICS, errors_of
+from lambent.materials.measured.inspecting.metrics import METRICS, errors_of
 from lambent.materials.measured.registry import load
 from tests.materials.fitting.known_answers import FEW, FOIL, ISOTROPIC, KNOWN, PAINT, TWO_LOBES, grey, setup_of
 

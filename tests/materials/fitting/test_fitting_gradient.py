@@ -10,7 +10,7 @@ from lambent.materials.fitting import gradient
 from lambent.materials.fitting.least_squares import Bounds, _normal_equations, _unknowns, minimise
 from lambent.materials.fitting.parameters import box_of, to_search
 from lambent.materials.fitting.problem import Candidate, Mixture, problem_of
-from lambent.materials.measured.metrics import METRICS
+from lambent.materials.measured.inspecting.metrics import METRICS
 from tests.materials.fitting.known_answers import FEW, FOIL, ISOTROPIC, PAINT, grey
 
 TWO = Mixture(

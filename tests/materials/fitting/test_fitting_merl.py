@@ -11,7 +11,7 @@ import pytest
 
 from lambent.materials.fitting.account import lambertian_errors
 from lambent.materials.fitting.fit import fit
-from lambent.materials.measured.metrics import errors_of
+from lambent.materials.measured.inspecting.metrics import errors_of
 from lambent.materials.measured.protocol import MeasuredSamples
 from lambent.materials.measured.registry import load
 from lambent.published.merl_fits import read_fits

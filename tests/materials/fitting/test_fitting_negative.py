@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import Floats, direction
+from lambent.core.geometry.directions import Floats, direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import rgl
 from lambent.materials.fitting.fit import fit
 from lambent.materials.measured import load
-from lambent.materials.measured.metrics import METRICS
+from lambent.materials.measured.inspecting.metrics import METRICS
+from lambent.materials.measured.inspecting.synthetic import synthesise
+from lambent.materials.measured.parts.tensor_file import read_tensors, tensor_bytes
 from lambent.materials.measured.protocol import MeasuredTable
-from lambent.materials.measured.synthetic import synthesise
-from lambent.materials.measured.tensor_file import read_tensors, tensor_bytes
 from tests.materials.fitting.known_answers import FEW
 
 FAINT = Lobe(k=(0.6, 0.5, 0.1), mx=0.15, my=0.15, r0=(0.04,) * 3, alpha=0.3)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.document import Material
-from lambent.materials.fitting.incidence import incidences
-from lambent.materials.fitting.plot import save_plots
+from lambent.materials.fitting.shown.incidence import incidences
+from lambent.materials.fitting.shown.plot import save_plots
 from tests.materials.fitting.known_answers import FEW, FOIL, PAINT, grey
 
 

@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bench.retro_tapes import TAPES
-from lambent.core.directions import direction
+from lambent.bench.scenes.retro_tapes import TAPES
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.parameters import box_of, check, to_search
 from lambent.materials.fitting.problem import Candidate, Mixture, problem_of
-from lambent.materials.fitting.slices import slices
-from lambent.materials.measured.metrics import METRICS
-from lambent.materials.measured.retro import towards_light
-from lambent.materials.measured.synthetic import ISOTROPIC, synthesise
+from lambent.materials.fitting.shown.slices import slices
+from lambent.materials.measured.inspecting.metrics import METRICS
+from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, synthesise
+from lambent.materials.measured.tables.retro import towards_light
 
 SETUP = replace(ISOTROPIC, about_lamp=True, sector_deg=0.0, step_deg=5.0, fine_deg=1.0)
 BEADS = Material(

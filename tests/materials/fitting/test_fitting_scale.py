@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from lambent.materials.fitting.scale import Channel, solve_scale, weighted_median
-from lambent.materials.measured.metrics import METRICS
+from lambent.materials.measured.inspecting.metrics import METRICS
 
 VALUES = arrays(float, 9, elements=st.floats(-10, 10, width=32))
 WEIGHTS = arrays(float, 9, elements=st.floats(0, 5, width=32))

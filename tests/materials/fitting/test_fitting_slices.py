@@ -9,10 +9,10 @@ import pytest
 
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.fitting.plot import error_slices
-from lambent.materials.fitting.slices import slices
-from lambent.materials.measured.metrics import METRICS
-from lambent.materials.measured.synthetic import ANISOTROPIC
+from lambent.materials.fitting.shown.plot import error_slices
+from lambent.materials.fitting.shown.slices import slices
+from lambent.materials.measured.inspecting.metrics import METRICS
+from lambent.materials.measured.inspecting.synthetic import ANISOTROPIC
 from tests.materials.fitting.known_answers import FEW, FOIL, PAINT, grey
 
 COARSE = replace(ANISOTROPIC, theta_i_deg=(5, 35, 65), phi_i_deg=(0, 45, 90), step_deg=6, fine_deg=3, noise=0, floor=0)

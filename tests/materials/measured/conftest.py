@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.synthetic import ISOTROPIC, synthesise
+from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, synthesise
+from lambent.materials.measured.parts.gonio_text import write_gonio
 from tests.materials.measured.measured_files import (
     GLOSSY,
     cornell_rows,

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import angles, direction
-from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.synthetic import Setup, synthesise
+from lambent.core.geometry.directions import angles, direction
+from lambent.materials.measured.inspecting.synthetic import Setup, synthesise
+from lambent.materials.measured.parts.gonio_text import write_gonio
 from tests.materials.measured.lbnl_files import angle_basis, lbnl_xml, random_tree, words
 from tests.materials.measured.measured_files import (
     GLOSSY,

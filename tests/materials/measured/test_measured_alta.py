@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import angles, direction, half_vector
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import angles, direction, half_vector
 from lambent.materials.measured import load
-from lambent.materials.measured.alta_directions import PARAMETRISATIONS
+from lambent.materials.measured.parts.alta_directions import PARAMETRISATIONS
 from tests.materials.measured.vendor_files import alta_text
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import angles, direction
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import angles, direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.measured import load
 from tests.materials.measured.measured_files import GLOSSY

@@ -9,7 +9,7 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.materials.measured import load
-from lambent.materials.measured.spectral import rgb_of_spectra
+from lambent.materials.measured.parts.spectral import rgb_of_spectra
 from tests.materials.measured.measured_files import cornell_rows, cornell_text
 
 BANDS_NM = np.linspace(400, 700, 31)

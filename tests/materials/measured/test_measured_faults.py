@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured import load
-from lambent.materials.measured.faults import too_bright
-from lambent.materials.measured.inspection import inspect_table
-from lambent.materials.measured.synthetic import ISOTROPIC, record, synthesise
+from lambent.materials.measured.inspecting.faults import too_bright
+from lambent.materials.measured.inspecting.inspection import inspect_table
+from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, record, synthesise
 from tests.materials.measured.measured_files import GLOSSY
 
 CLEAN = replace(

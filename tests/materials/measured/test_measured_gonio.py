@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured import load
-from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, outgoing_grid, synthesise
+from lambent.materials.measured.inspecting.synthetic import ANISOTROPIC, ISOTROPIC, outgoing_grid, synthesise
+from lambent.materials.measured.parts.gonio_text import write_gonio
 from tests.materials.measured.measured_files import GLOSSY
 
 WHITE = (1.0, 1.0, 1.0)

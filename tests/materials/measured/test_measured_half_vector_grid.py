@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.document import Lobe, Material
-from lambent.materials.measured import half_vector_resampling
-from lambent.materials.measured.half_vector_grid import GridShape
-from lambent.materials.measured.half_vector_resampling import grid_of
 from lambent.materials.measured.protocol import TableInfo
+from lambent.materials.measured.tables import half_vector_resampling
+from lambent.materials.measured.tables.half_vector_grid import GridShape
+from lambent.materials.measured.tables.half_vector_resampling import grid_of
 
 SMALL = GridShape(12, 8, 64, 32)
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import direction
 from lambent.materials.factored.opening import editable_of
 from lambent.materials.measured.homomorphic import recognise
 from lambent.materials.measured.registry import load

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import ENERGY_TOLERANCE
-from lambent.materials.check_table import _warnings, albedos
+from lambent.materials.checking.check_table import _warnings, albedos
 from lambent.materials.document import Material
 from lambent.materials.fitting.account import _energy
 from lambent.materials.measured import load
-from lambent.materials.measured.inspection import inspect_table
+from lambent.materials.measured.inspecting.inspection import inspect_table
+from lambent.materials.measured.inspecting.synthetic import ISOTROPIC
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable, TableInfo, collect
-from lambent.materials.measured.synthetic import ISOTROPIC
 
 CLEAN = replace(ISOTROPIC, noise=0.0, floor=0.0, theta_i_deg=tuple(range(0, 80, 5)), sector_deg=0.0)
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.colour import WHITE_XYZ, luminance, rgb_to_xyz
-from lambent.core.directions import Floats, direction
+from lambent.core.geometry.directions import Floats, direction
+from lambent.core.light.colour import WHITE_XYZ, luminance, rgb_to_xyz
 from lambent.materials.measured import load
-from lambent.materials.measured.klems import KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER
 from lambent.materials.measured.lbnl_xml import LbnlTable, read
+from lambent.materials.measured.parts.klems import KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER
 from tests.materials.measured.lbnl_files import (
     angle_basis,
     angles_away_from_borders,

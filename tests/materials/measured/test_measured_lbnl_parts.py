@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import Floats, direction
-from lambent.core.sequences import r2
-from lambent.materials.measured.klems import BUILT_IN, KLEMS_FULL, AngleBasis, PatchMatrix
+from lambent.core.geometry.directions import Floats, direction
+from lambent.core.geometry.sequences import r2
 from lambent.materials.measured.lbnl_xml import LbnlTable, read
-from lambent.materials.measured.tensor_tree import Malformed, disk_of, parse_tree, square_of
-from lambent.materials.measured.tree_part import TreePart
+from lambent.materials.measured.parts.klems import BUILT_IN, KLEMS_FULL, AngleBasis, PatchMatrix
+from lambent.materials.measured.parts.tensor_tree import Malformed, disk_of, parse_tree, square_of
+from lambent.materials.measured.parts.tree_part import TreePart
 from tests.materials.measured.lbnl_files import angle_basis, lbnl_xml, random_tree, words
 
 

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
-from lambent.materials.measured.metrics import METRICS, errors_of, metric_named
+from lambent.core.geometry.directions import direction
+from lambent.materials.measured.inspecting.metrics import METRICS, errors_of, metric_named
 from lambent.materials.measured.protocol import LeftOut, MeasuredSamples, TableInfo
 
 INFO = TableInfo("by hand", "test", False, False, 1, "f")

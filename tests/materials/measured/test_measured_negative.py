@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import direction
 from lambent.materials.measured import load
-from lambent.materials.measured.gonio import AnySheet, GonioTable
-from lambent.materials.measured.inspection import inspect_table
+from lambent.materials.measured.inspecting.inspection import inspect_table
 from lambent.materials.measured.lbnl_xml import read as read_xml
+from lambent.materials.measured.parts.spectral import rgb_of_measured, rgb_of_xyz
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect, negative_readings
-from lambent.materials.measured.sheets import ScatteredSheet, Sheet
-from lambent.materials.measured.spectral import rgb_of_measured, rgb_of_xyz
-from lambent.materials.measured.table import MARKS
+from lambent.materials.measured.tables.gonio import AnySheet, GonioTable
+from lambent.materials.measured.tables.sheets import ScatteredSheet, Sheet
+from lambent.materials.measured.tables.table import MARKS
 from tests.materials.measured.lbnl_files import lbnl_xml, words
 from tests.materials.measured.measured_files import (
     cornell_rows,

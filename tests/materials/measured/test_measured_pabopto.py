@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import direction
 from lambent.materials.measured import load
 from tests.materials.measured.vendor_files import beam, glossy
 

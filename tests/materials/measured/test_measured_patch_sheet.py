@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import components
-from lambent.materials.check import check_sampler
+from lambent.materials.checking.check import check_sampler
 from lambent.materials.measured import load
-from lambent.materials.measured.klems import KLEMS_FULL, KLEMS_HALF, AngleBasis, PatchMatrix
 from lambent.materials.measured.lbnl_xml import LbnlTable
-from lambent.materials.measured.patch_sheet import lookup_of, patch_sheet_of
-from lambent.materials.measured.table_bsdf import TableBSDF
+from lambent.materials.measured.parts.klems import KLEMS_FULL, KLEMS_HALF, AngleBasis, PatchMatrix
+from lambent.materials.measured.tables.patch_sheet import lookup_of, patch_sheet_of
+from lambent.materials.measured.tables.table_bsdf import TableBSDF
 
 ODD = AngleBasis("odd", (0.0, 11.0, 40.0, 62.0), (1, 5, 7))  # ends above the horizon; turns do not map it on itself
 DOWN = np.array([1, 1, -1])

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bench.retro_tapes import TAPES, Tape
-from lambent.core.directions import direction, normalize
+from lambent.bench.scenes.retro_tapes import TAPES, Tape
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import direction, normalize
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import gonio_text, lbnl_xml
 from lambent.materials.measured import load
-from lambent.materials.measured.inspection import inspect_table
-from lambent.materials.measured.retro import towards_light
-from lambent.materials.measured.synthetic import ISOTROPIC, record, synthesise
+from lambent.materials.measured.inspecting.inspection import inspect_table
+from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, record, synthesise
+from lambent.materials.measured.tables.retro import towards_light
 
 
 @pytest.fixture(scope="module", params=TAPES, ids=lambda tape: tape.name)
@@ -68,7 +68,7 @@ def test_a_scan_in_the_plane_of_incidence_keeps_the_peak_round():
     """Seen beside the plane, the peak about the light is as narrow as within it."""
     from pathlib import Path
 
-    from lambent.materials.measured.gonio_rows import table_of
+    from lambent.materials.measured.parts.gonio_rows import table_of
 
     tape = Tape("scan", 2.0, 0.3, 1.0, 0.1)
     rows = [
@@ -106,7 +106,7 @@ def test_peaks_of_a_fifth_of_a_degree_are_seen():
 
 
 def test_many_incident_directions_cost_a_few_folds(monkeypatch):
-    monkeypatch.setattr("lambent.materials.measured.gonio._MOST_FOLDS", 3)
+    monkeypatch.setattr("lambent.materials.measured.tables.gonio._MOST_FOLDS", 3)
     setup = replace(ISOTROPIC, theta_i_deg=tuple(range(0, 80, 8)), about_lamp=True, sector_deg=0.0, step_deg=10.0)
     table = record(TAPES[1].eval, "many", setup)
     assert len(list(table._folds())) == 3 and table.choice.way == "back_vector"

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.bench.retro_tapes import TAPES
-from lambent.core.directions import FLIP_Z, direction
+from lambent.bench.scenes.retro_tapes import TAPES
+from lambent.core.geometry.directions import FLIP_Z, direction
 from lambent.materials.bsdf import MaterialBSDF, components
-from lambent.materials.chi_square import chi_square, combined
+from lambent.materials.checking.chi_square import chi_square, combined
 from lambent.materials.document import Lobe, Material
-from lambent.materials.measured.half_vector_grid import GridShape
 from lambent.materials.measured.protocol import TableInfo
-from lambent.materials.measured.retro_grid import RetroGrid, retro_grid_of
-from lambent.materials.measured.table_bsdf import TableBSDF
+from lambent.materials.measured.tables.half_vector_grid import GridShape
+from lambent.materials.measured.tables.retro_grid import RetroGrid, retro_grid_of
+from lambent.materials.measured.tables.table_bsdf import TableBSDF
 
 SHAPE = GridShape(24, 1, 128, 32)
 

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from lambent.core.errors import UserError
 from lambent.materials.measured import load
-from lambent.materials.measured.marginal import Corners, Warp
+from lambent.materials.measured.tables.marginal import Corners, Warp
 from tests.materials.measured.measured_files import rgl_fields, tensor_bytes
 from tests.tools.in_mitsuba import f_cos
 

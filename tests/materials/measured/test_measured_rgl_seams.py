@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction, half_vector
+from lambent.core.geometry.directions import direction, half_vector
 from lambent.materials.measured import load
-from lambent.materials.measured.azimuths import Azimuths
+from lambent.materials.measured.parts.azimuths import Azimuths
 from tests.materials.measured.measured_files import tensor_bytes
 
 OF_PHI_I = {  # nodes of phi_i, and the factor at each; the ends of a period are one direction

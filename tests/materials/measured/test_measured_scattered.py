@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction, normalize
+from lambent.core.geometry.directions import direction, normalize
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured import load
-from lambent.materials.measured.faults import extrapolation
-from lambent.materials.measured.inspection import inspect_table
-from lambent.materials.measured.scattered import NEIGHBOURS, ScatteredTable, _place
-from lambent.materials.measured.table import isotropic_brdf
+from lambent.materials.measured.inspecting.faults import extrapolation
+from lambent.materials.measured.inspecting.inspection import inspect_table
+from lambent.materials.measured.tables.scattered import NEIGHBOURS, ScatteredTable, _place
+from lambent.materials.measured.tables.table import isotropic_brdf
 
 SHARP = Lobe(k=(0.5,) * 3, mx=0.06, my=0.06, r0=(0.05,) * 3, distribution="ggx")
 ROUGH = SHARP.model_copy(update={"mx": 0.3, "my": 0.3})

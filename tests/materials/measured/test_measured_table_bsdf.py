@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
-from lambent.materials import check
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.checking import check
 from lambent.materials.document import Lobe, Material
-from lambent.materials.measured.half_vector_grid import GridShape
 from lambent.materials.measured.protocol import TableInfo
-from lambent.materials.measured.table_bsdf import TableBSDF
+from lambent.materials.measured.tables.half_vector_grid import GridShape
+from lambent.materials.measured.tables.table_bsdf import TableBSDF
 
 SMALL = GridShape(24, 1, 64, 32)
 

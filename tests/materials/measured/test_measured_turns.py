@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 from lambent.materials.measured import load
 from tests.materials.measured.measured_files import zemax_text
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.colour import RGB_TO_XYZ
-from lambent.core.directions import direction
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import direction
+from lambent.core.light.colour import RGB_TO_XYZ
 from lambent.materials.measured import load
 from tests.materials.measured.measured_files import fred_text, zemax_text
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.directions import direction
+from lambent.core.geometry.directions import direction
 
 
 def alta_text(name: str, columns: np.ndarray, values: np.ndarray, out: str = "INV_STERADIAN", vs: str = "") -> str:

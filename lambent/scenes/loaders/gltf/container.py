@@ -16,8 +16,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from lambent.core.ceilings import ELEMENTS_READ, GLTF_BYTES, GLTF_JSON_BYTES, ZEROS, Ceiling
-from lambent.core.directions import Floats
 from lambent.core.errors import UserError, invalid
+from lambent.core.geometry.directions import Floats
 from lambent.core.inputs import parse_json, read_bytes
 from lambent.scenes.loaders.gltf.schema import READ_EXTENSIONS, GltfDocument
 from lambent.scenes.loaders.scene_files import SceneFiles

@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 
 from lambent.core.ceilings import IES_BYTES
-from lambent.core.directions import Floats, normalize
 from lambent.core.errors import UserError
-from lambent.core.photometry import radiometric
+from lambent.core.geometry.directions import Floats, normalize
+from lambent.core.light.photometry import radiometric
 from lambent.core.plain import triple
 from lambent.scenes.ies import Photometry, parse_ies
 from lambent.scenes.loaders.gltf.container import Gltf

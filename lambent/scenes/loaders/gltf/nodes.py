@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.camera import FARTHEST_M, Camera
 from lambent.core.ceilings import NODES, TRIANGLES, VARIANTS
-from lambent.core.directions import Floats, normalize
 from lambent.core.errors import UserError
-from lambent.core.photometry import radiometric
+from lambent.core.geometry.directions import Floats, normalize
+from lambent.core.light.photometry import radiometric
 from lambent.core.plain import Triple, UniqueNames, triple
+from lambent.core.views.camera import FARTHEST_M, Camera
 from lambent.scenes.geometry import copies_under
 from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
 from lambent.scenes.loaders.gltf.container import Gltf, read

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lambent.core.arrays import Floats, Indices
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
 from lambent.scenes.loaders.gltf.container import Gltf
 from lambent.scenes.loaders.gltf.schema import Primitive
 from lambent.scenes.loaders.meshes.repair import MeshArrays

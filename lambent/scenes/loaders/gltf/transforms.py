@@ -8,7 +8,7 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.ceilings import NODES
-from lambent.core.directions import normalize
+from lambent.core.geometry.directions import normalize
 from lambent.scenes.loaders.gltf.container import Gltf
 from lambent.scenes.loaders.gltf.schema import Node
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from lambent.core.arrays import Floats, Indices
-from lambent.core.directions import normalize
-from lambent.core.geometry import area_vectors, triangle_normals
+from lambent.core.geometry.directions import normalize
+from lambent.core.geometry.triangles import area_vectors, triangle_normals
 from lambent.scenes.geometry import tangents_along
 from lambent.scenes.mesh import Mesh, batches_of, corners_of, vertices_at_corners
 from lambent.scenes.scene import SceneObject

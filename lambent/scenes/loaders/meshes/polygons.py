@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.directions import basis, normalize
-from lambent.core.geometry import area_vectors, cross_2d
+from lambent.core.geometry.directions import basis, normalize
+from lambent.core.geometry.triangles import area_vectors, cross_2d
 
 
 def triangulate(positions: Floats, corners: Indices, sizes: Indices) -> tuple[Indices, Indices]:

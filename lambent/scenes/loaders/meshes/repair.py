@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
-from lambent.core.directions import basis, normalize
 from lambent.core.errors import UserError
-from lambent.core.geometry import area_vectors, cross_2d, triangle_areas, triangle_normals
+from lambent.core.geometry.directions import basis, normalize
+from lambent.core.geometry.triangles import area_vectors, cross_2d, triangle_areas, triangle_normals
 from lambent.scenes.geometry import tangents_along
 from lambent.scenes.geometry.grid import FLAT
 from lambent.scenes.loaders.meshes.creases import creased

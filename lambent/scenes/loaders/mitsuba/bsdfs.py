@@ -17,8 +17,8 @@ from functools import partial
 import numpy as np
 
 from lambent.core.ceilings import LOBES
-from lambent.core.directions import Floats
 from lambent.core.errors import did_you_mean
+from lambent.core.geometry.directions import Floats
 from lambent.core.plain import is_number
 from lambent.scenes.loaders.mitsuba import fresnel
 from lambent.scenes.loaders.mitsuba.fresnel import COS, nearest_fresnel, nearest_passage

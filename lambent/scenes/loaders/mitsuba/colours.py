@@ -11,10 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from lambent.core.ceilings import SPECTRUM_BYTES, WAVELENGTHS
-from lambent.core.colour import XYZ_TO_RGB, srgb_decode
-from lambent.core.directions import Floats
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import Floats
 from lambent.core.inputs import read_bytes
+from lambent.core.light.colour import XYZ_TO_RGB, srgb_decode
 from lambent.scenes.loaders.mitsuba.document import Document, Element
 
 Y_INTEGRAL_NM = 106.856895  # of the CIE 1931 luminosity function, as Mitsuba normalises emission
@@ -92,7 +92,7 @@ def _file(element: Element, document: Document, emitted: bool) -> Floats:
 
 
 def _spectrum(element: Element, text: str, pairs: Sequence[Sequence[str | float]], emitted: bool) -> Floats:
-    from lambent.materials.measured.spectral import rgb_of_spectra
+    from lambent.materials.measured.parts.spectral import rgb_of_spectra
 
     WAVELENGTHS.check(len(pairs), file=element.file, field=element.place)
     try:

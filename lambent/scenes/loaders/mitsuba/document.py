@@ -14,8 +14,8 @@ from xml.parsers import expat
 import numpy as np
 
 from lambent.core.ceilings import MITSUBA_BYTES, XML_ELEMENTS, XML_FILES, XML_LEVELS, XML_TEXT
-from lambent.core.directions import Floats
 from lambent.core.errors import UserError, did_you_mean
+from lambent.core.geometry.directions import Floats
 from lambent.scenes.loaders.scene_files import SceneFiles
 
 ABSURD = 1e30

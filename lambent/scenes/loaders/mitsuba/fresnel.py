@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.geometry.directions import Floats
 
 COSINES, FACETS = 128, 48  # Gauss-Legendre points over cos theta_i; quadrature over facets, each way
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(COSINES)

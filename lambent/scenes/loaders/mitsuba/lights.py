@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.core.camera import Camera
-from lambent.core.directions import Floats, normalize
-from lambent.core.photometry import LM_PER_W
+from lambent.core.geometry.directions import Floats, normalize
+from lambent.core.light.photometry import LM_PER_W
 from lambent.core.plain import Triple, triple
+from lambent.core.views.camera import Camera
 from lambent.scenes.loaders.contents import DAYLIGHT
 from lambent.scenes.loaders.mitsuba.textures import colour
 from lambent.scenes.loaders.mitsuba.values import Plugin

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.geometry.directions import Floats
 from lambent.materials.fresnel import r0_of
 from lambent.scenes.loaders.mitsuba.textures import LUMINANCE, colour, number
 from lambent.scenes.loaders.mitsuba.values import Plugin

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.camera import Camera
 from lambent.core.ceilings import TRIANGLES
-from lambent.core.directions import Floats, normalize, rotation_about
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import Floats, normalize, rotation_about
 from lambent.core.plain import UniqueNames
+from lambent.core.views.camera import Camera
 from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
 from lambent.scenes.loaders.mitsuba import lights
 from lambent.scenes.loaders.mitsuba.bsdfs import surface_of

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import Floats, basis, normalize
+from lambent.core.geometry.directions import Floats, basis, normalize
 from lambent.scenes.geometry import grid, merge, transformed
 from lambent.scenes.loaders import ply
 from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of

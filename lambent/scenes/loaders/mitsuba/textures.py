@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.geometry.directions import Floats
 from lambent.scenes.loaders.mitsuba.values import Plugin
 from lambent.scenes.loaders.surfaces.surface import GREY
 from lambent.scenes.loaders.surfaces.texture_images import TextureImage

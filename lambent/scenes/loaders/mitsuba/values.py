@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.camera import FARTHEST_M, Camera, camera_axes
 from lambent.core.ceilings import XML_NESTING, XML_PLUGINS
-from lambent.core.directions import Floats, normalize, rotation_about
 from lambent.core.errors import did_you_mean
+from lambent.core.geometry.directions import Floats, normalize, rotation_about
 from lambent.core.plain import triple
+from lambent.core.views.camera import FARTHEST_M, Camera, camera_axes
 from lambent.scenes.loaders.mitsuba.colours import colour_of
 from lambent.scenes.loaders.mitsuba.document import Document, Element
 from lambent.scenes.loaders.surfaces.surface import Surface

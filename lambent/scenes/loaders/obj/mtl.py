@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.ceilings import MATERIALS, MTL_BYTES
-from lambent.core.directions import Floats
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import Floats
 from lambent.core.inputs import decoded, read_bytes
 from lambent.core.plain import Triple, is_number
 from lambent.materials.fresnel import r0_of

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from lambent.core.errors import UserError, invalid
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.plain import Triple
 from lambent.materials.document import Material, material_from
 from lambent.scenes.first_view import first_views
@@ -35,6 +35,7 @@ from lambent.scenes.loaders.scene_toml.schema import (
 from lambent.scenes.loaders.scene_toml.text import toml_of
 from lambent.scenes.loaders.scene_toml.variants import parse_variants
 from lambent.scenes.loaders.surfaces.surface import UNDESCRIBED
+from lambent.scenes.looks.variants import with_variants
 from lambent.scenes.scene import (
     Environment,
     ImageEnvironment,
@@ -46,7 +47,6 @@ from lambent.scenes.scene import (
     Scene,
     SceneObject,
 )
-from lambent.scenes.variants import with_variants
 
 # Required at the beginning of every scene.toml.
 HEAD = {"format": 'format = "lambent-scene"', "version": "version = 1", "geometry": 'geometry = "model.glb"'}

@@ -11,8 +11,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from lambent.core.colour import luminance
-from lambent.core.photometry import LM_PER_W
+from lambent.core.light.colour import luminance
+from lambent.core.light.photometry import LM_PER_W
 from lambent.core.plain import Triple, triple
 from lambent.scenes.ies import Photometry
 from lambent.scenes.loaders.scene_toml.sections import Colour, Finite, NotNegative, Section, Vector, not_zero, unit

@@ -11,11 +11,11 @@ from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.plain import Triple, triple
 from lambent.core.surroundings import Axis
-from lambent.scenes.environment_images import up_turn
 from lambent.scenes.geometry import transformed
 from lambent.scenes.loaders.contents import Contents
 from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.scene import DirectionalLight, IesLight, Light
+from lambent.scenes.sky.environment_images import up_turn
 
 
 def placed(contents: Contents, scale: float, up: Axis, path: Path) -> Contents:

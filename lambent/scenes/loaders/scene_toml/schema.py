@@ -6,12 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, field_validator, model_validator
 
-from lambent.core.camera import Camera, CameraPath
 from lambent.core.ceilings import VARIANTS
-from lambent.core.exposure import exposure_of
-from lambent.core.light_field import LEAST_TEXELS, MOST_POINTS, MOST_TEXELS
+from lambent.core.light.exposure import exposure_of
 from lambent.core.surroundings import Axis, Layout
-from lambent.scenes.computed import COMPUTED
+from lambent.core.views.camera import Camera, CameraPath
 from lambent.scenes.light_groups import MOST_GROUPS
 from lambent.scenes.loaders.scene_toml.lamps import LightSection, one_of
 from lambent.scenes.loaders.scene_toml.sections import (
@@ -28,7 +26,10 @@ from lambent.scenes.loaders.scene_toml.sections import (
 )
 from lambent.scenes.scene import (
     LEAST_SUN_DEG,
+    LEAST_TEXELS,
+    MOST_POINTS,
     MOST_SUN_DEG,
+    MOST_TEXELS,
     SUN_RADIUS_DEG,
     ComputedEnvironment,
     ConstantEnvironment,
@@ -37,6 +38,7 @@ from lambent.scenes.scene import (
     LightGroup,
     SunSky,
 )
+from lambent.scenes.sky.computed import COMPUTED
 
 FORMAT = "lambent-scene"
 

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from lambent.core.camera import FARTHEST_M
 from lambent.core.plain import Triple, triple
+from lambent.core.views.camera import FARTHEST_M
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

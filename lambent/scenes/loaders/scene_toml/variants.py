@@ -8,13 +8,13 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from lambent.core.errors import UserError
-from lambent.core.light_mix import LightMix
+from lambent.core.light.light_mix import LightMix
 from lambent.scenes.loaders.scene_toml.assembly import check_material, fitting
 from lambent.scenes.loaders.scene_toml.looks import parse_looks, parse_mixes
 from lambent.scenes.loaders.scene_toml.material_files import LookFiles
 from lambent.scenes.loaders.scene_toml.schema import VariantSection
+from lambent.scenes.looks.variants import VariantByObject, looks_as_loaded
 from lambent.scenes.scene import Scene
-from lambent.scenes.variants import VariantByObject, looks_as_loaded
 
 
 def parse_variants(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.geometry.directions import Floats
 from lambent.core.plain import Triple, triple
 from lambent.materials.document import Distribution, Side
 from lambent.scenes.loaders.surfaces.textured import Textured, combined, constant, scaled

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core import exr, rgbe
 from lambent.core.ceilings import PIXELS, TEXTURE_BYTES
-from lambent.core.colour import srgb_decode
-from lambent.core.directions import Floats
 from lambent.core.errors import UserError
-from lambent.core.images import read_image
+from lambent.core.geometry.directions import Floats
 from lambent.core.inputs import read_bytes
+from lambent.core.light.colour import srgb_decode
+from lambent.core.pictures import exr, rgbe
+from lambent.core.pictures.images import read_image
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.surfaces.textured import Textured
 from lambent.scenes.scene import IDENTITY, UvTransform

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lambent.core.colour import HALF_MAX
-from lambent.core.directions import Floats
+from lambent.core.geometry.directions import Floats
+from lambent.core.light.colour import HALF_MAX
 from lambent.scenes.scene import IDENTITY, Texture, UvTransform
 
 EVEN = 1e-3  # a texture that deviates from its mean by less than this share is dropped

@@ -22,7 +22,7 @@ def edits(path: Path) -> bool:
 
 def start(path: Path, name: str, screen: Screen, **options: Any) -> Mode:
     """Start the mode on a scene, a store or a session; options as in `subject.opened`."""
-    from lambent.realtime.device import open_device
+    from lambent.realtime.gpu.device import open_device
     from lambent.viewer.modes.edit.drawing import EditDrawing
     from lambent.viewer.modes.edit.mode import EditMode
     from lambent.viewer.modes.edit.shown import backend_of

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection.proposal import Proposal, time_said
-from lambent.editing.document import SessionDocument
+from lambent.bake.interreflection.settings import Bounces
 from lambent.editing.interreflection.noise import PASS
-from lambent.editing.session import Session
-from lambent.viewer.worker_process import WorkerProcess
+from lambent.editing.session.document import SessionDocument
+from lambent.editing.session.session import Session
+from lambent.viewer.background.worker_process import WorkerProcess
 
 LIGHTS = (400, 4000)
 WORKER, BOUNCES = "lambent.viewer.modes.edit.worker", "--bounces"

@@ -8,12 +8,12 @@ from typing import Any
 import wgpu
 
 from lambent.core.errors import UserError
-from lambent.core.false_colour import with_scale
-from lambent.core.images import write_image, write_shown
-from lambent.core.photometry import LUMINANCE
+from lambent.core.light.false_colour import with_scale
+from lambent.core.light.photometry import LUMINANCE
+from lambent.core.pictures.images import write_image, write_shown
 from lambent.core.plain import plain_name
-from lambent.realtime.device import adapter_info
-from lambent.viewer.edits import unused
+from lambent.realtime.gpu.device import adapter_info
+from lambent.viewer.edits.edits import unused
 from lambent.viewer.mode import Divider, Drawing, Image
 from lambent.viewer.modes.edit.painter import Frame
 from lambent.viewer.modes.edit.shown import Shown

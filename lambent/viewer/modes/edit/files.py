@@ -9,17 +9,17 @@ from pathlib import Path
 
 from lambent.core.errors import UserError
 from lambent.core.plain import plain_name
-from lambent.editing.document import Surroundings
-from lambent.editing.exported import ExportedMaterial, export
-from lambent.editing.session import Session, Start
+from lambent.editing.session.document import Surroundings
+from lambent.editing.session.exported import ExportedMaterial, export
+from lambent.editing.session.session import Session, Start
 from lambent.materials.document import load_material
 from lambent.materials.factored.opening import editable_of
 from lambent.materials.factored.terms import Editable
+from lambent.viewer.background.work import Work, pending
 from lambent.viewer.editor.files import kind_of, typed_path
-from lambent.viewer.edits import unused
+from lambent.viewer.edits.edits import unused
 from lambent.viewer.modes.edit.subject import SESSION_ENDING
 from lambent.viewer.screen import Screen
-from lambent.viewer.work import Work, pending
 
 
 class Tables:

@@ -6,21 +6,21 @@ from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from pathlib import Path
 
-from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection.proposal import Proposal
+from lambent.bake.interreflection.settings import Bounces
+from lambent.baked.transport.tails import FIXED
 from lambent.core.errors import UserError
 from lambent.editing.interreflection.noise import light_of, noise, noted_noise
 from lambent.editing.interreflection.picture import BEYOND_DIRECT
 from lambent.editing.interreflection.stored import Interreflections, interreflections, samples_of, series_of
 from lambent.editing.interreflection.whole import ALL_HITS
 from lambent.editing.products import Pixels
-from lambent.editing.session import Session
+from lambent.editing.session.session import Session
 from lambent.materials.factored.terms import Editable
 from lambent.store.store import MANIFEST, Store
-from lambent.store.tails import FIXED
+from lambent.viewer.background.work import Work, pending
 from lambent.viewer.modes.edit.baking import Baking
 from lambent.viewer.modes.edit.painter import Painter
-from lambent.viewer.work import Work, pending
 
 SERIES = ("64,1,1,1", "64,1,1", "128,8,1", "64,16")
 SAMPLES = (256, 1024, 4096, 16384)

@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Image
 from lambent.core.errors import UserError
-from lambent.editing.document import SessionDocument
-from lambent.editing.session import Session
+from lambent.editing.session.document import SessionDocument
+from lambent.editing.session.session import Session
 from lambent.editing.stored import parts_of
 from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable
 from lambent.store.contract import transport_lights, view_artefact_name
 from lambent.store.store import Store
+from lambent.viewer.background.work import Work, pending
 from lambent.viewer.modes.edit.painter import Materials, Painter
-from lambent.viewer.work import Work, pending
 
 
 @dataclass(frozen=True)

@@ -8,19 +8,19 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from lambent.core.photometry import LUMINANCE
-from lambent.viewer.edits import MaterialEdits
+from lambent.core.light.photometry import LUMINANCE
+from lambent.viewer.background.lost import rescued
+from lambent.viewer.background.work import POLL_S
+from lambent.viewer.cameras.navigation import Navigation
+from lambent.viewer.edits.edits import MaterialEdits
 from lambent.viewer.input import Input
-from lambent.viewer.lost import rescued
 from lambent.viewer.mode import Drawing, Mode, Panel, Textures
 from lambent.viewer.modes.edit import panels
 from lambent.viewer.modes.edit.bounced_panel import draw_interreflections
 from lambent.viewer.modes.edit.state import OUTLINED_S, EditState
-from lambent.viewer.navigation import Navigation
 from lambent.viewer.panels import overlay
 from lambent.viewer.panels.widgets import rows, shadowed
 from lambent.viewer.screen import least
-from lambent.viewer.work import POLL_S
 
 SHORTCUTS = (
     ("click", "edit the material under the mouse"),

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lambent.core.arrays import Image
-from lambent.core.false_colour import Range, SignedRange
+from lambent.core.light.false_colour import Range, SignedRange
 from lambent.editing.interreflection.stored import Interreflections
 from lambent.editing.interreflection.whole import ALL_HITS, WholePicture
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded

@@ -9,11 +9,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from lambent.core.arrays import Image
-from lambent.core.false_colour import Range, SignedRange
+from lambent.core.light.false_colour import Range, SignedRange
 from lambent.editing.canvas import Canvas, HostCanvas
 from lambent.realtime.edited.display import Display
-from lambent.realtime.targets import DISPLAY_FORMAT, pixels, target_texture
-from lambent.viewer.edited import ShadedCanvas, sums
+from lambent.realtime.gpu.targets import DISPLAY_FORMAT, pixels, target_texture
+from lambent.viewer.edits.edited import ShadedCanvas, sums
 from lambent.viewer.modes.edit.tone import Bytes, difference, displayed
 
 Look = tuple[str, float, Range]  # view transform, exposure in EV, scale of false colours

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lambent.core.errors import UserError
-from lambent.core.exposure import metered
-from lambent.core.false_colour import Range, SignedRange
-from lambent.core.photometry import photometric
-from lambent.editing.document import SessionDocument
+from lambent.core.light.exposure import metered
+from lambent.core.light.false_colour import Range, SignedRange
+from lambent.core.light.photometry import photometric
+from lambent.editing.session.document import SessionDocument
 from lambent.materials.factored.terms import Editable
 from lambent.store.source import changed_inputs
 from lambent.store.store import MANIFEST, Store

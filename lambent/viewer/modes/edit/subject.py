@@ -8,18 +8,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from lambent.core.camera import Camera, overview
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.inputs import read_head, sha256_of
 from lambent.core.plain import plain_name, triple
-from lambent.editing.document import Surroundings
-from lambent.editing.session import Session
+from lambent.core.views.camera import Camera, overview
+from lambent.editing.session.document import Surroundings
+from lambent.editing.session.session import Session
 from lambent.scenes.loaders.load import BUILTIN_PREFIX, is_scene, load_scene
 from lambent.scenes.scene import Scene
+from lambent.store.kept.views import read_views
 from lambent.store.source import SURROUNDINGS, materials_in_views, scene_of
 from lambent.store.store import MANIFEST, Store
-from lambent.store.views import read_views
 from lambent.viewer.picture import LARGEST_PX
 
 Kind = Literal["scene", "store", "session"]

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Image
-from lambent.core.colour import HALF_MAX, luminance, neutral, shown
-from lambent.core.false_colour import SIGNED, Range, SignedRange, false_colour, ramp
-from lambent.core.images import to_bytes
-from lambent.core.photometry import LUMINANCE
-from lambent.editing.half_table import looked_up
+from lambent.core.light.colour import HALF_MAX, luminance, neutral, shown
+from lambent.core.light.false_colour import SIGNED, Range, SignedRange, false_colour, ramp
+from lambent.core.light.photometry import LUMINANCE
+from lambent.core.pictures.images import to_bytes
+from lambent.editing.curves.half_table import looked_up
 from lambent.realtime.frame_state import FALSE_COLOUR
 
 Bytes = NDArray[np.uint8]

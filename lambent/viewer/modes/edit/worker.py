@@ -17,11 +17,11 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from lambent.bake.bounces import Bounces
+from lambent.bake.interreflection.settings import Bounces
 from lambent.core.errors import UserError
-from lambent.editing.document import EditedMaterial, OfDocument
 from lambent.editing.interreflection.noise import PASS, PassNoise
-from lambent.editing.session import Session
+from lambent.editing.session.document import EditedMaterial, OfDocument
+from lambent.editing.session.session import Session
 from lambent.scenes.scene import Scene
 from lambent.store.source import SURROUNDINGS
 from lambent.store.store import Store
@@ -35,7 +35,7 @@ def main(session: Path, folder: Path, lights: Sequence[int]) -> None:
     """Bake for each number of lights in turn."""
     from lambent.bake.bake import bake
     from lambent.bake.quality import quality_named
-    from lambent.bake.view import View
+    from lambent.bake.transport.view import View
 
     opened = Session.open(session)
     document, scene = opened.document, scene_for(opened)
@@ -61,7 +61,7 @@ def bounce(session: Path, folder: Path, bounces: Bounces, kept: Collection[str] 
     """Bake interreflections, or, given materials to keep, propose further materials to edit."""
     from lambent.bake.bake import bake
     from lambent.bake.interreflection.proposal import propose, same_materials
-    from lambent.bake.view import View
+    from lambent.bake.transport.view import View
 
     opened = Session.open(session)
     document, scene, light = opened.document, scene_for(opened), opened.environment

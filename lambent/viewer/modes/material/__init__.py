@@ -17,7 +17,7 @@ def start(
     path: Path, name: str, screen: Screen, *, material: Path | None = None, environments: Sequence[Path] = ()
 ) -> Mode:
     """Start the mode on the file at `path`; `material` and `environments` as in `lambent.viewer.edit.run`."""
-    from lambent.realtime.device import open_device
+    from lambent.realtime.gpu.device import open_device
     from lambent.viewer.modes.material.mode import MaterialMode, MaterialState
     from lambent.viewer.modes.material.stage import Stage
 

@@ -11,22 +11,22 @@ from pathlib import Path
 from lambent.core.errors import UserError
 from lambent.materials.document import Material, load_material
 from lambent.realtime.frame_state import LIGHT_MAP_NOISE
+from lambent.viewer.background.lost import rescued
+from lambent.viewer.background.work import POLL_S
+from lambent.viewer.cameras.navigation import Navigation
 from lambent.viewer.editor.editor import Editor
 from lambent.viewer.editor.files import kind_of
 from lambent.viewer.editor.measurement import Measurement, read_measurement, start_material
-from lambent.viewer.edits import MaterialEdits, rescue
+from lambent.viewer.edits.edits import MaterialEdits, rescue
 from lambent.viewer.input import Input
 from lambent.viewer.look import SHOWS, Look
-from lambent.viewer.lost import rescued
 from lambent.viewer.mode import Beside, Drawing, Mode, Panel, Textures
 from lambent.viewer.modes.material.preview import BOUNDS, CAMERA, SHAPES, Preview
-from lambent.viewer.navigation import Navigation
 from lambent.viewer.panels import editing, overlay, statistics
 from lambent.viewer.panels import look as looks
 from lambent.viewer.panels.plots import beside
 from lambent.viewer.panels.widgets import check, choice, rows, typed_field
 from lambent.viewer.screen import Screen
-from lambent.viewer.work import POLL_S
 
 SHORTCUTS = (
     ("left drag", "orbit the shape"),

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera
-from lambent.core.colour import luminance
-from lambent.core.cubemap import face_directions, texel_solid_angles
-from lambent.core.directions import normalize
 from lambent.core.errors import UserError
-from lambent.scenes.environment_images import read_lat_long
-from lambent.scenes.environments import daylight, dusk, from_lat_long, night, studio
+from lambent.core.geometry.cubemap import face_directions, texel_solid_angles
+from lambent.core.geometry.directions import normalize
+from lambent.core.light.colour import luminance
+from lambent.core.views.camera import Camera
 from lambent.scenes.geometry import patch, placed, sphere, teapot, turn
 from lambent.scenes.scene import Mesh
+from lambent.scenes.sky.environment_images import read_lat_long
+from lambent.scenes.sky.environments import daylight, dusk, from_lat_long, night, studio
 from lambent.viewer.mode import Divider
 
 MEAN_RADIANCE = 0.35  # all environments are scaled to this mean, so that they share an exposure

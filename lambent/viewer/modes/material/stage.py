@@ -7,8 +7,8 @@ from typing import Any
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
+from lambent.realtime.objects.unbaked import unbaked_scene, with_diffuse_light
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.unbaked import unbaked_scene, with_diffuse_light
 from lambent.viewer.mode import Divider
 from lambent.viewer.modes.material.mode import MaterialState
 from lambent.viewer.modes.material.preview import OBJECT, SHAPES, with_lamp

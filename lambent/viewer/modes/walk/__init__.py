@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from lambent.core.map_cache import LEAST_RECENT
+from lambent.baked.light_fields.map_cache import LEAST_RECENT
 from lambent.store.store import Store
 from lambent.viewer.mode import Mode
 from lambent.viewer.screen import Screen

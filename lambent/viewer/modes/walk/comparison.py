@@ -18,16 +18,16 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.colour import luminance, shown
 from lambent.core.errors import UserError
-from lambent.core.false_colour import STOPS, Range, false_colour, ramp
-from lambent.core.images import to_bytes
-from lambent.core.metrics import psnr
+from lambent.core.light.colour import luminance, shown
+from lambent.core.light.false_colour import STOPS, Range, false_colour, ramp
+from lambent.core.pictures.images import to_bytes
+from lambent.core.pictures.metrics import psnr
 from lambent.core.progress import Progress
+from lambent.viewer.background.work import POLL_S, Work, pending
 from lambent.viewer.mode import Divider, Image
-from lambent.viewer.modes.walk.tracing import KINDS as TRACED
-from lambent.viewer.modes.walk.tracing import Kind as TracedKind
-from lambent.viewer.work import POLL_S, Work, pending
+from lambent.viewer.modes.walk.at_rest.tracing import KINDS as TRACED
+from lambent.viewer.modes.walk.at_rest.tracing import Kind as TracedKind
 
 Mode = Literal["off", "side by side", "error map"]
 Kind = Literal["difference", "FLIP"]
@@ -40,7 +40,7 @@ FLIP_PIXELS = 1 << 19  # larger pictures are halved: FLIP takes seconds per mill
 FLIP_PROGRAM = """
 import sys
 import numpy as np
-from lambent.core.metrics import flip_error
+from lambent.core.pictures.metrics import flip_error
 np.save(sys.argv[2], flip_error(*np.load(sys.argv[1])))
 """
 _FLIP_STOPS = np.array([(0, 0, 0.02), (0.32, 0.07, 0.48), (0.72, 0.21, 0.47), (0.98, 0.53, 0.38), (0.99, 0.99, 0.75)])

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera, rays_through
 from lambent.core.plain import Triple, triple
-from lambent.viewer import cameras
-from lambent.viewer.framing import framed
+from lambent.core.views.camera import Camera, rays_through
+from lambent.viewer.cameras import cameras
+from lambent.viewer.cameras.framing import framed
+from lambent.viewer.cameras.picking import Geometry
 from lambent.viewer.input import CLICK_PX, Input
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.modes.walk.walls import Walls
-from lambent.viewer.picking import Geometry
+from lambent.viewer.modes.walk.views.walls import Walls
 
 SHORTCUTS = (
     ("W A S D, arrows", "walk; faster with Shift"),

@@ -14,9 +14,9 @@ from lambent.core.plain import Triple
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.scene import ImageTexture, Look
-from lambent.store.images import readable
-from lambent.store.session import RoomState
-from lambent.viewer.modes.walk.answering import Answering, AnsweringLight
+from lambent.store.kept.images import readable
+from lambent.store.kept.session import RoomState
+from lambent.viewer.modes.walk.light.answering import Answering, AnsweringLight
 from lambent.viewer.picture import Picture
 from lambent.viewer.screen import Screen
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera, camera_axes, clip_from_world
-from lambent.core.colour import shown
-from lambent.core.cubemap import sample
-from lambent.core.directions import normalize, reflect
-from lambent.core.images import to_bytes
-from lambent.realtime.baked import Probe
-from lambent.realtime.cube_mips import finite, halved
+from lambent.core.geometry.cubemap import sample
+from lambent.core.geometry.directions import normalize, reflect
+from lambent.core.light.colour import shown
+from lambent.core.pictures.images import to_bytes
+from lambent.core.views.camera import Camera, camera_axes, clip_from_world
+from lambent.realtime.gpu.cube_mips import finite, halved
+from lambent.realtime.light.baked import Probe
 from lambent.store.contract import ReflectorRecord
 from lambent.viewer.mode import Image
 

@@ -8,22 +8,25 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from lambent.core.map_cache import LEAST_RECENT
-from lambent.realtime.baked import read_baked
-from lambent.realtime.device import open_device
+from lambent.baked.light_fields.map_cache import LEAST_RECENT
+from lambent.realtime.answering.texture_detail import without_uv
+from lambent.realtime.gpu.device import open_device
+from lambent.realtime.light.baked import read_baked
+from lambent.realtime.objects.replaced import with_replacements
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.replaced import with_replacements
 from lambent.realtime.resources import device_needs
-from lambent.realtime.texture_detail import without_uv
-from lambent.realtime.turned_sky import under_turned_sky
+from lambent.realtime.sun.turned_sky import under_turned_sky
 from lambent.scenes.replacement import parse_replacements
 from lambent.store.source import SOURCE
 from lambent.store.store import Store
-from lambent.viewer.lost import rescued
+from lambent.viewer.background.lost import rescued
+from lambent.viewer.background.work import POLL_S
+from lambent.viewer.cameras.navigation import Movement
+from lambent.viewer.cameras.picking import Geometry
 from lambent.viewer.mode import Beside, Drawing, Mode, Panel, Textures
-from lambent.viewer.modes.walk.answering import AnsweringLight
 from lambent.viewer.modes.walk.comparison import error_scale
 from lambent.viewer.modes.walk.input import SHORTCUTS, WalkInput
+from lambent.viewer.modes.walk.light.answering import AnsweringLight
 from lambent.viewer.modes.walk.panels import (
     compare,
     film,
@@ -38,15 +41,12 @@ from lambent.viewer.modes.walk.panels import (
     view,
 )
 from lambent.viewer.modes.walk.pictures import Pictures
+from lambent.viewer.modes.walk.session.texturing import ENDINGS
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.modes.walk.texturing import ENDINGS
-from lambent.viewer.navigation import Movement
 from lambent.viewer.panels import overlay, statistics
 from lambent.viewer.panels.plots import beside
 from lambent.viewer.panels.widgets import rows
-from lambent.viewer.picking import Geometry
 from lambent.viewer.screen import Screen, least
-from lambent.viewer.work import POLL_S
 
 
 def open_store(

@@ -9,28 +9,28 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.camera import CameraPath
 from lambent.core.errors import UserError
-from lambent.core.images import write_shown
+from lambent.core.pictures.images import write_shown
 from lambent.core.plain import triple
+from lambent.core.views.camera import CameraPath
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
+from lambent.viewer.background.work import POLL_S
 from lambent.viewer.mode import Divider
-from lambent.viewer.modes.walk.answering import AnsweringLight
+from lambent.viewer.modes.walk.at_rest.traced import AtRest, TracedFrames, TracedPicture, Worn, is_traceable
+from lambent.viewer.modes.walk.at_rest.tracing import ALL_LIGHT, Kind
 from lambent.viewer.modes.walk.comparison import AS_A
-from lambent.viewer.modes.walk.filming import QUALITIES, SIZES, Filming, film_file
-from lambent.viewer.modes.walk.glare import SAMPLES, GlareDrawing
 from lambent.viewer.modes.walk.lanes import Lane
-from lambent.viewer.modes.walk.light_fields import FieldDrawing
-from lambent.viewer.modes.walk.metering import read
+from lambent.viewer.modes.walk.light.answering import AnsweringLight
+from lambent.viewer.modes.walk.light.glare import SAMPLES, GlareDrawing
+from lambent.viewer.modes.walk.light.light_fields import FieldDrawing
+from lambent.viewer.modes.walk.light.metering import read
 from lambent.viewer.modes.walk.outlining import Outlining
-from lambent.viewer.modes.walk.rebaking import RebakedLight
+from lambent.viewer.modes.walk.rebake.rebaking import RebakedLight
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.modes.walk.traced import AtRest, TracedFrames, TracedPicture, Worn, is_traceable
-from lambent.viewer.modes.walk.tracing import ALL_LIGHT, Kind
+from lambent.viewer.modes.walk.views.filming import QUALITIES, SIZES, Filming, film_file
 from lambent.viewer.picture import Pair, Picture, Shown, size_px
 from lambent.viewer.screen import Rect, least
-from lambent.viewer.work import POLL_S
 
 METER_S = 0.2  # time between two meter readings in motion
 SHARED = 0.5  # share of the frame time for each of two pictures

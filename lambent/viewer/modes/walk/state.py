@@ -11,25 +11,25 @@ import numpy as np
 from lambent.core.errors import UserError
 from lambent.core.plain import Triple, plain_name, triple
 from lambent.store.contract import ObjectRecord, SceneRecord, whole_objects
+from lambent.viewer.cameras.navigation import Movement, Navigation
 from lambent.viewer.editor.editor import Editor
 from lambent.viewer.editor.files import document_file, with_account
-from lambent.viewer.edits import MaterialEdits, rescue
+from lambent.viewer.edits.edits import MaterialEdits, rescue
 from lambent.viewer.look import Look
 from lambent.viewer.mode import Divider
-from lambent.viewer.modes.walk.answering import Answering
 from lambent.viewer.modes.walk.comparison import Comparison
-from lambent.viewer.modes.walk.filming import Films
-from lambent.viewer.modes.walk.keeping import SessionKeeper
-from lambent.viewer.modes.walk.light_fields import FieldView
-from lambent.viewer.modes.walk.lights import Lights
+from lambent.viewer.modes.walk.light.answering import Answering
+from lambent.viewer.modes.walk.light.light_fields import FieldView
+from lambent.viewer.modes.walk.light.lights import Lights
+from lambent.viewer.modes.walk.light.metering import Meter
 from lambent.viewer.modes.walk.markers import Marks
-from lambent.viewer.modes.walk.metering import Meter
-from lambent.viewer.modes.walk.rebaked import Rebaking
-from lambent.viewer.modes.walk.recording import Recordings
-from lambent.viewer.modes.walk.states import States
-from lambent.viewer.modes.walk.texturing import Texturing
-from lambent.viewer.modes.walk.views import SavedViews
-from lambent.viewer.navigation import Movement, Navigation
+from lambent.viewer.modes.walk.rebake.rebaked import Rebaking
+from lambent.viewer.modes.walk.session.keeping import SessionKeeper
+from lambent.viewer.modes.walk.session.states import States
+from lambent.viewer.modes.walk.session.texturing import Texturing
+from lambent.viewer.modes.walk.views.filming import Films
+from lambent.viewer.modes.walk.views.recording import Recordings
+from lambent.viewer.modes.walk.views.views import SavedViews
 from lambent.viewer.screen import Screen
 
 

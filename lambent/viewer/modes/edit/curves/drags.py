@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
-from lambent.editing.operators import Kind, Operator, Region, room_for, translation
+from lambent.editing.curves.operators import Kind, Operator, Region, room_for, translation
 from lambent.viewer.modes.edit.curves.axes import Axis
 from lambent.viewer.modes.edit.curves.lines import ANGLES_DEG
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from lambent.editing.operators import Region
-from lambent.editing.session import Session
+from lambent.editing.curves.operators import Region
+from lambent.editing.session.session import Session
 from lambent.materials.factored.parametrisations import PARAMETRISATIONS
 from lambent.materials.factored.terms import Editable
 from lambent.viewer.modes.edit.curves import layers, plot, quantities, toolbar

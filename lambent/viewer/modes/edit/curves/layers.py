@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 from imgui_bundle import imgui
 
-from lambent.editing.document import LARGEST
-from lambent.editing.operators import Operator, Region
-from lambent.editing.session import Session
+from lambent.editing.curves.operators import Operator, Region
+from lambent.editing.session.document import LARGEST
+from lambent.editing.session.session import Session
 from lambent.viewer.modes.edit.curves.drags import STRETCH, resized
 from lambent.viewer.modes.edit.curves.regions import edges_deg
 from lambent.viewer.modes.edit.curves.state import ALL, CurveState, Shown

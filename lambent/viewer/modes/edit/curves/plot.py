@@ -8,8 +8,8 @@ import numpy as np
 from imgui_bundle import imgui, implot
 
 from lambent.core.arrays import Floats
-from lambent.editing.operators import Region
-from lambent.editing.session import Session
+from lambent.editing.curves.operators import Region
+from lambent.editing.session.session import Session
 from lambent.materials.factored.curve import KNOTS, Curve
 from lambent.viewer.modes.edit.curves.axes import END_DEG, Axes, Place
 from lambent.viewer.modes.edit.curves.drags import Direction, Tool

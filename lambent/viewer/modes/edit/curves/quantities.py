@@ -8,8 +8,8 @@ from typing import Any
 from imgui_bundle import imgui
 
 from lambent.core.plain import triple
-from lambent.editing.document import OfDocument, OfModel, OfTable
-from lambent.editing.session import Session
+from lambent.editing.session.document import OfDocument, OfModel, OfTable
+from lambent.editing.session.session import Session
 from lambent.materials.models.model import Parameter
 from lambent.viewer.modes.edit.curves.state import CurveState, Shown
 from lambent.viewer.panels import parameters

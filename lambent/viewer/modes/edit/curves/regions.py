@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
-from lambent.editing.operators import Region
+from lambent.editing.curves.operators import Region
 from lambent.viewer.modes.edit.curves.axes import END_DEG, Axes, Axis
 from lambent.viewer.modes.edit.curves.lines import ANGLES_DEG
 

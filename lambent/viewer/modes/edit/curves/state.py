@@ -12,9 +12,9 @@ from typing import Literal
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.editing.document import CurveEdit, EditedMaterial, OfModel
-from lambent.editing.operators import Operator, Region
-from lambent.editing.session import Session
+from lambent.editing.curves.operators import Operator, Region
+from lambent.editing.session.document import CurveEdit, EditedMaterial, OfModel
+from lambent.editing.session.session import Session
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable

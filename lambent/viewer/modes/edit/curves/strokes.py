@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from lambent.core.errors import UserError
-from lambent.editing.document import SessionDocument
-from lambent.editing.session import Session
+from lambent.editing.session.document import SessionDocument
+from lambent.editing.session.session import Session
 
 
 class Strokes:

@@ -10,7 +10,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from lambent.core.arrays import Floats
-from lambent.editing.operators import Region
+from lambent.editing.curves.operators import Region
 from lambent.materials.factored.curve import Curve
 from lambent.viewer.modes.edit.curves import regions
 from lambent.viewer.modes.edit.curves.axes import END_DEG

@@ -5,8 +5,8 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from lambent.viewer.look import INTEGRATORS, LOOKUPS
+from lambent.viewer.modes.walk.at_rest.tracing import KINDS as TRACED
 from lambent.viewer.modes.walk.comparison import AS_A, KINDS, MODES, Comparison
-from lambent.viewer.modes.walk.tracing import KINDS as TRACED
 from lambent.viewer.panels.widgets import choice, rows, wrapped
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from lambent.core.plain import plain_name
-from lambent.viewer.modes.walk.filming import FPS, QUALITIES, SIZES, Filming, Films
-from lambent.viewer.modes.walk.rebaking import clock_time
-from lambent.viewer.modes.walk.recording import Recordings
-from lambent.viewer.navigation import Navigation
+from lambent.viewer.cameras.navigation import Navigation
+from lambent.viewer.modes.walk.rebake.rebaking import clock_time
+from lambent.viewer.modes.walk.views.filming import FPS, QUALITIES, SIZES, Filming, Films
+from lambent.viewer.modes.walk.views.recording import Recordings
 from lambent.viewer.panels.widgets import choice, path_field, press
 from lambent.viewer.screen import Screen
 

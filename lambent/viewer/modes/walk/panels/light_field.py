@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from lambent.viewer.mode import Textures
-from lambent.viewer.modes.walk.light_fields import SHOWS, FieldView, distances_m
+from lambent.viewer.modes.walk.light.light_fields import SHOWS, FieldView, distances_m
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels.widgets import AMBER, check, choice, explain, rows, shadowed, wrapped
 from lambent.viewer.screen import Rect

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from lambent.core.light_mix import AS_BAKED, LEAST_K, MOST_K, WHITE, GroupMix, LightMix
-from lambent.realtime.group_arrays import BAKE_GROUPS, FIELDS_FOLLOW, NO_GROUPS
+from lambent.core.light.light_mix import AS_BAKED, LEAST_K, MOST_K, WHITE, GroupMix, LightMix
+from lambent.realtime.light.group_arrays import BAKE_GROUPS, FIELDS_FOLLOW, NO_GROUPS
 from lambent.store.light_groups import LightGroupRecord
-from lambent.viewer.modes.walk.light_keys import key_times
-from lambent.viewer.modes.walk.lights import Lights
-from lambent.viewer.modes.walk.recording import Recordings
-from lambent.viewer.navigation import PathPlay
+from lambent.viewer.cameras.navigation import PathPlay
+from lambent.viewer.modes.walk.light.light_keys import key_times
+from lambent.viewer.modes.walk.light.lights import Lights
+from lambent.viewer.modes.walk.views.recording import Recordings
 from lambent.viewer.panels.widgets import check, press, rgb, slider, wrapped
 
 BRIGHTEST = 4.0  # largest intensity of the slider, relative to the bake

@@ -7,9 +7,9 @@ from functools import partial
 from imgui_bundle import imgui
 
 from lambent.scenes.scene import ImageTexture
+from lambent.viewer.modes.walk.session.texturing import LEAST_REPEAT, MOST_SHOWN_REPEAT, Texturing
+from lambent.viewer.modes.walk.session.thumbnails import SIDE, Thumbnail
 from lambent.viewer.modes.walk.state import Materials, Selection
-from lambent.viewer.modes.walk.texturing import LEAST_REPEAT, MOST_SHOWN_REPEAT, Texturing
-from lambent.viewer.modes.walk.thumbnails import SIDE, Thumbnail
 from lambent.viewer.panels import editing, parameters
 from lambent.viewer.panels.widgets import buttons, explain, listed, path_field, press, slider
 

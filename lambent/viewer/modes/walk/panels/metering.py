@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import imgui
 
-from lambent.core.exposure import ev100_of
-from lambent.core.false_colour import number
-from lambent.core.photometry import photometric
+from lambent.core.light.exposure import ev100_of
+from lambent.core.light.false_colour import number
+from lambent.core.light.photometry import photometric
 from lambent.viewer.look import Look
-from lambent.viewer.modes.walk.glare import GlareMeter
-from lambent.viewer.modes.walk.metering import Meter
+from lambent.viewer.modes.walk.light.glare import GlareMeter
+from lambent.viewer.modes.walk.light.metering import Meter
 from lambent.viewer.panels.overlay import SHADE
 from lambent.viewer.panels.widgets import explain, press, rows
 from lambent.viewer.screen import Rect

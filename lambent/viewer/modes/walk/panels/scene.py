@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from imgui_bundle import imgui
 
-from lambent.viewer.modes.walk.recording import Recordings
-from lambent.viewer.modes.walk.views import Kind
-from lambent.viewer.navigation import Navigation
+from lambent.viewer.cameras.navigation import Navigation
+from lambent.viewer.modes.walk.views.recording import Recordings
+from lambent.viewer.modes.walk.views.views import Kind
 from lambent.viewer.panels.widgets import check, explain, listed, path_field, press, slider, wrapped
 
 LISTED = 6

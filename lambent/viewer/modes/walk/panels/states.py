@@ -5,9 +5,9 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from lambent.core.errors import UserError
-from lambent.store.session import RoomState
+from lambent.store.kept.session import RoomState
 from lambent.viewer.modes.walk.comparison import Comparison
-from lambent.viewer.modes.walk.states import BAKED, States
+from lambent.viewer.modes.walk.session.states import BAKED, States
 from lambent.viewer.panels.widgets import check, path_field, press
 from lambent.viewer.screen import Screen
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from lambent.store.contract import SIDES, noise_name
+from lambent.viewer.cameras.navigation import Navigation
 from lambent.viewer.look import LOOKUPS, Look
+from lambent.viewer.modes.walk.light.metering import Meter
 from lambent.viewer.modes.walk.markers import Marks
-from lambent.viewer.modes.walk.metering import Meter
 from lambent.viewer.modes.walk.panels import light_field
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.navigation import Navigation
 from lambent.viewer.panels.look import draw_exposure, draw_quality, draw_range, draw_reflections, draw_shown
 from lambent.viewer.panels.widgets import check, choice, explain, press, slider, wrapped
 

@@ -1,0 +1,214 @@
+"""Light mix: brightness and colour of each light group, relative to the baked light.
+
+Light adds up, so the picture of any mix is exact: E = sum over groups g of s_g E_g, with a factor s_g per channel.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+
+from lambent.core.errors import UserError, did_you_mean
+from lambent.core.light.colour import XYZ_TO_RGB, luminance, srgb_decode
+from lambent.core.plain import Triple, triple
+
+WHITE: Triple = (1.0, 1.0, 1.0)
+LEAST_K, MOST_K = 1667.0, 25000.0  # valid range of the fit to the Planckian locus
+MOST_INTENSITY = 1000.0
+EXPECTED = "NAME=VALUE, with VALUE an intensity, off, 2700K, #rrggbb, or several joined by commas"
+Factors = Mapping[str, Triple]  # by group; groups left out stay as baked
+
+
+@dataclass(frozen=True)
+class GroupMix:
+    """One group's mix: `intensity` and a tint of luminance 1 multiply its light.
+
+    The tint is the colour of a black body at `temperature_k`, LEAST_K to MOST_K, times the linear `colour`, whose
+    luminance has no effect. White light takes the tint's colour; coloured light is tinted as by a filter.
+    """
+
+    on: bool = True
+    intensity: float = 1.0
+    temperature_k: float | None = None
+    colour: Triple = WHITE
+
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 - read by pydantic: an unknown key in a file is an error
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.intensity <= MOST_INTENSITY:
+            expected = f"0 to {MOST_INTENSITY:g}"
+            raise UserError("intensity is out of range", field="light", got=self.intensity, expected=expected)
+        if self.temperature_k is not None and not LEAST_K <= self.temperature_k <= MOST_K:
+            expected = f"{LEAST_K:g} to {MOST_K:g} K"
+            raise UserError("temperature is out of range", field="light", got=self.temperature_k, expected=expected)
+        if not (all(0 <= value <= 1e6 for value in self.colour) and any(self.colour)):
+            raise UserError(
+                "light colour is out of range", field="light", got=self.colour, expected="0 to 1e6, not black"
+            )
+
+    @property
+    def factor(self) -> Triple:
+        """Factor on the group's light per channel, (3,)."""
+        if not self.on:
+            return 0.0, 0.0, 0.0
+        tint = np.array(self.colour, float)
+        if self.temperature_k is not None:
+            tint = tint * black_body(self.temperature_k)
+        if (level := float(luminance(tint))) <= 0:  # a blue filter on candle light
+            return 0.0, 0.0, 0.0
+        return triple(tint * (self.intensity / level))
+
+
+AS_BAKED = GroupMix()
+
+
+@dataclass(frozen=True)
+class LightMix:
+    """Mixes of groups by name; other groups stay as baked."""
+
+    groups: Mapping[str, GroupMix] = field(default_factory=dict)
+
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012
+
+    def of(self, name: str) -> GroupMix:
+        return self.groups.get(name, AS_BAKED)
+
+    def changed(self, name: str, mix: GroupMix) -> LightMix:
+        """A copy with a new mix for one group."""
+        others = {key: value for key, value in self.groups.items() if key != name}
+        return LightMix(others if mix == AS_BAKED else {**others, name: mix})
+
+    @property
+    def factors(self) -> dict[str, Triple]:
+        """Factors of the groups that differ from the bake."""
+        found = {name: mix.factor for name, mix in self.groups.items()}
+        return {name: factor for name, factor in found.items() if factor != WHITE}
+
+
+@dataclass(frozen=True)
+class MixTrack:
+    """Mixes over time: for each group name, keys of increasing time in seconds and mix.
+
+    A group's factor is linear between keys, and constant before the first and after the last.
+    """
+
+    groups: Mapping[str, tuple[tuple[float, GroupMix], ...]] = field(default_factory=dict)
+
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012
+
+    def __post_init__(self) -> None:
+        for name, keys in self.groups.items():
+            if not keys or any(b[0] <= a[0] for a, b in pairwise(keys)):
+                raise UserError("times do not increase", field=name, got=[time_s for time_s, _ in keys])
+
+    @classmethod
+    def of(cls, mix: LightMix) -> MixTrack:
+        """A track that holds one mix at all times."""
+        return cls({name: ((0.0, one),) for name, one in mix.groups.items()})
+
+    def factors_at(self, time_s: float) -> dict[str, Triple]:
+        """Factors at a time, of the groups that differ from the bake."""
+        found = {}
+        for name, keys in self.groups.items():
+            times, factors = [key[0] for key in keys], np.array([mix.factor for _, mix in keys])
+            found[name] = triple(np.interp(time_s, times, channel) for channel in factors.T)
+        return {name: factor for name, factor in found.items() if factor != WHITE}
+
+
+def factors_of(names: Sequence[str], light: Factors) -> np.ndarray:
+    """Factors (n, 3) float32 of the groups of these names in a mix; `UserError` for an unknown group."""
+    for name in light:
+        if name not in names:
+            hint, expected = did_you_mean(name, names), ", ".join(names)
+            raise UserError("unknown light group", field="light", got=name, expected=expected, hint=hint)
+    return np.array([light.get(name, WHITE) for name in names], np.float32)
+
+
+def black_body(temperature_k: float) -> np.ndarray:
+    """Linear RGB (3,), luminance 1, of a black body at LEAST_K to MOST_K; no channel is negative.
+
+    Chromaticity by the cubic fit of Kang et al. 2002, "Design of advanced color temperature control system for HDTV".
+    """
+    t = 1e3 / temperature_k
+    if temperature_k < 4000:
+        x = -0.2661239 * t**3 - 0.2343589 * t**2 + 0.8776956 * t + 0.179910
+    else:
+        x = -3.0258469 * t**3 + 2.1070379 * t**2 + 0.2226347 * t + 0.240390
+    if temperature_k < 2222:
+        y = -1.1063814 * x**3 - 1.34811020 * x**2 + 2.18555832 * x - 0.20219683
+    elif temperature_k < 4000:
+        y = -0.9549476 * x**3 - 1.37418593 * x**2 + 2.09137015 * x - 0.16748867
+    else:
+        y = 3.0817580 * x**3 - 5.87338670 * x**2 + 3.75112997 * x - 0.37001483
+    rgb = np.maximum(XYZ_TO_RGB @ np.array([x / y, 1.0, (1 - x - y) / y]), 0)
+    return np.asarray(rgb / luminance(rgb))
+
+
+def parse_light(texts: Iterable[str]) -> MixTrack:
+    """Parse a track from texts such as "lamp=off", "lamp=0.3", "lamp=2700K", "lamp=0.5,#ffd0a0" and "lamp=0.5@4".
+
+    The number after @ is a time in seconds, 0 by default. Values are interpolated between times.
+
+    Raises
+    ------
+    UserError
+        If a text is malformed, a value is out of range, or a group has two mixes at one time.
+    """
+    said: dict[str, dict[float, GroupMix]] = {}
+    for text in texts:
+        name, _, value = text.rpartition("=")
+        name, (value, _, at) = name.strip(), value.partition("@")
+        time_s = _number(at, text) if at else 0.0
+        if not name or not value:
+            raise UserError("cannot be read as light", field="--light", got=text, expected=EXPECTED)
+        of_name = said.setdefault(name, {})
+        if time_s in of_name:
+            raise UserError("names a light twice", field="--light", got=text, hint="join its values with a comma")
+        of_name[time_s] = mix_of(value, text)
+    return MixTrack({name: tuple(sorted(keys.items(), key=lambda key: key[0])) for name, keys in said.items()})
+
+
+def mix_of(value: str, text: str) -> GroupMix:
+    """Parse the mix of a value such as "0.5,2700K"; raises `UserError` that quotes `text`, the whole argument."""
+    try:
+        return _mix_of(value, text)
+    except UserError as error:
+        if error.field != "light":
+            raise
+        ranges = f"intensities reach {MOST_INTENSITY:g}; a temperature ends in K, {LEAST_K:g}K to {MOST_K:g}K"
+        raise UserError(error.message, field="--light", got=text, hint=ranges) from error
+
+
+def _mix_of(value: str, text: str) -> GroupMix:
+    mix, said = AS_BAKED, set[str]()
+    for word in (part.strip() for part in value.split(",")):
+        if word.lower() in ("on", "off"):
+            kind, mix = "on", replace(mix, on=word.lower() == "on")
+        elif re.fullmatch(r"#[0-9a-fA-F]{6}", word):
+            kind = "colour"
+            if word == "#000000":
+                raise UserError("light colour cannot be black", field="--light", got=text, hint="use off")
+            encoded = np.array([int(word[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+            mix = replace(mix, colour=triple(srgb_decode(encoded)))
+        elif re.fullmatch(r"[\d.]+[kK]", word):
+            kind, mix = "temperature", replace(mix, temperature_k=_number(word[:-1], text))
+        else:
+            kind, mix = "intensity", replace(mix, intensity=_number(word, text))
+        if kind in said:
+            raise UserError(f"has two values for {kind}", field="--light", got=text)
+        said.add(kind)
+    return mix
+
+
+def _number(word: str, text: str) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        value = -1.0
+    if not 0 <= value < 1e9:
+        raise UserError("cannot be read as light", field="--light", got=text, expected=EXPECTED)
+    return value

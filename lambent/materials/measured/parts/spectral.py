@@ -1,0 +1,61 @@
+"""Measured spectra and tristimulus values to linear RGB."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lambent.core.arrays import Flags, Floats
+from lambent.core.light.colour import XYZ_TO_RGB, xyz_to_rgb
+
+
+def rgb_of_spectra(wavelengths_nm: Floats) -> Floats:
+    """Matrix (3, K) that converts K spectral values of a reflectance or BSDF to linear RGB (Rec.709).
+
+    CIE 1931 2 degree observer under illuminant D65, whose white is that of Rec.709: a flat spectrum of value v becomes
+    (v, v, v). The spectrum is linear between the wavelengths and constant beyond them. Saturated spectra can give a
+    negative channel.
+
+    Parameters
+    ----------
+    wavelengths_nm : (K,) increasing
+    """
+    from colour import MSDS_CMFS, SDS_ILLUMINANTS
+
+    observer, d65 = MSDS_CMFS["CIE 1931 2 Degree Standard Observer"], SDS_ILLUMINANTS["D65"]
+    fine_nm = np.arange(360.0, 781.0)
+    cmf = np.stack([np.interp(fine_nm, observer.wavelengths, column) for column in observer.values.T])
+    power = np.interp(fine_nm, d65.wavelengths, d65.values)
+    hats = np.stack([np.interp(fine_nm, wavelengths_nm, unit) for unit in np.eye(len(wavelengths_nm))])
+    xyz = (cmf * power) @ hats.T / (cmf[1] * power).sum()
+    rgb = XYZ_TO_RGB @ xyz
+    return np.asarray(rgb / rgb.sum(axis=1, keepdims=True))  # observer and primaries round the white point differently
+
+
+def rgb_of_measured(spectra: Floats, usable: Flags, wavelengths_nm: Floats) -> tuple[Floats, tuple[str, ...]]:
+    """Linear RGB (N, 3) of spectra (N, K), and notes; NaN where not usable; readings below zero stay below."""
+    rgb = np.full((len(spectra), 3), np.nan)
+    rgb[usable] = spectra[usable] @ rgb_of_spectra(wavelengths_nm).T
+    rgb, outside = _within_gamut(rgb, spectra)
+    notes: tuple[str, ...] = ("spectra were converted to linear RGB under D65",)
+    if outside:
+        notes += (f"{outside} spectra are more saturated than Rec.709; the negative channel became 0",)
+    return rgb, notes
+
+
+def rgb_of_xyz(values: Floats) -> tuple[Floats, tuple[str, ...]]:
+    """Linear RGB (..., 3) of tristimulus values under D65, and notes; negative values stay negative."""
+    rgb, outside = _within_gamut(xyz_to_rgb(values), values)
+    notes: tuple[str, ...] = ("tristimulus values were converted to linear RGB under D65",)
+    if outside:
+        notes += (f"{outside} values are more saturated than Rec.709; the negative channel became 0",)
+    return rgb, notes
+
+
+def _within_gamut(rgb: Floats, source: Floats) -> tuple[Floats, int]:
+    """RGB (..., 3) with negative channels of colours outside Rec.709 removed, and the number of such colours.
+
+    The source (..., K) of such a colour, spectral or tristimulus values, is nowhere negative; otherwise it is noise.
+    """
+    with np.errstate(invalid="ignore"):
+        outside = np.any(rgb < 0, axis=-1, keepdims=True) & np.all(source >= 0, axis=-1, keepdims=True)
+    return np.where(outside, np.maximum(rgb, 0), rgb), int(outside.sum())

@@ -1,0 +1,152 @@
+"""Resample a measured table onto the dense grid of half_vector_grid.py."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from lambent.core.geometry.directions import FLIP_Z, HALF_TURN, Floats, direction, normalize, reflect
+from lambent.core.progress import Progress, silent
+from lambent.materials.bsdf import components
+from lambent.materials.measured.parts.back_vector import back_share
+from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.tables.half_vector_grid import (
+    ANISOTROPIC,
+    ISOTROPIC,
+    LAST_VIEWER_DEG,
+    GridShape,
+    HalfVectorGrid,
+)
+from lambent.materials.measured.tables.two_sided import TwoSided
+
+_FLAT = (*HalfVectorGrid.ARRAYS, "albedo")
+_LOWEST_COSINE = 0.02  # cells with wi below use f at this height, so that blending meets no edge at the horizon
+
+
+def grid_of(
+    table: MeasuredTable | TwoSided,
+    shape: GridShape | None = None,
+    progress: Progress = silent,
+    part: Literal["whole", "mirror", "light"] = "whole",
+) -> HalfVectorGrid:
+    """Resample a table to the grid; `shape` defaults to ISOTROPIC or ANISOTROPIC, by the table's declaration.
+
+    `part` serves `RetroGrid`: "mirror" and "light" are the shares that `back_share` assigns to each peak.
+    """
+    shape = shape or (ISOTROPIC if table.info.isotropic else ANISOTROPIC)
+    sheet = table if isinstance(table, TwoSided) else TwoSided(table)
+    faces, kinds = 2 if sheet.has_a_back else 1, 2 if table.info.transmits and part != "light" else 1
+    values = np.zeros((faces, kinds, shape.viewer_theta, shape.viewer_phi, shape.cells, 3), np.float32)
+    weights = np.zeros(values.shape[:-1])
+    viewers, h = _viewer_nodes(shape), _cell_centres(shape)
+    symmetric = _symmetric_viewers(sheet, shape)
+    for a, ring in enumerate(viewers):
+        progress(a, len(viewers), f"resampling {table.info.file}")
+        for b, viewer in enumerate(ring):
+            other, cells = symmetric[b]
+            if other != b:
+                values[..., a, b, :, :] = values[..., a, other, cells, :]
+                weights[..., a, b, :] = weights[..., a, other, cells]
+                continue
+            wo = np.broadcast_to(viewer, h.shape)
+            wi = reflect(wo, h)
+            cos_i = np.maximum(wi[:, 2], 0)
+            gain = 4 * np.maximum(np.sum(wo * h, axis=-1), 0)  # d_wi/d_h
+            wi[:, 2] = np.maximum(wi[:, 2], _LOWEST_COSINE)
+            wi = normalize(wi) * (HALF_TURN if part == "light" else 1.0)
+            share = _share_of(part, wi, wo)
+            for face, kind in np.ndindex(faces, kinds):
+                wo_there, wi_there = (w * FLIP_Z if below else w for w, below in ((wo, face), (wi, face != kind)))
+                f = sheet.eval(wi_there, wo_there) * (share if kind == 0 else 1.0)
+                values[face, kind, a, b] = f
+                weights[face, kind, a, b] = f.mean(axis=-1) * cos_i * gain
+    progress(len(viewers), len(viewers), f"resampled {table.info.file}")
+    sizes = (faces, kinds, shape.viewers, shape.cells)
+    found = _with_distributions(shape, values.reshape(*sizes, 3), weights.reshape(sizes))
+    return replace(found, about_light=part == "light")
+
+
+def _share_of(part: str, wi: Floats, wo: Floats) -> Any:
+    """Share (N, 1) of f that belongs to a part of the table."""
+    if part == "whole":
+        return 1.0
+    back = back_share(components(wi), components(wo))[:, None]
+    return back if part == "light" else 1 - back
+
+
+def _symmetric_viewers(table: TwoSided, shape: GridShape) -> list[tuple[int, Any]]:
+    """For each viewer azimuth, the one whose values it can share, and the order of cells; tables are often symmetric.
+
+    Mirror symmetry at x = 0 and y = 0, and under half a turn, is detected by look-ups at random pairs.
+    """
+    n, columns = shape.viewer_phi, shape.phi_h
+    own = [(k, np.arange(shape.cells)) for k in range(n)]
+    if n % 4 or columns % 4:
+        return own
+    rng = np.random.default_rng(1)
+    wi, wo = direction(np.arccos(rng.uniform(0.1, 1, (2, 256))), rng.uniform(0, 2 * np.pi, (2, 256)))
+    wo = wo * np.where(rng.random((256, 1)) < (0.5 if table.info.transmits else 0), FLIP_Z, 1.0)
+    given = table.eval(wi, wo)
+
+    def same(flip: list[int]) -> bool:
+        return np.allclose(table.eval(wi * flip, wo * flip), given, rtol=1e-4, atol=1e-5 * given.max())
+
+    def ordered(column: Any) -> Any:
+        return (np.arange(shape.theta_h)[:, None] * columns + column % columns).ravel()
+
+    j = np.arange(columns)
+    if same([1, -1, 1]) and same([-1, 1, 1]):
+        for k in range(n):
+            if k > n // 2:
+                other, order = own[n - k][0], columns - 1 - j
+                own[k] = (other, ordered(order if other == n - k else columns // 2 + j))
+            elif k > n // 4:
+                own[k] = (n // 2 - k, ordered(columns // 2 - 1 - j))
+    elif same([-1, -1, 1]):
+        for k in range(n // 2, n):
+            own[k] = (k - n // 2, ordered(j - columns // 2))
+    return own
+
+
+def _viewer_nodes(shape: GridShape) -> Floats:
+    """(viewer_theta, viewer_phi, 3) directions of the viewer nodes."""
+    left = np.linspace(1, 0, shape.viewer_theta)
+    theta = np.radians(LAST_VIEWER_DEG * (1 - left * np.sqrt(left)))  # denser towards grazing, where f curves most
+    phi = np.arange(shape.viewer_phi) * 2 * np.pi / shape.viewer_phi
+    return direction(theta[:, None], phi)
+
+
+def _cell_centres(shape: GridShape) -> Floats:
+    """(cells, 3) half vectors at the cells' centres, phi fastest."""
+    theta = ((np.arange(shape.theta_h) + 0.5) / shape.theta_h) ** 2 * np.pi / 2
+    phi = (np.arange(shape.phi_h) + 0.5) / shape.phi_h * 2 * np.pi
+    return direction(theta[:, None], phi).reshape(-1, 3)
+
+
+def _with_distributions(shape: GridShape, values: Floats, weights: Floats) -> HalfVectorGrid:
+    """The grid with the CDFs of weights (faces, kinds, viewers, cells), which are unnormalized densities.
+
+    Cells and densities are derived from the stored float32 CDFs, so that both agree.
+    """
+    faces, kinds = weights.shape[:2]
+    edges = (np.arange(shape.theta_h + 1) / shape.theta_h) ** 2 * np.pi / 2
+    omega = np.diff(2 * np.sin(edges / 2) ** 2)[:, None] * (2 * np.pi / shape.phi_h)  # solid angle of a row's cells
+    mass = weights.reshape(faces, kinds, shape.viewers, shape.theta_h, shape.phi_h) * omega
+    total = mass.sum(axis=(-1, -2))
+    across = total[:, 1] / np.maximum(total.sum(axis=1), 1e-30) if kinds == 2 else np.zeros((faces, shape.viewers))
+    mass = np.where(total[..., None, None] > 0, mass, omega)  # for a black viewer node any distribution works
+    rows = mass.sum(axis=-1)
+    mass = np.where(rows[..., None] > 0, mass, 1.0)
+    marginal, conditional = _cdf(rows), _cdf(mass)
+    share = np.diff(marginal.astype(float), axis=-1, prepend=0.0)[..., None]
+    density = share * np.diff(conditional.astype(float), axis=-1, prepend=0.0) / omega
+    flat = (a.astype(np.float32).ravel() for a in (values, marginal, conditional, density, across, total))
+    arrays: dict[str, Any] = dict(zip(_FLAT, flat, strict=True))
+    return HalfVectorGrid(shape, faces, kinds, **arrays)
+
+
+def _cdf(mass: Floats) -> Floats:
+    cdf = np.cumsum(mass, axis=-1)
+    return np.asarray((cdf / cdf[..., -1:]).astype(np.float32))
