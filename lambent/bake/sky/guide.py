@@ -168,48 +168,38 @@ class _PrePass:
         self._position, self._normal, self._crossed = position[chosen], normal[chosen], crossed[chosen]
 
     def brought(self, which: Indices, counts: Indices, what: str) -> tuple[Floats, Floats]:
-        """(n, BINS) mean cosine where the sky is visible, and mean square, over `counts` (BINS,) rays or more."""
-        block = int(counts.min())  # rays that are summed on the device
-        blocks = -(-counts // block)
+        """Means (n, BINS) over `counts` (BINS,) rays of the cosine where the sky is visible, and of its square."""
         means, squares = np.zeros((2, len(which), BINS))
-        number = np.repeat(np.arange(BINS), blocks * block)
-        first = np.cumsum(blocks) - blocks
-        turn = np.arange(len(number)) - block * first[number]  # index of a ray among those of its bin
-        point = (turn * POINTS // np.maximum(block * blocks[number], POINTS) + turn + 7 * number) % POINTS
+        number = np.repeat(np.arange(BINS), counts)
+        first = np.cumsum(counts) - counts
+        turn = np.arange(len(number)) - first[number]  # index of a ray among those of its bin
+        point = (turn * POINTS // np.maximum(counts[number], POINTS) + turn + 7 * number) % POINTS
         at_once = max(1, RAYS_AT_ONCE // len(number))
         for mine in slices(len(which), at_once):
-            seed = seed_of(0, "sky guide", what, mine.start)
-            for found, sums in zip((means, squares), self._sums(which[mine], number, point, block, seed), strict=True):
-                found[mine] = np.add.reduceat(sums, first, axis=1) / (block * blocks)
+            cosine = self._cosines(which[mine], number, point, seed_of(0, "sky guide", what, mine.start))
+            means[mine] = np.add.reduceat(cosine, first, axis=1) / counts
+            squares[mine] = np.add.reduceat(cosine**2, first, axis=1) / counts
         return means, squares
 
-    def _sums(self, which: Indices, number: Indices, point: Indices, block: int, seed: int) -> tuple[Floats, Floats]:
-        """Sums (n, rays / block) over blocks of rays in bins `number` from the groups' `point`s.
-
-        They are of the cosine, 0 where the sky is hidden, and of its square.
-        """
+    def _cosines(self, which: Indices, number: Indices, point: Indices, seed: int) -> Floats:
+        """(n, rays) cosines of rays in bins `number` from the groups' `point`s; 0 where the sky is hidden."""
         count, width = len(number), len(which) * len(number)
         sampler = independent(seed, width)
-        thread, each = dr.arange(mi.UInt32, width), dr.opaque(mi.UInt32, count)
-        group = thread // each
-        ray_number = thread - group * each
-        place = group * POINTS + dr.gather(mi.UInt32, mi.UInt32(point.astype(np.uint32)), ray_number)
-        bins = dr.gather(mi.UInt32, mi.UInt32(number.astype(np.uint32)), ray_number)
+        thread = dr.arange(mi.UInt32, width)
+        place = thread // count * POINTS + dr.gather(mi.UInt32, mi.UInt32(point.astype(np.uint32)), thread % count)
+        bins = dr.gather(mi.UInt32, mi.UInt32(number.astype(np.uint32)), thread % count)
         w = self._bins.direction(bins, sampler.next_2d())
         p = dr.gather(mi.Point3f, vectors(mi.Point3f, self._position[which]), place)
         n = dr.gather(mi.Vector3f, vectors(mi.Vector3f, self._normal[which]), place)
-        cosine = dr.dot(w, n)
         crossed = dr.gather(mi.Bool, mi.Bool(self._crossed[which].ravel()), place)
+        cosine = dr.dot(w, n)
         cosine = dr.select(crossed, dr.abs(cosine), dr.maximum(cosine, 0.0))
         ray, ahead = rays.leaving(self._whole, p, n, w), cosine > 0
         if self._panes:
             seen = mi.luminance(rays.passed(self._whole, ray, ahead))
         else:
             seen = dr.select(rays.in_shadow(self._whole, ray, ahead, self._holes), 0.0, 1.0)
-        brought = seen * cosine
-        dr.eval(brought)
-        sums, squares = (dr.block_sum(one, block) for one in (brought, brought * brought))
-        return np.array(sums).reshape(len(which), -1), np.array(squares).reshape(len(which), -1)
+        return np.array(seen * cosine).reshape(len(which), count)
 
     def sees_most(self, brought: Floats) -> Flags:
         """Groups that see most of the light of the hemisphere they face."""
