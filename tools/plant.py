@@ -194,6 +194,8 @@ class Field:
     def judged(self, defect: Defect) -> tuple[str, str]:
         """Return the verdict of the tests, and the test that failed."""
         file, tests = self._copy / defect.file, tests_of(defect.file, self._copy)
+        if not tests:
+            return SURVIVED, ""
         before = file.read_bytes()
         try:
             self._write(file, before[: defect.begin] + defect.new.encode() + before[defect.end :])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import shutil
 import sys
 from pathlib import Path
 
@@ -83,3 +84,5 @@ def test_tests_of_its_room_catch_a_defect_or_do_not(plant, tmp_path, monkeypatch
     field = plant.Field(root, tmp_path, limit=60)
     assert field.judged(product) == ("caught", "tests/rooms/test_sizes.py::test_area")
     assert field.judged(one) == ("survived", "")
+    shutil.rmtree(tmp_path / "copy" / "tests" / "rooms")
+    assert field.judged(product) == ("survived", ""), "a room without tests is not that of all tests"

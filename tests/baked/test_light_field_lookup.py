@@ -13,7 +13,7 @@ from lambent.baked.light_fields.lookup import March, Place, blended, marched, no
 from lambent.baked.light_fields.maps import nearest_points, nearness_along, radiance_along, whole_texels
 from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.octahedral import bordered, texel_directions, to_square
-from tests.core.analytic_light_field import ball_field, errors, on_ball, places, seen, sky_light
+from tests.baked.analytic_light_field import ball_field, errors, on_ball, places, seen, sky_light
 
 
 @pytest.fixture(scope="module")
