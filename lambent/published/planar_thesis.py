@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 
@@ -34,7 +33,7 @@ def multi_ring_table(lobe: Lobe, n: int) -> Floats:
 @contextmanager
 def offered() -> Iterator[None]:
     """Draw the estimate on planar reflectors by the thesis's integrators, which else show probes there."""
-    shader = str(Path(__file__).with_suffix(".wgsl"))
+    shader = "planar_thesis.wgsl"
     made = {f"lobe-4.{n}": Integrator(shader, multi_ring_table, {"FORMULA": n}) for n in (24, 25)}
     PLANAR.update(made)
     try:
