@@ -1,6 +1,6 @@
 """Errors of reflections from an offset surface light field, by method, and miss rates of caches of its maps.
 
-The march of `core.light_field_lookup` and published look-ups are compared with traced mirror rays of the teapot's
+The march of `baked.light_fields.lookup` and published look-ups are compared with traced mirror rays of the teapot's
 pixels in the pavilion, as in tables 6.1 and 6.2 of thesis R; caches as in its tables 6.3 to 6.6. Look-ups count texels
 of radiance and distance. Pixels are means over the same places for all methods: the look-up is compared, not its
 sampling.

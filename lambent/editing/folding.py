@@ -37,7 +37,7 @@ def folded(
         Difference of each entry's pair of bands to the previous one's. With K bands of the second curve, bands j and k
         are pair j K + k; each point begins at -1.
     values : (N,)
-        Transport by these pairs, RGB9E5 (`core.shared_exponent`).
+        Transport by these pairs, RGB9E5 (`baked.shared_exponent`).
     idle : (K, 3)
         Means of the idle curve over its bands.
     edited : {0, 1}
@@ -83,7 +83,7 @@ def _fold(out, spans, steps, values, means, places, taps):  # type: ignore[no-un
 
 @numba.njit(fastmath=True, cache=True)
 def write_wavelets(out, first, rows, before, taps):  # type: ignore[no-untyped-def]
-    """out[:, :, first:] (J, 3, P) = halves of `core.wavelets.transformed` of rows (J, TOGETHER, 4); overwrites rows."""
+    """out[:, :, first:] (J, 3, P) = halves of `wavelets.transformed` of rows (J, TOGETHER, 4); overwrites rows."""
     bands, _, points = out.shape
     a, b, c, d = taps
     size = bands

@@ -23,7 +23,7 @@ class IncrementalPicture:
     Parameters
     ----------
     products
-        Of its transport by bands or, better, by wavelets (`core.wavelets`).
+        Of its transport by bands or, better, by wavelets (`baked.transport.wavelets`).
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Sums of packed colours (`core.shared_exponent`), with vectorized channels.
+"""Sums of packed colours (`baked.shared_exponent`), with vectorized channels.
 
 numba does not vectorize this by itself; each entry takes a third of the time. Positions are flat indices of contiguous
 arrays.

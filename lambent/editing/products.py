@@ -56,7 +56,7 @@ def _float_of_bits(_typing, bits):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def unit_of(bits):  # type: ignore[no-untyped-def]
-    """Value of mantissa 1 in a colour of `core.shared_exponent`."""
+    """Value of mantissa 1 in a colour of `baked.shared_exponent`."""
     return _float_of_bits(np.uint32(((bits >> 27) + 103) << 23))  # type: ignore[call-arg]
 
 

@@ -30,7 +30,7 @@ SHOW = {
 }  # fmt: skip
 QUANTITIES = {LIGHT_MAP: ILLUMINANCE, LIGHT_MAP_NOISE: NOISE}  # shown quantity; luminance for all others
 FALSE_COLOUR = "false-colour"
-VIEW_TRANSFORMS = {FALSE_COLOUR: 3, "linear": 0, "neutral": 1, "filmic": 2}  # as shaders/tonemap.wgsl numbers them
+VIEW_TRANSFORMS = {FALSE_COLOUR: 3, "linear": 0, "neutral": 1, "filmic": 2}  # as tonemap.wgsl numbers them
 MOST_PX = 8192  # of a texture, by WebGPU's default limits
 QMC_N = 8  # samples per pixel, lobe and frame of the progressive mode
 

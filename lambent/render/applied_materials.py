@@ -39,7 +39,7 @@ class AppliedMaterials:
         self._looks: Mapping[str, Look] = {}
 
     def apply(self, looks: Mapping[str, Look], colours: Mapping[str, Triple], textures: Mapping[str, str]) -> None:
-        """Apply looks, then textures (`scenes.retexturing`), then diffuse colours, and the light that follows.
+        """Apply looks, then textures (`scenes.looks.retexturing`), then diffuse colours, and the light that follows.
 
         Materials left out stay as baked.
         """

@@ -30,7 +30,7 @@ def edits_of(
     colours: Mapping[str, Triple],
     textures: Mapping[str, str],
 ) -> Edits:
-    """Apply looks, then textures (`scenes.retexturing`), then diffuse colours to a scene's `materials`.
+    """Apply looks, then textures (`scenes.looks.retexturing`), then diffuse colours to a scene's `materials`.
 
     `textured` are the scene's textures by material; materials `without_uv` cannot show images.
     """

@@ -51,8 +51,8 @@ class Settings:
     width, height : int
         Pixels.
     integrator : str
-        "traced" against the baked light, "path" for whole paths, or one of `realtime.integrators.INTEGRATORS`, which
-        draw.
+        "traced" against the baked light, "path" for whole paths, or one of
+        `realtime.integrators.integrators.INTEGRATORS`, which draw.
     samples : int, optional
         Per pixel for converging integrators ("traced": as many as `noise` needs, in a film 8, "path": 64, "qmc": 256),
         otherwise per lobe (by default chosen from each material's roughness).
@@ -63,7 +63,7 @@ class Settings:
         For traced pictures: by default "traced" ones are denoised, "path" ones are not.
     exposure_ev : float, optional
         Stops, -64 to 64, for displayed images; by default the scene's, else metered from the first image
-        (`core.exposure.metered`) and kept for the rest.
+        (`core.light.exposure.metered`) and kept for the rest.
     view : str
         View transform of displayed images, one of `VIEWS`; "false-colour" shows luminance in cd/m^2.
     scale : Range, optional
@@ -86,25 +86,26 @@ class Settings:
         Mix of the store's light groups over the time of a film; by default the mix saved with the view or walk, else as
         baked.
     light_field_cache : str
-        Eviction policy if not all maps fit: least-recent or adaptive (`core.map_cache`).
+        Eviction policy if not all maps fit: least-recent or adaptive (`baked.light_fields.map_cache`).
     sky_turn_deg : float
-        Rotation of the sky about the vertical, -360 to 360, from -z towards -x (`realtime.turned_sky`).
+        Rotation of the sky about the vertical, -360 to 360, from -z towards -x (`realtime.sun.turned_sky`).
     field_deg : float, optional
         Field of view across the width of a fisheye or cylinder, degrees; 180 and 360 by default.
     seed : int
         For the path tracer, 0 or more: different seeds have independent noise.
     recolour : mapping
-        Diffuse colour, linear RGB, by material; indirect light follows (`realtime.answering`).
+        Diffuse colour, linear RGB, by material; indirect light follows (`realtime.answering.answering`).
     textures : mapping
         Texture that a material shows instead of its own: an image file, another material, or none, as
-        `scenes.retexturing` parses it. Its mean becomes the diffuse colour, unless `recolour` has one; light follows.
+        `scenes.looks.retexturing` parses it. Its mean becomes the diffuse colour, unless `recolour` has one; light
+        follows.
     variant : str
-        Name of a variant of the store (`store.states`): its materials, overridden by `recolour` and `textures`, and its
-        light mix, unless `light` has one. Indirect light follows.
+        Name of a variant of the store (`store.kept.states`): its materials, overridden by `recolour` and `textures`,
+        and its light mix, unless `light` has one. Indirect light follows.
     looks : LookTrack, optional
         Looks of materials over the time of a film, overriding the variant's; indirect light follows.
     replacements : tuple of Replacement
-        Meshes that replace objects with light fields of their volume (`realtime.replaced`).
+        Meshes that replace objects with light fields of their volume (`realtime.objects.replaced`).
     """
 
     width: int = 1280
@@ -213,7 +214,7 @@ class Images(ABC):
 
     @property
     def light_fields(self) -> dict[str, Any]:
-        """`realtime.streaming.Streaming.statistics` of light fields with a memory budget, else empty."""
+        """`realtime.light_fields.streaming.Streaming.statistics` of light fields with a memory budget, else empty."""
         return {}
 
     def apply_variant(self, variant: Variant) -> None:

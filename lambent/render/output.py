@@ -216,7 +216,7 @@ def write_frames(
     fps: float,
     progress: Progress = silent,
 ) -> None:
-    """Draw each camera into a film or an image sequence: see `core.film.pictures_writer`."""
+    """Draw each camera into a film or an image sequence: see `core.pictures.film.pictures_writer`."""
     with pictures_writer(file, *size, fps) as write:
         for camera in tracked(cameras, progress, "frames"):
             write(draw(camera))

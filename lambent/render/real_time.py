@@ -42,7 +42,7 @@ FILM_SUPERSAMPLES = 4  # per pixel in image sequences of radiance
 
 
 class RealTime(Images):
-    """Images by an integrator of `realtime.integrators`.
+    """Images by an integrator of `realtime.integrators.integrators`.
 
     Displayed images of a film (`moving`) are single frames with coverage, as the window shows them in motion; a still
     is the mean of many frames with different subpixel offsets.

@@ -89,8 +89,8 @@ class SceneObject:
 class SunSky:
     """Clear daylight, up is +y, over a `ground` that is diffuse with the sky's `albedo` and lit by it, or black.
 
-    Colours and distribution are those of Mitsuba's `sunsky` (Hosek-Wilkie), illuminances those of `scenes.clear_sky`
-    times `sun_scale` and `sky_scale`. The sun gives the same light for any radius.
+    Colours and distribution are those of Mitsuba's `sunsky` (Hosek-Wilkie), illuminances those of
+    `scenes.sky.clear_sky` times `sun_scale` and `sky_scale`. The sun gives the same light for any radius.
     """
 
     sun_direction: Triple  # unit, towards the sun
@@ -104,7 +104,7 @@ class SunSky:
 
 @dataclass(frozen=True)
 class ImageEnvironment:
-    """A picture of the surroundings, in a layout of `core.environment_layouts`; None to detect it.
+    """A picture of the surroundings, in a layout of `core.pictures.environment_layouts`; None to detect it.
 
     It is rotated by `rotation_deg` about its own up, from -z towards -x; its up is then aligned with the axis `up`.
     """
@@ -125,7 +125,7 @@ class ConstantEnvironment:
 
 @dataclass(frozen=True)
 class ComputedEnvironment:
-    """Procedural surroundings, by their name in `scenes.computed`."""
+    """Procedural surroundings, by their name in `scenes.sky.computed`."""
 
     name: str
 
@@ -243,7 +243,7 @@ class Look:
 
 @dataclass(frozen=True)
 class Variant:
-    """A state of the scene's materials and of its light: see `scenes.variants`.
+    """A state of the scene's materials and of its light: see `scenes.looks.variants`.
 
     `looks` are by the name of the material that each replaces; all others stay, as do light groups that the mix `light`
     does not name.
@@ -263,7 +263,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class LightFieldWish:
-    """Settings of an object's offset surface light field (`core.light_field`); None lets the bake decide.
+    """Settings of an object's offset surface light field (`baked.light_fields.light_field`); None lets the bake decide.
 
     At most `points` points, each with a map of `texels` a side, at `offset_m` off the surface; with one of `levels`,
     the object shows itself without its lobes. With an `error`, the mean difference in log(1 + L/median) from what

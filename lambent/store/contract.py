@@ -95,8 +95,8 @@ icosahedron repeatedly into four, in the order of scenes.triangle_wavelets:
 Indirect light at the same points:
 
     view/KEY/interreflection/tails         (Z,) uint32, surfaces on the path of each tail; meta["tails"] is the document
-                                           of `store.tails`, which numbers them, meta["series"] that of the bands,
-                                           meta["environment"] the image that lit it instead of the scene's own
+                                           of `baked.transport.tails`, which numbers them, meta["series"] that of the
+                                           bands, meta["environment"] the image that lit it instead of the scene's own
     view/KEY/interreflection/MATERIAL/TERM/TILE    uint32, the TILE-th 4096 points of a material, P: number of entries
                                            of each point (P,), then of all entries tail * bands + band (N,), ascending,
                                            and their light (N,), RGB9E5 times meta["unit"] W/(sr m^2). meta["points"] is

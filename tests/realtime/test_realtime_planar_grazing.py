@@ -19,7 +19,7 @@ from tests.realtime.test_realtime_planar import HEIGHT, WIDTH, mirror, scene_of
 def test_a_floor_at_a_grazing_angle_shows_its_whole_lobe(device: Any) -> None:
     """Under one radiance, viewers at cosines of .04 to .07 see its albedo there; not less of it.
 
-    Reference: the mean of f cos_i/pdf over half vectors of the lobe (`realtime.albedo`).
+    Reference: the mean of f cos_i/pdf over half vectors of the lobe (`realtime.integrators.albedo`).
     """
     scene = scene_of(mirror(0.05))
     sky = np.ones((6, 4, 4, 3), np.float32)

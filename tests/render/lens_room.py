@@ -52,7 +52,7 @@ class Lens:
         """What a square picture shows (pixels, pixels, 3): through the lens, and without it.
 
         Also where all rays enter by the front face and leave by the back one. Weights of light as in
-        `core.thin_glass`; pixels are means of `within` x `within` rays.
+        `baked.light_fields.thin_glass`; pixels are means of `within` x `within` rays.
         """
         count = pixels * within
         across, up, forward = image_plane(camera, count, count)

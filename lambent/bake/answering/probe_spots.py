@@ -28,7 +28,7 @@ MOST_OWN = 64  # surfaces of its own object that a ray of a probe passes
 
 @dataclass(frozen=True, eq=False)
 class ProbeSpots:
-    """spots (6, N, N) uint32 as `store.answer` has them, tint (6, N, N, 3), sun (6, N, N)."""
+    """spots (6, N, N) uint32 as `baked.answering.stored` has them, tint (6, N, N, 3), sun (6, N, N)."""
 
     spots: NDArray[np.uint32]
     tint: NDArray[np.float16]

@@ -1,4 +1,4 @@
-"""Arrays from which indirect light follows edits of materials: see `store.answer` and `core.answer`."""
+"""Arrays from which indirect light follows edits of materials: see `baked.answering`, `stored` and `answer`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Interreflections of a view: indirect light, by bands of the curves and by tails (`store.tails`).
+"""Interreflections of a view: indirect light, by bands of the curves and by tails (`baked.transport.tails`).
 
 Each pass over all points doubles the samples, so that a picture is available early and its noise falls. A tile of
 points is one array, written whole: an interruption loses at most one tile's pass.

@@ -257,7 +257,7 @@ def _rays(points: Floats, place: Any, texels: int, within: Any) -> Any:
 
 
 def direction(uv: Any) -> Any:
-    """Unit directions (mi.Vector3f) of mi.Point2f: `core.octahedral.from_square`, with which a test compares it."""
+    """Unit directions (mi.Vector3f) of mi.Point2f: `core.geometry.octahedral.from_square`; a test compares them."""
     x, y = 2 * uv.x - 1, 2 * uv.y - 1
     z = 1 - dr.abs(x) - dr.abs(y)
     over = dr.maximum(-z, 0)

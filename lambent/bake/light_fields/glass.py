@@ -1,4 +1,4 @@
-"""The faces behind the surface of a piece of glass, for refraction by two interfaces (`core.thin_glass`)."""
+"""The faces behind the surface of a piece of glass, for two refractions (`baked.light_fields.thin_glass`)."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Exits:
         self._passed = float(np.mean(normal_transmittance(clearest(material))))
 
     def behind(self, places: Floats, normals: Floats) -> Floats:
-        """(n, 4) of places and unit normals (n, 3): `exits` of `core.light_field.Glass`."""
+        """(n, 4) of places and unit normals (n, 3): `exits` of `baked.light_fields.light_field.Glass`."""
         found = np.zeros((len(places), 4))
         found[:, 3] = NO_EXIT
         for mine in slices(len(places), AT_ONCE):

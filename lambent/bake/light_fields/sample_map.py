@@ -23,7 +23,7 @@ GUTTER = 2  # texels around charts that have the entries of the nearest one
 
 @dataclass(frozen=True)
 class SampleMap:
-    """`entries` (h, w, 4) uint16, and where they are: see `core.light_field.LightField`; `exits` as in its `Glass`."""
+    """`entries` (h, w, 4) uint16, and where they are: see `LightField`; `exits` as in its `Glass`."""
 
     entries: NDArray[np.uint16]
     corner: tuple[int, int]
@@ -48,7 +48,7 @@ def sample_map(
     points : (P, 3), P at most 65535.
     spacing_m : of the points; texels are finer, as far as the map has room.
     behind : finds the exits, where the object is of glass.
-    sees : whether places see points (`core.nearest_points`).
+    sees : whether places see points (`baked.light_fields.nearest_points`).
     side : -1 where viewers see the object from the other side of its normals.
     """
     grid, low, high = rectangle(geometry, faces, size, spacing_m)

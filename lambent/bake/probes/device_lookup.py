@@ -1,4 +1,4 @@
-"""Probe look-ups on the device: `core.probe_lookups` in Dr.Jit, for many rays at once.
+"""Probe look-ups on the device: `baked.probes.lookups` in Dr.Jit, for many rays at once.
 
 Sizes and plane counts are passed as data or padded, so that all probes share their kernels.
 """
@@ -82,7 +82,7 @@ class DeviceProbe:
 
 
 class _Cube:
-    """A scalar cube map (6, N, N), bilinear within each face like `core.cubemap.sample`."""
+    """A scalar cube map (6, N, N), bilinear within each face like `core.geometry.cubemap.sample`."""
 
     def __init__(self, values: Floats) -> None:
         self._values = mi.Float(np.asarray(values, np.float32).ravel())

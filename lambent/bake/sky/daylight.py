@@ -3,7 +3,7 @@
 Mitsuba's `sunsky` (Hosek & Wilkie 2012, 2013) gives colours and the sky's distribution of light. Its RGB is in
 W/(sr m^2 nm), which 683 lm/W x 106.856 nm, the integral of V(lambda), converts to cd/m^2. With that scale its sun dims
 too little with turbidity: 81 klx at 45 degrees and turbidity 6, where published models have 57 to 59. Sky and sun are
-therefore scaled to the illuminances of `scenes.clear_sky`.
+therefore scaled to the illuminances of `scenes.sky.clear_sky`.
 
 Evaluating the sky model at every path vertex costs several times the ray itself; an image costs almost nothing and can
 be importance sampled. The smooth sky is evaluated coarsely; around the sun, radiance is averaged over each pixel, so
@@ -62,7 +62,7 @@ class SunDisc:
 
 
 def sun_disc(sky: SunSky) -> SunDisc:
-    """The sun of daylight: the colour of Mitsuba's model, and the illuminance of `scenes.clear_sky`."""
+    """The sun of daylight: the colour of Mitsuba's model, and the illuminance of `scenes.sky.clear_sky`."""
     direction = normalize(np.asarray(sky.sun_direction, float))
     there = _raised(direction)[None]
     colour = np.maximum(_model(sky, there, sun=True) - _model(sky, there, sun=False), 0)[0].astype(float)
@@ -80,7 +80,7 @@ def sunsky_radiance(sky: SunSky, w: Floats, *, sun: bool = True) -> Floats:
 
 @lru_cache(maxsize=4)
 def _sky_scale(sky: SunSky) -> float:
-    """Factor that gives Mitsuba's sky the illuminance of `scenes.clear_sky`."""
+    """Factor that gives Mitsuba's sky the illuminance of `scenes.sky.clear_sky`."""
     y = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS  # a spiral of equal solid angles
     around, across = np.pi * (1 + 5**0.5) * np.arange(DIRECTIONS), np.sqrt(1 - y**2)
     w = np.stack([across * np.cos(around), y, across * np.sin(around)], axis=-1)

@@ -41,7 +41,7 @@ class Pairs(NamedTuple):
     """Transport by pairs of bands: the number of entries per point, and all entries, point after point.
 
     counts (P,); steps (N,) uint8 from one entry's pair to the next: pairs are numbered j K + k, and each point begins
-    at -1; light (N,) RGB9E5 (`core.shared_exponent`). Black entries bridge steps that would be too long.
+    at -1; light (N,) RGB9E5 (`baked.shared_exponent`). Black entries bridge steps that would be too long.
     """
 
     counts: NDArray[np.int64]

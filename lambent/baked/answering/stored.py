@@ -1,4 +1,4 @@
-"""The arrays from which a store recomputes its indirect light after edits of materials, by `core.answer`.
+"""The arrays from which a store recomputes its indirect light after edits of materials, by `baked.answering.answer`.
 
 answer/patch               (2, H, W) uint16, patch of each texel of the light map on the normal's side and on the other;
                            NO_PATCH without a patch. meta["materials"]: names, in order
@@ -9,7 +9,7 @@ answer/direct, direct_back (G, H, W, 3) float16, direct irradiance of texels wit
                            light map; light that arrives through lobes alone counts as direct. Absent if the light map
                            holds it as light_map/direct, direct_back; meta["direct"] of answer/patch names the arrays
 answer/transfer            (P, P) float16, share of each patch's light that reaches each other; rows receive
-answer/rays                (3, K, R) uint8, `core.answer_rays.packed_rays` of the points that send and gather light
+answer/rays                (3, K, R) uint8, `baked.answering.rays.packed_rays` of the points that send and gather light
 answer/receiver_rays       (3, F, S) uint8, likewise of points near contacts, which gather and do not send
 answer/points              (K + F,) numbers, texel and side of each, coded as answer/texels; the F come last
 answer/point_sun           (K + F, 3) float32, direct irradiance of the sun at the points, W/m^2
@@ -26,8 +26,8 @@ answer/probe/OBJECT/sun    (6, N, N) float16, direct sun there over its normal i
 answer/traced, traced_back (2, H, W, 4) float32, samples of direct light, with which a bake continues; if light is
                            separated, also by group: traced_by_group, traced_back_by_group (1, H, W, 6 G)
 
-Numbers are `core.delta_bytes` (4, ...) uint8. G is the number of light groups, in the order of `store.light_groups`; 1
-if all light was baked together.
+Numbers are `baked.answering.delta_bytes` (4, ...) uint8. G is the number of light groups, in the order of
+`store.light_groups`; 1 if all light was baked together.
 """
 
 from __future__ import annotations

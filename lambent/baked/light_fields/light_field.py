@@ -85,9 +85,9 @@ class LightField:
         other quarters show the sky, whatever the texel's distance. A texel with a surface has its light and its
         distance.
     glass : the refraction of the object's transmitted light, or None; with it, maps leave the object out.
-    blocks : (P, B, B, 4) uint32, or None: radiance as stored in blocks, by `core.light_field_blocks`.
+    blocks : (P, B, B, 4) uint32, or None: radiance as stored in blocks, by `baked.light_fields.blocks.blocks`.
     distances : (P, R, B, 2) uint32, or None: inverse_distance and cover as stored in blocks, by
-        `core.light_field_blocks`.
+        `baked.light_fields.blocks.blocks`.
     """
 
     points: NDArray[np.float32]

@@ -1,4 +1,4 @@
-"""Read light fields: arrays light_field/OBJECT/* to `core.light_field.LightField`."""
+"""Read light fields: arrays light_field/OBJECT/* to `baked.light_fields.light_field.LightField`."""
 
 from __future__ import annotations
 

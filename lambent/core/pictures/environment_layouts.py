@@ -1,4 +1,4 @@
-"""Convert pictures of the surroundings from the layouts that tools write to lat-long (`core.latlong`).
+"""Convert pictures of the surroundings from the layouts that tools write to lat-long (`core.geometry.latlong`).
 
 Every layout shows the surroundings from within, unmirrored: front -z, right +x, top +y.
 

@@ -35,7 +35,7 @@ class TermLight:
         Difference of each entry's number to the previous one's; each point begins at 0. A number is the tail times the
         number of bands, plus the band.
     values : (N,) uint32
-        RGB9E5 (`core.shared_exponent`), times `units` of the point.
+        RGB9E5 (`baked.shared_exponent`), times `units` of the point.
     units : (P,) float32
         W/(sr m^2).
     counts : tuple of int

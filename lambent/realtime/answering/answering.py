@@ -1,4 +1,4 @@
-"""Baked light that answers edited materials: light maps and probes, from a store's answer (`core.answer`).
+"""Baked light that answers edited materials: light maps and probes, from a store's answer (`baked.answering.answer`).
 
 A texel of a probe keeps its baked radiance plus the change a E' - a E of the diffuse light that it sees: edges stay
 smooth, and reflections in mirrors stay as baked. Before the first edit every array equals the store's, to the bit.

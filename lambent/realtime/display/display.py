@@ -30,7 +30,7 @@ class TonemapPass:
 
 
 class SmoothPass:
-    """Fast approximate antialiasing of an encoded image, see shaders/smooth.wgsl."""
+    """Fast approximate antialiasing of an encoded image, see smooth.wgsl."""
 
     def __init__(self, layouts: Layouts) -> None:
         self._layouts = layouts

@@ -19,7 +19,7 @@ from lambent.realtime.gpu.targets import DISPLAY_FORMAT
 
 
 class Display:
-    """Exposure and view transform on one device; see shaders/edited_display.wgsl."""
+    """Exposure and view transform on one device; see edited_display.wgsl."""
 
     def __init__(self, device: Any) -> None:
         self._device, self._layouts = device, Layouts(device)

@@ -4,8 +4,8 @@ A look-up is a module with the members of `LookUp`, and a shader of the same nam
     fn incident_look_up(x: vec3f, w: vec3f) -> LookUp    look-up from x, about the probe's centre, along w
     fn incident_bound(x: vec3f, w: vec3f) -> f32         1 over the distance, in m, to the nearest known wall along w; 0
                                                          without one
-shaders/incident.wgsl declares the type. Bindings of the look-up are in group 2, from 3 on. A look-up with its own
-light, other than the probe's cube map, must also define all functions of shaders/incident_light.wgsl.
+incident.wgsl declares the type. Bindings of the look-up are in group 2, from 3 on. A look-up with its own
+light, other than the probe's cube map, must also define all functions of incident_light.wgsl.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Offset surface light fields: light recorded at points just above the object, through whose maps rays march.
 
-Source: thesis R, "Offset surface light fields"; the march is that of `core.light_field_lookup`.
+Source: thesis R, "Offset surface light fields"; the march is that of `baked.light_fields.lookup`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The specular integrators: shader, constants and table of samples of each.
 
-To add one, write a file in shaders/ with `integrate(index, wo, surface)`, and add a row here.
+To add one, write a file in this folder with `integrate(index, wo, surface)`, and add a row here.
 """
 
 from __future__ import annotations

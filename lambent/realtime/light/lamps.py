@@ -1,4 +1,4 @@
-"""Lamps taken out of a probe's cube map, for shaders/lamps.wgsl.
+"""Lamps taken out of a probe's cube map, for lamps.wgsl.
 
 Lamps of similar radius form a group. As a lobe gets wider, groups leave the cube map, the smallest first. There is one
 cube map for each number of groups taken out; lobes between two numbers mix both maps (`groups_out`), so that nothing

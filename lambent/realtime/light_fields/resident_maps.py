@@ -45,7 +45,7 @@ class ResidentMaps:
     """The atlas of a light field, and `points`, the texture of points; `most_bytes` limits the atlas's two textures.
 
     Without a budget, or if all maps fit, they stay resident. Otherwise `follow` loads the maps that views need, and
-    evicts others by its `policy`, one of `core.map_cache.POLICIES`.
+    evicts others by its `policy`, one of `baked.light_fields.map_cache.POLICIES`.
     """
 
     def __init__(

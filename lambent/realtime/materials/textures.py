@@ -24,7 +24,7 @@ from lambent.realtime.gpu.uploads import half, upload
 from lambent.scenes.looks.textures import CHANNELS, doubled_angle, halved, parts, slopes
 from lambent.scenes.scene import MaterialTextures, Texture
 
-KINDS = tuple(CHANNELS)  # order of the bindings, and of the bits of TEXTURES, in shaders/material.wgsl
+KINDS = tuple(CHANNELS)  # order of the bindings, and of the bits of TEXTURES, in material.wgsl
 BITS = {kind: 1 << i for i, kind in enumerate(KINDS)}
 WIDENING = BITS["roughness"] | BITS["normal"]  # textures that make lobes wider
 ROUGH_SHARE = 0.9  # quantile of a texture's roughness that sets the number of samples

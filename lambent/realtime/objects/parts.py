@@ -1,4 +1,4 @@
-"""Parts of objects: the neighbours' faces that each part's probe also lights (shaders/part_share.wgsl)."""
+"""Parts of objects: the neighbours' faces that each part's probe also lights (part_share.wgsl)."""
 
 from __future__ import annotations
 

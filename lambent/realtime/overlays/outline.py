@@ -21,7 +21,7 @@ from lambent.realtime.resources import SceneResources
 from lambent.store.contract import ObjectRecord
 
 SEEN_FORMAT = "r8unorm"
-REACH_PX = 2  # reach of the line on either side of the border; as in shaders/outline.wgsl
+REACH_PX = 2  # reach of the line on either side of the border; as in outline.wgsl
 
 
 class Outline(Overlay):

@@ -1,4 +1,4 @@
-"""Edges and thin geometry in motion: pixels become means over several places in them (shaders/coverage.wgsl)."""
+"""Edges and thin geometry in motion: pixels become means over several places in them (coverage.wgsl)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lambent.realtime.passes.context import FrameContext
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.light import LightPass
 
-PLACES = (0.2, 0.4), (0.4, -0.2), (-0.2, -0.4), (-0.4, 0.2)  # px, as shaders/places.wgsl
+PLACES = (0.2, 0.4), (0.4, -0.2), (-0.2, -0.4), (-0.4, 0.2)  # px, as places.wgsl
 LIGHT_FORMAT, STEPS_FORMAT = "rgba16float", "r32uint"
 
 
@@ -26,7 +26,7 @@ class Covering:
     """Textures of one size."""
 
     places: list[Any]  # depth at each place
-    steps: Any  # step from each place to the pixel with its light, see shaders/places.wgsl
+    steps: Any  # step from each place to the pixel with its light, see places.wgsl
     missed: Any  # light of surfaces that no neighbouring pixel shows
     covered: Any
 

@@ -16,7 +16,7 @@ from lambent.realtime.planar.planar_buffer import PlanarBuffer, PlanarBufferPass
 from lambent.realtime.planar.planar_integrators import planar_integrator
 
 FORMAT = "rgba16float"
-FOUND, CLEANED = 2, 3  # numbers of layers (shaders/planar_layers.wgsl) of planar.wgsl and of planar_clean.wgsl
+FOUND, CLEANED = 2, 3  # numbers of layers (planar_layers.wgsl) of planar.wgsl and of planar_clean.wgsl
 STAGE = Stage("planar_main")  # of the shader of a planar integrator
 
 

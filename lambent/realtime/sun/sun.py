@@ -27,7 +27,7 @@ from lambent.realtime.sun.sunlit_faces import sunlit_faces
 from lambent.store.contract import SunRecord
 
 SunParts = tuple[SunSquares, ...]
-BLOCK = 8  # texels along a block whose least and greatest depths are known: SUN_BLOCK of shaders/sun.wgsl
+BLOCK = 8  # texels along a block whose least and greatest depths are known: SUN_BLOCK of sun.wgsl
 
 
 class SunLight:

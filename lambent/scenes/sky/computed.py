@@ -19,7 +19,7 @@ COMPUTED: Mapping[str, Callable[[Floats], Floats]] = {**INTERIORS, **GARDENS}
 
 @cache
 def lat_long_image(name: str) -> NDArray[np.float32]:
-    """(HEIGHT, 2 HEIGHT, 3) radiance in W/(sr m^2) of surroundings in `COMPUTED`, oriented as `core.latlong`."""
+    """(HEIGHT, 2 HEIGHT, 3) radiance in W/(sr m^2) of surroundings of `COMPUTED`; see `core.geometry.latlong`."""
     height, width = HEIGHT * SAMPLES, 2 * HEIGHT * SAMPLES
     fine = COMPUTED[name](lat_long_directions(height, width))
     return np.asarray(fine.reshape(HEIGHT, SAMPLES, 2 * HEIGHT, SAMPLES, 3).mean(axis=(1, 3)), np.float32)

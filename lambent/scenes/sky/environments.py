@@ -119,7 +119,7 @@ def _perez(shape: Sequence[float], cos_theta: Floats, cos_gamma: Floats) -> Floa
 
 
 def from_lat_long(image: Floats, n: int = 256) -> Floats:
-    """Environment (6, n, n, 3) of a lat-long image (H, W, 3), oriented as `core.latlong`; means over 3x3 samples."""
+    """Environment (6, n, n, 3) of a lat-long image (H, W, 3), see `core.geometry.latlong`; means over 3x3 samples."""
     height, width = image.shape[:2]
     total = np.zeros((6, n, n, 3))
     fine = face_directions(3 * n).reshape(6, n, 3, n, 3, 3)

@@ -1,7 +1,7 @@
 """The session of a store: the user's changes while viewing it, `session.json` in its folder.
 
 Bakes never touch the file. `session-unsaved.json` beside it has the same form: the window keeps unsaved changes there,
-so that they survive the end of the process. Saved cameras and paths are elsewhere: see `store.views`.
+so that they survive the end of the process. Saved cameras and paths are elsewhere: see `store.kept.views`.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class RoomState(Strict):
     """The look of a room: replacement materials by name, and the mix of its light groups.
 
     `textures` maps a material to what it shows instead of its own textures: those of another material, "" for none, or
-    an image, by its name in the store (`store.images`).
+    an image, by its name in the store (`store.kept.images`).
     """
 
     materials: dict[str, Material] = Field(default_factory=dict)

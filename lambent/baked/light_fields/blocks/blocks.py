@@ -47,7 +47,7 @@ def maps_of(blocks: NDArray[np.uint32], side: int) -> NDArray[np.float16]:
 
 
 def distance_blocks_of(inverse: NDArray[np.float16], cover: NDArray[np.uint8] | None) -> NDArray[np.uint32]:
-    """Blocks (P, R, B, 2) of inverse distances, 1/m, and cover (P, E, E); see `core.distance_blocks`."""
+    """Blocks (P, R, B, 2) of inverse distances, 1/m, and cover (P, E, E); see `baked.light_fields.blocks.distances`."""
     size = up(inverse.shape[1] + 2, BLOCK)
     bits = None if cover is None else tiled(cover[..., None], size)[..., 0]
     return distance_blocks.encoded(tiled(inverse[..., None], size)[..., 0], bits)

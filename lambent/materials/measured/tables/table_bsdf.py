@@ -1,4 +1,4 @@
-"""A measured table as a BSDF with eval, pdf and sample, for `materials.check` and path tracers.
+"""A measured table as a BSDF with eval, pdf and sample, for `materials.checking.check` and path tracers.
 
 It is the two-sided sheet that the path tracer renders. `eval` is the table's own; directions are drawn from the CDF of
 its dense grid (half_vector_grid.py), or exactly from that of its patches (patch_sheet.py).

@@ -96,7 +96,7 @@ class ConstantSection(Section):
 
 
 class ComputedSection(Section):
-    """An environment of `scenes.computed`."""
+    """An environment of `scenes.sky.computed`."""
 
     kind: Literal["computed"]
     name: str

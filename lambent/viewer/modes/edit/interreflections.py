@@ -39,7 +39,7 @@ class Bounced:
     on : bool
         Whether samples are baked up to `wanted`.
     series, wanted
-        Series of bands and samples of the bake; see `bake.bounces`.
+        Series of bands and samples of the bake; see `bake.interreflection.settings`.
     fixed : frozenset of str or None
         Materials whose edits do not change the light on others: from the store, the proposal, or the user; None
         before that.

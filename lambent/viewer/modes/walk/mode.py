@@ -55,8 +55,8 @@ def open_store(
 ) -> WalkMode:  # fmt: skip
     """Start the mode on a store with at least geometry and the scene record; else raise `UserError`.
 
-    `light_field_mb` is the GPU memory for light field maps, cached by a `policy` of `core.map_cache`; `sky_turn_deg`
-    rotates the sky; `replaced` are meshes in place of objects (`scenes.replacement`).
+    `light_field_mb` is the GPU memory for light field maps, cached by a `policy` of `baked.light_fields.map_cache`;
+    `sky_turn_deg` rotates the sky; `replaced` are meshes in place of objects (`scenes.replacement`).
     """
     store = Store.open(path)
     baked = with_replacements(read_baked(store, light_field_mb, policy), parse_replacements(replaced))

@@ -33,7 +33,7 @@ class Wish:
     Attributes
     ----------
     materials, textures : mapping
-        What replaces the scene's, by material: documents, and as in `store.session.RoomState` with images' paths.
+        What replaces the scene's, by material: documents, and as in `store.kept.session.RoomState` with images' paths.
     light : mapping
         Factors of light groups; groups left out are as baked.
     show : str

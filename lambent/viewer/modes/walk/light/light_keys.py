@@ -1,4 +1,4 @@
-"""Keys of the light along a camera path: tracks (`core.light_mix`) with a complete mix at each time."""
+"""Keys of the light along a camera path: tracks (`core.light.light_mix`) with a complete mix at each time."""
 
 from __future__ import annotations
 

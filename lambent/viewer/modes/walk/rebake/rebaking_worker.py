@@ -5,8 +5,8 @@ python -m lambent.viewer.modes.walk.rebake.rebaking_worker STORE COPY
 The first line of stdin is a `RoomState` as a JSON object, in light as baked. The end of
 stdin ends the process at any moment; the next bake continues the copy. Every line of stdout is a JSON object: "what",
 "done" and "total" of a step; "error", a line for the user; "kind" and "there", names of arrays that are now in the
-copy; "region", the shape (n, H, W) of light that is finished before its light map (`bake.watch`), followed by its
-bytes, n H W 3 half floats and H W flags; or "baked", when everything is complete.
+copy; "region", the shape (n, H, W) of light that is finished before its light map (`bake.running.watch`), followed by
+its bytes, n H W 3 half floats and H W flags; or "baked", when everything is complete.
 """
 
 from __future__ import annotations
