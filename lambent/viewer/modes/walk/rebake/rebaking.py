@@ -1,7 +1,8 @@
 """Rebakes the light of edited materials in the background, and blends it into the picture as it arrives.
 
 A process of low priority bakes into a copy beside the store (`bake.running.again`). Another edit stops it; the next
-bake reuses finished parts of the copy. The estimated light is replaced object by object (`rebaked_light`), without a jump.
+bake reuses finished parts of the copy. The estimated light is replaced object by object (`rebaked_light`), without a
+jump.
 """
 
 from __future__ import annotations
