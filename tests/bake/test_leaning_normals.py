@@ -61,7 +61,7 @@ def test_the_bsdf_sees_a_normal_bent_as_the_shader_bends_it(mi):
 def test_both_bend_to_the_same_cosine():
     from lambent.bake.bsdfs.textured import GRAZING
 
-    shader = (Path(lambent.realtime.__file__).parent / "shaders" / "shade.wgsl").read_text()
+    shader = (Path(lambent.realtime.__file__).parent / "shading" / "shade.wgsl").read_text()
     assert float(re.search(r"const GRAZING = ([\d.]+);", shader)[1]) == GRAZING
     assert "normalize(given + max(GRAZING - dot(given, view), 0.0) * view)" in shader
 

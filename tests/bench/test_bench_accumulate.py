@@ -36,7 +36,7 @@ def test_pictures_at_rest_come_below_path_tracing(folder: Path, monkeypatch: pyt
     effort = replace(accumulate.QUICK, width=96, height=64, truth_spp=512, seconds=(1.0, 14.0))
     report = accumulate.run(effort, inputs=[folder])
     first, last = report["rows"]
-    assert (first["ended"], first["gathered"]) == (1, 0) and last["ended"] == 16 and last["gathered"] > 16
+    assert first["ended"] < 16 and first["gathered"] == 0 and last["ended"] == 16 and last["gathered"] > 16
     assert (first["seconds"], last["seconds"], last["denoising_s"]) == (3.0, 14.0, 1.0)
     assert last["flip"] < first["flip"] and last["psnr"] > first["psnr"]
     assert last["flip"] < last["bar"], "two path traced pictures differ by more"

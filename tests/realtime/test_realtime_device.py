@@ -14,7 +14,7 @@ from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.device import WEBGPU_LIMITS, adapter_info, choose_adapter, open_device
-from lambent.realtime.gpu.shader_source import assemble
+from lambent.realtime.gpu.shader_source import PACKAGE, assemble, shader_files
 from lambent.realtime.gpu.targets import PassTimer, Targets
 from lambent.realtime.objects.unbaked import CAMERA
 from lambent.realtime.renderer import Renderer
@@ -76,16 +76,22 @@ def test_a_large_scene_asks_for_what_it_needs(device) -> None:
     assert device_needs(large) == {"max-buffer-size": 7_000_000 * 52}
 
 
-def test_includes_come_once_and_in_order(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lambent.realtime.gpu.shader_source.FOLDERS", (tmp_path,))
-    (tmp_path / "a.wgsl").write_text("const A = 1;\n")
-    (tmp_path / "b.wgsl").write_text('#include "a.wgsl"\nconst B = A;\n')
-    (tmp_path / "c.wgsl").write_text('#include "b.wgsl"\n#include "a.wgsl"\nconst C = B;\n')
-    assert [line for line in assemble("c.wgsl", "a.wgsl").splitlines() if line] == [
+def test_includes_come_once_and_in_order() -> None:
+    given = {
+        "a.wgsl": "const A = 1;\n",
+        "b.wgsl": '#include "a.wgsl"\nconst B = A;\n',
+        "c.wgsl": '#include "b.wgsl"\n#include "a.wgsl"\nconst C = B;\n',
+    }
+    assert [line for line in assemble("c.wgsl", "a.wgsl", given=given).splitlines() if line] == [
         "const A = 1;", "const B = A;", "const C = B;",
     ]  # fmt: skip
     with pytest.raises(FileNotFoundError, match="shader d"):
-        assemble("d.wgsl")
+        assemble("d.wgsl", given=given)
+
+
+def test_no_two_shaders_have_one_name() -> None:
+    """They are included by name, from any room."""
+    assert len(shader_files()) == len(list(PACKAGE.rglob("*.wgsl")))
 
 
 def test_more_passes_than_the_timer_holds_are_drawn_untimed(device) -> None:

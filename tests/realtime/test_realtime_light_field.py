@@ -108,7 +108,7 @@ def test_the_light_field_of_a_store_is_rendered(tmp_path: Path, renderer: Render
         still(store.folder, picture, settings=Settings(SIZE, SIZE, "lamps", samples=1, show="specular", lookup=name))
         drawn[name] = read_image(picture)
     expected = renderer.still_radiance(replace(STATE, lookup="light_field"))
-    np.testing.assert_allclose(drawn["auto"], expected, rtol=0.01, atol=0.01)
+    assert psnr_db(drawn["auto"], expected) > 38  # the store has the maps in blocks
     assert error(drawn["auto"]) < error(drawn["plain"])
 
 

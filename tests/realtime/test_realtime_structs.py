@@ -11,11 +11,11 @@ import pytest
 import wgpu
 
 from lambent.materials.shader_layout import wgsl_dtype
-from lambent.realtime.gpu.shader_source import FOLDERS
+from lambent.realtime.gpu.shader_source import shader_files
 from lambent.realtime.gpu.structs import STRUCTS
 from tests.tools.shader_parity import gpu_device
 
-WGSL = "\n".join(path.read_text() for folder in FOLDERS for path in sorted(folder.glob("*.wgsl")))
+WGSL = "\n".join(path.read_text() for _, path in sorted(shader_files().items()))
 
 
 def leaves(place: str, dtype: np.dtype[Any], begin: int = 0) -> Iterator[tuple[str, int]]:

@@ -26,15 +26,15 @@ def assemble(*names: str, given: Mapping[str, str] | None = None) -> str:
 
 
 @cache
-def _files() -> dict[str, Path]:
+def shader_files() -> dict[str, Path]:
     """Shaders of all rooms by name: each lies beside the Python that binds it."""
     return {path.name: path for path in PACKAGE.rglob("*.wgsl")}
 
 
 def _path(name: str) -> Path:
-    if name not in _files():
+    if name not in shader_files():
         raise FileNotFoundError(f"shader {name} is nowhere in {PACKAGE}")
-    return _files()[name]
+    return shader_files()[name]
 
 
 def _add(name: str, given: Mapping[str, str], done: dict[str, str]) -> None:
