@@ -18,7 +18,7 @@ from lambent.bake.transport.view_points import ViewPoints
 from lambent.bake.transport.view_tracer import ViewTracer
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.scene import Scene
-from tests.bake.test_interreflection import FIRST, FROM_ABOVE, INSIDE, corner, furnace, of_scene
+from tests.bake.interreflection.test_interreflection import FIRST, FROM_ABOVE, INSIDE, corner, furnace, of_scene
 
 GLOSSY = Material(kd=0.3, lobes=(Lobe(mx=0.3, my=0.3, r0=0.5),))
 

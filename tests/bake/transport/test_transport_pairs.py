@@ -19,7 +19,7 @@ from lambent.scenes.sky.triangle_lights import (
     solid_angles,
     surface_triangles,
 )
-from tests.bake.test_transport import BRUSHED, GLOSSY, View, ball_on_floor, environment, view
+from tests.bake.transport.test_transport import BRUSHED, GLOSSY, View, ball_on_floor, environment, view
 from tests.tools.pair_numbers import pair_numbers
 
 SATIN = Material(kd=0.2, lobes=(Lobe(mx=0.3, my=0.3, r0=0.4),))

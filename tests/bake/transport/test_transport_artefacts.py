@@ -25,7 +25,7 @@ from lambent.scenes.scene import ConstantEnvironment, ImageEnvironment, Material
 from lambent.store.contract import baked_views, transport_lights, view_artefact_name
 from lambent.store.store import Store
 from tests.bake.small_scenes import GREY
-from tests.bake.test_transport import CAMERA, GLOSSY, ball_on_floor, view
+from tests.bake.transport.test_transport import CAMERA, GLOSSY, ball_on_floor, view
 from tests.tools.pair_numbers import pair_numbers
 
 SIZE = (12, 10)

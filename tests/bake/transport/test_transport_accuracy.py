@@ -10,7 +10,7 @@ from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_lobes import beckmann, of_material
 from lambent.materials.fresnel import schlick
 from lambent.scenes.sky.triangle_lights import environment_triangles
-from tests.bake.test_transport import View, ball_on_floor, environment, view
+from tests.bake.transport.test_transport import View, ball_on_floor, environment, view
 
 GLAZE = of_material(Material(lobes=(Lobe(mx=0.06, my=0.06, r0=0.05),)))
 EDITS = {

@@ -19,7 +19,7 @@ from lambent.editing.interreflection.stored import interreflections
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.of_lobes import of_material
 from lambent.store.store import Store
-from tests.bake.test_interreflection import FROM_ABOVE, corner
+from tests.bake.interreflection.test_interreflection import FROM_ABOVE, corner
 
 SIZE, BOUNCES = (20, 20), Bounces((16, 1, 1), 64, frozenset({"black"}))
 PAINT = Material(kd=(0.6, 0.4, 0.3))

@@ -27,7 +27,7 @@ from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.source import materials_in_views
 from lambent.store.store import Store
-from tests.bake.test_interreflection import FROM_ABOVE, corner
+from tests.bake.interreflection.test_interreflection import FROM_ABOVE, corner
 
 VIEW = View(FROM_ABOVE, 48, 48)
 KINDS = {"floor": Material(kd=0.6), "back": Material(kd=0.5), "side": Material(kd=0.4), "ball": Material(kd=0.7)}

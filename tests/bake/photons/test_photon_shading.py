@@ -16,7 +16,7 @@ from lambent.materials.document import Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import DirectionalLight, Mesh, Scene, SceneObject
 from tests.bake.small_scenes import BLACK
-from tests.bake.test_photon_density import map_of
+from tests.bake.photons.test_photon_density import map_of
 
 TILT_DEG = 30.0
 SCREENS = {"right": 1.0, "left": -1.0}

@@ -25,15 +25,15 @@ from lambent.scenes.scene import (
     SunSky,
 )
 from lambent.scenes.sky.triangle_lights import joined, small_lights
-from tests.bake.test_luminaires import LAMP
-from tests.bake.test_transport import View
+from tests.bake.tracing.test_luminaires import LAMP
+from tests.bake.transport.test_transport import View
 from tests.tools.z_test import assert_same_image
 
 SIZE = 12
 CAMERA = Camera("above", (0.0, 2.2, 3.2), (0.0, 0.2, 0.0), fov_y_deg=12.0)  # every pixel well inside of one surface
 SATIN = Material(kd=(0.3, 0.2, 0.1), lobes=(Lobe(mx=0.3, my=0.3, r0=0.4, k=(0.8, 0.8, 0.8)),))
 DULL = Material(kd=(0.6, 0.5, 0.4))
-PROBES = Path(__file__).parents[2].parent / "shared/data/environments"
+PROBES = Path(__file__).parents[3].parent / "shared/data/environments"
 SAMPLED = 4  # places in each pixel along x and y
 FLOOR = 0.01  # of the pixel: what triangles instead of the light itself, and places instead of areas, may cost
 

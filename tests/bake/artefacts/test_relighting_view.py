@@ -21,7 +21,7 @@ from lambent.scenes.scene import ConstantEnvironment, ImageEnvironment, PointLig
 from lambent.store.contract import view_artefact_name
 from lambent.store.store import Store
 from tests.bake.small_scenes import GREY
-from tests.bake.test_transport import GLOSSY
+from tests.bake.transport.test_transport import GLOSSY
 from tests.tools.z_test import assert_same_image
 
 SIZE = (16, 12)

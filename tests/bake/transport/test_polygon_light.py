@@ -15,7 +15,7 @@ from lambent.scenes.geometry import box, patch
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.scenes.sky.triangle_lights import surface_triangles
 from tests.bake.small_scenes import turned_inwards
-from tests.bake.test_transport import view
+from tests.bake.transport.test_transport import view
 
 CEILING = np.array([[[0, 0, 1], [200, 0, 1], [200, 100, 1]], [[0, 0, 1], [200, 100, 1], [0, 100, 1]]], float)
 

@@ -18,8 +18,8 @@ from lambent.materials.factored.roughness import narrowed, thinned
 from lambent.materials.lobes import NUMPY
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import ConstantEnvironment, ImageEnvironment, MaterialTextures, Scene, SceneObject, Texture
-from tests.bake.test_relighting_view import sky
-from tests.bake.test_transport_converges import CAMERA, SIZE, direct_light, scene
+from tests.bake.artefacts.test_relighting_view import sky
+from tests.bake.transport.test_transport_converges import CAMERA, SIZE, direct_light, scene
 from tests.tools.z_test import assert_same_image
 
 GLOSSY = Material(kd=(0.1, 0.1, 0.1), lobes=(Lobe(mx=0.2, my=0.2, r0=0.5, alpha=0.3),))

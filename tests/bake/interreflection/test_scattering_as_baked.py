@@ -27,7 +27,7 @@ from lambent.materials.factored.terms import Editable
 from lambent.materials.models.blinn_phong import BlinnPhong
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import MaterialTextures, Scene, SceneObject, Texture
-from tests.bake.test_interreflection import SIZE, baked, of_scene, path_traced, picture
+from tests.bake.interreflection.test_interreflection import SIZE, baked, of_scene, path_traced, picture
 from tests.tools.z_test import assert_same_image
 
 SHINY = Material(kd=(0.3, 0.2, 0.1), lobes=(Lobe(mx=0.15, my=0.15, r0=0.5, k=(0.6, 0.8, 0.9), alpha=0.5),))
