@@ -68,9 +68,10 @@ def test_figures_and_maps():
     comparison = Comparison()
     comparison.mode = "error map"
     b = np.random.default_rng(5).random((32, 32, 3)).astype(np.float32)
-    assert comparison.due("here", 1)
+    assert comparison.due("here", (0, 8))
     comparison.compare(1.2 * b, b, "linear", 0.0, (0, 8))
-    assert not comparison.due("here", 15) and comparison.due("here", 16)
+    assert not comparison.due("here", (0, 15)) and comparison.due("here", (0, 16))
+    assert comparison.due("here", (1, 8)), "the slower picture counts as well"
     comparison._work.wait()
     comparison.tick()
     figures = comparison.figures
@@ -81,7 +82,7 @@ def test_figures_and_maps():
     comparison.kind = "FLIP"
     comparison.tick()
     assert comparison.map.shape == (32, 32, 4) and (comparison.map != by_difference).any()
-    assert comparison.due("elsewhere", 1) and comparison.map is None
+    assert comparison.due("elsewhere", (0, 1)) and comparison.map is None
 
 
 def test_places_on_the_screen():

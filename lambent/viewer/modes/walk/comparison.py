@@ -74,7 +74,7 @@ class Comparison:
         self._flip: Floats | None = None
         self._work: Work | None = None
         self._of: object = None
-        self._next = 1  # number of samples for the next comparison
+        self._compared: tuple[int, int] | None = None  # samples of A and B at the last comparison of `_of`
         self._painted: object = None  # values drawn in `map`
 
     @property
@@ -90,12 +90,12 @@ class Comparison:
     def busy(self) -> bool:
         return self._work is not None
 
-    def due(self, of: object, samples: int) -> bool:
-        """Whether to compare the pictures of `of` now: when the samples have doubled."""
+    def due(self, of: object, samples: tuple[int, int]) -> bool:
+        """Whether to compare the pictures of `of` now: when the samples of either have doubled."""
         if of != self._of:
             self.forget()
-            self._of, self._next = of, 1
-        return samples >= self._next
+            self._of, self._compared = of, None
+        return self._compared is None or any(n > 0 and n >= 2 * k for n, k in zip(samples, self._compared, strict=True))
 
     def forget(self) -> None:
         """Drop maps and work for earlier pictures; keep the figures."""
@@ -105,7 +105,7 @@ class Comparison:
 
     def compare(self, a: Floats, b: Floats, view: str, exposure_ev: float, samples: tuple[int, int]) -> None:
         """Compare pictures (H, W, 3) of radiance with `samples` per pixel; FLIP runs in the background."""
-        self._next = 2 * max(1, *samples)
+        self._compared = samples
         self._difference = difference(a, b)
         pair = [shown(np.asarray(x, np.float32), view, exposure_ev) for x in (b, a)]
         figures, before = Figures(psnr(pair[0], pair[1]), float(self._difference.mean()), samples), self.figures

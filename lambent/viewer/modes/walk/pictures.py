@@ -297,7 +297,7 @@ class Pictures(Pair):
         if not at_rest or not a.readable or not b.readable or a.size != b.size:
             comparison.figures = comparison.figures if at_rest else None
             comparison.forget()
-        elif comparison.due(of, max(1, a.samples, b.samples)):
+        elif comparison.due(of, (a.samples, b.samples)):
             view, exposure_ev = look.display_transform, look.exposure_ev
             comparison.compare(a.read(), b.read(), view, exposure_ev, (a.samples, b.samples))
         comparison.tick()
