@@ -20,8 +20,8 @@ from lambent.scenes.geometry import box, placed, sphere
 from lambent.scenes.scene import ImageEnvironment, Mesh, Scene, SceneObject
 from lambent.store.store import Store
 from lambent.store.sunlit import GEOMETRY
+from tests.bake.sky.test_sun import disc
 from tests.bake.small_scenes import TINY, turned_inwards
-from tests.bake.test_sun import disc
 from tests.realtime.test_realtime_sun import DOWN, TOWARDS, drawn, floor, places, plate, traced
 
 FINE = TINY.changed("fine", geometry={"texels": 320}, light_map={"samples": (4, 4)})

@@ -22,8 +22,8 @@ from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.geometry.directions import normalize
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import DirectionalLight, PointLight, Scene, SceneObject
+from tests.bake.sky.test_sun import SKY, TOWARDS, disc, environment_file, suns, wall_with_an_opening
 from tests.bake.small_scenes import GREY
-from tests.bake.test_sun import SKY, TOWARDS, disc, environment_file, suns, wall_with_an_opening
 
 Floats = NDArray[np.floating]
 

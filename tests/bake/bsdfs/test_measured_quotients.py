@@ -18,7 +18,7 @@ from lambent.materials.factored.tabulated import Grid, Tabulated
 from lambent.materials.lobes import NUMPY
 from lambent.materials.measured.homomorphic import HomomorphicTable
 from lambent.scenes.sky.triangle_lights import environment_triangles
-from tests.bake.test_transport import GLOSSY, ball_on_floor, environment, view
+from tests.bake.transport.test_transport import GLOSSY, ball_on_floor, environment, view
 
 RNG = np.random.default_rng(5)
 

@@ -29,7 +29,7 @@ from dataclasses import replace
 from pathlib import Path
 from lambent.bake.bake import bake
 from tests.bake.small_scenes import room_with_step
-from tests.bake.test_resume import TILED
+from tests.bake.running.test_resume import TILED
 bake(room_with_step(), Path(sys.argv[1]), quality=TILED, only=["light_map"])
 """
 
@@ -46,7 +46,7 @@ def keys(store: Store) -> dict[str, str]:
 def test_killed_and_resumed_is_the_same_bit_for_bit(tmp_path: Path) -> None:
     whole = bake(room_with_step(), tmp_path / "whole", quality=TILED, only=["light_map"])
     path = tmp_path / "killed"
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     tiles = len(whole.artefact("light_map/traced").done)
     for chunks in (1, tiles + 1):  # killed in the path traced map, then in the gathered one
         process = subprocess.Popen([sys.executable, "-c", BAKE, str(path)], cwd=root)

@@ -21,8 +21,8 @@ from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import DirectionalLight, MaterialTextures, Mesh, Scene, SceneObject, Texture
+from tests.bake.sky.test_sun import TOWARDS, disc, environment_file
 from tests.bake.small_scenes import BLACK, GREY
-from tests.bake.test_sun import TOWARDS, disc, environment_file
 
 Floats = NDArray[np.floating]
 IRRADIANCE = np.array([3.0, 2.0, 1.0])

@@ -24,7 +24,7 @@ from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.store.store import Store
-from tests.bake.test_interreflection import FIRST, FROM_ABOVE, corner, of_scene
+from tests.bake.interreflection.test_interreflection import FIRST, FROM_ABOVE, corner, of_scene
 
 BOUNCES = Bounces((16, 1, 1), samples=64, fixed=frozenset({"side"}))
 VIEW = View(FROM_ABOVE, 16, 16)
