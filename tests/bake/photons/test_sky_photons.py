@@ -13,8 +13,8 @@ from lambent.bake.photons.maps import BATCHES, FEWEST, shot_of
 from lambent.bake.photons.shooting import learnt_sky, shoot
 from lambent.scenes.scene import ConstantEnvironment
 from lambent.store.store import Store
-from tests.bake.small_scenes import TINY, furnace
 from tests.bake.sky.test_sky_guide import HALF, built, pit, sunny
+from tests.bake.small_scenes import TINY, furnace
 
 SMALL = TINY.changed(light_map={"photons_per_texel": 64, "max_depth": 8})
 
