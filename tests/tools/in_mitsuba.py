@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,3 +33,43 @@ def f_cos(bsdf: Any, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
 
     plugin = mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
     return np.array(plugin.eval(mi.BSDFContext(), interaction(wo), vectors(wi)), dtype=float).T
+
+
+def random_directions(n: int, seed: int, lowest_cosine: float = 0.05, *, both: bool = True) -> np.ndarray:
+    """(n, 3) float32 directions on both sides of the surface, or above it; cosines are uniform."""
+    from lambent.core.geometry.directions import direction
+
+    rng = np.random.default_rng(seed)
+    cosine = rng.uniform(lowest_cosine, 1, n) * (rng.choice([-1, 1], n) if both else 1)
+    return direction(np.arccos(cosine), rng.uniform(0, 2 * np.pi, n)).astype(np.float32)
+
+
+def square(folder: Path, bsdf: dict[str, Any], axes: np.ndarray, tangent: np.ndarray) -> Any:
+    """Scene of a square of 2 m along `axes` (2, 3), whose vertices have this brushing direction (3,)."""
+    import mitsuba as mi
+
+    mesh = mi.Mesh("square", 4, 2)
+    parameters = mi.traverse(mesh)
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) @ axes
+    parameters["vertex_positions"], parameters["faces"] = corners.ravel().astype(np.float32), [0, 1, 2, 0, 2, 3]
+    parameters.update()
+    mesh.add_attribute("vertex_tangent", 3, list(tangent) * 4)
+    mesh.write_ply(str(folder / "square.ply"))
+    return mi.load_dict({"type": "scene", "s": {"type": "ply", "filename": str(folder / "square.ply"), "bsdf": bsdf}})
+
+
+def sampler_of(plugin: Any, wo: np.ndarray) -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
+    """`sample(u)` and `density(w)`, for `chi_square`, of a BSDF seen from `wo` (3,); rejected samples are (1, 0, 0)."""
+    import mitsuba as mi
+
+    context = mi.BSDFContext()
+
+    def sample(u: np.ndarray) -> np.ndarray:
+        si, u = interaction(np.tile(wo, (len(u), 1))), u.astype(np.float32)
+        bs, _ = plugin.sample(context, si, mi.Float(u[:, 0]), mi.Point2f(np.ascontiguousarray(u[:, 1:].T)))
+        return np.where(np.array(bs.pdf)[:, None] > 0, np.array(bs.wo).T, [1.0, 0.0, 0.0]).astype(float)
+
+    def density(w: np.ndarray) -> np.ndarray:
+        return np.array(plugin.pdf(context, interaction(np.tile(wo, (len(w), 1))), vectors(w)), float)
+
+    return sample, density

@@ -8,8 +8,9 @@ import pytest
 from lambent.bake.bsdfs.material_plugin import PLUGIN, material_dict
 from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.checking.chi_square import chi_square
 from lambent.materials.document import Lobe, Material
-from tests.tools.in_mitsuba import interaction
+from tests.tools.in_mitsuba import interaction, random_directions, sampler_of, square, vectors
 
 BRUSHED = Lobe(mx=0.3, my=0.07, k=(0.5, 0.6, 0.7), r0=(0.5, 0.6, 0.7), alpha=0.43)
 MATERIALS = {
@@ -27,65 +28,32 @@ MATERIALS = {
 }
 
 
-def random_directions(n, seed, lowest_cosine=0.02):
-    rng = np.random.default_rng(seed)
-    cosine = rng.uniform(lowest_cosine, 1, n) * rng.choice([-1, 1], n)
-    return direction(np.arccos(cosine), rng.uniform(0, 2 * np.pi, n))
-
-
 @pytest.mark.parametrize("name", MATERIALS)
-def test_eval_and_pdf_equal_numpy(mi, name):
+def test_values_densities_and_samples_equal_numpy(mi, name):
     material = MATERIALS[name]
     plugin, model = mi.load_dict(material_dict(material)), MaterialBSDF(material)
-    wo = random_directions(20_000, 1).astype(np.float32)
-    wi = random_directions(20_000, 2).astype(np.float32)
-    value, density = plugin.eval_pdf(mi.BSDFContext(), interaction(wo), mi.Vector3f(wi.T))
+    wi, wo = (random_directions(20_000, seed, 0.02) for seed in (1, 2))
+    value, density = (np.array(v).T for v in plugin.eval_pdf(mi.BSDFContext(), interaction(wo), vectors(wi)))
     expected = model.eval(wi, wo) * np.abs(wi[:, 2:])
     assert expected.max() > 0.01
-    np.testing.assert_allclose(np.array(value).T, expected, rtol=1e-4, atol=1e-12)
-    np.testing.assert_allclose(np.array(density), model.pdf(wi, wo), rtol=1e-4, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", MATERIALS)
-def test_sample_agrees_with_eval_pdf_and_numpy(mi, name):
-    material = MATERIALS[name]
-    plugin = mi.load_dict(material_dict(material))
-    wo = random_directions(20_000, 3).astype(np.float32)
+    np.testing.assert_allclose(value, expected, rtol=1e-4, atol=1e-12)
+    np.testing.assert_allclose(density, model.pdf(wi, wo), rtol=1e-4, atol=1e-12)
     u = np.random.default_rng(4).random((20_000, 3)).astype(np.float32)
-    si = interaction(wo)
-    bs, weight = plugin.sample(mi.BSDFContext(), si, mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T))
-    value, density = plugin.eval_pdf(mi.BSDFContext(), si, bs.wo)
-    density, weight, value = np.array(density), np.array(weight).T, np.array(value).T
-    good = np.array(bs.pdf) > 1e-3
+    bs, weight = plugin.sample(mi.BSDFContext(), interaction(wo), mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T))
+    value, density = (np.array(v).T for v in plugin.eval_pdf(mi.BSDFContext(), interaction(wo), bs.wo))
+    good, weight = np.array(bs.pdf) > 1e-3, np.array(weight).T
     assert good.mean() > 0.5
     np.testing.assert_allclose(np.array(bs.pdf)[good], density[good], rtol=1e-3)
     np.testing.assert_allclose(weight[good] * density[good, None], value[good], rtol=2e-3, atol=1e-6)
-    same = np.linalg.norm(np.array(bs.wo).T - MaterialBSDF(material).sample(wo, u), axis=-1) < 1e-4
+    same = np.linalg.norm(np.array(bs.wo).T - model.sample(wo, u), axis=-1) < 1e-4
     assert same.mean() > 0.998  # float32 may choose another component where u_select lies on the border
 
 
-@pytest.mark.parametrize("name", ["beckmann", "ggx", "retro", "mixture"])
-def test_chi_square(mi, name, tmp_path, monkeypatch):
-    from mitsuba.chi2 import ChiSquareTest, SphericalDomain
-
+@pytest.mark.parametrize("name", ["retro", "mixture"])
+def test_samples_follow_the_density(mi, name):
     plugin = mi.load_dict(material_dict(MATERIALS[name]))
-    context, wo = mi.BSDFContext(), direction(np.radians(50), 0.4)
-
-    def sample_func(u):
-        n = u.shape[1]
-        bs, _ = plugin.sample(context, interaction(np.tile(wo, (n, 1))), u[0], mi.Point2f(u[1], u[2]))
-        return bs.wo, mi.Float(mi.Bool(bs.pdf > 0))
-
-    def pdf_func(w):
-        import drjit as dr
-
-        return plugin.pdf(context, interaction(np.tile(wo, (dr.width(w), 1))), w)
-
-    test = ChiSquareTest(
-        SphericalDomain(), sample_func, pdf_func, sample_dim=3, sample_count=1_000_000, res=101, ires=8
-    )
-    monkeypatch.chdir(tmp_path)  # a failing test writes its data to the working folder
-    assert test.run(), test.messages
+    test = chi_square(*sampler_of(plugin, direction(np.radians(50), 0.4)), samples=400_000)
+    assert test.p_value > 1e-3 and test.pdf_integral + test.rejected_share == pytest.approx(1, abs=2e-3)
 
 
 def test_closed_box_of_albedo_and_emission_one_half_has_radiance_one(mi):
@@ -111,14 +79,14 @@ def test_furnace_of_a_mirror_like_sphere_shows_the_models_albedo(mi):
             "ball": {"type": "sphere", "bsdf": material_dict(material)},
         }
     )
-    seen = np.array(mi.render(scene, spp=20_000)).mean()
+    seen = np.array(mi.render(scene, spp=4_000)).mean()
     half_width = 19 * np.tan(np.radians(0.5))  # of the square that is seen, on a sphere of radius 1
     cosine = 1 - half_width**2 / 3  # its mean
     expected = MaterialBSDF(material).albedo(direction(np.arccos(cosine), 0.0), samples=200_000).mean()
-    assert seen == pytest.approx(expected, rel=0.005)
+    assert seen == pytest.approx(expected, rel=0.01)
 
 
-@pytest.mark.parametrize("apart_deg", [0.0, 1.0, 4.0, 60.0])
+@pytest.mark.parametrize("apart_deg", [0.0, 4.0])
 def test_a_plane_of_retro_tape_shines_back_at_the_lamp(mi, apart_deg):
     """Lit by a small lamp so many degrees from the camera, a plane shows f cos_i I/d^2."""
     tape = Material(kd=0.1, lobes=(Lobe(retro=True, mx=0.02, my=0.02, k=0.4, r0=1.0, alpha=-1.0),))
@@ -160,54 +128,27 @@ def closed(bsdf, radiance, mi):
     )
 
 
-def square_with_tangent(mi, folder, tangent):
-    mesh = mi.Mesh("square", 4, 2)
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = [-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0]
-    parameters["faces"] = [0, 1, 2, 0, 2, 3]
-    parameters.update()
-    mesh.add_attribute("vertex_tangent", 3, list(tangent) * 4)
-    file = folder / "square.ply"
-    mesh.write_ply(str(file))
-    return {"type": "ply", "filename": str(file)}
-
-
-@pytest.mark.parametrize("degrees", [0.0, 90.0, 30.0, -120.0])
+@pytest.mark.parametrize("degrees", [None, 30.0, -120.0])
 def test_vertex_tangent_is_the_brushing_direction(mi, tmp_path, degrees):
-    """Evaluated on a mesh with that tangent, the plugin equals numpy in the frame (t, n x t, n)."""
-    material = MATERIALS["mixture"]
-    angle = np.radians(degrees)
-    t, b, n = (
-        np.array([np.cos(angle), np.sin(angle), 0]),
-        np.array([-np.sin(angle), np.cos(angle), 0]),
-        np.array([0, 0, 1.0]),
-    )
-    scene = mi.load_dict(
-        {"type": "scene", "square": square_with_tangent(mi, tmp_path, t) | {"bsdf": material_dict(material)}}
-    )
-    wo_world, wi_world = direction(0.5, 1.0), direction(0.4, 3.9)
-    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(wo_world * 2 + [0.1, 0.2, 0]), mi.Vector3f(-wo_world)))
-    assert si.is_valid()[0]
-    frame = np.stack([t, b, n])
-    expected = MaterialBSDF(material).eval(frame @ wi_world, frame @ wo_world) * (frame @ wi_world)[2]
-    value = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(mi.Vector3f(wi_world)))
-    np.testing.assert_allclose(np.array(value).ravel(), expected, rtol=1e-4)
+    """Evaluated on a mesh with that tangent, the plugin equals numpy in the frame (t, n x t, n).
 
+    Without tangents the frame is that of the surface.
+    """
+    model, bsdf = MaterialBSDF(MATERIALS["mixture"]), material_dict(MATERIALS["mixture"])
+    wo, wi = direction(0.5, 1.0), direction(0.4, 3.9)
+    if degrees is None:
+        scene = mi.load_dict({"type": "scene", "square": {"type": "rectangle", "bsdf": bsdf}})
+    else:
+        c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        scene, frame = square(tmp_path, bsdf, np.eye(3)[:2], (c, s, 0)), np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(wo * 2 + [0.1, 0.2, 0]), mi.Vector3f(-wo)))
+    if degrees is None:
+        frame = np.stack([np.array(v).ravel() for v in (si.sh_frame.s, si.sh_frame.t, si.sh_frame.n)])
+    value = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(mi.Vector3f(wi)))
+    np.testing.assert_allclose(np.array(value).ravel(), model.eval(frame @ wi, frame @ wo) * wi[2], rtol=1e-4)
     bs, _ = si.bsdf().sample(mi.BSDFContext(), si, mi.Float(0.9), mi.Point2f(0.3, 0.4))
     sampled = frame @ np.array(si.to_world(bs.wo)).ravel()
-    wanted = MaterialBSDF(material).sample(frame @ wo_world, np.array([0.9, 0.3, 0.4]))
-    np.testing.assert_allclose(sampled, wanted, atol=1e-5)
-
-
-def test_without_tangents_the_frame_is_used(mi):
-    material = MATERIALS["mixture"]
-    scene = mi.load_dict({"type": "scene", "square": {"type": "rectangle", "bsdf": material_dict(material)}})
-    wo, wi = direction(0.5, 1.0), direction(0.4, 3.9)
-    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(wo * 2), mi.Vector3f(-wo)))
-    value = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(mi.Vector3f(wi)))
-    frame = np.stack([np.array(v).ravel() for v in (si.sh_frame.s, si.sh_frame.t, si.sh_frame.n)])
-    expected = MaterialBSDF(material).eval(frame @ wi, frame @ wo) * wi[2]
-    np.testing.assert_allclose(np.array(value).ravel(), expected, rtol=1e-4)
+    np.testing.assert_allclose(sampled, model.sample(frame @ wo, np.array([0.9, 0.3, 0.4])), atol=1e-5)
 
 
 def test_flags_components_and_switches(mi):

@@ -17,7 +17,7 @@ from lambent.materials.measured.protocol import TableInfo
 from lambent.materials.measured.tables.half_vector_grid import GridShape
 from lambent.materials.measured.tables.half_vector_resampling import grid_of
 from lambent.materials.measured.tables.patch_sheet import lookup_of
-from tests.tools.in_mitsuba import interaction
+from tests.tools.in_mitsuba import interaction, random_directions, sampler_of
 
 SMALL = GridShape(8, 8, 64, 32)
 
@@ -64,12 +64,6 @@ def patches(mi):
     parts = {("reflection", 1): blind(1), ("transmission", 1): blind(0), ("transmission", -1): blind(-1)}
     table = LbnlTable("blind", parts)
     return table, mi.load_dict(table_dict(table))
-
-
-def random_directions(n, seed, lowest_cosine=0.05, both=True):
-    rng = np.random.default_rng(seed)
-    cosine = rng.uniform(lowest_cosine, 1, n) * (rng.choice([-1, 1], n) if both else 1)
-    return direction(np.arccos(cosine), rng.uniform(0, 2 * np.pi, n)).astype(np.float32)
 
 
 def test_eval_and_pdf_equal_numpy(mi, sheet):
@@ -121,44 +115,15 @@ def test_samples_of_patches_weigh_the_albedo(mi, patches):
     assert (f > 0)[kept].mean() > 0.999
 
 
-@pytest.mark.parametrize("theta_deg", [3.0, 50.0, 120.0])
-def test_chi_square_of_patches(mi, patches, theta_deg):
-    """In cells along the borders of the patches: Mitsuba's own test integrates across steps."""
-    table, plugin = patches
-    context, wo = mi.BSDFContext(), direction(np.radians(theta_deg), 0.4)
-
-    def draw(u):
-        si, u = interaction(np.tile(wo, (len(u), 1))), u.astype(np.float32)
-        bs, _ = plugin.sample(context, si, mi.Float(u[:, 0]), mi.Point2f(np.ascontiguousarray(u[:, 1:].T)))
-        return np.where(np.array(bs.pdf)[:, None] > 0, np.array(bs.wo).T, [1.0, 0.0, 0.0]).astype(float)
-
-    def density(w):
-        si = interaction(np.tile(wo, (len(w), 1)))
-        return np.array(plugin.pdf(context, si, mi.Vector3f(np.ascontiguousarray(w.T, np.float32))), float)
-
-    test = chi_square(draw, density, samples=500_000, cells=lookup_of(table).cell_borders(wo))
-    assert test.p_value > 1e-3 and test.pdf_integral + test.rejected_share == pytest.approx(1, abs=2e-4)
-
-
-@pytest.mark.parametrize("theta_deg", [0.0, 50.0, 120.0])
-def test_chi_square(mi, sheet, theta_deg, tmp_path, monkeypatch):
-    import drjit as dr
-    from mitsuba.chi2 import ChiSquareTest, SphericalDomain
-
-    _, plugin = sheet
-    context, wo = mi.BSDFContext(), direction(np.radians(theta_deg), 0.4)
-
-    def sample_func(u):
-        si = interaction(np.tile(wo, (u.shape[1], 1)))
-        bs, _ = plugin.sample(context, si, u[0], mi.Point2f(u[1], u[2]))
-        return bs.wo, mi.Float(mi.Bool(bs.pdf > 0))
-
-    def pdf_func(w):
-        return plugin.pdf(context, interaction(np.tile(wo, (dr.width(w), 1))), w)
-
-    monkeypatch.chdir(tmp_path)  # a failing test writes its data to the working folder
-    test = ChiSquareTest(SphericalDomain(), sample_func, pdf_func, sample_dim=3, sample_count=1_000_000, ires=32)
-    assert test.run(), test.messages
+@pytest.mark.parametrize(("lookup", "theta_deg"), [("sheet", 50), ("sheet", 120), ("patches", 3), ("patches", 120)])
+def test_samples_follow_the_density(request, lookup, theta_deg):
+    """Patches in cells along their borders."""
+    table, plugin = request.getfixturevalue(lookup)
+    wo = direction(np.radians(theta_deg), 0.4)
+    cells = lookup_of(table).cell_borders(wo) if lookup == "patches" else None
+    test = chi_square(*sampler_of(plugin, wo), samples=300_000, cells=cells)
+    assert test.p_value > 1e-3
+    assert test.pdf_integral + test.rejected_share == pytest.approx(1, abs=2e-3 if cells is None else 2e-4)
 
 
 def test_closed_box_of_albedo_and_emission_one_half_has_radiance_one(mi):
@@ -177,26 +142,6 @@ def test_closed_box_of_albedo_and_emission_one_half_has_radiance_one(mi):
         }
     )
     assert np.array(mi.render(scene, spp=256)).mean() == pytest.approx(1.0, abs=0.003)
-
-
-def test_vertex_tangent_is_the_brushing_direction(mi, sheet, tmp_path):
-    grid, _ = sheet
-    t, b = np.array([0.6, 0.8, 0.0]), np.array([-0.8, 0.6, 0.0])
-    mesh = mi.Mesh("square", 4, 2)
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = [-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0]
-    parameters["faces"] = [0, 1, 2, 0, 2, 3]
-    parameters.update()
-    mesh.add_attribute("vertex_tangent", 3, list(t) * 4)
-    mesh.write_ply(str(tmp_path / "square.ply"))
-    square = {"type": "ply", "filename": str(tmp_path / "square.ply"), "bsdf": table_dict(grid)}
-    scene = mi.load_dict({"type": "scene", "square": square})
-    wo, wi = direction(0.5, 1.0), direction(0.4, 3.9)
-    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(wo * 2 + [0.1, 0.2, 0]), mi.Vector3f(-wo)))
-    frame = np.stack([t, b, [0, 0, 1]])
-    expected = np.array(grid.evaluate(components(frame @ wi), components(frame @ wo))) * wi[2]
-    value = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(mi.Vector3f(wi)))
-    np.testing.assert_allclose(np.array(value).ravel(), expected, rtol=1e-3)
 
 
 def test_components_are_the_two_sides(mi, sheet):
