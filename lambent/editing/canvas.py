@@ -1,7 +1,6 @@
 """Canvases of an edited picture: terms are added, pixel by pixel, to the unedited part.
 
-`HostCanvas` is in memory and the reference. `lambent.realtime.edited` implements the same on a GPU; the window combines
-both (`lambent.viewer.edits.edited`).
+`HostCanvas` is in memory and the reference. `lambent.viewer.edits.edited` implements the same on a GPU.
 """
 
 from __future__ import annotations

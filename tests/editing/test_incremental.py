@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.baked.transport.wavelets import transformed
 from lambent.editing.incremental import IncrementalPicture
 from lambent.editing.products import HostProducts, add_rows
 
@@ -56,45 +55,3 @@ def test_frames_finish_a_large_edit() -> None:
     assert picture.is_exact
     assert errors[0] > errors[1] > errors[2]
     assert errors[2] < 1e-5
-
-
-def test_incremental_picture_is_the_dense_one() -> None:
-    transport = random_transport()
-    incremental, whole = IncrementalPicture(HostProducts(transport)), IncrementalPicture(HostProducts(transport))
-    curve = np.random.default_rng(6).random((64, 3))
-    incremental.want(curve)
-    while not incremental.is_exact:
-        incremental.step(terms=5)
-    whole.want(curve)
-    whole.draw()
-    assert np.allclose(incremental.picture, whole.picture, rtol=1e-6, atol=1e-6 * whole.picture.max())
-
-
-def test_wavelets_draw_the_picture_of_the_bands() -> None:
-    """In float32, which tells the transform from the rounding of halves."""
-    transport = random_transport().astype(np.float32)
-    curve = np.random.default_rng(7).random((64, 3)).astype(np.float32)
-    bands = np.einsum("jc,jcp->cp", curve, transport)
-    wavelets = np.einsum("jc,jcp->cp", transformed(curve), transformed(transport))
-    assert np.allclose(wavelets, bands, rtol=1e-5)
-
-
-def test_ten_thousand_edits_do_not_drift() -> None:
-    transport = random_transport(32, 300)
-    picture, rng = IncrementalPicture(HostProducts(transport)), np.random.default_rng(8)
-    curve = rng.random((32, 3))
-    for _ in range(10_000):
-        curve[rng.integers(32)] = rng.random(3) * 10.0 ** rng.integers(-2, 3)
-        picture.want(curve)
-        picture.step(terms=4)
-    while not picture.is_exact:
-        picture.step()
-    truth = dense(transport, curve)
-    assert np.allclose(picture.picture, truth, rtol=1e-5, atol=2e-7 * np.abs(truth).max())
-
-
-def test_no_edit_is_no_work() -> None:
-    picture = IncrementalPicture(HostProducts(random_transport()))
-    picture.step()
-    assert picture.is_exact
-    assert not picture.picture.any()

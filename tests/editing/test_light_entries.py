@@ -43,12 +43,6 @@ def test_the_first_number_may_be_far_too() -> None:
     assert light.largest == 8
 
 
-def test_fewer_bytes_than_numbers_in_full() -> None:
-    entries = tile(200, 5000, 0.06, 3)
-    light = TermLight.of_tiles([entries], np.ones(200, np.float32), (64,))
-    assert light.steps.nbytes + light.values.nbytes < 0.65 * (entries[1].nbytes + entries[2].nbytes)
-
-
 @pytest.mark.parametrize("scale", [1e-4, 1.0, 3e3])
 def test_rows_of_very_bright_light_are_the_sums_of_its_entries(scale: float) -> None:
     """Four tails in two cells, eight bands in two rows; half floats end at 65504."""

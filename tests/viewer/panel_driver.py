@@ -5,6 +5,9 @@ import functools
 from imgui_bundle import imgui, implot
 
 from lambent.viewer import layout
+from lambent.viewer.mode import Drawing
+from lambent.viewer.modes.walk.input import WalkInput
+from lambent.viewer.modes.walk.mode import WalkMode
 
 RECORDED = (
     "slider_float", "slider_float3", "slider_int", "combo", "checkbox", "radio_button", "button", "selectable",
@@ -87,6 +90,11 @@ class PanelDriver(Frames):
     def type(self, text):
         self.io.add_input_characters_utf8(text)
         self.frame()
+
+
+def walk_mode(state, geometry):
+    """The walk mode without a drawing."""
+    return WalkMode(state, WalkInput(state, geometry), Drawing(None))
 
 
 def recording(setattr_of, rects):

@@ -4,7 +4,6 @@ import pytest
 
 from lambent.core.pictures.images import read_image
 from lambent.editing.session.session import Session
-from lambent.store.contract import baked_views, transport_lights
 from lambent.store.store import Store
 from tests.viewer.window_session import VirtualScreen, WindowSession, missing_tools
 
@@ -36,9 +35,13 @@ def opened(adapter, screen):
 
 
 def test_a_scene_is_baked_edited_and_opened_again(opened, tmp_path):
+    first = opened("builtin:teatray", tmp_path)
+    assert first.state()["lights"] == 0 and first.state()["baking"], "the window is there at once"
+    first.wait_for(lambda state: state["lights"] == 400)
+    assert first.close() == 0, first.log()
+    with Store.open(tmp_path / "teatray.edit.store") as store:
+        store.set_document("written by", "the test")  # the bake has ended with its window
     session = opened("builtin:teatray", tmp_path)
-    assert session.state()["lights"] == 0 and session.state()["baking"], "the window is there at once"
-    session.wait_for(lambda state: state["lights"] >= 400)
     session.wait_for(lambda state: state["lights"] == 4000 and state["baking"] is None and not state["busy"])
     before = session.state()
     assert before["picture"] == [600, 600] and before["brightness"] > 0.01 and not before["trouble"]
@@ -108,20 +111,6 @@ def pull(session, begin, end):
     session.drag((x, top + begin * (bottom - top)), (x, top + end * (bottom - top)))
 
 
-def test_a_window_that_closes_early_ends_the_bake_which_goes_on_the_next_time(opened, tmp_path):
-    first = opened("builtin:teatray", tmp_path)
-    first.wait_for(lambda state: state["lights"] == 400)
-    assert first.close() == 0, first.log()
-    with Store.open(tmp_path / "teatray.edit.store") as store:
-        store.set_document("written by", "the test")  # nobody else writes
-        camera = next(iter(baked_views(store).values())).camera
-    second = opened("builtin:teatray", tmp_path)
-    second.wait_for(lambda state: state["lights"] == 4000 and state["baking"] is None)
-    store.refresh()
-    assert transport_lights(store, camera, PIXELS, PIXELS) == [400, 4000]
-    assert second.close() == 0, second.log()
-
-
 TWINS = """mtllib twins.mtl
 v -1 0 1\nv 1 0 1\nv 1 0 -1\nv -1 0 -1\nv -1 1.5 -1\nv 1 1.5 -1\nv 1 1.5 1
 vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1
@@ -129,33 +118,3 @@ o floor\nusemtl oak\nf 1/1 2/2 3/3 4/4
 o back\nusemtl plaster\nf 4/1 3/2 6/3 5/4
 o side\nusemtl stucco\nf 3/1 2/2 7/3 6/4
 """
-
-
-def test_twins_are_merged_and_a_finished_store_says_its_noise(opened, tmp_path):
-    (tmp_path / "twins.obj").write_text(TWINS)
-    kinds = {"oak": ".5 .3 .2", "plaster": ".6 .6 .6", "stucco": ".6 .6 .6"}
-    (tmp_path / "twins.mtl").write_text("".join(f"newmtl {name}\nKd {kd}\n" for name, kd in kinds.items()))
-    session = opened(tmp_path / "twins.obj", tmp_path)
-    before = session.wait_for(lambda state: state["lights"] == 4000 and state["baking"] is None and not state["busy"])
-    assert set(before["edited"]) == set(kinds)
-    fold(session, "Material", "View")
-    session.click(*session.point("Interreflections"))
-    session.wait_for(lambda state: "merge##stucco" in state["rects"])
-    session.settle()
-    session.click(*session.point("merge##stucco"))
-    merged = session.wait_for(lambda state: any("new transport" in text for text in state["messages"]))
-    assert merged["merged"] == {"stucco": "plaster"} and set(merged["edited"]) == {"oak", "plaster"}
-    there = session.wait_for(lambda state: state["baking"] is None and state["lights"] == 4000 and not state["busy"])
-    assert there["brightness"] == pytest.approx(before["brightness"], rel=0.01), "they look the same"
-    session.click(*session.point("bake"))
-    whole = session.wait_for(lambda state: state["samples"] == 1024 and not state["busy"])
-    assert whole["noise"] > 0 and whole["brightness"] > 1.02 * before["brightness"]
-    session.tool("key", "ctrl+s")
-    session.wait_for(lambda state: any("edits.json" in text for text in state["messages"]))
-    assert session.close() == 0, session.log()
-
-    again = opened(next(tmp_path.glob("*.edits.json")), tmp_path)
-    shown = again.wait_for(lambda state: state["samples"] == 1024 and not state["busy"])
-    assert shown["noise"] == pytest.approx(whole["noise"], rel=0.2) and shown["merged"] == {"stucco": "plaster"}
-    assert shown["baking"] is None, "nothing is baked again"
-    assert again.close() == 0, again.log()

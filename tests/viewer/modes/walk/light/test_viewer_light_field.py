@@ -12,18 +12,16 @@ from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.viewer.cameras.picking import Geometry
-from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.light.light_fields import FieldView, colours_of, map_image
 from lambent.viewer.modes.walk.markers import projected
-from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.panels.light_field import without
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.screen import Rect
 from tests.realtime.lit_ball import CAMERA, ball_scene, light_field
 from tests.viewer.drawn_frames import drawn
-from tests.viewer.panel_driver import PanelDriver
+from tests.viewer.panel_driver import PanelDriver, walk_mode
 
 SIZE = (160, 160)
 
@@ -142,7 +140,7 @@ def test_a_light_field_is_compared_with_the_single_probe(renderer, screen):
 
 
 def test_the_panel_picks_a_point_and_says_what_bakes_a_light_field(monkeypatch, state, geometry, field):
-    driver = PanelDriver(monkeypatch, WalkMode(state, WalkInput(state, geometry), Drawing(None)))
+    driver = PanelDriver(monkeypatch, walk_mode(state, geometry))
     try:
         state.fields.fields = {"table": field}
         driver.click("Light field", 0.3)

@@ -110,15 +110,6 @@ def test_channels_and_direction(panel):
     assert np.array_equal(values[:, [0, 2]], original[:, [0, 2]]) and values[0, 1] > original[0, 1]
 
 
-def test_amplification_on_a_log_axis(panel):
-    panel.click("amplify")
-    panel.click("y")
-    panel.click("log")
-    panel.pull((3.0, 5.0), (3.0, 50.0))
-    (layer,) = panel.layers()
-    assert (layer.kind, layer.base) == ("amplify_y", 0.0) and layer.size == pytest.approx(10, rel=0.05)
-
-
 def test_keys_work_over_the_plot_alone(panel):
     keys = {imgui.Key.l: lambda: panel.view.y.log, imgui.Key.a: lambda: panel.editor.state.tool == "amplify"}
     keys |= {imgui.Key.d: lambda: panel.editor.state.tool == "draw"}
@@ -215,17 +206,6 @@ def test_the_wheel_over_the_plot_scrolls_no_panel(open_panel):
     panel.io.add_mouse_wheel_event(0, -3)
     panel.frame(3)
     assert panel.editor.axes.place.y == top and panel.rects["highlight##curve"][:2] == (x, y)
-
-
-def test_escape_drops_the_drag(panel):
-    axes = panel.editor.axes
-    panel.move(*axes.pixel(2.0, 20.0))
-    panel.button(True)
-    panel.move(*axes.pixel(3.0, 25.0))
-    panel.tap(imgui.Key.escape)
-    panel.move(*axes.pixel(3.0, 28.0))
-    panel.button(False)
-    assert not panel.edit.curves and not panel.session.history.can_undo
 
 
 def test_another_material_ends_the_drag(panel):
@@ -345,17 +325,6 @@ def test_factors_of_a_table(open_panel, tmp_path, monkeypatch):
     assert red < 0.5 and green == blue == 1, "the first of the last term's three sliders"
     panel.undo()
     assert not panel.edit.tints and len(panel.layers()) == 2, "one step"
-
-
-def test_errors_are_shown(panel):
-    panel.view.y = type(panel.view.y)(0.0, 4e9)
-    panel.frame(2)
-    panel.pull((2.0, 1e9), (2.0, 3.9e9))
-    assert "too large" in panel.editor.state.strokes.message and not panel.edit.curves
-    panel.view.fit(panel.session.editable("gold").curves["highlight"].values)
-    panel.frame(2)
-    panel.pull((2.0, 20.0), (2.0, 25.0))
-    assert panel.editor.state.strokes.message == "" and len(panel.layers()) == 1
 
 
 @pytest.mark.parametrize("size", [NARROW, WIDE, (200, 300), (60, 40)])

@@ -187,18 +187,6 @@ def test_a_key_that_is_released_before_the_frame_takes_a_step(mouse, state):
     assert state.navigation.camera != stepped and not mouse.walking
 
 
-def test_walking(mouse, state):
-    send(mouse, "key_down", key="w")
-    assert mouse.walking
-    for _ in range(10):
-        mouse.walk(0.05)
-    send(mouse, "key_up", key="w")
-    assert not mouse.walking
-    assert state.navigation.camera.position[2] == pytest.approx(3 - 0.5 * cameras.WALK_M_S)
-    mouse.walk(0.05)
-    assert state.navigation.camera.position[2] == pytest.approx(3 - 0.5 * cameras.WALK_M_S)
-
-
 def test_shift_walks_faster_and_its_release_in_between_sticks_to_no_key(mouse, state):
     send(mouse, "key_down", key="Shift", modifiers=("Shift",))
     send(mouse, "key_down", key="W", modifiers=("Shift",))
@@ -271,14 +259,6 @@ def test_keys_of_views_and_recordings(mouse, state):
     assert state.navigation.camera.name == "view 1"
     send(mouse, "key_down", key="R")
     assert state.recordings.recorder.on
-
-
-def test_the_walkers_own_pace(mouse, state):
-    state.navigation.walker.speed_m_s = 0.5
-    before = state.navigation.camera.position
-    send(mouse, "key_down", key="w")
-    mouse.walk(0.2)
-    assert before[2] - state.navigation.camera.position[2] == pytest.approx(0.1)
 
 
 def test_who_stops_flying_comes_down(mouse, state):

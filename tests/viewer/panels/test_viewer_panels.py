@@ -8,21 +8,17 @@ from imgui_bundle import imgui
 from PIL import Image
 
 from lambent.core.light.false_colour import Range
-from lambent.materials.document import Lobe, load_material
+from lambent.materials.document import Lobe
 from lambent.scenes.scene import ImageTexture
 from lambent.store.contract import ReflectorPart, ReflectorRecord
 from lambent.store.kept.views import read_views
 from lambent.viewer import layout
 from lambent.viewer.look import SAMPLE_COUNTS
-from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.walk.comparison import Figures
-from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.light.metering import read
 from lambent.viewer.modes.walk.markers import Ball
-from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.screen import Statistics
-from tests.viewer.panel_driver import PanelDriver
+from tests.viewer.panel_driver import PanelDriver, walk_mode
 
 
 @pytest.fixture
@@ -39,10 +35,6 @@ def unfold(driver, *headers):
     driver.frame(2)
 
 
-def walk_mode(state, geometry):
-    return WalkMode(state, WalkInput(state, geometry), Drawing(None))
-
-
 def test_movement_and_cameras(panels, state):
     panels.click("orbit", 0.1)
     assert state.navigation.movement == "orbit"
@@ -51,17 +43,6 @@ def test_movement_and_cameras(panels, state):
     assert (state.navigation.movement, state.navigation.flying) == ("walk", True)
     panels.click("2  side##1", 0.1)
     assert state.navigation.camera == state.scene.cameras[1]
-
-
-def test_the_line_on_a_bake_moves_no_control(panels, state):
-    """A bake starts seconds after an edit, while the mouse may hold the next slider."""
-    state.answering.possible = state.rebaking.possible = True
-    panels.frame()
-    places = dict(panels.rects)
-    for line, done in (("baking again 0:07: starting", False), ("exact: baked again", True), ("", False)):
-        state.rebaking.line, state.rebaking.said = line, done
-        panels.frame()
-        assert panels.rects == places
 
 
 def test_the_texture_of_a_material(panels, state, tmp_path):
@@ -212,31 +193,6 @@ def test_the_colour_picker_edits_linear_coefficients(panels, state):
     panels.frame()
     kd = state.materials.edits.current("plaster").kd
     assert kd != (0.6, 0.6, 0.6) and all(0 <= v <= 1 for v in kd)
-
-
-def test_save(panels, state, tmp_path):
-    state.selection.name = "table"
-    panels.frame(2)
-    panels.click("save")
-    assert load_material(tmp_path / "brass.json") == state.scene.materials["brass"]
-    panels.click("##file", 0.9)
-    assert panels.io.want_text_input
-    panels.type("x")
-    assert "x" in state.materials.file_names["brass"]
-
-
-def test_everything_fits_the_column(panels, state):
-    """No control or label is cut off at the right edge."""
-    state.selection.name = "table"
-    state.screen.statistics = Statistics(
-        adapter="a rather long name of an adapter (LLVM 15.0.6, 256 bits)", gpu_ms={"shade": 1}
-    )
-    panels.click("Statistics", 0.3)
-    panels.click("Help", 0.3)
-    panels.frame(2)
-    assert len(panels.rects) > 20
-    width = panels.io.display_size.x
-    assert {label for label, rect in panels.rects.items() if rect[2] > width} == set()
 
 
 def test_a_message_does_not_end_a_drag(panels, state):

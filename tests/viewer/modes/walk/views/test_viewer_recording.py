@@ -91,14 +91,6 @@ def test_smoothing_takes_jerks_out_and_leaves_the_ends():
     assert smoothed(line[:2], 50.0).shape == (2, 2)
 
 
-def test_nothing_moved_is_no_path():
-    recording = Recording()
-    assert recording.path("w") is None
-    recording.take(at(0), 0.0)
-    recording.take(at(0), 9.0)
-    assert recording.path("w") is None
-
-
 def test_record_save_rename_delete(state, tmp_path):
     state.recordings.record()
     for k in range(1, 20):
@@ -179,14 +171,6 @@ def test_a_damaged_file_is_said_and_kept(state, tmp_path):
     state.recordings.save_view()
     assert "views.json" in state.screen.messages[0].text and "not saved" in state.screen.messages[1].text
     assert (tmp_path / "views.json").read_text() == "{"
-
-
-def test_two_windows_do_not_lose_views(state, tmp_path):
-    other = SavedViews(state.scene, tmp_path)
-    other.load()
-    state.recordings.save_view()
-    other.add(at(3), "other")
-    assert [c.name for c in read_views(tmp_path).cameras] == ["view 1", "other"]
 
 
 def test_two_windows_name_what_they_save_beside_each_other(state, tmp_path):

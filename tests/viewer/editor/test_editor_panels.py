@@ -6,12 +6,10 @@ import pytest
 
 from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.material.mode import MaterialMode, MaterialState
-from lambent.viewer.modes.walk.input import WalkInput
-from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels.plots import labels_apart
 from tests.viewer.measured_specimens import BRASS, FROSTED, write_measurement
-from tests.viewer.panel_driver import PanelDriver
+from tests.viewer.panel_driver import PanelDriver, walk_mode
 
 
 @pytest.fixture
@@ -162,7 +160,7 @@ def test_from_the_walk_mode(monkeypatch, scene, screen, geometry, tmp_path):
     materials = state.materials
     state.selection.choose("table")
     materials.typed_measurement = str(write_measurement(tmp_path / "brass.txt", BRASS))
-    driver = PanelDriver(monkeypatch, WalkMode(state, WalkInput(state, geometry), Drawing(None)))
+    driver = PanelDriver(monkeypatch, walk_mode(state, geometry))
     driver.click("compare##measurement")
     editor = materials.editor
     while editor.measurement is None:

@@ -8,13 +8,10 @@ from lambent.core.light.light_mix import GroupMix, LightMix, MixTrack
 from lambent.store.kept.views import read_views
 from lambent.store.light_groups import LightGroupRecord
 from lambent.viewer.cameras.navigation import PathPlay
-from lambent.viewer.mode import Drawing
-from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.light.light_keys import key_times, mix_at, with_key, without_key
 from lambent.viewer.modes.walk.light.lights import RecordedLight
-from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.views.views import SavedViews
-from tests.viewer.panel_driver import PanelDriver
+from tests.viewer.panel_driver import PanelDriver, walk_mode
 
 GROUPS = (
     LightGroupRecord(name="lamp", members=("bulb_1", "bulb_2"), share=0.25),
@@ -26,7 +23,7 @@ HALF, OFF = LightMix({"lamp": GroupMix(intensity=0.5)}), LightMix({"lamp": Group
 @pytest.fixture
 def panels(monkeypatch, state, geometry):
     state.lights.groups = GROUPS
-    driver = PanelDriver(monkeypatch, WalkMode(state, WalkInput(state, geometry), Drawing(None)))
+    driver = PanelDriver(monkeypatch, walk_mode(state, geometry))
     for header in ("Material", "View", "Scene"):
         driver.click(header, 0.3)
     driver.click("Light", 0.3)

@@ -1,5 +1,6 @@
 """Light baked anew beside the window: into a copy of the store, and region by region into the picture."""
 
+import io
 import json
 import re
 import subprocess
@@ -17,22 +18,26 @@ from lambent.core.light.light_mix import GroupMix, LightMix
 from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe
 from lambent.realtime.gpu.device import open_device
+from lambent.realtime.light.baked import read_baked
 from lambent.realtime.renderer import Renderer
 from lambent.scenes import load_scene
+from lambent.store.kept.session import RoomState
 from lambent.store.store import Store
 from lambent.viewer.modes.walk.light.answering import AnsweringLight
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.rebake import rebaking
-from lambent.viewer.modes.walk.rebake.arrivals import Arrived
+from lambent.viewer.modes.walk.rebake.arrivals import Arrived, Region
 from lambent.viewer.modes.walk.rebake.rebaked_light import (
     FADE_STEPS,
     Rebaked,
     batches_of,
     in_view_order,
+    steps,
     texel_objects,
     texel_steps,
 )
 from lambent.viewer.modes.walk.rebake.rebaking import clock_time
+from lambent.viewer.modes.walk.rebake.rebaking_worker import StreamWatch
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.screen import Rect
 from tests.bake.small_scenes import TINY
@@ -41,6 +46,7 @@ from tests.viewer.window_session import ROOT
 SIZE = (64, 48)
 PLACE = Rect(0, 0, *SIZE)
 LONGEST_S = 180.0
+TILES = TINY.changed("tiles", light_map={"tile_texels": 16})
 WORKER = """
 import json, sys, time
 from pathlib import Path
@@ -50,34 +56,18 @@ def say(**words):
 say(what="light map", done=1, total=4)
 {then}
 """
-BAKES = """
-from lambent.bake.running.again import bake_again
-from lambent.materials.document import Material
-from tests.bake.small_scenes import TINY
-materials = {name: Material.model_validate(one) for name, one in asked["materials"].items()}
-from lambent.viewer.modes.walk.rebake.rebaking_worker import StreamWatch
-watch = StreamWatch(sys.stdout.buffer)
-watch.region_pause = 0.0
-bake_again(Path(sys.argv[1]), Path(sys.argv[2]), materials, quality=TINY, watch=watch)
-watch.say(baked=True)
-"""
-IN_TILES = """
-import time
-from lambent.bake.running.again import bake_again
-from lambent.materials.document import Material
-from lambent.viewer.modes.walk.rebake.rebaking_worker import StreamWatch
-from tests.bake.small_scenes import TINY
-class Waits(StreamWatch):
-    region_pause = 0.0
-    def region(self, light, finished):
-        super().region(light, finished)
-        while finished.mean() > 0.5 and not Path({flag!r}).exists():
-            time.sleep(0.01)
-materials = {{name: Material.model_validate(one) for name, one in asked["materials"].items()}}
-tiles = TINY.changed("tiles", light_map={{"tile_texels": 16}})
-watch = Waits(sys.stdout.buffer)
-bake_again(Path(sys.argv[1]), Path(sys.argv[2]), materials, quality=tiles, watch=watch)
-watch.say(baked=True)
+REPLAYS = """
+import shutil
+(recording,) = (one for one in Path({recordings!r}).iterdir()
+                if json.loads((one / "asked.json").read_text()) == asked["materials"])
+pieces = [(recording / name).read_bytes() for name in ("first", "rest")]
+shutil.copytree(recording / "copy", sys.argv[2], dirs_exist_ok=True)
+for number, piece in enumerate(pieces):
+    while number == {waits_at} and not Path({flag!r}).exists():
+        time.sleep(0.01)
+    sys.stdout.buffer.write(piece)
+    sys.stdout.buffer.flush()
+say(baked=True)
 """
 ENDLESS = """
 import runpy, sys, time
@@ -90,21 +80,60 @@ runpy.run_module("lambent.viewer.modes.walk.rebake.rebaking_worker", run_name="_
 """
 
 
-def baked_box(folder, groups):
-    store = bake(load_scene("builtin:box"), folder / "box.store", quality=TINY, light_groups=groups)
-    store.close()
-    return folder / "box.store"
+class Recording(StreamWatch):
+    """Keeps what a bake reports; `half`: its length when more than half of the texels had arrived."""
+
+    region_pause, half = 0.0, 0
+
+    def __init__(self):
+        self.stream = io.BytesIO()
+        super().__init__(self.stream)
+
+    def region(self, light, finished):
+        super().region(light, finished)
+        if not self.half and finished.mean() > 0.5:
+            self.half = self.stream.tell()
+
+
+def record(store, folder, materials):
+    """Bake a store again for materials, and write the copy and the reports for `REPLAYS`."""
+    watch = Recording()
+    bake_again(store, folder / "copy", materials, quality=TILES, watch=watch).close()
+    asked = RoomState(materials=materials).model_dump(mode="json")["materials"]
+    (folder / "asked.json").write_text(json.dumps(asked))
+    said = watch.stream.getvalue()
+    (folder / "first").write_bytes(said[: watch.half])
+    (folder / "rest").write_bytes(said[watch.half :])
+
+
+class Box:
+    """The built-in box, and recorded bakes of it in other materials."""
+
+    def __init__(self, folder, groups):
+        self.store, self.recordings = folder / "box.store", folder / "recordings"
+        bake(load_scene("builtin:box"), self.store, quality=TINY, light_groups=groups).close()
+
+    def record(self, name, materials):
+        (self.recordings / name).mkdir(parents=True)
+        record(self.store, self.recordings / name, materials)
+
+    def replays(self, flag=__file__, waits_at=0):
+        """A worker that replays the bake it is asked for; it waits for a file before a piece of it."""
+        return REPLAYS.format(recordings=str(self.recordings), flag=str(flag), waits_at=waits_at)
 
 
 @pytest.fixture(scope="module")
 def boxes(mi, adapter, tmp_path_factory):
-    """The built-in box with and without light groups."""
-    return {groups: baked_box(tmp_path_factory.mktemp(groups), groups) for groups in ("none", "scene")}
+    """The box with and without light groups, and its bakes in the materials of `painted`."""
+    made = {groups: Box(tmp_path_factory.mktemp(groups), groups) for groups in ("none", "scene")}
+    for box in made.values():
+        box.record("painted", painted(load_scene("builtin:box")))
+    return made
 
 
 @pytest.fixture(scope="module")
 def store(boxes):
-    return boxes["none"]
+    return boxes["none"].store
 
 
 def painted(scene):
@@ -114,17 +143,15 @@ def painted(scene):
     return {first: dark, second: scene.materials[second].model_copy(update={"kd": (0.6, 0.1, 0.05)})}
 
 
-def test_the_copy_is_the_bake_of_the_edited_scene(store, tmp_path):
-    """To the bit, since seeds and effort are the same; the store itself stays as it was."""
-    scene, before = load_scene("builtin:box"), {a.name: a.key for a in Store.open(store).artefacts()}
-    copy = bake_again(store, tmp_path / "copy", painted(scene), quality=TINY)
-    worn = replace(scene, materials={**scene.materials, **painted(scene)})
-    direct = bake(worn, tmp_path / "direct", quality=TINY, only={"light_map", "probe"})
+def test_the_copy_is_the_bake_of_the_edited_scene(boxes, store, tmp_path):
+    """To the bit, since seeds and effort are the same."""
+    scene, copy = load_scene("builtin:box"), Store.open(boxes["none"].recordings / "painted" / "copy")
+    edited = replace(scene, materials={**scene.materials, **painted(scene)})
+    direct = bake(edited, tmp_path / "direct", quality=TILES, only={"light_map", "probe"})
     names = [a.name for a in copy.artefacts() if a.kind in ("light_map", "probe")]
     assert "light_map/irradiance" in names
     for name in names:
         np.testing.assert_array_equal(copy.read(name), direct.read(name), err_msg=name)
-    assert {a.name: a.key for a in Store.open(store).artefacts()} == before
     assert copy.documents[COPY_OF] == "box.store"
 
 
@@ -234,10 +261,23 @@ class Room:
 
 
 @pytest.fixture
-def room(store, screen, monkeypatch, tmp_path):
-    made = Room(store, screen, monkeypatch, tmp_path, BAKES)
-    yield made
-    made.pictures.close()
+def opened(boxes, screen, monkeypatch, tmp_path):
+    """Opens a box with the worker `then`, by default one that replays recorded bakes."""
+    made = []
+
+    def open_box(groups="none", then=None):
+        box = boxes[groups]
+        made.append(Room(box.store, screen, monkeypatch, tmp_path, then or box.replays()))
+        return made[-1]
+
+    yield open_box
+    for room in made:
+        room.pictures.close()
+
+
+@pytest.fixture
+def room(opened):
+    return opened()
 
 
 def image(renderer, state, light=()):
@@ -252,9 +292,13 @@ def image_of(renderer, state, materials, light=()):
     return found
 
 
-def test_an_edit_is_estimated_then_baked_then_exact(room, store):
+def test_an_edit_is_estimated_then_baked_then_exact(boxes, opened, store, tmp_path):
+    flag = tmp_path / "go on"
+    room = opened(then=boxes["none"].replays(flag))
     state = room.state
     room.paint()
+    room.until(lambda: "25 %" in state.rebaking.line)
+    flag.touch()
     room.until(lambda: state.rebaking.exact)
     truth = Renderer(open_device(), Store.open(copy_beside(store)))
     np.testing.assert_allclose(image(room.renderer, state), image(truth, state), rtol=2e-3, atol=1e-4)
@@ -273,7 +317,7 @@ def test_an_edit_is_estimated_then_baked_then_exact(room, store):
     assert room.renderer.light_version == version and room.pictures.wait_s() is None, "then nothing goes on"
 
 
-def test_another_edit_ends_it_and_undo_comes_back_without_a_bake(room, store):
+def test_another_edit_ends_it_and_undo_comes_back_without_a_bake(room):
     state, edits = room.state, room.state.materials.edits
     baked = image(room.renderer, state)
     room.paint()
@@ -293,10 +337,8 @@ def test_another_edit_ends_it_and_undo_comes_back_without_a_bake(room, store):
 
 
 @pytest.mark.parametrize("groups", ["none", "scene"])
-def test_a_state_that_goes_beside_keeps_its_light_and_undo_of_all_is_as_baked(
-    boxes, screen, monkeypatch, tmp_path, groups
-):
-    room = Room(boxes[groups], screen, monkeypatch, tmp_path, BAKES)
+def test_a_state_that_goes_beside_keeps_its_light_and_undo_of_all_is_as_baked(opened, groups):
+    room = opened(groups)
     state, edits = room.state, room.state.materials.edits
     baked = image(room.renderer, state)
     room.paint()
@@ -318,13 +360,12 @@ def test_a_state_that_goes_beside_keeps_its_light_and_undo_of_all_is_as_baked(
     room.frame()
     room.until(lambda: not room.pictures._lane.busy)
     np.testing.assert_allclose(image(room.pictures._lane.renderer, state), baked, rtol=2e-3, atol=1e-5)
-    room.pictures.close()
 
 
 @pytest.mark.parametrize("groups", ["none", "scene"])
-def test_objects_whose_light_is_finished_go_over_while_others_are_baked(boxes, screen, monkeypatch, tmp_path, groups):
+def test_objects_whose_light_is_finished_go_over_while_others_are_baked(boxes, opened, tmp_path, groups):
     flag = tmp_path / "go on"
-    room = Room(boxes[groups], screen, monkeypatch, tmp_path, IN_TILES.format(flag=str(flag)))
+    room = opened(groups, boxes[groups].replays(flag, waits_at=1))
     state, rebaked = room.state, room.pictures._rebaked
     room.paint()
     room.frame()
@@ -341,30 +382,30 @@ def test_objects_whose_light_is_finished_go_over_while_others_are_baked(boxes, s
     assert np.abs(shown - estimate)[theirs].mean() > 1e-3
     flag.touch()
     room.until(lambda: state.rebaking.exact)
-    truth = Renderer(open_device(), Store.open(copy_beside(boxes[groups])))
+    truth = Renderer(open_device(), Store.open(copy_beside(boxes[groups].store)))
     np.testing.assert_allclose(image(room.renderer, state), image(truth, state), rtol=4e-3, atol=1e-4)
     whole = room.renderer.resources.light_layers[0].astype(np.float32)
     off = np.abs(shown - whole)[theirs].mean() / np.abs(estimate - whole)[theirs].mean()
     assert off < 0.5, "early light is near to the final one"
-    room.pictures.close()
 
 
-def test_light_of_an_edit_that_was_given_up_is_not_shown(store, screen, monkeypatch, tmp_path):
+def test_light_of_an_edit_that_was_given_up_is_not_shown(boxes, opened, store, tmp_path):
     """A second edit comes while the first one's light goes in: nothing of the first stays."""
     flag = tmp_path / "go on"
-    room = Room(store, screen, monkeypatch, tmp_path, IN_TILES.format(flag=str(flag)))
+    room = opened(then=boxes["none"].replays(flag, waits_at=1))
     state, rebaked, edits = room.state, room.pictures._rebaked, room.state.materials.edits
     room.paint()
     room.until(lambda: rebaked._fade is not None and rebaked._fade.moves)
     name = sorted(state.scene.materials)[0]
-    edits.set_materials({name: state.scene.materials[name].model_copy(update={"kd": (0.2, 0.3, 0.7)})})
+    blue = {name: state.scene.materials[name].model_copy(update={"kd": (0.2, 0.3, 0.7)})}
+    edits.set_materials(blue)
+    boxes["none"].record("blue", {**painted(state.scene), **blue})
     room.frame()
     assert rebaked._fade is None and rebaked._light is None and state.rebaking.share is None
     flag.touch()
     room.until(lambda: state.rebaking.exact)
     truth = Renderer(open_device(), Store.open(copy_beside(store)))
     np.testing.assert_allclose(image(room.renderer, state), image(truth, state), rtol=2e-3, atol=1e-4)
-    room.pictures.close()
 
 
 def test_without_answers_an_edit_goes_from_as_baked_to_exact_and_back(room):
@@ -387,8 +428,8 @@ def test_without_answers_an_edit_goes_from_as_baked_to_exact_and_back(room):
     np.testing.assert_allclose(image(room.renderer, state), baked, rtol=2e-3, atol=1e-5)
 
 
-def test_mixes_of_light_groups_are_exact_too(boxes, screen, monkeypatch, tmp_path):
-    room = Room(boxes["scene"], screen, monkeypatch, tmp_path, BAKES)
+def test_mixes_of_light_groups_are_exact_too(boxes, opened):
+    room = opened("scene")
     state = room.state
     name = state.lights.groups[0].name
     room.paint()
@@ -398,22 +439,21 @@ def test_mixes_of_light_groups_are_exact_too(boxes, screen, monkeypatch, tmp_pat
     room.frame()
     assert state.rebaking.exact
     room.until(lambda: not room.pictures._lane.busy)
-    truth = Renderer(open_device(), Store.open(copy_beside(boxes["scene"])))
+    truth = Renderer(open_device(), Store.open(copy_beside(boxes["scene"].store)))
     light = state.recordings.light
     np.testing.assert_allclose(
         image(room.renderer, state, light.items()), image(truth, state, light.items()), rtol=4e-3, atol=1e-4
     )
     state.materials.edits.take(state.materials.edits.room.model_copy(update={"materials": {}}))
     room.until(lambda: not state.rebaking.exact and not room.pictures._lane.busy)
-    plain = Renderer(open_device(), Store.open(boxes["scene"]))
+    plain = Renderer(open_device(), Store.open(boxes["scene"].store))
     np.testing.assert_allclose(
         image(room.renderer, state, light.items()), image(plain, state, light.items()), rtol=4e-3, atol=1e-4
     )
-    room.pictures.close()
 
 
-def test_an_edit_meanwhile_and_closing_end_the_process(store, screen, monkeypatch, tmp_path):
-    room = Room(store, screen, monkeypatch, tmp_path, "time.sleep(600)")
+def test_an_edit_meanwhile_and_closing_end_the_process(opened):
+    room = opened(then="time.sleep(600)")
     room.paint()
     room.until(lambda: "25 %" in room.state.rebaking.line)
     first = room.pictures._rebaked._process._process
@@ -432,13 +472,11 @@ def test_an_edit_meanwhile_and_closing_end_the_process(store, screen, monkeypatc
     ("then", "line"),
     [
         ("say(error='room.toml: file does not exist')", "not baked again: room.toml: file does not exist"),
-        ("raise RuntimeError('no memory')", "ended with 1 (RuntimeError: no memory)"),
         ("sys.exit(0)", "not baked again: the bake ended too soon"),
-        ("import os; os.kill(os.getpid(), 9)", "the bake of edited materials was killed by SIGKILL (no message)"),
     ],
 )
-def test_faults_are_one_line_and_the_estimate_stays(store, screen, monkeypatch, tmp_path, then, line):
-    room = Room(store, screen, monkeypatch, tmp_path, then)
+def test_faults_are_one_line_and_the_estimate_stays(opened, then, line):
+    room = opened(then=then)
     room.paint()
     room.until(lambda: "not baked again" in room.state.rebaking.line)
     assert line in room.state.rebaking.line and not room.state.rebaking.exact
@@ -454,7 +492,6 @@ def test_faults_are_one_line_and_the_estimate_stays(store, screen, monkeypatch, 
     room.state.materials.edits.undo()
     room.frame()
     assert room.state.rebaking.line == "", "the light of the room as baked has no fault"
-    room.pictures.close()
 
 
 def test_the_worker_says_what_is_wrong_in_a_line(store, tmp_path):
@@ -479,18 +516,37 @@ def test_the_worker_ends_with_the_window(store, tmp_path):
         assert process.wait(10) == 0
 
 
-def test_reading_takes_the_units_of_the_scene_that_is_shown(store, tmp_path):
-    scene = Renderer(open_device(), Store.open(store)).scene
-    bake_again(store, tmp_path / "copy", {}, quality=TINY)
-    copy = Store.open(tmp_path / "copy")
-    names = frozenset(one.name for one in copy.artefacts("probe"))
-    again = Rebaked.read(tmp_path / "copy", scene, Arrived(None, True, names, True))
-    np.testing.assert_array_equal(again.layers({}, [])[0][..., :3], scene.irradiance.astype(np.float16))
-    assert again.scene.probes.keys() == scene.probes.keys()
-    for name, probe in scene.probes.items():
-        np.testing.assert_allclose(again.probe(name, {}).radiance, probe.radiance, rtol=1e-3)
+def test_reading_takes_the_units_of_the_scene_that_is_shown(boxes, store):
+    scene, folder = Renderer(open_device(), Store.open(store)).scene, boxes["none"].recordings / "painted" / "copy"
+    copy = read_baked(Store.open(folder))
+    names = frozenset(one.name for one in Store.open(folder).artefacts("probe"))
+    again = Rebaked.read(folder, scene, Arrived(None, True, names, True))
+    found, expected = again.layers({}, [])[0][..., :3], copy.irradiance * copy.unit / scene.unit
+    np.testing.assert_allclose(found, expected, rtol=2e-3)
+    assert again.scene.probes.keys() == scene.probes.keys() == copy.probes.keys()
+    for name, probe in copy.probes.items():
+        found = again.probe(name, {}).radiance * scene.unit
+        np.testing.assert_allclose(found, probe.radiance * copy.unit, rtol=1e-3, atol=1e-4)
 
 
-@pytest.mark.parametrize(("seconds", "shown"), [(0.9, "0:00"), (65, "1:05"), (3599, "59:59"), (14962, "4:09:22")])
+def test_a_region_that_finishes_no_object_changes_nothing(store):
+    """The picture goes on refining."""
+    renderer = Renderer(open_device(), Store.open(store))
+    scene, size = renderer.scene, renderer.scene.irradiance.shape[:2]
+
+    def arrived(finished, before=None):
+        light = np.zeros((1, *size, 3), np.float16)
+        return Rebaked.read(store, scene, Arrived(Region(light, np.full(size, finished))), before)
+
+    def uploads(rebaked, since):
+        return list(steps(rebaked, since, scene, renderer.resources, {}, scene.record.cameras[0], SIZE))
+
+    nothing, everything = arrived(False), arrived(True)
+    assert not nothing.lit.any() and uploads(nothing, None) == []
+    assert len(uploads(everything, nothing)) >= FADE_STEPS
+    assert uploads(arrived(True, everything), everything) == []
+
+
+@pytest.mark.parametrize(("seconds", "shown"), [(65.9, "1:05"), (14962, "4:09:22")])
 def test_clock_time_has_hours_where_there_are_some(seconds, shown):
     assert clock_time(seconds) == shown

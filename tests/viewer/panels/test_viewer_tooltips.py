@@ -15,14 +15,12 @@ from lambent.viewer.modes.edit.mode import EditMode
 from lambent.viewer.modes.edit.state import DIRECT
 from lambent.viewer.modes.material.mode import MaterialMode, MaterialState
 from lambent.viewer.modes.walk.comparison import Figures
-from lambent.viewer.modes.walk.input import WalkInput
-from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels.widgets import press
 from tests.viewer import panel_driver
 from tests.viewer.edited_view import lit_state, until
 from tests.viewer.measured_specimens import BRASS, write_measurement
-from tests.viewer.panel_driver import PanelDriver
+from tests.viewer.panel_driver import PanelDriver, walk_mode
 
 MORE = ("input_float2", "drag_float", "invisible_button", "tree_node", "color_edit3", "input_int", "slider_angle")
 NOT_CONTROLS = ("##plot",)  # the plot of a curve: its keys are those of "?"
@@ -85,7 +83,7 @@ def walk(monkeypatch, scene, screen, geometry):
     plane = ReflectorRecord(plane=(0, 1, 0, -1), outline=((-1, 1, -1), (1, 1, -1), (1, 1, 1)), parts=(part,))
     scene = scene.model_copy(update={"reflectors": (plane,), "warnings": ("a", "b", "c", "d")})
     state = WalkState.of(scene, "walk", screen, screen.folder)
-    driver = Walked(monkeypatch, WalkMode(state, WalkInput(state, geometry), Drawing(None)))
+    driver = Walked(monkeypatch, walk_mode(state, geometry))
     yield driver
     driver.close()
 

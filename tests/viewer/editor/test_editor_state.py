@@ -286,19 +286,6 @@ def test_work_is_cancelled_through_its_progress():
     assert isinstance(work._error, Cancelled)
 
 
-def test_the_editor_fits_as_the_command_line_does(screen):
-    """One default: what a person gets does not depend on the door."""
-    from inspect import signature
-
-    from lambent.cli.fit import command
-    from lambent.materials.fitting.fit import fit
-
-    made = Editor(MaterialEdits({"m": Material(name="m")}), "m", screen).fit
-    for function in (fit, command):
-        assert signature(function).parameters["distribution"].default == made.distribution
-    assert str(signature(command).parameters["lobes"].default) == made.lobes
-
-
 def test_what_a_fit_leaves_alone_is_undone_too(editor):
     subject, edits = editor.subject, editor.subject.edits
     subject.add_lobe("reflection")

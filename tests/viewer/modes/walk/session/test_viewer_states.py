@@ -7,12 +7,10 @@ from lambent.core.light.light_mix import GroupMix, LightMix
 from lambent.scenes.scene import Look, Variant
 from lambent.store.kept.session import RoomState
 from lambent.store.light_groups import LightGroupRecord
-from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.walk.input import WalkInput
-from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.session.states import AS_BAKED
 from lambent.viewer.modes.walk.state import WalkState
-from tests.viewer.panel_driver import PanelDriver
+from tests.viewer.panel_driver import PanelDriver, walk_mode
 
 OFF = LightMix({"lamp": GroupMix(on=False)})
 
@@ -29,29 +27,6 @@ def paint(state, kd=0.2):
 def dim(state, mix=OFF):
     state.lights.mix = mix
     state.materials.edits.end_stroke()
-
-
-def test_light_and_materials_have_one_history(state):
-    edits = state.materials.edits
-    paint(state)
-    dim(state)
-    state.selection.choose("table")
-    state.selection.choose(None)
-    edits.undo()
-    assert state.lights.mix == LightMix() and edits.current("plaster") == painted(state)
-    edits.undo()
-    assert edits.room == AS_BAKED and not edits.can_undo
-    edits.redo()
-    edits.redo()
-    assert state.lights.mix == OFF and edits.current("plaster") == painted(state)
-
-
-def test_a_drag_of_a_light_is_one_step(state):
-    for intensity in (0.9, 0.7, 0.4):
-        state.lights.mix = LightMix({"lamp": GroupMix(intensity=intensity)})
-    state.materials.edits.end_stroke()
-    state.materials.edits.undo()
-    assert state.lights.mix == LightMix() and not state.materials.edits.can_undo
 
 
 def test_a_stored_state_comes_back_and_can_be_undone(state):
@@ -100,7 +75,7 @@ def test_undo_of_what_is_beside_ends_the_split(state):
 @pytest.fixture
 def panels(monkeypatch, state, geometry):
     state.lights.groups = (LightGroupRecord(name="lamp", members=("bulb",), share=1.0),)
-    driver = PanelDriver(monkeypatch, WalkMode(state, WalkInput(state, geometry), Drawing(None)))
+    driver = PanelDriver(monkeypatch, walk_mode(state, geometry))
     for header in ("Material", "View", "Scene"):
         driver.click(header, 0.3)
     for header in ("States", "Light"):
@@ -167,7 +142,7 @@ def test_a_variant_takes_its_materials_textures_and_light_and_leaves_the_rest(sc
 
 def test_variants_are_offered(monkeypatch, scene, screen, geometry):
     state = WalkState.of(with_variants(scene), "walk", screen)
-    driver = PanelDriver(monkeypatch, WalkMode(state, WalkInput(state, geometry), Drawing(None)))
+    driver = PanelDriver(monkeypatch, walk_mode(state, geometry))
     driver.click("States", 0.3)
     driver.frame(2)
     driver.click("apply##variant night")

@@ -12,12 +12,6 @@ from lambent.viewer.cameras.picking import Geometry, first_hit
 TOP = Camera(name="top", position=(0, 3, 0), target=(0, 0, 0), up=(0, 0, -1), fov_y_deg=90)
 
 
-def test_the_nearest_object_is_picked(geometry):
-    assert geometry.pick(TOP.position, rays_through(TOP, 150, 100, 300, 200)).name == "table"
-    assert geometry.pick(TOP.position, rays_through(TOP, 190, 100, 200, 200)).name == "floor"
-    assert geometry.pick(np.array([0.0, 3, 0]), np.array([0.0, 1, 0])) is None
-
-
 def test_the_nearest_is_picked_in_whatever_order(geometry, scene):
     """The table stands over the floor; from below the floor is nearer."""
     down, up = np.array([0.0, -1, 0]), np.array([0.1, 1, 0.05])
@@ -32,17 +26,6 @@ def test_the_nearest_is_picked_in_whatever_order(geometry, scene):
 def reordered(triangles):
     """Vertices and faces of the same triangles; the records say where each object's are."""
     return triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
-
-
-def test_a_box_is_entered_ahead_alone():
-    from lambent.viewer.cameras.picking import _box_entry
-
-    box = np.array([[-1.0, -1, -1], [1, 1, 1]])
-    ahead = np.array([0.0, 0, 1])
-    assert _box_entry(np.array([0.0, 0, -3]), ahead, box) == pytest.approx(2)
-    assert _box_entry(np.zeros(3), ahead, box) == 0
-    assert _box_entry(np.array([0.0, 0, 3]), ahead, box) == np.inf
-    assert _box_entry(np.array([2.0, 0, -3]), ahead, box) == np.inf
 
 
 def test_picture_points_are_right_side_up():

@@ -18,7 +18,7 @@ from lambent.editing.session.session import Session
 from lambent.materials.document import Material
 from lambent.viewer.modes.edit import interreflections
 from lambent.viewer.modes.edit.interreflections import Bounced
-from tests.viewer.test_editor_state import PATIENCE_S
+from tests.viewer.drawn_frames import LONGEST_S
 
 NAMES = [f"material {k}" for k in range(8)]
 SMALL = frozenset(NAMES[6:])
@@ -75,7 +75,7 @@ def made(monkeypatch, tmp_path):
 
 def tick(made, idle=True):
     """Until nothing is read."""
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + LONGEST_S
     made.bounced.tick(made.session, made.folder, idle)
     while made.bounced._reading is not None:
         assert time.monotonic() < end

@@ -12,7 +12,7 @@ from lambent.materials.factored.curve import KNOTS, Curve, angles_rad
 from lambent.materials.models import model_named
 from lambent.viewer.modes.edit.curves import regions
 from lambent.viewer.modes.edit.curves.axes import Axes, Axis, Place, within_curve
-from lambent.viewer.modes.edit.curves.drags import Drag, locked, painted, resized
+from lambent.viewer.modes.edit.curves.drags import Drag, painted, resized
 from lambent.viewer.modes.edit.curves.lines import ANGLES_DEG, decimated, feature_deg, fitted_x, fitted_y, is_grey
 from lambent.viewer.modes.edit.curves.regions import edges_deg, grip_at, region_of, with_edge
 from lambent.viewer.modes.edit.curves.state import CurveState, View
@@ -181,11 +181,6 @@ def test_a_layer_of_another_size():
     assert resized(stretched, 2.0).size == 2.0 and resized(stretched, 2.0).base == stretched.base
     with pytest.raises(UserError, match="folds"):
         resized(stretched, 0.01)
-
-
-def test_modifier_keys_lock_an_axis():
-    assert locked("x and y", shift=True, ctrl=False) == "y" and locked("y", shift=False, ctrl=True) == "x"
-    assert locked("x", shift=False, ctrl=False) == "x"
 
 
 @pytest.mark.parametrize("log", [False, True])

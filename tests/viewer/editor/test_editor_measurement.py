@@ -5,17 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.fitting.shown.disks import disk_directions
 from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.materials.measured.inspecting.synthetic import synthesise
-from lambent.viewer.editor import readings
 from lambent.viewer.editor.matrix import matrix
 from lambent.viewer.editor.measurement import read_measurement, thinned
-from lambent.viewer.editor.readings import Disks, Incident
-from tests.viewer.measured_specimens import BRUSHED, FROSTED, TURNED, write_measurement
+from lambent.viewer.editor.readings import Incident
+from tests.viewer.measured_specimens import BRUSHED, TURNED, write_measurement
 
 OTHERS = (
     Material(kd=0.3),
@@ -61,32 +58,6 @@ def test_few_tuples_stand_for_noise_about_zero():
     f = [MaterialBSDF(OTHERS[0]).eval(samples.wi, samples.wo) for samples in (few, dark)]
     for name, metric in METRICS.items():
         assert metric.error(few, f[0]) == pytest.approx(metric.error(dark, f[1]), rel=0.05), name
-
-
-def test_the_same_tuples_every_time(brushed):
-    a, b = thinned(brushed.samples, 500), thinned(brushed.samples, 500)
-    assert np.array_equal(a.wi, b.wi) and np.array_equal(a.weight, b.weight)
-
-
-def test_disks_hold_the_cube_root_of_p(brushed):
-    incidents = readings.incidents_of(brushed.gathered)
-    disks = Disks(incidents, False, 20)
-    model = disks.model(BRUSHED)
-    wo, inside = disk_directions(20, incidents[3].phi_deg, False)
-    wi = direction(*np.radians([incidents[3].theta_deg, incidents[3].phi_deg]))
-    f = MaterialBSDF(BRUSHED).eval(np.broadcast_to(wi, wo[inside].shape), wo[inside])
-    assert model[3] == pytest.approx(np.cbrt(f * np.abs(wo[inside][:, 2:])), abs=1e-3)
-    measured = disks.measured(brushed.gathered)
-    known = np.isfinite(measured[3])
-    assert known.mean() > 0.6
-    assert np.abs(measured[3] - model[3])[known].mean() < 0.05 * model[3].max(), "nearest tuples, so not exact"
-
-
-def test_the_curve_is_p_in_the_plane():
-    p = readings.in_plane(FROSTED, Incident(30.0, 0.0), far=True)
-    at = int(np.argmin(np.abs(readings.THETA_O_DEG - 30.0)))
-    wi, wo = direction(np.radians(30.0), 0.0), direction(np.radians(180 - readings.THETA_O_DEG[at]), np.pi)
-    assert p[at] == pytest.approx(MaterialBSDF(FROSTED).eval(wi, wo) * abs(wo[2]), rel=1e-6)
 
 
 @pytest.mark.parametrize("sides", [1, 2])

@@ -1,4 +1,4 @@
-"""Edited pictures that a device shows: the same on the GPU and by the processor's cores."""
+"""Edited pictures of stored transport are the same on the GPU and in memory."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import wgpu
 
 from lambent.editing.picture import EditedPicture, Part
 from lambent.editing.rows import PairTransport, Rows
@@ -17,10 +16,8 @@ from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_models import editable
 from lambent.materials.factored.terms import Editable
 from lambent.materials.models import model_named
-from lambent.realtime.gpu.device import AdapterInfo, open_device
-from lambent.realtime.gpu.targets import pixels
-from lambent.viewer.edits import edited
-from lambent.viewer.edits.edited import Backend, SentCanvas, ShadedCanvas, backend, on_device, texture_of
+from lambent.realtime.gpu.device import open_device
+from lambent.viewer.edits.edited import ShadedCanvas
 from tests.editing.dense_rows import DensePairs, rows_of
 from tests.editing.test_folding import sparse
 
@@ -51,14 +48,12 @@ def assert_close(found: np.ndarray, expected: np.ndarray) -> None:
     assert np.abs(found - expected).max() <= 1e-3 * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("stored", [True, False])
-@pytest.mark.parametrize("name", ["kurt", "cook-torrance", "oren-nayar"])
+@pytest.mark.parametrize(("name", "stored"), [("kurt", True), ("cook-torrance", False), ("oren-nayar", True)])
 def test_a_session_of_edits_is_the_same_everywhere(device: Any, name: str, stored: bool) -> None:
     """Frames, switched curves, a viewer's curve, a colour, and better transport on the way."""
     start, rng = editable(model_named(name)()), np.random.default_rng(4)
     parts = {"it": part_of(start, 5, stored=stored)}
-    made: list[Backend] = [partial(SentCanvas, device), partial(ShadedCanvas, device)]
-    pictures = [EditedPicture(BACKGROUND, parts), *(EditedPicture(BACKGROUND, parts, canvas) for canvas in made)]
+    pictures = [EditedPicture(BACKGROUND, parts), EditedPicture(BACKGROUND, parts, partial(ShadedCanvas, device))]
     now = start
     for curve in [*start.curves, *start.curves]:
         knots = rng.uniform(0.2, 2, (4, 3))
@@ -67,44 +62,13 @@ def test_a_session_of_edits_is_the_same_everywhere(device: Any, name: str, store
         for picture in pictures:
             picture.show("it", now)
             picture.step(terms=5)
-        images = [picture.image() for picture in pictures]
-        assert np.array_equal(images[1], images[0])
-        assert_close(images[2], images[0])
-        for picture, image in zip(pictures[1:], images[1:], strict=True):
-            assert np.array_equal(pixels(device, texture_of(picture)), image)
+        host, shaded = (picture.image() for picture in pictures)
+        assert_close(shaded, host)
     for picture in pictures:
         picture.put("it", part_of(start, 6, stored=stored))
         picture.show("it", now)
         while not picture.is_settled:
             picture.step()
     settled = [picture.image() for picture in pictures]
-    assert_close(settled[2], settled[0])
-    assert np.abs(settled[0] - images[0]).max() > 0.01
-
-
-@pytest.mark.parametrize(("type", "expected"), [("CPU", SentCanvas), ("DiscreteGPU", ShadedCanvas)])
-def test_a_real_gpu_sums_and_software_leaves_it_to_numba(
-    device: Any, monkeypatch: pytest.MonkeyPatch, type: str, expected: Any
-) -> None:
-    monkeypatch.setattr(edited, "adapter_info", lambda _: AdapterInfo("it", type, "Vulkan", ""))
-    assert isinstance(backend(device)(BACKGROUND), expected)
-
-
-def test_without_room_on_the_gpu_the_cores_draw_and_it_is_said(device: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(edited, "adapter_info", lambda _: AdapterInfo("it", "DiscreteGPU", "Vulkan", ""))
-    part, said = part_of(editable(model_named("cook-torrance")()), 5), list[str]()
-
-    create = device.create_buffer
-
-    def small(*, size: int, usage: int) -> Any:
-        if size > 1 << 20:
-            raise wgpu.GPUOutOfMemoryError("full")
-        return create(size=size, usage=usage)
-
-    monkeypatch.setattr(device, "create_buffer", small)
-    picture = on_device(device, lambda canvas: EditedPicture(BACKGROUND, {"it": part}, canvas), said.append)
-    picture.compose()
-    assert isinstance(picture.canvas, SentCanvas)
-    assert "no room for another" in said[0]
-    assert "the CPU draws the picture" in said[0]
-    assert pixels(device, texture_of(picture)).any()
+    assert_close(settled[1], settled[0])
+    assert np.abs(settled[0] - host).max() > 0.01

@@ -14,7 +14,6 @@ from lambent.bake.bake import bake
 from lambent.baked.answering.stored import read_answer
 from lambent.core.views.camera import Camera
 from lambent.realtime.answering.answer_shown import answered
-from lambent.realtime.answering.answering import answered_scene
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.device import open_device
 from lambent.realtime.light.baked import read_baked
@@ -26,6 +25,7 @@ from lambent.store.store import Store
 from lambent.viewer.modes.walk.light import answering
 from lambent.viewer.modes.walk.light.answering import WITHOUT, Answering, AnsweringLight
 from tests.bake.small_scenes import GREY, TINY, room_with_step
+from tests.realtime.answering.answered_scene import answered_scene
 from tests.viewer.small_store import write_small_store
 
 VIEW = FrameState(Camera(name="in", position=(1.4, 1.2, -1.4), target=(-0.8, 0.5, 0.0), fov_y_deg=70), 96, 64)
