@@ -8,7 +8,7 @@ import numpy as np
 
 from lambent.baked.light_fields.lookup import blended, normal_weights
 from lambent.published.distance_impostors import fixed_point
-from tests.baked.analytic_light_field import ball_field, errors, places
+from tests.baked.light_fields.analytic_light_field import ball_field, errors, places
 
 
 def test_iteration_finds_the_walls() -> None:

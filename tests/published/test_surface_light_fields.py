@@ -10,7 +10,7 @@ import pytest
 from lambent.baked.light_fields.light_field import NO_POINT, LightField
 from lambent.baked.light_fields.lookup import Place
 from lambent.published.surface_light_fields import Basis, basis_weights, surface
-from tests.baked.analytic_light_field import BALL, OWN, ball_field, on_ball, places
+from tests.baked.light_fields.analytic_light_field import BALL, OWN, ball_field, on_ball, places
 
 BASES: tuple[Basis, ...] = ("nearest", "angle", "average", "reflection", "normal")
 

@@ -36,11 +36,6 @@ def test_it_passes_the_keys_smoothly() -> None:
     assert np.sum(ways[1:] * ways[:-1], axis=-1).min() > np.cos(np.radians(2))
 
 
-def test_a_path_that_stands_still_turns() -> None:
-    keys = (Camera("a", (0, 1, 0), (1, 1, 0)), Camera("b", (0, 1, 0), (0, 1, 1)))
-    assert sample_path(CameraPath("turn", keys), 0.5).target == pytest.approx((0.5, 1, 0.5))
-
-
 def key(position, fov=45.0):
     return Camera(name="key", position=position, target=(0, 1, 0), fov_y_deg=fov)
 
@@ -53,12 +48,6 @@ def test_it_begins_and_ends_at_its_keys_and_stays_there():
         camera = camera_at(TOUR, time_s)
         assert camera.position == pytest.approx(TOUR.keys[end].position)
         assert camera.fov_y_deg == pytest.approx(TOUR.keys[end].fov_y_deg)
-
-
-def test_it_is_the_scenes_curve_by_time():
-    camera, same = camera_at(TOUR, 1.5), sample_path(TOUR, 0.25)
-    assert isinstance(camera, Camera)
-    assert (camera.position, camera.target, camera.up) == (same.position, same.target, same.up)
 
 
 def test_a_path_of_one_key_or_of_no_time_stands_still():

@@ -7,7 +7,7 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
-from lambent.scenes.floor_plan import CELLS, CELLS_OF_ALL, STEPS, FloorPlan, shared_cells
+from lambent.scenes.floor_plan import STEPS, FloorPlan
 from lambent.scenes.geometry import box, merge, patch, placed, turn
 from lambent.scenes.reflectors import find_reflectors
 from lambent.scenes.scene import Mesh, Scene, SceneObject
@@ -121,20 +121,3 @@ def test_plans_come_back_from_their_record() -> None:
     for broken in ({"packed": record.packed[: len(record.packed) // 2]}, {"packed": "?"}, {"rows": record.rows + 1}):
         with pytest.raises(UserError, match="broken store"):
             plan_of(record.model_copy(update=broken))
-
-
-def test_plans_of_many_reflectors_share_a_bounded_number_of_cells() -> None:
-    """The large ones keep theirs, and so do a few small ones; forty mirrors on a wall have coarser ones."""
-    assert shared_cells([20.0, 0.5, 0.3]) == [CELLS] * 3
-    many = np.array(shared_cells([50.0, 9.0, *[0.3] * 400]))
-    assert many[0] == CELLS and (many[2:] == many[2]).all() and 32 <= many[2] < many[1] <= CELLS
-    assert (many**2).sum() <= CELLS_OF_ALL
-    room = [patch((0, 0, 0), (4, 0, 0), (0, 3, 0))]
-    mirrors = [patch((x, y, 0.01), (0.5, 0, 0), (0, 0.6, 0)) for x in np.arange(6) * 0.6 for y in (0.5, 1.2, 1.9)]
-    frames = [placed(box((0.02, 0.6, 0.2)), (x - 0.012, y, 0)) for x in np.arange(6) * 0.6 for y in (0.8, 1.5, 2.2)]
-    spread = [placed(mirror, (0, 0, 0.05 * i)) for i, mirror in enumerate(mirrors)]  # each in a plane of its own
-    objects = [SceneObject(f"m{i}", mesh, "varnish") for i, mesh in enumerate(spread)]
-    objects += [SceneObject(f"f{i}", placed(f, (0, 0, 0.05 * i)), "paint") for i, f in enumerate(frames)]
-    found = find_reflectors(Scene("mirrors", (*objects, SceneObject("room", merge(room), "paint")), MATERIALS))
-    cells = [r.plan.distance.size for r in found if r.plan is not None]
-    assert len(found) == 18 and len(cells) > 8 and sum(cells) < 2 * CELLS_OF_ALL

@@ -10,7 +10,7 @@ from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch
-from lambent.scenes.light_groups import MOST_GROUPS, OTHERS, groups_before_bake, names_of_lights, sorted_lights, stem
+from lambent.scenes.light_groups import MOST_GROUPS, OTHERS, groups_before_bake, names_of_lights, sorted_lights
 from lambent.scenes.scene import (
     ConstantEnvironment,
     DirectionalLight,
@@ -37,14 +37,6 @@ def scene_of(*lights, environment=None, shining=(), **more) -> Scene:
 
 def members(scene: Scene, *args, **kwargs) -> dict[str, tuple[str, ...]]:
     return {group.name: group.members for group in sorted_lights(scene, *args, **kwargs).groups}
-
-
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [("lamp", "lamp"), ("lamp_1", "lamp"), ("Lamp.002", "Lamp"), ("spot 3-12", "spot"), ("42", "42"), ("a1b", "a1b")],
-)
-def test_stems_are_names_without_numbers_at_their_end(name, expected):
-    assert stem(name) == expected
 
 
 def test_by_default_sun_sky_and_lamps_by_stem_are_groups():
@@ -85,13 +77,6 @@ def test_the_weakest_lamps_are_merged_where_there_are_too_many():
     assert set(found.groups[names.index(OTHERS)].members) == {f"lamp {c}" for c in "abcdef"}
 
 
-def test_parts_of_an_object_are_one_member():
-    scene = scene_of(shining=("shade.part1", "shade.part2"), parts={"shade.part1": "shade", "shade.part2": "shade"})
-    found = sorted_lights(scene)
-    assert found.groups == (LightGroup("shade", ("shade",)),)
-    assert found.of_objects == {"shade.part1": 0, "shade.part2": 0}
-
-
 def test_before_a_bake_the_sun_of_daylight_is_known():
     assert [g.name for g in groups_before_bake(scene_of(environment=SunSky(UP)))] == ["sun", "sky"]
     assert [g.name for g in groups_before_bake(scene_of(environment=SunSky(UP, sun_scale=0.0)))] == ["sky"]
@@ -120,12 +105,6 @@ members = [{members}]
 def written(tmp_path: Path, members: str) -> Path:
     (tmp_path / "scene.toml").write_text(TOML.format(members=members))
     return tmp_path / "scene.toml"
-
-
-def test_groups_and_names_are_read_from_a_scene_toml(tmp_path):
-    scene = load_scene(written(tmp_path, '"bulb*", "sky"'))
-    assert scene.lights[-1].name == "bulb_1"
-    assert scene.light_groups == (LightGroup("reading", ("bulb*", "sky")),)
 
 
 def test_a_member_that_fits_nothing_is_an_error(tmp_path):

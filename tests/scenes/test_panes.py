@@ -14,10 +14,10 @@ from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch
 from lambent.scenes.panes import panes_of
 from lambent.scenes.scene import MaterialTextures, Scene, SceneObject, Texture
-from tests.scenes.test_gltf import _worn as worn
-from tests.scenes.test_gltf import loaded
-from tests.scenes.test_scene_mitsuba_bsdfs import bsdf, rgb
-from tests.scenes.test_scene_obj import QUAD
+from tests.scenes.loaders.gltf.test_gltf import _worn as worn
+from tests.scenes.loaders.gltf.test_gltf import loaded
+from tests.scenes.loaders.mitsuba.test_scene_mitsuba_bsdfs import bsdf, rgb
+from tests.scenes.loaders.test_scene_obj import QUAD
 
 TINT = rgb("specular_transmittance", "0.5 0.9 0.7")
 IN_MITSUBA = {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -93,16 +92,6 @@ def test_scene_toml_rules(tmp_path: Path) -> None:
     path.write_text(text + '[[reflectors]]\nobjects = "flor"\n', encoding="utf-8")
     with pytest.raises(UserError, match="floor"):
         load_scene(path)
-
-
-def test_the_room_shows_its_floor_its_tables_and_its_plate() -> None:
-    found = find_reflectors(load_scene("builtin:room"))
-    names = [{part.object for part in r.parts} for r in found]
-    assert names[0] == {"floor_tiles_light", "floor_tiles_dark"}
-    assert found[0].area_m2 > 30
-    assert all(any(wanted in n for n in names) for wanted in ("table_top", "brushed_plate", "screen_pane"))
-    scene = load_scene("builtin:room")
-    assert find_reflectors(replace(scene, reflector_rules=(ReflectorRule("*", use=False),))) == ()
 
 
 def test_a_part_of_something_that_transmits_is_seen_from_both_sides() -> None:

@@ -103,13 +103,3 @@ def textures_in_looks(
     """The textures of each material after some get other looks."""
     changed = {name: textures_in_look(name, look, textures) for name, look in looks.items()}
     return {name: found for name, found in {**textures, **changed}.items() if found is not None}
-
-
-def scene_in_variant(scene: Scene, variant: Variant) -> Scene:
-    """The scene with the materials of a variant; its light stays as loaded."""
-    return replace(
-        scene,
-        materials={**scene.materials, **variant.materials},
-        textures=textures_in_looks(scene.textures, variant.looks),
-        measured={name: file for name, file in scene.measured.items() if name not in variant.looks},
-    )

@@ -16,7 +16,7 @@ from lambent.scenes.ies import Photometry
 from lambent.scenes.scene import DirectionalLight, IesLight, PointLight
 from lambent.scenes.sky.triangle_lights import joined, small_lights
 from tests.bake.small_scenes import TINY, plane
-from tests.scenes.test_gltf import document, loaded
+from tests.scenes.loaders.gltf.test_gltf import document, loaded
 
 VERTICAL, HORIZONTAL = (0.0, 20.0, 33.3, 60.0, 90.0), (0.0, 90.0, 180.0, 290.0, 360.0)
 CANDELA = tuple(tuple(100.0 * (1 + k) / (1 + j) for j in range(5)) for k in (0, 1, 2, 3, 0))
@@ -33,7 +33,7 @@ def illuminance(light: IesLight, points: np.ndarray, normal: np.ndarray) -> np.n
     return cd * np.maximum(-(to @ normal), 0) / metres**3
 
 
-@pytest.mark.parametrize("aim", [(0.0, -1.0, 0.0), (0.6, -0.8, 0.0), (0.0, 1.0, 0.0), (0.48, 0.64, 0.6)])
+@pytest.mark.parametrize("aim", [(0.0, -1.0, 0.0), (0.48, 0.64, 0.6)])
 def test_a_luminaire_shines_as_its_file_says(mi: Any, aim: tuple[float, float, float]) -> None:
     from lambent.bake.tracing.rays import array_of, vectors
     from lambent.bake.tracing.scene_builder import emitter_of

@@ -38,7 +38,3 @@ def test_columns_are_known_by_their_names(tmp_path: Path, order: str, names: tup
     found = np.column_stack([arrays.positions, arrays.normals, arrays.uv])
     np.testing.assert_allclose(found, ROWS, atol=1e-6)
     assert np.asarray(arrays.triangles).tolist() == [[0, 1, 2]]
-
-
-def test_the_names_are_those_that_programs_write() -> None:
-    assert UV_NAMES == (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))

@@ -47,11 +47,6 @@ def test_no_light_is_lost(count: int) -> None:
     assert not found.near.any()
 
 
-def test_uniform_light_has_triangles_of_its_share() -> None:
-    found = lights(500, np.ones((len(W), 3)))
-    assert np.allclose(found.light[:, 0], solid_angles(found.corners), rtol=0.25)  # by the grid of samples
-
-
 def test_the_sun_is_cut_out() -> None:
     """Its light lies in small triangles at its place, and their centres are where it is."""
     found = lights(400)
@@ -69,14 +64,6 @@ def test_irradiance_of_the_triangles_is_the_environments() -> None:
     found, n = lights(2000), normalize(np.array([0.2, 0.9, 0.3]))
     exact = (sunny() * (WEIGHT_SR * np.maximum(W @ n, 0))[:, None]).sum(axis=0)
     assert np.allclose((found.light * np.maximum(found.centres @ n, 0)[:, None]).sum(axis=0), exact, rtol=2e-3)
-
-
-def test_black_parts_and_few_samples_end_the_division() -> None:
-    few = environment_triangles(W[::97], WEIGHT_SR[::97], sunny()[::97], 10_000)
-    assert len(few) < 1000
-    dark = lights(400, np.zeros((len(W), 3)))
-    assert not dark.light.any()
-    assert np.isfinite(dark.centres).all()
 
 
 def test_lamps_are_cut_into_equal_parts() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -30,16 +29,6 @@ def test_colours_beyond_a_masks_edge_come_from_within() -> None:
     assert np.array_equal(filled[leaf], picture(colour).texels[leaf])
 
 
-def test_hidden_texels_take_the_nearest_colour() -> None:
-    colour = np.zeros((8, 64, 1), np.float32)
-    colour[:, :32], colour[:, 32:] = 1, 2
-    known = np.zeros((8, 64), bool)
-    known[:, [0, 63]] = True
-    filled = textures.filled(colour, known)[..., 0]
-    assert (filled[:, :16] == 1).all()
-    assert (filled[:, 48:] == 2).all()
-
-
 def test_large_pictures_are_reduced_and_shared_ones_stay_shared(monkeypatch) -> None:
     monkeypatch.setattr(textures, "SIDE_MAX", 16)
     large = picture(np.random.default_rng(0).random((50, 20, 3)))
@@ -56,13 +45,6 @@ def test_wrong_channels_and_holes_in_the_numbers_are_refused() -> None:
         textures.prepared({"m": MaterialTextures(roughness=picture(np.ones((2, 2, 3))))})
     with pytest.raises(UserError, match="not finite"):
         textures.prepared({"m": MaterialTextures(diffuse=picture(np.full((2, 2, 3), np.nan)))})
-
-
-def test_a_picture_is_told_by_texels_and_place() -> None:
-    one = picture(np.ones((2, 2, 3)))
-    assert textures.digest(one) == textures.digest(picture(np.ones((2, 2, 3))))
-    assert textures.digest(one) != textures.digest(picture(np.full((2, 2, 3), 0.5)))
-    assert textures.digest(one) != textures.digest(replace(one, uv_transform=((2.0, 0, 0), (0, 1.0, 0))))
 
 
 def test_an_object_whose_uv_is_one_point_can_show_an_image(tmp_path: Path) -> None:

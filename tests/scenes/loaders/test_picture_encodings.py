@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from lambent.scenes import load_scene
-from tests.scenes.test_gltf import _png as png
-from tests.scenes.test_gltf import _worn as worn
-from tests.scenes.test_gltf import loaded
-from tests.scenes.test_scene_mitsuba import written
-from tests.scenes.test_scene_obj import QUAD, parts_of
+from tests.scenes.loaders.gltf.test_gltf import _png as png
+from tests.scenes.loaders.gltf.test_gltf import _worn as worn
+from tests.scenes.loaders.gltf.test_gltf import loaded
+from tests.scenes.loaders.mitsuba.test_scene_mitsuba import written
+from tests.scenes.loaders.test_scene_obj import QUAD, parts_of
 
 BYTE = 188
 NUMBER = BYTE / 255
@@ -24,10 +24,6 @@ LIGHT = ((NUMBER + 0.055) / 1.055) ** 2.4  # IEC 61966-2-1
 def grey(tmp_path: Path) -> Path:
     png(tmp_path / "grey.png", np.full((2, 2, 4), (BYTE, BYTE, BYTE, BYTE)))
     return tmp_path
-
-
-def test_the_byte_is_half_of_the_light() -> None:
-    assert pytest.approx(0.503, abs=1e-3) == LIGHT and pytest.approx(0.737, abs=1e-3) == NUMBER
 
 
 @pytest.mark.parametrize(("metallic", "expected"), [(0.0, 0.96 * LIGHT), (1.0, LIGHT)])
@@ -58,14 +54,6 @@ def test_roughness_metal_and_alpha_of_gltf_are_numbers(grey: Path) -> None:
     pane = {"name": "m", "alphaMode": "BLEND", "pbrMetallicRoughness": pbr}
     (through,) = loaded(grey, worn(pane, ["grey.png"])).materials["m"].transmission_lobes
     assert through.k == pytest.approx((1 - NUMBER,) * 3, rel=2e-3)
-
-
-def test_normals_of_gltf_are_numbers_and_their_green_points_up(grey: Path) -> None:
-    png(grey / "lean.png", np.full((1, 1, 3), (BYTE, 64, 230)))
-    textures = loaded(grey, worn({"name": "m", "normalTexture": {"index": 0}}, ["lean.png"])).textures["m"]
-    assert textures.normal is not None
-    n = np.array([BYTE, 64, 230]) / 255 * 2 - 1
-    np.testing.assert_allclose(textures.normal.texels[0, 0], n / np.linalg.norm(n), atol=1e-3)
 
 
 def test_specular_glossiness_is_encoded_but_for_its_alpha(grey: Path) -> None:

@@ -14,7 +14,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.scenes import builtin, load_scene, validate
 from lambent.scenes.geometry import signed_volume
 from lambent.scenes.scene import Scene
-from tests.scenes.test_geometry import boundary_edges
+from tests.scenes.geometry.test_geometry import boundary_edges
 
 # Objects that are sheets, or end in others.
 OPEN = {

@@ -12,9 +12,9 @@ from lambent.core.geometry.sequences import cosine_hemisphere, hammersley
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.scenes.loaders.surfaces.material_builder import masking
-from tests.scenes.test_gltf import _png as png
-from tests.scenes.test_gltf import _worn as worn
-from tests.scenes.test_gltf import loaded
+from tests.scenes.loaders.gltf.test_gltf import _png as png
+from tests.scenes.loaders.gltf.test_gltf import _worn as worn
+from tests.scenes.loaders.gltf.test_gltf import loaded
 
 
 def test_specular_has_a_weight_and_a_colour(tmp_path: Path) -> None:
@@ -94,10 +94,3 @@ def test_specular_glossiness(tmp_path: Path) -> None:
     assert roughness is not None and scene.textures["m"].specular is not None
     slopes = scene.materials["m"].lobes[0].mx * roughness.texels[0, :, 0]
     assert slopes == pytest.approx([0.04, (1 - 0.8 * 128 / 255) ** 2], rel=5e-3)
-
-
-def test_missing_pictures_are_said(tmp_path: Path) -> None:
-    pbr = {"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 0.4, 0.3, 1], "metallicFactor": 0}
-    scene = loaded(tmp_path, worn({"name": "m", "pbrMetallicRoughness": pbr}, ["gone.png"]))
-    assert scene.materials["m"].kd == pytest.approx((0.48, 0.384, 0.288))
-    assert any("gone.png is missing" in w for w in scene.warnings)

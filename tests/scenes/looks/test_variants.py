@@ -15,7 +15,6 @@ from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch
 from lambent.scenes.looks.variants import (
     VariantByObject,
-    scene_in_variant,
     textures_in_looks,
     variant_named,
     with_variants,
@@ -68,7 +67,6 @@ materials.white.kd = 0.1
     assert copper.materials["white"].kd == (0.3, 0.1, 0.05)
     assert dark.materials["white"].kd == (0.1, 0.1, 0.1) and not dark.light.groups
     assert tmp_path / "copper.json" in scene.sources
-    assert scene_in_variant(scene, dark).materials["white"].kd == (0.1, 0.1, 0.1)
 
 
 def test_objects_of_one_material_that_part_ways_get_materials_of_their_own(tmp_path: Path) -> None:
@@ -95,15 +93,6 @@ def test_a_material_keeps_its_textures_with_other_numbers_and_takes_those_of_ano
     assert {*dark.looks} == {left, right} and {*half.looks} == {right}
     assert textures_in_looks(found.textures, dark.looks) == {left: texture, right: texture}
     assert textures_in_looks(found.textures, half.looks) == {left: texture}
-    assert {*scene_in_variant(found, dark).measured} == {"grey"}
-    assert {*scene_in_variant(found, half).measured} == {left, "grey"}
-
-
-def test_variants_that_change_nothing_part_no_materials() -> None:
-    objects = tuple(SceneObject(name, SQUARE, "grey") for name in ("a", "b"))
-    look = Look(GREY)
-    found = with_variants(Scene("s", objects, {"grey": GREY}), [VariantByObject("as it is", (look, look))])
-    assert found.objects == objects and not found.variants[0].looks
 
 
 WRONG = {
@@ -166,20 +155,5 @@ def test_a_variant_shows_an_image(tmp_path: Path) -> None:
     assert bricks.materials["white"].kd == pytest.approx((0.5, 0, 0), abs=1e-3)
     assert tinted.materials["white"].kd == pytest.approx((0, 0, 1)) and tinted.looks["white"].textures
     assert not none.looks and image.resolve() in [path.resolve() for path in scene.sources]
-    shown = scene_in_variant(scene, bricks)
-    np.testing.assert_allclose(shown.textures["white"].diffuse.texels[0, :, 0], (2, 0), atol=0.01)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "said"),
-    [('"missing.png"', "neither a material with textures nor a file"), ('"../a.png"', "path leaves its folder"),
-     ("3", "is not a name"), ('"images/bricks.png,0"', "repetition is out of range"),
-     ('"gold"', "neither a material with textures nor a file"), ('"scene.toml"', "scene.toml"), ('""', "file name"),
-     ('"none"\nmaterials.white.use = "gold"', "has other keys beside use")],
-)  # fmt: skip
-def test_wrong_textures_of_variants_are_one_line(tmp_path: Path, wrong: str, said: str) -> None:
-    (tmp_path / "images").mkdir()
-    write_shown(tmp_path / "images" / "bricks.png", STRIPES)
-    with pytest.raises(UserError, match=said) as raised:
-        load_scene(written(tmp_path, PAINTED + BRICKS.format(wrong=wrong)))
-    assert "\n" not in str(raised.value)
+    shown = textures_in_looks(scene.textures, bricks.looks)
+    np.testing.assert_allclose(shown["white"].diffuse.texels[0, :, 0], (2, 0), atol=0.01)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.scenes.test_gltf import document, loaded
+from tests.scenes.loaders.gltf.test_gltf import document, loaded
 
 
 def test_extensions_that_are_not_read_are_said(tmp_path: Path) -> None:

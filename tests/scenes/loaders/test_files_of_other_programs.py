@@ -10,17 +10,15 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import normalize
-from lambent.core.pictures.environment_layouts import layout_of
-from lambent.core.pictures.images import read_image
 from lambent.scenes import load_scene
 from lambent.scenes.ies import parse_ies
 from lambent.scenes.loaders.contents import Contents
 from lambent.scenes.loaders.scene_toml.placing import placed
 from lambent.scenes.scene import DirectionalLight, IesLight, PointLight
 from lambent.scenes.sky.environment_images import read_lat_long
-from tests.scenes.test_gltf import _worn as worn
-from tests.scenes.test_gltf import document, loaded
-from tests.scenes.test_gltf_luminaires import DATA, UNEVEN, candela
+from tests.scenes.loaders.gltf.test_gltf import _worn as worn
+from tests.scenes.loaders.gltf.test_gltf import document, loaded
+from tests.scenes.loaders.gltf.test_gltf_luminaires import UNEVEN, candela
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 1 1 0\n"
 PICTURE = np.linspace(0.1, 1, 16 * 32 * 3, dtype=np.float32).reshape(16, 32, 3)
@@ -101,18 +99,6 @@ def test_lights_are_placed_with_their_geometry(tmp_path: Path, up: str) -> None:
         assert candela(luminaire, tuple(matrix @ w)) == pytest.approx(candela(before, tuple(w)), abs=1e-3)
 
 
-def test_luminaires_of_a_file_are_scaled_with_it(tmp_path: Path) -> None:
-    listed = [{"mesh": 0}, {"translation": [1, 2, 3], "extensions": {"EXT_lights_ies": {"light": 0}}}]
-    content = document(nodes=listed, scenes=[{"nodes": [0, 1]}])
-    content["extensions"] = {"EXT_lights_ies": {"lights": [{"uri": DATA}]}}
-    loaded(tmp_path, content)
-    (name,) = (path.name for path in tmp_path.glob("*.gl*"))
-    head = f'format = "lambent-scene"\nversion = 1\ngeometry = {{ file = "{name}", scale = 0.5 }}\n'
-    (tmp_path / "scene.toml").write_text(head)
-    (light,) = load_scene(tmp_path / "scene.toml").lights
-    assert isinstance(light, IesLight) and light.position == pytest.approx((0.5, 1, 1.5))
-
-
 def test_an_exr_in_parts_is_its_first_part_with_colour(tmp_path: Path) -> None:
     depth, colour = {"Z": PICTURE[..., 0].copy()}, {"RGB": PICTURE}
     for parts in ((colour, depth), (depth, colour)):
@@ -141,12 +127,3 @@ def test_surroundings_of_few_pixels_have_enough_for_the_path_tracer(tmp_path: Pa
     picture = PICTURE[: shape[0], : shape[1]].copy()
     read = read_lat_long(exr(tmp_path / "a.exr", {"RGB": picture}))
     assert min(read.shape[:2]) >= 4 and read.mean(axis=(0, 1)) == pytest.approx(picture.mean(axis=(0, 1)), rel=1e-5)
-
-
-def test_a_square_of_one_colour_needs_no_layout() -> None:
-    assert layout_of(np.full((1, 1, 3), 0.7, np.float32)) == "lat-long"
-
-
-def test_radiance_headers_may_end_their_lines_in_two_characters(tmp_path: Path) -> None:
-    (tmp_path / "a.hdr").write_bytes(b"#?RADIANCE\r\nEXPOSURE=2\r\n\r\n-Y 1 +X 2\r\n" + bytes([128, 64, 32, 129] * 2))
-    assert read_image(tmp_path / "a.hdr") == pytest.approx(np.tile((0.5, 0.25, 0.125), (1, 2, 1)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +10,9 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.triangles import triangle_normals
-from lambent.scenes.geometry import box, copies_under, sphere, transformed
-from lambent.scenes.loaders.meshes.creases import deviating_faces
-from lambent.scenes.mesh import areas_of, boxes_of, corners_of
-from lambent.scenes.scene import Mesh
-from tests.scenes.test_gltf import TRIANGLE, document, loaded
+from lambent.scenes.geometry import copies_under, sphere, transformed
+from tests.scenes.loaders.gltf.test_gltf import TRIANGLE, document, loaded
 
 FLOAT, BYTE = 5126, 5121
 
@@ -126,14 +121,6 @@ def test_instances_of_unlike_numbers_are_an_error(tmp_path: Path) -> None:
         loaded(tmp_path, content)
 
 
-def test_a_camera_whose_node_has_no_size_is_left_out(tmp_path: Path) -> None:
-    cameras = [{"type": "perspective", "perspective": {"yfov": 0.8, "znear": 0.1}}]
-    nodes = [{"mesh": 0}, {"camera": 0, "name": "flat", "scale": [0, 0, 0]}, {"camera": 0, "name": "good"}]
-    scene = loaded(tmp_path, document(nodes=nodes, scenes=[{"nodes": [0, 1, 2]}], cameras=cameras))
-    assert [camera.name for camera in scene.cameras] == ["good"]
-    assert scene.warnings == ("flat: left out, its node's scale is zero",)
-
-
 def test_a_camera_that_is_too_wide_is_left_out(tmp_path: Path) -> None:
     cameras = [{"type": "perspective", "perspective": {"yfov": yfov, "znear": 0.1}} for yfov in (3.3, -0.5, 0.8)]
     nodes = [{"mesh": 0}, *({"camera": k, "name": name} for k, name in enumerate(("wide", "negative", "good")))]
@@ -164,18 +151,6 @@ def test_copies_placed_at_once_are_the_copies_placed_one_by_one() -> None:
             assert np.array_equal(getattr(copy, name), getattr(alone, name)), name
         exact = mesh.positions.astype(float) @ world[:3, :3].T + world[:3, 3]
         np.testing.assert_allclose(copy.positions, exact, atol=1e-5)
-
-
-def test_what_is_found_of_many_meshes_is_what_is_found_of_each(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lambent.scenes.mesh.TRIANGLES_AT_ONCE", 300)
-    block = box((1, 1, 1))
-    smooth = replace(block, normals=normalize(block.positions.astype(float)).astype(np.float32))
-    meshes: list[Mesh] = [*copies_under(sphere(1.0, 12, 6), matrices(5)), smooth, block, smooth]
-    assert np.array_equal(corners_of(meshes), np.concatenate([mesh.corners for mesh in meshes]))
-    assert np.array_equal(boxes_of(meshes), np.array([mesh.bounds for mesh in meshes]))
-    assert np.array_equal(areas_of(meshes), np.concatenate([areas_of([mesh]) for mesh in meshes]))
-    assert np.array_equal(deviating_faces(meshes), np.concatenate([deviating_faces([mesh]) for mesh in meshes]))
-    assert deviating_faces(meshes)[-3:].tolist() == [12, 0, 12]
 
 
 def test_a_ground_of_any_size_is_no_matter_of_units(tmp_path: Path) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
@@ -14,10 +12,8 @@ from lambent.scenes.geometry import (
     cylinder,
     extrusion,
     lathe,
-    placed,
     signed_volume,
     sphere,
-    transformed,
     tube,
     turn,
 )
@@ -87,11 +83,6 @@ def test_lathe_normals_point_away_from_the_axis_outside_and_to_it_inside() -> No
     assert (outward[radius > 0.45] > 0).all() and (outward[radius < 0.45] < 0).all()
 
 
-def test_a_mirrored_mesh_keeps_its_outside() -> None:
-    mesh = transformed(cushion((1, 0.5, 0.3), 4.0, 4), np.diag([-2.0, 1.0, 1.0, 1.0]))
-    assert signed_volume(mesh) > 0 and mesh_faults(mesh) == []
-
-
 @pytest.mark.parametrize(("axis", "of", "to"), [("x", 1, 2), ("y", 2, 0), ("z", 0, 1)])
 def test_turn_is_right_handed(axis: str, of: int, to: int) -> None:
     assert np.allclose(turn(axis, 90) @ np.eye(3)[of], np.eye(3)[to])
@@ -127,16 +118,3 @@ def test_teapot_normals_are_those_of_the_surface() -> None:
             assert np.abs(du - along[inner]).max() < 0.02 and np.abs(dv - across[inner]).max() < 0.02
             assert np.abs(np.sum(normals * along, axis=-1)).max() < 1e-9
             assert np.allclose(np.linalg.norm(normals, axis=-1), 1)
-
-
-def test_teapot_parts_meet() -> None:
-    """Neighbouring turned patches share their rows, to rounding."""
-    parts = patches()
-    for upper, lower in pairwise((parts["rim"][:4], parts["body"][:4], parts["body"][4:], parts["bottom"])):
-        for a, b in zip(upper, lower, strict=True):
-            assert np.allclose(a[3], b[0])
-
-
-def test_placed_turns_then_moves() -> None:
-    mesh = placed(box((1, 1, 1)), (10, 0, 0), turn("y", 45))
-    assert mesh.bounds[1][0] == pytest.approx(10 + np.sqrt(0.5))

@@ -344,12 +344,6 @@ def test_broken_triangles_go_and_that_is_said(tmp_path: Path) -> None:
     assert len(scene.object("thing").mesh.faces) == 1 and validate(scene) == []
 
 
-@pytest.mark.parametrize("size", [600.0, 0.01])
-def test_another_unit_is_noticed(tmp_path: Path, size: float) -> None:
-    scene = loaded(tmp_path, _with_positions(TRIANGLE * size, [(0, 1, 2)]))
-    assert any("is its unit the metre?" in w for w in scene.warnings)
-
-
 def _set(*path: Any) -> Callable[[dict[str, Any]], None]:
     """A change: all but the last of `path` lead to a place, the last is put there."""
 
@@ -366,11 +360,8 @@ BROKEN = {
     "index out of range": (_set("accessors", 0, "count", 2), "face index out of range|wrong length"),
     "huge count": (_set("accessors", 0, "count", 10**12), "accessor ends beyond its buffer view"),
     "huge buffer": (_set("buffers", 0, "byteLength", 10**13), "buffer is truncated"),
-    "view past its buffer": (_set("bufferViews", 0, "byteLength", 10**6), "buffer view ends beyond its buffer"),
     "negative offset": (_set("bufferViews", 0, "byteOffset", -4), "greater than or equal to 0"),
     "no such mesh": (_set("nodes", 0, "mesh", 7), "index out of range"),
-    "no such accessor": (_set("meshes", 0, "primitives", 0, "indices", 99), "index out of range"),
-    "no such material": (_set("meshes", 0, "primitives", 0, "material", 3), "index out of range"),
     "cycle": (_set("nodes", 0, "children", [0]), "several parents"),
     "wrong type": (_set("meshes", "none"), "list"),
     "wrong accessor type": (_set("accessors", 0, "type", "VEC2"), "wrong accessor type"),
@@ -382,7 +373,6 @@ BROKEN = {
     "broken base64": (_set("buffers", 0, "uri", "data:;base64,%%%"), "base64"),
     "it has no light": (_set("nodes", 0, {"name": "empty"}), "holds no triangles"),
     "matrix that is not affine": (_set("nodes", 0, "matrix", [*[0.0] * 15, 0.0]), "not an affine matrix"),
-    "infinite transform": (_set("nodes", 0, "translation", [0, 0, float("inf")]), "finite"),
 }
 
 
@@ -431,14 +421,8 @@ def test_variants_of_primitives_are_variants_of_the_scene(tmp_path: Path) -> Non
     oak, night, bare = scene.variants
     assert oak.materials["plain"] == scene.materials["wood"] and not night.looks and not bare.looks
     assert "variant night: thing would change emission, which is ignored" in scene.warnings
-    head = 'format = "lambent-scene"\nversion = 1\ngeometry = "thing.gltf"\n'
-    (tmp_path / "scene.toml").write_text(head + 'variant = "night"\n')
-    lit = load_scene(tmp_path / "scene.toml").object("thing")
-    assert lit.material == "lamp" and lit.emission == (1, 1, 1) and scene.object("thing").material == "plain"
-    (tmp_path / "scene.toml").write_text(head + 'variant = "nigth"\n')
-    with pytest.raises(UserError, match="did you mean 'night'"):
-        load_scene(tmp_path / "scene.toml")
     more = 'variant = "oak"\n[[variants]]\nname = "oak"\nlight.sun = "off"\n[[variants]]\nname = "red"\n'
+    head = 'format = "lambent-scene"\nversion = 1\ngeometry = "thing.gltf"\n'
     (tmp_path / "scene.toml").write_text(f'{head}{more}materials.wood.colour = "#ff0000"\n')
     chosen = load_scene(tmp_path / "scene.toml")
     oak, night, bare, red = chosen.variants

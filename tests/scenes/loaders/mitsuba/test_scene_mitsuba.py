@@ -12,10 +12,10 @@ from lambent.bake.engine import engine
 from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
 from lambent.core.geometry.directions import normalize
 from lambent.core.pictures.images import write_image
-from lambent.core.views.camera import Camera, camera_axes
+from lambent.core.views.camera import camera_axes
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.scenes import load_scene, validate
-from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, ImageEnvironment, PointLight, Scene, SunSky
+from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, ImageEnvironment, PointLight, Scene
 
 BALL = '<shape type="sphere" id="ball"/>'
 
@@ -138,15 +138,6 @@ def test_cameras_see_what_mitsubas_see(tmp_path: Path, kind: str, said: str, wid
         assert camera.position == pytest.approx(
             np.array(theirs.sensors()[0].world_transform().matrix)[:3, 3].ravel(), abs=1e-4
         )
-
-
-def test_an_up_along_the_view_gives_the_axes_of_our_cameras(tmp_path: Path) -> None:
-    """Where `up` tells nothing, the loader and core.camera take the same axis instead."""
-    stand = '<lookat origin="0, 5, 0" target="0, 0, 0" up="0, 1, 0"/>'
-    body = f'<sensor type="perspective"><transform name="to_world">{stand}</transform></sensor>{BALL}'
-    (camera,) = load_scene(written(tmp_path, body)).cameras
-    expected = camera_axes(Camera("", (0.0, 5.0, 0.0), (0.0, 0.0, 0.0)))
-    np.testing.assert_allclose(camera_axes(camera), expected, atol=1e-12)
 
 
 def test_a_scene_that_stands_along_z_is_turned(tmp_path: Path) -> None:
@@ -291,16 +282,6 @@ def test_old_names_defaults_includes_and_instances(tmp_path: Path) -> None:
     assert scene.environment == ConstantEnvironment((0.1, 0.2, 0.3)) and scene.exposure_ev is None
     assert "a scene has one environment" in " ".join(scene.warnings)
     assert {p.name for p in scene.sources} == {"scene.xml", "materials.xml"}
-
-
-def test_skies(tmp_path: Path) -> None:
-    said = '<vector name="sun_direction" value="0 3 4"/><float name="turbidity" value="5"/>'
-    sky = f'<emitter type="sunsky">{said}</emitter>'
-    scene = load_scene(written(tmp_path, BALL + sky, "0.6.0"))
-    assert isinstance(scene.environment, SunSky) and scene.environment.sun_direction == pytest.approx((0, 0.6, 0.8))
-    assert scene.environment.turbidity == 5
-    dark = load_scene(written(tmp_path, BALL))
-    assert isinstance(dark.environment, SunSky) and "it has no light: daylight is added" in dark.warnings
 
 
 def test_the_living_room(shared_data: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from lambent.core.light.photometry import photometric
 from lambent.scenes.scene import IesLight, PointLight, Scene
-from tests.scenes.test_gltf import document, loaded
+from tests.scenes.loaders.gltf.test_gltf import document, loaded
 from tests.scenes.test_ies import ies
 
 UNEVEN = ies("0 45 90", "0 90 180 270 360", "100 80 0 100 60 0 100 40 0 100 20 0 100 80 0")

@@ -10,20 +10,10 @@ import pytest
 from lambent.materials.document import Material
 from lambent.scenes import load_scene
 from lambent.scenes.scene import SUN_RADIUS_DEG, PointLight, SunSky
-from tests.scenes.test_gltf import _png as png
-from tests.scenes.test_scene_mitsuba import written
+from tests.scenes.loaders.gltf.test_gltf import _png as png
+from tests.scenes.loaders.mitsuba.test_scene_mitsuba import written
 
 BALL = '<shape type="sphere" id="ball"/>'
-
-
-def test_emission_and_lamps_are_scaled(tmp_path: Path) -> None:
-    scaled = '<rgb name="{}" value="1 2 3"/><float name="scale" value="4"/>'
-    body = f"""<shape type="sphere" id="ball"><emitter type="area">{scaled.format("radiance")}</emitter></shape>
-        <emitter type="point">{scaled.format("intensity")}</emitter>"""
-    scene = load_scene(written(tmp_path, body))
-    assert scene.object("ball").emission == pytest.approx((4, 8, 12))
-    (lamp,) = scene.lights
-    assert isinstance(lamp, PointLight) and lamp.intensity == pytest.approx((4, 8, 12))
 
 
 @pytest.mark.parametrize(
@@ -92,29 +82,6 @@ def test_one_channel_of_a_bitmap(tmp_path: Path, channel: str, byte: int) -> Non
         <string name="channel" value="{channel}"/></texture></bsdf></shape>"""
     kd = load_scene(written(tmp_path, body)).materials["m"].kd
     assert kd == pytest.approx((byte / 255,) * 3, rel=2e-3)
-
-
-def test_instances_are_turned_with_their_scene(tmp_path: Path) -> None:
-    """z is up: what is moved by (1, 2, 5) there stands at (1, 5, -2) here."""
-    body = f"""<sensor type="perspective">
-        <transform name="to_world"><lookat origin="3, -4, 2" target="0, 0, 0" up="0, 0, 1"/></transform></sensor>
-        <shape type="shapegroup" id="group">{BALL}</shape>
-        <shape type="instance"><ref id="group"/>
-          <transform name="to_world"><translate x="1" y="2" z="5"/></transform></shape>"""
-    (thing,) = load_scene(written(tmp_path, body)).objects
-    assert np.mean(thing.mesh.bounds, axis=0) == pytest.approx((1, 5, -2), abs=1e-4)
-
-
-def test_shapes_without_area_are_left_out(tmp_path: Path) -> None:
-    shapes = "".join(
-        f'<shape type="{kind}" id="{kind}_0"><float name="radius" value="0"/></shape>'
-        for kind in ("sphere", "cylinder")
-    )
-    scene = load_scene(written(tmp_path, shapes + BALL))
-    assert [o.name for o in scene.objects] == ["ball"]
-    assert [w for w in scene.warnings if "no triangle has an area" in w] == [
-        f"{kind}_0: left out, no triangle has an area" for kind in ("sphere", "cylinder")
-    ]
 
 
 def test_parameters_of_principled_are_kept_within_their_ranges(tmp_path: Path) -> None:

@@ -7,9 +7,9 @@ import pytest
 
 from lambent.scenes.geometry import bezier
 from lambent.scenes.geometry.teapot import patches
-from lambent.scenes.geometry.tessellation import net_areas, oriented_alike, steps_to, tessellated, triangles_of
+from lambent.scenes.geometry.tessellation import oriented_alike, steps_to, tessellated, triangles_of
 from lambent.scenes.validation import mesh_faults
-from tests.scenes.test_geometry import boundary_edges
+from tests.scenes.geometry.test_geometry import boundary_edges
 
 HANDLE = 4 / 3 * (np.sqrt(2) - 1)  # of a cubic quarter circle: its radius is right within .03 %
 ARC = np.array([[1, 0], [1, HANDLE], [HANDLE, 1], [0, 1]])
@@ -21,13 +21,6 @@ def sheet(heights: np.ndarray | float = 0.0) -> np.ndarray:
     """Control points (4, 4, 3) over the unit square: x is u, y is v."""
     u, v = np.meshgrid(THIRDS, THIRDS)
     return np.stack([u, v, np.broadcast_to(heights, u.shape)], axis=-1).astype(float)
-
-
-def quarter_cylinder(radius: float, length: float) -> np.ndarray:
-    """About the z axis: u runs around it, v along it; S_u x S_v points away from it."""
-    points = np.zeros((4, 4, 3))
-    points[..., :2], points[..., 2] = radius * ARC, length * THIRDS[:, None]
-    return points
 
 
 def octant(radius: float = 1.0) -> np.ndarray:
@@ -45,23 +38,6 @@ def random_patch() -> np.ndarray:
 def some(count: int = 200) -> tuple[np.ndarray, np.ndarray]:
     u, v = np.random.default_rng(0).random((2, count))
     return u, v
-
-
-def test_a_plane() -> None:
-    u, v = some()
-    flat = sheet() * (3, 2, 1)
-    assert np.allclose(bezier.positions(flat, u, v), np.stack([3 * u, 2 * v, 0 * u], axis=-1), atol=1e-14)
-    assert np.allclose(bezier.normals(flat, u, v), (0, 0, 1))
-
-
-def test_a_cylinder() -> None:
-    """Cubic arcs: radius within .03 %."""
-    u, v = some()
-    tube = quarter_cylinder(0.5, 2.0)
-    at = bezier.positions(tube, u, v)
-    assert np.allclose(np.hypot(at[:, 0], at[:, 1]), 0.5, rtol=3e-4) and np.allclose(at[:, 2], 2 * v)
-    outwards = at * (1, 1, 0) / np.hypot(at[:, 0], at[:, 1])[:, None]
-    assert (bezier.normals(tube, u, v) * outwards).sum(axis=1).min() > 0.9999
 
 
 def test_a_ball_and_its_pole() -> None:
@@ -87,20 +63,6 @@ def test_derivatives_are_those_of_finite_differences() -> None:
     by_v = [(a - b) / (2 * h) for a, b in zip(*(bezier.tangents(points, u, v + k) for k in (h, -h)), strict=True)]
     for found, expected in zip((s_uu, s_uv, s_uv, s_vv), (*by_u, *by_v), strict=True):
         assert np.allclose(found, expected, atol=1e-6)
-
-
-def test_normals_of_the_teapot_at_its_poles() -> None:
-    """Top of the knob and middle of the bottom: along the axis, outwards, from every patch that meets there."""
-    u = np.linspace(0, 1, 5)
-    for part, v, up in (("lid", 0.0, 1.0), ("bottom", 1.0, -1.0)):
-        for points in patches()[part][:4]:
-            assert np.allclose(bezier.normals(points, u, np.full(5, v)), (0, 0, up), atol=1e-6)
-
-
-def test_patches_without_area_have_no_normal() -> None:
-    u, v = some(20)
-    for points in (np.zeros((4, 4, 3)), sheet() * (1, 0, 0), np.tile(sheet()[:1], (4, 1, 1))):
-        assert not bezier.normals(points, u, v).any() and net_areas(points[None]) == pytest.approx(0, abs=1e-12)
 
 
 @pytest.mark.parametrize("shape", [(2, 2), (2, 4), (3, 2), (4, 3), (4, 4)])
@@ -161,24 +123,6 @@ def test_a_fixed_number_of_steps() -> None:
     assert len(ball.faces) == 2 * 64 - 8, "those at the pole have one triangle"
     assert np.allclose(bezier.positions(octant(), *ball.uv.T.astype(float)), ball.positions, atol=1e-6)
     assert np.allclose(np.linalg.norm(ball.positions, axis=1), 1, rtol=6e-4)
-
-
-def test_patches_that_are_not_finite_or_flat_have_no_triangles() -> None:
-    broken = sheet()
-    broken[1, 2, 0] = np.nan
-    mesh = tessellated(np.array([broken, sheet(), np.zeros((4, 4, 3))]), 4)
-    assert len(mesh.faces) == 32 and np.array_equal(mesh.bounds, [(0, 0, 0), (1, 1, 0)])
-    assert mesh_faults(mesh) == []
-
-
-def test_patches_are_turned_to_the_side_of_their_neighbours() -> None:
-    reversed_ = np.random.default_rng(0).random(32) < 0.35
-    mixed = np.where(reversed_[:, None, None, None], TEAPOT[:, :, ::-1], TEAPOT)
-    assert np.array_equal(oriented_alike(mixed), TEAPOT)
-    far = 1e-3 * mixed + 1e14 / 1024
-    assert len(oriented_alike(far)) == 32, "numbers that overflow nothing"
-    alone = octant()[None, :, ::-1]
-    assert np.array_equal(oriented_alike(alone), alone), "nothing tells which side is outside"
 
 
 def test_a_closed_ball_has_no_open_edge() -> None:

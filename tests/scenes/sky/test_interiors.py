@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.geometry.latlong import lat_long_direction, lat_long_directions
+from lambent.core.geometry.latlong import lat_long_directions
 from lambent.scenes import load_scene
 from lambent.scenes.scene import ComputedEnvironment
 from lambent.scenes.sky.computed import COMPUTED, HEIGHT, lat_long_image
+from lambent.scenes.sky.gardens import SUN
 from lambent.scenes.sky.interiors import INTERIORS
 
 HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
@@ -40,12 +41,6 @@ def test_the_image_is_the_mean_of_the_interior(name: str) -> None:
     assert near.mean() > 0.95
 
 
-def test_every_direction_meets_a_wall() -> None:
-    axes = np.concatenate([np.eye(3), -np.eye(3), lat_long_direction([0, 1.0, np.pi], [0.0, 2.0, 1.0])])
-    for interior in COMPUTED.values():
-        assert np.isfinite(interior(axes)).all() and interior(axes).shape == axes.shape
-
-
 def test_a_scene_names_an_interior(tmp_path: Path) -> None:
     file = tmp_path / "scene.toml"
     materials = "[materials]\n" + "".join(
@@ -71,3 +66,22 @@ def test_the_path_tracer_sees_the_interior(mi: Any) -> None:
     windows = (w[..., 0] < -0.8) & (np.abs(w[..., 1]) < 0.3)
     opposite = (w[..., 0] > 0.8) & (np.abs(w[..., 1]) < 0.3)
     assert cube[windows].mean() > 10 * cube[opposite].mean()
+
+
+def test_the_park_is_bright_and_dark_in_many_colours() -> None:
+    image = lat_long_image("park")
+    assert np.isfinite(image).all() and image.min() > 0 and image.max() > 1e5 * image.min()
+    w = lat_long_directions(*image.shape[:2])
+    at = np.unravel_index(image.sum(axis=-1).argmax(), image.shape[:2])
+    assert w[at] @ SUN > np.cos(np.radians(1.5))
+    band = image[w[..., 1] > 0].astype(float)
+    share = band / band.sum(axis=-1, keepdims=True)
+    for channel in range(3):  # red and green leaves, blue sky
+        assert (share[:, channel] > 0.45).mean() > 0.02
+
+
+def test_the_park_has_no_seam() -> None:
+    """Neighbours across the first and the last column differ no more than those within."""
+    image = np.log(lat_long_image("park").astype(float))
+    within = np.abs(np.diff(image, axis=1)).mean()
+    assert np.abs(image[:, 0] - image[:, -1]).mean() < 2 * within
