@@ -17,7 +17,7 @@ from lambent.core import files
 from lambent.core.errors import UserError
 from lambent.core.files import atomic_path, check_place, remove_left_over, write_text
 from lambent.core.outputs import check_output, is_marked
-from lambent.core.pictures.film import check_pictures, film_writer
+from lambent.core.pictures.film import film_writer
 from lambent.core.pictures.images import read_image, write_image, write_shown
 from lambent.materials.plots import new_figure, save_figure
 from lambent.report.page import page
@@ -56,19 +56,6 @@ def test_a_link_stays_and_its_target_is_replaced(tmp_path: Path) -> None:
         write_text(tmp_path / "circle", "x")
 
 
-@posix
-def test_the_mode_is_that_of_the_umask_or_of_the_file_before(tmp_path: Path) -> None:
-    before = os.umask(0o027)
-    try:
-        write_text(tmp_path / "a", "new")
-        assert mode(tmp_path / "a") == 0o640
-        (tmp_path / "a").chmod(0o604)
-        write_text(tmp_path / "a", "newer")
-        assert mode(tmp_path / "a") == 0o604
-    finally:
-        os.umask(before)
-
-
 def test_an_error_leaves_the_former_file_and_nothing_else(tmp_path: Path) -> None:
     write_text(tmp_path / "a", "former")
     with (
@@ -87,12 +74,9 @@ def test_an_error_leaves_the_former_file_and_nothing_else(tmp_path: Path) -> Non
 
 
 WRITERS: dict[str, str] = {
-    "a.json": "from lambent.materials.document import Material; Material(name='x' * 9000).save(path)",
-    "a.png": "from lambent.core.pictures.images import write_image; write_image(path, np.random.rand(64, 64, 3))",
     "a.exr": "from lambent.core.pictures.images import write_image; write_image(path, np.random.rand(64, 64, 3))",
     "a.mp4": "from lambent.core.pictures.film import film_writer\n"
     "with film_writer(path, 64, 64) as write: [write(np.random.randint(0, 255, (64, 64, 3), np.uint8)) for _ in '12']",
-    "a.pdf": "from lambent.materials.plots import new_figure, save_figure; save_figure(new_figure(2, 2), path)",
 }
 
 
@@ -152,7 +136,6 @@ def drawn(folder: Path) -> dict[str, Callable[[Path], object]]:
         ".hdr": lambda path: write_image(path, PICTURE),
         ".mp4": film,
         ".pdf": lambda path: save_figure(new_figure(1, 1), path),
-        ".svg": lambda path: save_figure(new_figure(1, 1), path),
         ".html": lambda path: write_text(path, page("<script>", [])),
     }
 
@@ -185,21 +168,3 @@ def test_other_files_are_replaced_by_force_alone(tmp_path: Path) -> None:
     assert not is_marked(tmp_path / "absent.png") and not is_marked(tmp_path)
     with pytest.raises(UserError, match=r"found \.txt; expected \.png"):
         check_output(tmp_path / "a.txt", (".png",), force=True)
-
-
-def test_every_picture_of_a_sequence_is_asked_after(tmp_path: Path) -> None:
-    write_shown(tmp_path / "tour-0001.png", np.zeros((8, 8, 3), np.uint8))
-    (tmp_path / "tour-12.png").write_text("has another number of digits")
-    (tmp_path / "tour-x.png").write_text("has none")
-    check_pictures(tmp_path / "tour-####.png", force=False)
-    (tmp_path / "tour-0099.png").write_text("of another program")
-    with pytest.raises(UserError, match=r"tour-0099\.png: exists already"):
-        check_pictures(tmp_path / "tour-####.png", force=False)
-    check_pictures(tmp_path / "tour-####.png", force=True)
-
-
-def test_a_read_only_file_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write_text(tmp_path / "a", "kept")
-    monkeypatch.setattr(os, "access", lambda *_: False)  # as for any user but root
-    with pytest.raises(UserError, match="is read-only"):
-        check_place(tmp_path / "a")

@@ -18,13 +18,6 @@ def test_every_item_and_the_end_are_reported():
     assert seen == [(0, 2, "letters"), (1, 2, "letters"), (2, 2, "letters")]
 
 
-def test_items_are_reported_when_they_are_taken():
-    seen, progress = record()
-    items = tracked("ab", progress, "letters")
-    next(items)
-    assert len(seen) == 1
-
-
 def test_steps_count_up_to_the_total():
     seen, progress = record()
     step = stepper(progress, 2)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from lambent.baked.light_fields.thin_glass import (
-    eta_of,
     exits_beside,
     mirrored_back,
     refracted,
@@ -119,10 +118,6 @@ def test_another_face_beside_does_not_continue_the_exit() -> None:
     tilted = np.array([[-np.sin(0.2), 0.0, -np.cos(0.2), DEPTH]])  # passes DEPTH below the place beside
     found = exits_beside(here, tilted, step, n)
     np.testing.assert_allclose(found[0, 3], DEPTH + 0.01 * np.tan(-0.2))
-
-
-def test_the_index_follows_the_reflectance() -> None:
-    assert eta_of(0.04) == pytest.approx(1.5) and eta_of(0.0) == 1.0 and np.isfinite(eta_of(1.0))
 
 
 def test_clear_glass_in_even_light_is_as_bright_as_what_is_behind_it() -> None:

@@ -9,11 +9,11 @@ import pytest
 
 from lambent.baked.light_fields import maps as light_field_maps
 from lambent.baked.light_fields.light_field import NO_POINT, LightField
-from lambent.baked.light_fields.lookup import March, Place, blended, marched, normal_weights
-from lambent.baked.light_fields.maps import nearest_points, nearness_along, radiance_along, whole_texels
+from lambent.baked.light_fields.lookup import March, blended, marched, normal_weights
+from lambent.baked.light_fields.maps import nearest_points, radiance_along, whole_texels
 from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.octahedral import bordered, texel_directions, to_square
-from tests.baked.analytic_light_field import ball_field, errors, on_ball, places, seen, sky_light
+from tests.baked.light_fields.analytic_light_field import ball_field, errors, places, seen, sky_light
 
 
 @pytest.fixture(scope="module")
@@ -51,13 +51,6 @@ def test_the_sky_has_its_share_of_texels_that_show_both() -> None:
     np.testing.assert_allclose(found, expected)
     whole = whole_texels(field.radiance, field.cover, lambda w: np.full(w.shape, 10.0))
     np.testing.assert_allclose(whole.reshape(16, 3), expected)
-
-
-def test_distances_are_those_of_the_nearest_texel(field: LightField) -> None:
-    n = field.inverse_distance.shape[1]
-    w = texel_directions(n).reshape(-1, 3)
-    point = np.full(len(w), 7)
-    np.testing.assert_array_equal(nearness_along(field, point, w), field.inverse_distance[7].reshape(-1))
 
 
 def test_a_sample_map_is_cropped_from_its_grid(field: LightField) -> None:
@@ -155,12 +148,6 @@ def test_places_without_points_are_black_and_finite(field: LightField) -> None:
     answer = marched(field, nowhere, w, sky=sky_light)
     assert not answer.met.any() and not answer.sky.any()
     np.testing.assert_array_equal(answer.radiance, 0)
-
-
-def test_a_place_on_a_point_is_finite(field: LightField) -> None:
-    n = on_ball(144)
-    place = Place(field.points.astype(float), n, np.tile(np.arange(144)[:, None], (1, 4)))
-    assert np.isfinite(marched(field, place, n).radiance).all()
 
 
 def test_quarters_of_texels_sharpen_the_edge_of_a_roof() -> None:

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from lambent.core.errors import UserError
 from lambent.core.light import colour
 from lambent.core.pictures import exr, rgbe
-from lambent.core.pictures.images import check_writable, read_encoded, read_image, write_image
+from lambent.core.pictures.images import check_writable, read_image, write_image
 
 RNG = np.random.default_rng(7)
 PICTURE = (RNG.random((20, 37, 3)) ** 4 * 50).astype(np.float32)
@@ -27,26 +27,6 @@ PICTURE = (RNG.random((20, 37, 3)) ** 4 * 50).astype(np.float32)
 def test_exr_keeps_every_bit(tmp_path: Path) -> None:
     write_image(tmp_path / "a.exr", PICTURE)
     np.testing.assert_array_equal(read_image(tmp_path / "a.exr"), PICTURE)
-
-
-def test_hdr_is_within_half_a_mantissa_step(tmp_path: Path) -> None:
-    write_image(tmp_path / "a.hdr", PICTURE)
-    error = np.abs(read_image(tmp_path / "a.hdr") - PICTURE) / PICTURE.max(axis=-1, keepdims=True)
-    assert error.max() <= 1 / 255
-
-
-def test_png_is_within_half_a_byte(tmp_path: Path) -> None:
-    encoded = RNG.integers(0, 256, (9, 8, 3)) / 255
-    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
-    write_image(tmp_path / "a.png", linear)
-    np.testing.assert_allclose(read_encoded(tmp_path / "a.png"), encoded, atol=1e-6)
-    np.testing.assert_allclose(read_image(tmp_path / "a.png"), linear, atol=1e-6)
-
-
-def test_kind_is_found_by_content_not_by_name(tmp_path: Path) -> None:
-    write_image(tmp_path / "a.exr", PICTURE)
-    (tmp_path / "a.exr").rename(tmp_path / "a.png")
-    np.testing.assert_array_equal(read_image(tmp_path / "a.png"), PICTURE)
 
 
 def test_rgbe_known_pixels() -> None:
@@ -100,13 +80,13 @@ def test_every_truncation_is_refused(tmp_path: Path, suffix: str, capfd: pytest.
     write_image(whole, PICTURE)
     data, cut = whole.read_bytes(), tmp_path / f"cut{suffix}"
     # A PNG may lose its end marker (12 bytes) and checksum and still hold every pixel.
-    for length in np.unique(np.linspace(0, len(data) - (1 if suffix != ".png" else 40), 60).astype(int)):
+    for length in np.unique(np.linspace(0, len(data) - (1 if suffix != ".png" else 40), 24).astype(int)):
         cut.write_bytes(data[:length])
         _refused(cut)
     assert capfd.readouterr() == ("", "")
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(at=st.integers(0, 400), value=st.integers(0, 255), suffix=st.sampled_from([".exr", ".hdr", ".png"]))
 def test_a_wrong_byte_is_read_or_refused(tmp_path: Path, at: int, value: int, suffix: str) -> None:
     path = tmp_path / f"a{suffix}"
@@ -167,12 +147,6 @@ def test_not_finite_and_not_a_picture(tmp_path: Path) -> None:
     assert "cannot be read" in _refused(tmp_path)
 
 
-def test_unknown_suffix_writes_nothing(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"expected \.exr, \.hdr, \.png"):
-        write_image(tmp_path / "a.gif", PICTURE)
-    assert not list(tmp_path.iterdir())
-
-
 def _exr_of(path: Path, kind: int, **channels: Any) -> Path:
     OpenEXR.File({"compression": kind, "type": OpenEXR.scanlineimage}, channels).write(str(path))
     return path
@@ -201,11 +175,6 @@ def test_exr_files_that_are_refused(
     with pytest.raises(UserError, match="found 37 x 20, 1 channels; expected at most 739 pixels"):
         exr.decode(tmp_path / "z.exr", exr.PIXELS)
     assert capfd.readouterr() == ("", "")
-
-
-def test_real_environments(shared_data: Path) -> None:
-    image = read_image(shared_data / "environments" / "grace_probe_latlong.hdr")
-    assert image.shape == (512, 1024, 3) and image.max() > 100 and image.min() >= 0
 
 
 def test_a_place_is_tried_before_long_work(tmp_path: Path) -> None:

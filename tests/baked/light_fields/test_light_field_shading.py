@@ -7,7 +7,7 @@ import numpy as np
 from lambent.baked.light_fields.lookup import marched
 from lambent.baked.light_fields.shading import turned, under_sky
 from lambent.core.geometry.directions import normalize, rotation_about
-from tests.baked.analytic_light_field import ball_field, places, sky_light
+from tests.baked.light_fields.analytic_light_field import ball_field, places, sky_light
 
 
 def test_a_turned_sky_is_seen_through_the_roof_alone() -> None:

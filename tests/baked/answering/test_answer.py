@@ -121,17 +121,6 @@ def test_rays_that_end_at_one_point_are_one(groups: int) -> None:
     assert np.allclose(gathered(merged, padded(light))[..., :3], rays_of_light(weight, point, light), rtol=0.08)
 
 
-def test_points_that_gather_alone_follow_those_that_send() -> None:
-    rng = np.random.default_rng(2)
-    point, weight = rng.integers(0, 5, (5, 64)), rng.random((5, 64))
-    more, of_more = rng.integers(0, 5, (3, 16)), rng.random((3, 16))
-    senders, given = Rays.of(packed_rays(point, weight)), rng.random((5, 2, 3)).astype(np.float32)
-    both, light = senders.followed_by(Rays.of(packed_rays(more, of_more))), padded(given)
-    assert np.allclose(gathered(both, light)[5:, :, :3], rays_of_light(of_more, more, given), rtol=0.1)
-    assert np.array_equal(gathered(both, light)[:5], gathered(senders, light))
-    assert np.array_equal(gathered(both.of_first(5), light), gathered(senders, light))
-
-
 def test_points_send_the_light_of_both_their_sides() -> None:
     light = np.array([[[10.0] * 3, [4.0] * 3]], np.float32)
     points = Points(np.zeros(2, int), np.zeros(2, int), np.array([1, 0]), np.float32(0.5) * light, light)
@@ -227,13 +216,6 @@ def test_direct_light_stays_and_light_that_was_not_gathered_never_grows() -> Non
     found = answered(0 * one, 10 * one, 4 * one, 2 * one)
     assert np.allclose(found, 10 + 2 * MOST_EXCESS), "what was not gathered grows with no edit"
     assert np.allclose(answered(0 * one, 10 * one, 0 * one, 2 * one), 0), "but dies with the light around it"
-
-
-def test_texels_are_answered_as_arrays_are() -> None:
-    answer = small_answer()
-    reference, other = answer.reference(), albedos(8)
-    expected = answered(answer.direct, answer.baked, upsampled(answer.indirect(other), answer.near), reference)
-    assert np.allclose(answer.irradiance(other, reference), expected, rtol=1e-5)
 
 
 def alone(count: int) -> Neighbours:

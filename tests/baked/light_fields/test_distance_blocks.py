@@ -86,12 +86,6 @@ def test_maps_of_any_side_come_back(side: int) -> None:
         distances_of(blocks, side + 4)
 
 
-def test_one_distance_is_exact() -> None:
-    for inverse in (1e-3, 1.0, 6e4):
-        even = np.full((1, 4, 4), inverse, np.float16)
-        np.testing.assert_allclose(decoded(encoded(even, None), 1)[0], even, rtol=1e-3)
-
-
 def test_maps_in_blocks_read_as_arrays_and_decode_what_is_read() -> None:
     """By one map, slices, lists and arrays of indices; maps that are not read stay in blocks."""
     inverse = np.stack([FLOOR, EDGE, FLOOR.T, NOISE])[:, :22, :22].astype(np.float16)

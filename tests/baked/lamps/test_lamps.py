@@ -69,10 +69,6 @@ def test_even_light_has_no_lamps(level: float) -> None:
     assert find_lamps(np.full((6, 1, 1, 3), level)) == []
 
 
-def test_a_quarter_of_the_sky_is_no_lamp() -> None:
-    assert find_lamps(lit(((0.0, 1.0, 0.0), np.pi / 3, 1.0), rest=0.02)) == []
-
-
 def test_of_many_equal_lamps_no_more_than_most_leave_and_always_the_same() -> None:
     rng = np.random.default_rng(2)
     cube = np.full((6, N, N, 3), 0.05)

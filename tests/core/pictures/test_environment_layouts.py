@@ -10,7 +10,7 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.core.geometry.cubemap import texel_solid_angles
 from lambent.core.geometry.directions import normalize
-from lambent.core.geometry.latlong import lat_long_direction, lat_long_directions
+from lambent.core.geometry.latlong import lat_long_directions
 from lambent.core.pictures.environment_layouts import as_lat_long, layout_of
 from lambent.core.surroundings import Layout
 
@@ -113,16 +113,3 @@ def test_what_is_not_clear_is_an_error() -> None:
     for layout, shape, expected in (("angular", (32, 64), "1:1"), ("cross", (32, 64), "4:3"), ("strip", (9, 9), "6:1")):
         with pytest.raises(UserError, match=expected):
             as_lat_long(filled(*shape), layout)  # type: ignore[arg-type]
-
-
-def test_the_probe_of_the_test_data_shows_its_window_upright(shared_data: Path) -> None:
-    """The kitchen's window is before the viewer and above the table."""
-    from lambent.core.pictures.images import read_image
-
-    path = shared_data / "environments" / "kitchen_probe.hdr"
-    picture = read_image(path)
-    assert layout_of(picture, path) == "angular"
-    found = as_lat_long(picture, "angular")
-    window = found[int(0.4 * len(found)) : len(found) // 2, int(0.9 * len(found)) : len(found)].mean()
-    assert window > 3 * found.mean()
-    assert np.allclose(lat_long_direction(np.pi / 2, 0.0), (0, 0, -1))

@@ -43,10 +43,3 @@ def test_borders_go_on_as_the_map_does(n):
     for axis in (0, 1):
         longest = np.linalg.norm(np.diff(inside, axis=axis), axis=-1).max()
         assert np.linalg.norm(np.diff(around, axis=axis), axis=-1).max() <= longest + 1e-9
-
-
-def test_borders_of_a_batch_leave_the_maps_as_they_are():
-    maps = np.random.default_rng(0).random((3, 6, 6, 2))
-    np.testing.assert_array_equal(bordered(maps, 2)[:, 2:-2, 2:-2], maps)
-    with pytest.raises(ValueError, match="border of 7"):
-        bordered(maps, 7)
