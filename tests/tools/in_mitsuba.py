@@ -73,3 +73,16 @@ def sampler_of(plugin: Any, wo: np.ndarray) -> tuple[Callable[..., np.ndarray], 
         return np.array(plugin.pdf(context, interaction(np.tile(wo, (len(w), 1))), vectors(w)), float)
 
     return sample, density
+
+
+def furnace_box(bsdf: dict[str, Any]) -> Any:
+    """A closed cube seen from inside, whose sides emit a radiance of .5."""
+    import mitsuba as mi
+
+    sides = {"flip_normals": True, "bsdf": bsdf, "emitter": {"type": "area", "radiance": 0.5}}
+    return mi.load_dict({
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": 40, "rr_depth": 100},
+        "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 8}},
+        "box": {"type": "cube", **sides},
+    })  # fmt: skip

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.bake.bsdfs.material_plugin import PLUGIN, material_dict
+from lambent.bake.bsdfs.material_plugin import material_dict
 from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.checking.chi_square import chi_square
 from lambent.materials.document import Lobe, Material
-from tests.tools.in_mitsuba import interaction, random_directions, sampler_of, square, vectors
+from tests.tools.in_mitsuba import furnace_box, interaction, random_directions, sampler_of, square, vectors
 
 BRUSHED = Lobe(mx=0.3, my=0.07, k=(0.5, 0.6, 0.7), r0=(0.5, 0.6, 0.7), alpha=0.43)
 MATERIALS = {
@@ -57,8 +57,7 @@ def test_samples_follow_the_density(mi, name):
 
 
 def test_closed_box_of_albedo_and_emission_one_half_has_radiance_one(mi):
-    scene = closed(material_dict(Material(kd=0.5)), 0.5, mi)
-    image = np.array(mi.render(scene, spp=256))
+    image = np.array(mi.render(furnace_box(material_dict(Material(kd=0.5))), spp=256))
     assert image.mean() == pytest.approx(1.0, abs=0.003)
 
 
@@ -109,23 +108,6 @@ def test_a_plane_of_retro_tape_shines_back_at_the_lamp(mi, apart_deg):
     seen = np.array(mi.render(scene, spp=64)).mean()
     expected = MaterialBSDF(tape).eval(lamp, eye).mean() * lamp[2] * 3.0 / d**2
     assert seen == pytest.approx(expected, rel=0.01)
-
-
-def closed(bsdf, radiance, mi):
-    """A cube seen from inside, its sides emitting inwards."""
-    return mi.load_dict(
-        {
-            "type": "scene",
-            "integrator": {"type": "path", "max_depth": 40, "rr_depth": 100},
-            "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 8}},
-            "box": {
-                "type": "cube",
-                "flip_normals": True,
-                "bsdf": bsdf,
-                "emitter": {"type": "area", "radiance": radiance},
-            },
-        }
-    )
 
 
 @pytest.mark.parametrize("degrees", [None, 30.0, -120.0])
@@ -185,8 +167,3 @@ def test_sampled_type_names_the_component(mi):
     assert set(index) == {0, 1, 2, 3} and (np.diff(index.astype(int)) >= 0).all()
     below = np.array(bs.wo).T[:, 2] < 0
     assert (below == ((kind & int(mi.BSDFFlags.Transmission)) != 0)).all()
-
-
-def test_a_bad_document_is_refused(mi):
-    with pytest.raises(Exception, match="roughnes"):
-        mi.load_dict({"type": PLUGIN, "material": '{"roughnes": 1}'})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bsdfs.table_plugin import table_dict
-from lambent.core.geometry.directions import direction
+from lambent.core.geometry.directions import direction, normalize
 from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.checking.chi_square import chi_square
 from lambent.materials.document import Lobe, Material
@@ -17,9 +17,14 @@ from lambent.materials.measured.protocol import TableInfo
 from lambent.materials.measured.tables.half_vector_grid import GridShape
 from lambent.materials.measured.tables.half_vector_resampling import grid_of
 from lambent.materials.measured.tables.patch_sheet import lookup_of
-from tests.tools.in_mitsuba import interaction, random_directions, sampler_of
+from tests.tools.in_mitsuba import furnace_box, interaction, random_directions, sampler_of, square, vectors
 
 SMALL = GridShape(8, 8, 64, 32)
+N = normalize(np.array([0.3, -0.5, 0.8]))  # a surface that leans, its tangent 130 degrees from any axis in it
+E = normalize(np.cross([0.0, 1.0, 0.0], N))
+T = np.cos(np.radians(130)) * E + np.sin(np.radians(130)) * np.cross(N, E)
+FRAME = np.stack([T, np.cross(N, T), N])
+WO = direction(np.radians(50), 0.7)  # the viewer in the frame of the brushing
 
 
 class Exact:
@@ -126,36 +131,53 @@ def test_samples_follow_the_density(request, lookup, theta_deg):
     assert test.pdf_integral + test.rejected_share == pytest.approx(1, abs=2e-3 if cells is None else 2e-4)
 
 
+@pytest.fixture(scope="module")
+def turned(mi, sheet, tmp_path_factory):
+    """What the viewer sees of a brushed square whose tangent is turned, for any number of rays."""
+    import drjit as dr
+
+    scene = square(tmp_path_factory.mktemp("turned"), table_dict(sheet[0]), np.stack([E, np.cross(N, E)]), T)
+    viewer = mi.Vector3f(*(WO @ FRAME).tolist())
+
+    def interaction(count):
+        origin = 2 * viewer + mi.Vector3f(*(0.1 * E).tolist()) + dr.zeros(mi.Vector3f, count)
+        return scene.ray_intersect(mi.Ray3f(mi.Point3f(origin), -viewer))
+
+    return interaction
+
+
+def test_on_a_turned_surface_samples_values_and_densities_agree_in_world_space(mi, sheet, turned):
+    """Samples and density that ignored the tangent alike would agree with each other, but not with the grid."""
+
+    def sampled(u):
+        si, u = turned(len(u)), u.astype(np.float32)
+        bs, weight = si.bsdf().sample(mi.BSDFContext(), si, mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T))
+        return si, bs, weight
+
+    def density(w):
+        si = turned(len(w))
+        return np.array(si.bsdf().pdf(mi.BSDFContext(), si, si.to_local(vectors(w))), float)
+
+    def draw(u):
+        si, bs, _ = sampled(u)
+        return np.array(si.to_world(bs.wo), float).T
+
+    test = chi_square(draw, density, samples=200_000)
+    assert test.p_value > 1e-4 and test.pdf_integral == pytest.approx(1, abs=0.02)
+    wi = random_directions(4000, 2)
+    expected = sheet[0].pdf(components(wi), components(np.broadcast_to(WO, wi.shape)))
+    np.testing.assert_allclose(density(wi @ FRAME), expected, rtol=5e-3, atol=1e-3)
+    si, bs, weight = sampled(np.random.default_rng(3).random((4000, 3)))
+    value, pdf = si.bsdf().eval_pdf(mi.BSDFContext(), si, bs.wo)
+    some = np.array(bs.pdf) > 1e-3
+    np.testing.assert_allclose(np.array(bs.pdf)[some], np.array(pdf)[some], rtol=2e-2)
+    np.testing.assert_allclose(np.array(weight)[:, some], np.array(value / pdf)[:, some], rtol=2e-2, atol=1e-3)
+
+
 def test_closed_box_of_albedo_and_emission_one_half_has_radiance_one(mi):
     """White furnace of a Lambertian table: sum of .5 (1/2)^n."""
-    scene = mi.load_dict(
-        {
-            "type": "scene",
-            "integrator": {"type": "path", "max_depth": 40, "rr_depth": 100},
-            "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 8}},
-            "box": {
-                "type": "cube",
-                "flip_normals": True,
-                "bsdf": table_dict(Exact(Material(kd=0.5), isotropic=True), shape=GridShape(8, 1, 32, 16)),
-                "emitter": {"type": "area", "radiance": 0.5},
-            },
-        }
-    )
-    assert np.array(mi.render(scene, spp=256)).mean() == pytest.approx(1.0, abs=0.003)
-
-
-def test_components_are_the_two_sides(mi, sheet):
-    _, plugin = sheet
-    assert plugin.component_count() == 2 and mi.has_flag(plugin.flags(), mi.BSDFFlags.GlossyTransmission)
-    wi, wo = random_directions(1000, 5), random_directions(1000, 6)
-    values = []
-    for i in (0, 1):
-        context = mi.BSDFContext()
-        context.component = i
-        values.append(np.array(plugin.eval(context, interaction(wo), mi.Vector3f(wi.T))).T.max(axis=1) > 0)
-    across = wi[:, 2] * wo[:, 2] < 0
-    assert values[0][~across].all() and not values[0][across].any()
-    assert values[1][across].any() and not values[1][~across].any()
+    table = table_dict(Exact(Material(kd=0.5), isotropic=True), shape=GridShape(8, 1, 32, 16))
+    assert np.array(mi.render(furnace_box(table), spp=256)).mean() == pytest.approx(1.0, abs=0.003)
 
 
 def test_an_rgl_file_is_mitsubas_own_measured(mi, shared_data):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -52,11 +50,6 @@ def test_shares_that_noise_does_not_explain_are_kept() -> None:
     assert found[32, 32] == pytest.approx(9.0, rel=0.02)
 
 
-def test_half_the_difference_of_halves_is_their_error() -> None:
-    light = np.stack([np.full((4, 4, 3), 3.0), np.full((4, 4, 3), 1.0)])
-    assert variance_of(light) == pytest.approx(1.0)
-
-
 @pytest.fixture(scope="module")
 def gathered(tmp_path_factory: pytest.TempPathFactory) -> Store:
     return bake(furnace(), tmp_path_factory.mktemp("gathered") / "s", quality=GATHERING, only=("answer",))
@@ -67,14 +60,6 @@ def test_direct_light_of_a_furnace_is_known(gathered: Store) -> None:
     assert gathered.read("light_map/direct").astype(float).mean() == pytest.approx(np.pi / 2, rel=0.01)
     assert read_answer(gathered).answer.direct.mean() == pytest.approx(np.pi / 2, rel=0.01)
     assert "answer/traced" not in gathered, "nothing is sampled twice"
-
-
-def test_groups_have_the_direct_light_of_all(tmp_path: Path) -> None:
-    whole = bake(room_with_step(), tmp_path / "a", quality=GATHERING, only=("light_map",))
-    sorted_light = bake(room_with_step(), tmp_path / "b", quality=GATHERING, light_groups="scene", only=("light_map",))
-    one, other = (store.read("light_map/direct").astype(float).sum(axis=0) for store in (whole, sorted_light))
-    assert other.mean() == pytest.approx(one.mean(), rel=0.01) and one.mean() > 0.1
-    assert np.abs(one - other).mean() < 0.02 * one.mean()
 
 
 @pytest.mark.usefixtures("mi")

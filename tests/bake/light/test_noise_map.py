@@ -48,22 +48,15 @@ def test_unsampled_texels_take_the_noise_beside_them_and_black_has_none() -> Non
     assert not noise_map(np.zeros((2, 8, 8, 3)), known, labels).any()
 
 
-@pytest.mark.parametrize("way", ["paths", "photons"])
-def test_bakes_keep_it(tmp_path: Path, way: str) -> None:
-    store = bake(furnace(), tmp_path / "s", quality=TINY, only=["light_map"], light_map=way)
+def test_bakes_keep_it_and_an_older_store_gets_it_without_new_samples(tmp_path: Path) -> None:
+    path = tmp_path / "s"
+    store = bake(furnace(), path, quality=TINY, only=["light_map"])
     noise, whole = store.read("light_map/noise"), store.artefact("light_map/irradiance").meta["noise"]
     assert noise.shape == store.read("light_map/irradiance").shape[:2] and noise.dtype == np.float16
-    if way == "paths":
-        known = sampled_halves(store.read("light_map/traced"))[1]
-        assert np.sqrt((noise[known].astype(float) ** 2).mean()) == pytest.approx(whole, rel=0.15)
-
-
-def test_store_of_an_older_bake_gets_it_without_new_samples(tmp_path: Path) -> None:
-    path = tmp_path / "s"
-    first = bake(furnace(), path, quality=TINY, only=["light_map"])
-    noise, key = first.read("light_map/noise"), first.artefact("light_map/traced").key
-    del first._artefacts["light_map/noise"]
-    first._save()
+    known, key = sampled_halves(store.read("light_map/traced"))[1], store.artefact("light_map/traced").key
+    assert np.sqrt((noise[known].astype(float) ** 2).mean()) == pytest.approx(whole, rel=0.15)
+    del store._artefacts["light_map/noise"]
+    store._save()
     again = bake(furnace(), path, quality=TINY, only=["light_map"])
     assert np.array_equal(again.read("light_map/noise"), noise)
     assert Store.open(path).artefact("light_map/traced").key == key

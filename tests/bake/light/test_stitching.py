@@ -80,39 +80,34 @@ def test_hidden_parts_darkness_and_nothing_stay() -> None:
     assert (moved != image).any(axis=-1).sum() <= 8
 
 
+def two_sides(right: float, area_right: float = 1.0, covered: Floats = FIFTH) -> tuple[Floats, Floats, Cuts]:
+    """A map of light 1, and `right` from column 4 on, before and after closing a cut between columns 2 and 5."""
+    image, area_m2, along = np.ones((8, 8, 3)), np.ones((8, 8)), (np.arange(1, 7) + 0.5) / 8
+    image[:, 4:], area_m2[:, 4:] = right, area_right
+    cuts = Cuts(*(np.stack([np.full(6, (column + 0.5) / 8), along], axis=1) for column in (2, 5)))
+    return image, stitched(image, cuts, np.zeros((8, 8), int), area_m2, covered), cuts
+
+
 def test_a_whole_texel_of_surface_keeps_more_of_its_light_than_the_rim_of_one() -> None:
-    image, along = np.ones((8, 8, 3)), (np.arange(1, 7) + 0.5) / 8
-    image[:, 4:] = 0.5
     covered = np.ones((8, 8))
     covered[:, :4] = 0.3
-    cuts = Cuts(*(np.stack([np.full(6, (column + 0.5) / 8), along], axis=1) for column in (2, 5)))
-    moved = stitched(image, cuts, np.zeros((8, 8), int), np.ones((8, 8)), covered)
+    _, moved, _ = two_sides(0.5, covered=covered)
     assert np.abs(moved[1:7, 5] - 0.5).mean() < 0.6 * np.abs(moved[1:7, 2] - 1).mean()
 
 
 def test_a_sliver_follows_the_broad_side() -> None:
-    """A cut between columns 2 and 5, the second one a sliver with a little less light."""
-    image, along = np.ones((8, 8, 3)), (np.arange(1, 7) + 0.5) / 8
-    image[:, 4:] = 0.95
-    area_m2 = np.ones((8, 8))
-    area_m2[:, 4:] = 0.1
-    cuts = Cuts(*(np.stack([np.full(6, (column + 0.5) / 8), along], axis=1) for column in (2, 5)))
-    moved = stitched(image, cuts, np.zeros((8, 8), int), area_m2, FIFTH)
+    """The second side is a sliver with a little less light."""
+    image, moved, cuts = two_sides(0.95, 0.1)
     assert np.array_equal(moved[:, :4], image[:, :4])
     assert steps(moved, cuts).max() < 0.01
-    both = stitched(image, cuts, np.zeros((8, 8), int), np.ones((8, 8)), FIFTH)
+    both = two_sides(0.95)[1]
     assert np.allclose(both[1:7, 2], both[1:7, 5], rtol=0.01) and 0.96 < both[1:7, 2].mean() < 0.99
 
 
 @pytest.mark.parametrize("area", [0.1, 1.0])
 def test_a_gap_stays_dark_beside_a_lit_surface(area: float) -> None:
-    """A cut between columns 2 and 5, the second one in a gap with a hundredth of the light, a sliver or not."""
-    image, along = np.ones((8, 8, 3)), (np.arange(1, 7) + 0.5) / 8
-    image[:, 4:] = 0.01
-    area_m2 = np.ones((8, 8))
-    area_m2[:, 4:] = area
-    cuts = Cuts(*(np.stack([np.full(6, (column + 0.5) / 8), along], axis=1) for column in (2, 5)))
-    moved = stitched(image, cuts, np.zeros((8, 8), int), area_m2, FIFTH)
+    """The second side is in a gap with a hundredth of the light, a sliver or not."""
+    _, moved, _ = two_sides(0.01, area)
     assert moved[:, 4:].max() < 0.011 and moved[:, :4].min() > 0.98
 
 

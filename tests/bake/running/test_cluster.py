@@ -14,9 +14,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.interreflection.series import bins_of, tails_of
 from lambent.bake.interreflection.settings import Bounces
-from lambent.bake.interreflection.tiles import Job, TileTracer
 from lambent.bake.running.cluster import DaskWorkers, opened
 from lambent.bake.running.workers import Workers
 from lambent.bake.transport.view import View
@@ -24,7 +22,7 @@ from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.store.store import Store
-from tests.bake.interreflection.test_interreflection import FIRST, FROM_ABOVE, corner, of_scene
+from tests.bake.interreflection.test_interreflection import FIRST, FROM_ABOVE, corner
 
 BOUNCES = Bounces((16, 1, 1), samples=64, fixed=frozenset({"side"}))
 VIEW = View(FROM_ABOVE, 16, 16)
@@ -102,10 +100,6 @@ def test_terms_of_different_samples_begin_anew(alone: Store, tmp_path: Path) -> 
     assert np.array_equal(counts, before)  # the same paths, added up in one go
 
 
-def test_two_processes_find_the_same(alone: Store, two: DaskWorkers, tmp_path: Path) -> None:
-    assert_same(baked(tmp_path / "s", two), alone)
-
-
 def test_a_worker_that_is_killed_is_survived(alone: Store, two: DaskWorkers, tmp_path: Path) -> None:
     calls = iter(range(1000))
 
@@ -165,12 +159,3 @@ def test_without_dask(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(UserError, match=r"pip install 'lambent\[cluster\]'"), opened(count=2):
         pass
-
-
-def test_a_job_holds_no_scene() -> None:
-    """What is sent with each job is its points: the scene goes to each worker once."""
-    editables = of_scene(SCENE)
-    tracer = TileTracer(SCENE, tails_of(editables, BOUNCES), bins_of(editables, BOUNCES), 0)
-    assert set(tracer.bins) == set(SCENE.materials)
-    assert "scene" not in Job.__dataclass_fields__
-    assert pickle.loads(pickle.dumps(tracer)).tails == tracer.tails

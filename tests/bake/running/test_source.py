@@ -50,17 +50,6 @@ def test_reference_has_the_materials_of_the_bake(tmp_path: Path) -> None:
     assert images[0][..., 1].mean() < 0.9 * images[2][..., 1].mean(), "red reflects no green"
 
 
-def test_the_command_traces_them_too(tmp_path: Path) -> None:
-    scene = changed(load_scene("builtin:box"))
-    bake(scene, tmp_path / "s", quality=TINY, only=["geometry"])
-    file = tmp_path / "a.exr"
-    traced = ["--integrator", "path", "--size", "24x16", "--samples", "256"]
-    assert run(["render", str(tmp_path / "s"), "-o", str(file), *traced]) == 0
-    expected, _ = render_reference(scene, scene.cameras[0], 24, 16, 256)
-    found = read_image(file)[..., :3]
-    assert found.mean(axis=(0, 1)) == pytest.approx(expected.mean(axis=(0, 1)), rel=0.02)
-
-
 LAMP = """format = "lambent-scene"
 version = 1
 geometry = "floor.obj"

