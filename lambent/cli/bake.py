@@ -249,7 +249,7 @@ def _proposed(
     from dataclasses import replace
 
     from lambent.bake.interreflection.proposal import held_by, propose_all
-    from lambent.bake.interreflection.series import worn
+    from lambent.bake.interreflection.series import used_materials
 
     views, light = edited["views"], edited.get("environment")
     if not views:
@@ -260,7 +260,7 @@ def _proposed(
         if (first := held[0]) is not None and all(one == first for one in held):
             say(f"continuing with the materials that the store has: {', '.join(sorted(first.edited))}")
             scene = first.merged(scene)
-            return scene, replace(bounces, fixed=frozenset(worn(scene)) - first.edited), []
+            return scene, replace(bounces, fixed=frozenset(used_materials(scene)) - first.edited), []
     found = propose_all(
         scene if light is None else replace(scene, environment=light), views, bounces, merging=merge,
         kept=changed.union(editable) - bounces.fixed, editables=edited.get("editables"), progress=progress,
@@ -273,12 +273,12 @@ def _proposed(
 
 def _watch(scene: Scene, store: Path, bounces: Bounces, edited: dict[str, Any], progress: Progress) -> PassNoise:
     """The recorder of the noise of interreflections in the store."""
-    from lambent.bake.interreflection.series import worn
+    from lambent.bake.interreflection.series import used_materials
     from lambent.editing.interreflection.noise import PassNoise
     from lambent.materials.factored.of_lobes import of_material
 
     given = edited.get("editables", {})
-    materials = {name: given.get(name) or of_material(scene.materials[name]) for name in worn(scene)}
+    materials = {name: given.get(name) or of_material(scene.materials[name]) for name in used_materials(scene)}
     shots = [(view.camera, (view.width, view.height)) for view in edited["views"]]
     return PassNoise(store, shots, materials, bounces.samples, progress)
 

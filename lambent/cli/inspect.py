@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from lambent.cli.console import Between, CreaseAngle, Force, Json, show, table, words
-from lambent.cli.convert import is_document
+from lambent.cli.materials.convert import is_document
 from lambent.core.errors import UserError
 from lambent.core.inputs import read_head
 from lambent.core.plain import plain

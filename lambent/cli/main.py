@@ -1,6 +1,6 @@
 """`lambent`: finds the commands and reports errors.
 
-Every module in this folder with a function `command` is a command named after the module; no registration is needed.
+Every module in this folder or in `materials/` with a function `command` is a command named after the module.
 Exit codes: 0 done; 1 done with a negative result (a failed check, a missing part); 2 wrong input; 130 interrupted.
 
 The top of the file imports only modules that Python has already loaded, so that Ctrl-C works while the rest is
@@ -51,6 +51,7 @@ def build_app() -> typer.Typer:
     import typer
 
     from lambent import cli
+    from lambent.cli import materials
     from lambent.cli.console import options
     from lambent.core.discovery import modules_in
 
@@ -63,7 +64,7 @@ def build_app() -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     )
     app.callback()(options)
-    for name, module in modules_in(cli, having="command").items():
+    for name, module in sorted((modules_in(cli, having="command") | modules_in(materials, having="command")).items()):
         app.command(name)(module.command)
     return app
 

@@ -39,16 +39,6 @@ def test_the_picture_shows_curves_and_disks(lambent, bright, tmp_path):
     assert (image[: int(0.6 * len(image)), :, 0] < 0.2).any()  # curves
 
 
-def test_decimal_commas_are_named(refused, bright):
-    bright.write_text(bright.read_text().replace(".", ","))
-    assert "decimal commas" in refused("inspect", bright)
-
-
-def test_a_file_that_does_not_say_its_quantity(refused, tmp_path):
-    (tmp_path / "a.txt").write_text("10 0 0 0 0.1\n10 0 20 0 0.1\n")
-    assert "theta_i phi_i theta_o phi_o, then f, f_cos or p" in refused("inspect", tmp_path / "a.txt")
-
-
 def test_daylight_is_said_in_a_line(lambent, tmp_path):
     """The sun's height, both illuminances, and the ground that the scene does not have."""
     scene = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n[materials]\n' + "".join(

@@ -21,16 +21,6 @@ def test_an_error_of_memory_is_one_line(refused, monkeypatch, tmp_path: Path, er
     assert "out of memory" in refused("inspect", tmp_path / "a.png")
 
 
-def test_another_import_that_fails_is_a_bug(lambent, monkeypatch, tmp_path: Path) -> None:
-    def fails(*_: object) -> None:
-        raise ImportError("no module named x")
-
-    Image.new("L", (8, 8)).save(tmp_path / "a.png")
-    monkeypatch.setattr("lambent.core.pictures.images.read_image", fails)
-    with pytest.raises(ImportError, match="no module"):
-        lambent("inspect", tmp_path / "a.png")
-
-
 def test_a_picture_larger_than_the_memory(tmp_path: Path) -> None:
     """800 MB of pixels in a process that may have 900 MB."""
     Image.new("L", (8192, 8192)).save(tmp_path / "a.png")

@@ -102,19 +102,12 @@ WRONG = {
         "--recolour",
         "grey=red",
     ): "--recolour: cannot be read as a recoloured material; found grey=red; expected MATERIAL=#rrggbb",
-    ("--recolour", "grey=#f00"): "--recolour: cannot be read as a recoloured material",
-    ("--recolour", "grey=#ff0000", "--recolour", "grey=#00ff00"): "--recolour: names a material twice; found grey",
-    ("--texture", "gray=none"): "--texture: unknown material; found gray; .*did you mean 'grey'",
     ("--texture", "grey"): "--texture: cannot be read as an exchanged texture; found grey; expected MATERIAL=FILE, ",
     ("--texture", "grey=missing.png"): "--texture: is neither a material with textures nor a file; found missing.png",
-    ("--texture", "grey=pyproject.toml"): "pyproject.toml: picture cannot be read",
     ("--texture", "grey=pyproject.toml,0"): "--texture: repetition is out of range; found 0.0",
-    ("--texture", "bare=pyproject.toml"): "--texture: has no texture coordinates; found bare",
-    ("--texture", "grey=none", "--texture", "grey=none"): "--texture: names a material twice; found grey",
     ("--variant", "blu"): "--variant: unknown variant; found blu; expected blue; did you mean 'blue'",
     ("--variant", "blue", "--variants"): "--variant: excludes --variants; leave out one",
     ("--light", "lomp=off"): "unknown light group; found lomp; expected lamp",
-    ("--keyframes", "k.toml"): "--keyframes: applies to films only; write to .mp4, or add --path NAME",
 }
 
 

@@ -26,6 +26,7 @@ COARSE = DRAFT.changed(
     light_map={"samples": (4, 4), "noise": 9.0, "max_depth": 3, "gather_samples": 8},
     environment={"texels": 32},
     probe={"texels": 16, "samples": 1},
+    answer={"patches": 100, "gather_rays": 16, "receiver_rays": 8, "direct_samples": 2, "lobe_samples": 1},
 )
 SMALLER = {"1680x1050": "64x40", "256": "1"}  # sizes and samples; nothing else of a line changes
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import importlib.util
-import json
 import subprocess
 import sys
 from pathlib import Path
@@ -60,11 +59,6 @@ def test_another_python_is_looked_for(run, monkeypatch, version):
         run.main(["demo"])
 
 
-def test_a_suitable_python_is_suitable(run):
-    question = "import sys; assert (3, 11) <= sys.version_info[:2] <= (3, 13)"
-    assert run.works([*run.suitable_python(), "-c", question])
-
-
 def test_help_and_nonsense():
     for arguments, code in ((["--help"], 0), ([], 2), (["fly"], 2)):
         done = subprocess.run([sys.executable, RUN, *arguments], capture_output=True, text=True)
@@ -77,14 +71,6 @@ def test_installs_once_and_again_when_requirements_change(run, done):
     run.set_up(for_tests=False)
     assert len(done) == 3
     (run.HOME / "constraints.txt").write_text("b")
-    run.set_up(for_tests=False)
-    assert len(done) == 6
-
-
-def test_tests_need_more_than_the_demo_and_not_the_other_way_round(run, done):
-    run.set_up(for_tests=False)
-    run.set_up(for_tests=True)
-    assert len(done) == 6
     run.set_up(for_tests=False)
     assert len(done) == 6
 
@@ -105,12 +91,6 @@ def test_an_interrupted_set_up_is_not_taken_for_a_finished_one(run, done, monkey
     assert run.STAMP.exists()
 
 
-def test_a_damaged_stamp_is_no_stamp(run, done):
-    run.STAMP.write_text("{")
-    run.set_up(for_tests=False)
-    assert len(done) == 3 and json.loads(run.STAMP.read_text())["wanted"] == run.fingerprint()
-
-
 def test_what_cannot_be_installed_is_one_command(run, monkeypatch):
     check = {"name": "path tracer", "ok": False, "found": "no LLVM", "essential": True}
     report = {"ok": False, "packages": ["libllvm19"], "mend": "sudo apt-get install -y libllvm19", "checks": [check]}
@@ -118,9 +98,3 @@ def test_what_cannot_be_installed_is_one_command(run, monkeypatch):
     monkeypatch.setattr(run, "apt_install", lambda packages: False)
     with pytest.raises(run.Stop, match=r"path tracer: no LLVM\.\nRun: sudo apt-get install -y libllvm19$"):
         run.install_system_parts(for_tests=False)
-
-
-def test_first_package_that_is_known(run, monkeypatch):
-    monkeypatch.setattr(run, "works", lambda command: command[-1] == "libllvm20")
-    assert run.first_known(["libllvm19", "libllvm20"]) == "libllvm20"
-    assert run.first_known(["other"]) == "other"

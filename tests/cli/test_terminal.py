@@ -160,9 +160,7 @@ module.check = check
 
 
 @posix
-@pytest.mark.parametrize(
-    "name", ["typer", "lambent.cli.fit", "lambent.materials.checking.check", "numpy", "scipy.special", ""]
-)
+@pytest.mark.parametrize("name", ["typer", "lambent.materials.checking.check", ""])
 def test_ctrl_c_is_clean_while_libraries_are_imported(name):
     """Among the modules: those of the command line itself, and those of a command that has begun."""
     program = INTERRUPTED_IMPORT.format(name=name, before="" if name else AT_THE_END_OF_AN_OBJECT)
@@ -193,7 +191,6 @@ main()
 READER = "with foreign_bytes('reader', 'a.txt'): raise RuntimeError('no compiled object yet')"
 STEPS = "with progress_bar() as progress: progress(0, 1, 'step')\n    raise SystemExit('went on')"
 BEFORE = "raise RuntimeError('a bug')"
-SAVING = "dropped()\n    raise UserError('cannot be written') from OSError(28, 'no space')"
 FULL = "dropped()\n    raise OSError(28, 'no space', 'a.png')"
 
 
@@ -201,9 +198,8 @@ FULL = "dropped()\n    raise OSError(28, 'no space', 'a.png')"
 @pytest.mark.parametrize(
     ("body", "code", "said"),
     [("dropped()\n    raise RuntimeError('no compiled object yet')", 130, "lambent: interrupted"),
-     (f"dropped()\n    {READER}", 130, "lambent: interrupted"),
      (f"dropped()\n    {STEPS}", 130, "lambent: interrupted"),
-     (SAVING, 2, "lambent: error: cannot be written"), (FULL, 2, "lambent: error: a.png: cannot be written"),
+     (FULL, 2, "lambent: error: a.png: cannot be written"),
      (READER, 2, "lambent: error: a.txt: "), (BEFORE, 1, "Traceback")],
 )  # fmt: skip
 def test_errors_after_ctrl_c_are_the_interruption(body, code, said):

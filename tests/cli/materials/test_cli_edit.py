@@ -13,7 +13,7 @@ from lambent.viewer.modes.material.mode import MaterialState
 from lambent.viewer.screen import Screen
 from tests.viewer.measured_specimens import BRASS, write_measurement
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def opened(folder, file, material=None, environments=()):
@@ -46,13 +46,6 @@ def test_what_cannot_be_shown(tmp_path, file, says):
     (tmp_path / "bad.json").write_text('{"kd": -1}')
     with pytest.raises(UserError, match=says):
         opened(tmp_path, tmp_path / file)
-
-
-def test_two_documents_are_compared(tmp_path):
-    for name in ("a", "b"):
-        Material(name=name, kd=0.5).save(tmp_path / f"{name}.json")
-    editor = opened(tmp_path, tmp_path / "a.json", tmp_path / "b.json").editor
-    assert (editor.subject.material.name, editor.subject.compared.name, editor.measurement) == ("a", "b", None)
 
 
 def test_the_order_does_not_matter(tmp_path):

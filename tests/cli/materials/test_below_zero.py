@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lambent.cli.check import describe
+from lambent.cli.materials.check import describe
 from lambent.materials.checking import check, check_table
 from lambent.materials.measured import load
-from lambent.materials.measured.inspecting.synthetic import synthesise
-from lambent.materials.measured.parts.gonio_text import write_gonio
 from lambent.materials.measured.tables.half_vector_grid import GridShape
-from tests.materials.fitting.known_answers import FEW, PAINT
 from tests.materials.measured.measured_files import rgl_fields, tensor_bytes
 
 
@@ -48,13 +44,3 @@ def test_check_finds_them_and_no_fault_in_them(spoilt, monkeypatch):
     assert not any("zero" in text for text in (*report.warnings, *report.failures))
     (line,) = (line for line in describe(report).splitlines() if words in line)
     assert line.startswith("readings below zero") and line.endswith("drawn as 0")
-
-
-def test_convert_says_whether_they_are_kept(lambent, spoilt, tmp_path):
-    (lost,) = (line for line in lambent("convert", spoilt, tmp_path / "a.txt", "--json").json["lost"] if "zero" in line)
-    assert lost.startswith("readings below zero became 0: ") and "blue in" in lost
-    assert load(tmp_path / "a.txt").samples().below_zero == 0
-    noisy = tmp_path / "noisy.txt"
-    write_gonio(noisy, synthesise(PAINT, replace(FEW, floor=0.1)))
-    assert lambent("convert", noisy, tmp_path / "b.txt", "--json").json["lost"] == []
-    assert load(tmp_path / "b.txt").samples().below_zero == load(noisy).samples().below_zero > 0

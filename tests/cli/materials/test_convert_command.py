@@ -40,16 +40,6 @@ def test_a_person_is_told_the_loss_and_the_error(lambent, material, tmp_path):
     assert all(name in outcome.out for name in METRICS)
 
 
-def test_the_verdict_is_printed_and_changes_no_exit_code(lambent, tmp_path):
-    lobes = tuple(Lobe(k=0.3, mx=m, my=m, r0=0.9) for m in (0.01, 0.08, 0.5))
-    Material(name="three", lobes=lobes).save(tmp_path / "three.json")
-    outcome = lambent("convert", tmp_path / "three.json", tmp_path / "three.glb")
-    assert outcome.code == 0 and outcome.out.rstrip().splitlines()[-1].startswith("verdict: unusable: ")
-    outcome = lambent("convert", tmp_path / "three.json", tmp_path / "again.glb", "--json")
-    assert outcome.code == 0 and outcome.json["verdict"] == "unusable" and "limit" in outcome.json["reason"]
-    assert outcome.json["light"]["reflection"] == pytest.approx(1, abs=0.3)
-
-
 def test_a_measurement_is_no_material(refused, measured, tmp_path):
     said = refused("convert", measured, tmp_path / "out.glb")
     assert "is a table, which" in said and "lambent fit" in said and not (tmp_path / "out.glb").exists()

@@ -86,13 +86,6 @@ def test_normalise_writes_the_safe_version(lambent, tmp_path):
     assert again.code == 0 and "nothing written" in again.out and not (tmp_path / "again.json").exists()
 
 
-@pytest.mark.usefixtures("one_azimuth")
-def test_normalise_says_what_changed(lambent, tmp_path):
-    STEEP.save(tmp_path / "m.json")
-    outcome = lambent("check", tmp_path / "m.json", "--normalise", "-o", tmp_path / "safe.json")
-    assert "lobes[0].alpha" in outcome.out and "cuberoot" in outcome.out and "safe.json: written" in outcome.out
-
-
 def test_only_documents_are_normalised(refused, tmp_path):
     out = tmp_path / "out.json"
     assert "is a model" in refused("check", "ward", "--normalise", "-o", out)

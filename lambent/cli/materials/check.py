@@ -97,7 +97,7 @@ def _normalise(
 
 def _subject(name: str, values: list[str], reconstruction: Between = "auto") -> Material | MeasuredTable | Model:
     """The material or table of a file, or the model of this name; a file takes precedence."""
-    from lambent.cli.convert import subject_of
+    from lambent.cli.materials.convert import subject_of
     from lambent.materials.models import models
 
     if Path(name).exists():

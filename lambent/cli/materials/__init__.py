@@ -1,0 +1,1 @@
+"""Commands on materials: measured tables and documents."""
