@@ -144,11 +144,6 @@ def run_in_a_process(store, arguments, environment):
     return subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
 
 
-def test_a_given_number_of_frames(screen, store):
-    done = run_in_a_process(store, "size=(320, 240), frames=4", {**os.environ, "DISPLAY": screen.name})
-    assert done.returncode == 0, done.stderr
-
-
 def test_without_a_display(store):
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     done = run_in_a_process(store, "'walk'", environment)

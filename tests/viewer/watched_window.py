@@ -11,6 +11,7 @@ import json
 import signal
 import sys
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import wgpu
@@ -18,10 +19,12 @@ import wgpu
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
 from lambent.viewer import app, edit, modes, window
+from lambent.viewer.modes.edit import state as edit_state
 from lambent.viewer.modes.edit.state import EditState
 from lambent.viewer.modes.walk.pictures import Pictures
 from tests.viewer.panel_driver import recording
 
+FEW_LIGHTS = (100, 400)  # of a small view
 MARK = "F12"  # a key that means nothing: what was sent before it has arrived when it does
 INTERRUPT = "F11"  # another: Ctrl-C, while the next frame is drawn to the window
 SKIP = "F10"  # another: the display has no image for the next frame
@@ -139,6 +142,7 @@ if __name__ == "__main__":
             modes.__path__.append(path)
             edit.run(file, size=size, folder=out)
         elif how == "place":
+            edit_state.EditState = partial(EditState, lights=FEW_LIGHTS)
             edit.run(file, picture=(int(path), int(path)), size=size, folder=out)
         elif how == "edit":
             edit.run(file, Path(path), size=size, folder=out)

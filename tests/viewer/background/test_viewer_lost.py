@@ -1,9 +1,10 @@
 """What is kept when the window is lost."""
 
 import errno
-import os
 import shutil
 import signal
+import subprocess
+import sys
 
 import pytest
 
@@ -17,7 +18,7 @@ from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.state import WalkState
 from tests.viewer.small_store import write_small_store
-from tests.viewer.window_session import INTERRUPT, VirtualScreen, WindowSession, missing_tools
+from tests.viewer.window_session import ROOT, VirtualScreen, WindowSession, missing_tools
 
 
 class Ended(Drawing):
@@ -82,8 +83,7 @@ def test_a_store_that_is_gone_is_not_made_anew(state, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("how", ["display", "SIGTERM"])
-def test_a_window_that_is_lost_keeps_its_material(adapter, tmp_path, how):
+def test_a_window_that_loses_its_display_keeps_its_material(adapter, tmp_path):
     if missing_tools():
         pytest.skip(f"not installed: {', '.join(missing_tools())}")
     screen = VirtualScreen()
@@ -93,33 +93,26 @@ def test_a_window_that_is_lost_keeps_its_material(adapter, tmp_path, how):
         session.wait_for(lambda state: state["selected"] == "ball")
         session.drag(session.point("mx", 0.5), session.point("mx", 0.8))
         seen = session.wait_for(lambda state: state["edited"])
-        if how == "display":
-            screen.close()
-        else:
-            os.kill(session.process.pid, signal.SIGTERM)
+        screen.close()
         code = session.process.wait(40)
     finally:
         session.kill()
         screen.close()
-    assert code == (1 if how == "display" else -signal.SIGTERM), session.log()
+    assert code == 1, session.log()
     rescued = read_session(tmp_path / "store" / UNSAVED_FILE).now.materials["brass"]
     assert rescued.model_dump(mode="json")["lobes"] == seen["edited"]["brass"]["lobes"]
     assert UNSAVED_FILE in session.log()
 
 
-@pytest.mark.slow
-def test_an_interrupt_within_a_frame_closes_the_window_after_it(adapter, tmp_path):
-    if missing_tools():
-        pytest.skip(f"not installed: {', '.join(missing_tools())}")
-    screen = VirtualScreen()
-    session = WindowSession(screen, write_small_store(tmp_path / "store"), tmp_path)
-    try:
-        session.tool("key", INTERRUPT)
-        code = session.process.wait(60)
-    finally:
-        session.kill()
-        screen.close()
-    assert code == 0 and "Received signal Interrupt" in session.log(), session.log()
+def test_a_signal_ends_the_process_after_the_rescue():
+    code = """
+import os
+from lambent.viewer.background.lost import kept
+with kept(lambda: print("saved", flush=True)):
+    os.kill(os.getpid(), 15)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False)
+    assert done.returncode == -signal.SIGTERM and done.stdout == "saved\n", done.stderr
 
 
 def test_a_walk_that_can_be_kept_nowhere_is_said(mode, state, capsys, monkeypatch):

@@ -3,11 +3,10 @@
 from dataclasses import replace
 
 import pytest
-from tests.viewer.test_viewer_panels import walk_mode
 
 from lambent.materials.document import load_material
 from lambent.store.kept.views import read_views
-from tests.viewer.panel_driver import PanelDriver
+from tests.viewer.panel_driver import PanelDriver, walk_mode
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.edit.mode import EditMode
 from lambent.viewer.modes.edit.state import DIRECT
 from lambent.viewer.screen import Rect
-from tests.viewer.edited_view import LIGHTS, lit_state, new_state, until
+from tests.viewer.edited_view import LIGHTS, lit_state, until
 from tests.viewer.panel_driver import PanelDriver
 
 
@@ -167,11 +167,7 @@ def test_the_panel_shows_the_difference_to_a(driver):
 
 def test_sliders_are_in_reach_without_scrolling(monkeypatch, screen, tmp_path):
     """In a window of 1280 x 960 as it opens: the plot, its region, the numbers of a lobe, and exposure."""
-    state, bakes = new_state(screen, tmp_path)
-    until(state, lambda: bakes.begun)
-    for lights in LIGHTS:
-        bakes.begun[0].arrive(lights)
-        until(state, lambda lights=lights: state.loading.lights == lights)
+    state = lit_state(monkeypatch, screen, tmp_path)
     state.select("tray")
     driver = PanelDriver(monkeypatch, EditMode(state, Drawing(None)), (1280, 960))
     driver.frame(3)

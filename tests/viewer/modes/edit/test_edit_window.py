@@ -5,10 +5,12 @@ import pytest
 from lambent.core.pictures.images import read_image
 from lambent.editing.session.session import Session
 from lambent.store.store import Store
+from tests.viewer.watched_window import FEW_LIGHTS
 from tests.viewer.window_session import VirtualScreen, WindowSession, missing_tools
 
 pytestmark = pytest.mark.slow
-SIZE, PIXELS = (900, 900), 32
+SIZE, PIXELS = (900, 900), 24
+FIRST, LAST = FEW_LIGHTS
 
 
 @pytest.fixture(scope="module")
@@ -37,25 +39,17 @@ def opened(adapter, screen):
 def test_a_scene_is_baked_edited_and_opened_again(opened, tmp_path):
     first = opened("builtin:teatray", tmp_path)
     assert first.state()["lights"] == 0 and first.state()["baking"], "the window is there at once"
-    first.wait_for(lambda state: state["lights"] == 400)
+    first.wait_for(lambda state: state["lights"] == FIRST)
     assert first.close() == 0, first.log()
     with Store.open(tmp_path / "teatray.edit.store") as store:
         store.set_document("written by", "the test")  # the bake has ended with its window
     session = opened("builtin:teatray", tmp_path)
-    session.wait_for(lambda state: state["lights"] == 4000 and state["baking"] is None and not state["busy"])
+    session.wait_for(lambda state: state["lights"] == LAST and state["baking"] is None and not state["busy"])
     before = session.state()
     assert before["picture"] == [600, 600] and before["brightness"] > 0.01 and not before["trouble"]
     x, y = 0.5 * 600, 150 + 0.55 * 600
     session.click(x, y)
     session.wait_for(lambda state: state["selected"] == "glaze" and state["pointed"][1] == "glaze")
-    session.tool("key", "Tab")
-    session.wait_for(lambda state: state["selected"] != "glaze")
-    session.click(x, y)
-    session.wait_for(lambda state: state["selected"] == "glaze")
-    fold(session, "Material", "View")
-    session.click(*session.point("snapshot"))
-    session.wait_for(lambda state: state["compared"])
-    fold(session, "Material", "View")
     session.click(*session.point("diffuse##curve", 0.1))
     session.click(*session.point("all##preset"))
     pull(session, 0.7, 0.3)
@@ -83,13 +77,10 @@ def test_a_scene_is_baked_edited_and_opened_again(opened, tmp_path):
     assert list(saved.document.materials["glaze"].curves) == ["diffuse"]
 
     again = opened(tmp_path / "teatray-001.edits.json", tmp_path)
-    there = again.wait_for(lambda state: state["lights"] == 4000 and state["samples"] >= 64 and not state["busy"])
+    there = again.wait_for(lambda state: state["lights"] == LAST and state["samples"] >= 64 and not state["busy"])
     assert there["baking"] is None and there["edited"]["glaze"]
     assert there["brightness"] == pytest.approx(bounced["brightness"], rel=0.05), "with the noise of fewer samples"
-    again.click(*again.point("all##preset"))
-    pull(again, 0.4, 0.6)
-    again.wait_for(lambda state: not state["busy"])
-    assert again.close("discard") == 0 and "changes not saved" in again.log()
+    assert again.close() == 0, again.log()
 
 
 def fold(session, *headers):

@@ -19,7 +19,7 @@ from lambent.viewer.screen import Rect
 from tests.viewer.drawn_frames import drawn
 from tests.viewer.small_store import MATERIALS, SIDE, with_light_groups, write_small_store
 
-SIZE = 96, 64
+SIZE = 48, 32
 PLACE = Rect(0, 0, *SIZE)
 LONGEST_S = 60.0  # until a picture rests, however busy the machine is
 OFF = LightMix({"lamp": GroupMix(on=False), "sky": GroupMix(intensity=2.0)})

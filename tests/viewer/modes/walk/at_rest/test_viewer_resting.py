@@ -5,22 +5,17 @@ import signal
 
 import pytest
 
-from lambent.bake.bake import bake
-from lambent.scenes import load_scene
-from tests.bake.small_scenes import TINY
 from tests.viewer.window_session import SKIP, VirtualScreen, WindowSession, missing_tools
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def session(mi, adapter, tmp_path):
+def session(baked_box, adapter, tmp_path):
     if missing_tools():
         pytest.skip(f"not installed: {', '.join(missing_tools())}")
-    store = tmp_path / "box.store"
-    bake(load_scene("builtin:box"), store, quality=TINY, only={"geometry", "environment", "light_map"}).close()
     screen = VirtualScreen()
-    session = WindowSession(screen, store, tmp_path)
+    session = WindowSession(screen, baked_box, tmp_path)
     yield session
     session.kill()
     screen.close()

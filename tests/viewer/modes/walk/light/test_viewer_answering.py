@@ -43,8 +43,15 @@ def settled(light: AnsweringLight, edited: dict) -> None:
         light.update(edited)
 
 
-def test_light_follows_an_edit_and_comes_back(tmp_path: Path) -> None:
-    store = bake(room_with_step(), tmp_path / "s", quality=TINY)
+@pytest.fixture(scope="module")
+def store(adapter: None, tmp_path_factory: pytest.TempPathFactory) -> Store:
+    """The room with a second ball, for two probes."""
+    second = SceneObject("other ball", placed(sphere(0.3, 16, 8), (0.8, 1.2, -0.8)), "mirror")
+    room = replace(room_with_step(), objects=(*room_with_step().objects, second))
+    return bake(room, tmp_path_factory.mktemp("answering") / "s", quality=TINY)
+
+
+def test_light_follows_an_edit_and_comes_back(store: Store) -> None:
     renderer, shown = Renderer(open_device(), store), Answering()
     light = AnsweringLight(store, renderer, shown)
     before, version = renderer.image(VIEW), renderer.light_version
@@ -65,11 +72,8 @@ def test_a_store_without_an_answer_is_named(tmp_path: Path) -> None:
     assert not shown.possible and shown.note == WITHOUT
 
 
-def test_an_edit_drops_the_probes_of_the_one_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_edit_drops_the_probes_of_the_one_before(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first edit's probes are given up after the one under way, and made where the edit comes back."""
-    second = SceneObject("other ball", placed(sphere(0.3, 16, 8), (0.8, 1.2, -0.8)), "mirror")
-    room = replace(room_with_step(), objects=(*room_with_step().objects, second))
-    store = bake(room, tmp_path / "s", quality=TINY)
     renderer, made, go_on = Renderer(open_device(), store), list[str](), threading.Event()
     light = AnsweringLight(store, renderer, Answering())
     assert len(read_answer(store).seen) == 2
@@ -110,8 +114,7 @@ def test_a_store_with_light_groups_answers_in_its_mix(tmp_path: Path) -> None:
     light.close()
 
 
-def test_light_stays_as_baked_where_an_object_is_replaced(tmp_path: Path) -> None:
-    store = bake(room_with_step(), tmp_path / "s", quality=TINY)
+def test_light_stays_as_baked_where_an_object_is_replaced(store: Store) -> None:
     renderer, shown = Renderer(open_device(), replace(read_baked(store), replaced=True)), Answering()
     light = AnsweringLight(store, renderer, shown)
     version = renderer.light_version

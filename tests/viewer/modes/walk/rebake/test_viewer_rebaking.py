@@ -109,9 +109,8 @@ def record(store, folder, materials):
 class Box:
     """The built-in box, and recorded bakes of it in other materials."""
 
-    def __init__(self, folder, groups):
-        self.store, self.recordings = folder / "box.store", folder / "recordings"
-        bake(load_scene("builtin:box"), self.store, quality=TINY, light_groups=groups).close()
+    def __init__(self, store, recordings):
+        self.store, self.recordings = store, recordings
 
     def record(self, name, materials):
         (self.recordings / name).mkdir(parents=True)
@@ -123,9 +122,14 @@ class Box:
 
 
 @pytest.fixture(scope="module")
-def boxes(mi, adapter, tmp_path_factory):
+def boxes(baked_box, adapter, tmp_path_factory):
     """The box with and without light groups, and its bakes in the materials of `painted`."""
-    made = {groups: Box(tmp_path_factory.mktemp(groups), groups) for groups in ("none", "scene")}
+    grouped = tmp_path_factory.mktemp("grouped") / "box.store"
+    bake(load_scene("builtin:box"), grouped, quality=TINY, light_groups="scene").close()
+    made = {
+        groups: Box(store, tmp_path_factory.mktemp("recordings"))
+        for groups, store in (("none", baked_box), ("scene", grouped))
+    }
     for box in made.values():
         box.record("painted", painted(load_scene("builtin:box")))
     return made
