@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from lambent.core.arrays import Image
 from lambent.core.light.false_colour import Range, SignedRange
-from lambent.editing.canvas import Canvas, HostCanvas
+from lambent.editing.canvas import HostCanvas
 from lambent.realtime.edited.display import Display
 from lambent.realtime.gpu.targets import DISPLAY_FORMAT, pixels, target_texture
 from lambent.viewer.edits.edited import ShadedCanvas, sums
@@ -20,85 +20,57 @@ Look = tuple[str, float, Range]  # view transform, exposure in EV, scale of fals
 Fading = tuple[Image, float]  # a difference added to a picture, and its remaining share
 
 
-class Shown(Protocol):
-    """A picture (H, W) of a frame."""
-
-    @property
-    def radiance(self) -> Image:
-        """(H, W, 3) float32."""
-
-    @property
-    def bytes(self) -> Bytes:
-        """(H, W, 4), encoded."""
-
-    def put(self, texture: Any) -> None:
-        """Copy the picture into a texture of the window."""
-
-
-class Backend(Protocol):
-    """A backend that sums pictures and displays them."""
-
-    def canvas(self, background: Image) -> Canvas:
-        """A canvas for a picture."""
-
-    def show(self, canvas: Any, look: Look, fading: Fading | None) -> Shown:
-        """The last composed picture of a canvas from `canvas`."""
-
-    def still(self, image: Image, look: Look) -> Shown:
-        """A fixed picture of linear radiance."""
-
-    def difference(self, shown: Shown, against: Shown, scale: SignedRange) -> Shown:
-        """Difference of two pictures in false colours, computed on the CPU."""
-
-    def without_gpu(self) -> Backend:
-        """The CPU backend for the same window."""
-
-
 @dataclass(frozen=True)
 class HostShown:
-    """`Shown` in memory."""
+    """A picture (H, W) of a frame in memory: radiance (H, W, 3) float32, and encoded bytes (H, W, 4)."""
 
     device: Any
     radiance: Image
     bytes: Bytes
 
     def put(self, texture: Any) -> None:
+        """Copy the picture into a texture of the window."""
         height, width = self.bytes.shape[:2]
         rows = {"bytes_per_row": 4 * width, "rows_per_image": height}
         self.device.queue.write_texture({"texture": texture}, self.bytes, rows, (width, height, 1))
 
 
 class OnHost:
-    """`Backend` on the CPU; without a device nothing can be copied into textures."""
+    """Sums and displays pictures on the CPU; without a device nothing can be copied into textures."""
 
     def __init__(self, device: Any = None) -> None:
         self._device = device
         self._still: tuple[Image, Look, HostShown] | None = None
 
     def canvas(self, background: Image) -> HostCanvas:
+        """A canvas for a picture."""
         return HostCanvas(background)
 
     def show(self, canvas: Any, look: Look, fading: Fading | None) -> HostShown:
+        """The last composed picture of a canvas from `canvas`."""
         return self._made(faded(canvas.image(), fading), look)
 
     def still(self, image: Image, look: Look) -> HostShown:
+        """A fixed picture of linear radiance."""
         if self._still is None or self._still[0] is not image or self._still[1] != look:
             self._still = image, look, self._made(image, look)
         return self._still[2]
 
     def difference(self, shown: Shown, against: Shown, scale: SignedRange) -> HostShown:
+        """Difference of two pictures in false colours."""
         return HostShown(self._device, shown.radiance, difference(shown.radiance, against.radiance, scale))
 
     def _made(self, image: Image, look: Look) -> HostShown:
         return HostShown(self._device, image, displayed(image, *look))
 
     def without_gpu(self) -> OnHost:
+        """The CPU backend for the same window."""
         return self
 
 
 @dataclass(frozen=True)
 class GpuShown:
-    """`Shown` in textures, which the next frame overwrites; reading them back waits for the GPU."""
+    """As `HostShown`, in textures, which the next frame overwrites; reading them back waits for the GPU."""
 
     device: Any
     light: Any
@@ -120,7 +92,7 @@ class GpuShown:
 
 
 class OnGpu:
-    """`Backend` of compute shaders: a frame is a few submissions, and no picture leaves the GPU."""
+    """As `OnHost`, by compute shaders: a frame is a few submissions, and no picture leaves the GPU."""
 
     def __init__(self, device: Any) -> None:
         self._device, self._display = device, Display(device)
@@ -158,6 +130,10 @@ class OnGpu:
         if name not in self._sent or self._sent[name][0] is not image:
             self._sent[name] = image, self._display.texture(image)
         return self._sent[name][1]
+
+
+Shown = HostShown | GpuShown
+Backend = OnHost | OnGpu
 
 
 def faded(image: Image, fading: Fading | None) -> Image:
