@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.baked.answering.albedos import edited_albedos
-from lambent.baked.answering.answer import Albedos, solved
+from lambent.baked.answering.answer import solved
 from lambent.baked.answering.stored import has_answer, read_answer
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
@@ -26,14 +26,11 @@ def box(tmp_path_factory: pytest.TempPathFactory) -> Store:
     return bake(furnace(), tmp_path_factory.mktemp("furnace") / "s", quality=TINY, only=("answer",))
 
 
-@pytest.mark.parametrize("albedo", [0.0, 0.25, 0.8, 0.95])
+@pytest.mark.parametrize("albedo", [0.0, 0.25, 0.95])
 def test_a_furnace_of_another_albedo_has_the_light_of_its_series(box: Store, albedo: float) -> None:
     """Emission .5: direct irradiance pi/2, all of it (pi/2) / (1 - a)."""
-    stored = read_answer(box)
-    answer = stored.answer
-    assert answer.direct.mean() == pytest.approx(np.pi / 2, rel=0.03)
-    edited = edited_albedos([Material(kd=0.5)], [Material(kd=albedo)])
-    found = answer.irradiance(edited, answer.reference())
+    answer = read_answer(box).answer
+    found = answer.irradiance(edited_albedos([Material(kd=0.5)], [Material(kd=albedo)]), answer.reference())
     expected = np.pi / 2 / (1 - albedo)
     assert found.mean() == pytest.approx(expected, rel=0.04)
     assert np.quantile(np.abs(found / expected - 1), 0.95) < 0.15
@@ -59,9 +56,9 @@ def sheet() -> Scene:
 def test_light_through_a_sheet_follows_what_it_transmits(tmp_path: Path) -> None:
     stored = read_answer(bake(sheet(), tmp_path / "s", quality=TINY, only=("answer",)))
     answer = stored.answer
-    given = list(sheet().materials.values())
-    half = [given[0], given[1].model_copy(update={"kt_d": (0.2,) * 3})]
-    found = answer.irradiance(edited_albedos(given, half), answer.reference())
+    black, paper = sheet().materials.values()
+    half = [black, paper.model_copy(update={"kt_d": (0.2,) * 3})]
+    found = answer.irradiance(edited_albedos([black, paper], half), answer.reference())
     floor = (stored.texels % 2 == 0) & (answer.direct[0, :, 0] < 0.02 * answer.baked[0].max())
     floor &= answer.baked[0, :, 0] > 0.3 * np.median(answer.baked[0][floor])
     ratio = found[0][floor] / answer.baked[0][floor]
@@ -88,27 +85,15 @@ def test_an_interrupted_answer_goes_on_and_ends_the_same(tmp_path: Path) -> None
 
 
 def test_a_store_without_an_answer_says_so(tmp_path: Path) -> None:
-    store = bake(furnace(), tmp_path / "s", quality=TINY, only=("geometry",))
+    store = Store.create(tmp_path / "s", {})
     assert not has_answer(store)
     with pytest.raises(UserError, match="--only answer"):
         read_answer(store)
 
 
 def test_an_answer_that_contradicts_itself_is_refused(box: Store, tmp_path: Path) -> None:
-    store = bake(furnace(), tmp_path / "s", quality=TINY, only=("answer",))
-    store.put("answer/patch_paired", "answer", np.full(3, 7, np.uint16), key="other")
-    with pytest.raises(UserError, match="broken store"):
-        read_answer(store)
-
-
-def test_another_colour_in_the_scene_bakes_the_answer_again(tmp_path: Path) -> None:
-    store = bake(furnace(), tmp_path / "s", quality=TINY, only=("answer",))
-    before = store.artefact("answer/transfer").key
-    other = replace(furnace(), materials={"grey": Material(kd=0.4)})
-    assert bake(other, tmp_path / "s", quality=TINY, only=("answer",)).artefact("answer/transfer").key != before
-
-
-def test_albedos_are_compared_to_the_bit() -> None:
-    one = Albedos(np.full((1, 3), 0.5), np.zeros((1, 3)))
-    assert one.same_as(Albedos(np.full((1, 3), 0.5), np.zeros((1, 3))))
-    assert not one.same_as(Albedos(np.full((1, 3), np.nextafter(0.5, 1)), np.zeros((1, 3))))
+    shutil.copytree(box.folder, tmp_path / "s")
+    with Store.open(tmp_path / "s") as store:
+        store.put("answer/patch_paired", "answer", np.full(3, 7, np.uint16), key="other")
+        with pytest.raises(UserError, match="broken store"):
+            read_answer(store)

@@ -12,7 +12,7 @@ from lambent.bake.bake import bake
 from lambent.baked.answering.stored import has_answer, read_answer
 from lambent.core.views.camera import Camera
 from lambent.materials.recolour import recoloured
-from lambent.realtime.answering.answering import AnsweredLight, answered_scene
+from lambent.realtime.answering.answering import AnsweredLight
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.device import open_device
 from lambent.realtime.light.baked import BakedScene, read_baked
@@ -23,10 +23,10 @@ from lambent.store.contract import SIDES
 from lambent.store.light_groups import group_name, light_groups
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, room_with_step
+from tests.realtime.answering.answered_scene import answered_scene
 
 VIEW = FrameState(Camera("in", (1.4, 1.2, -1.4), (-0.8, 0.5, 0.0), fov_y_deg=70), 96, 64, integrator="rings")
 RED = (0.5, 0.05, 0.05)
-DARK = (0.0, 0.0, 0.0)
 
 
 def two_lamps() -> Scene:
@@ -79,20 +79,6 @@ def test_every_group_answers_as_a_bake_of_the_other_colour(store: Store, scene: 
         assert ours[group][lit].mean(axis=0) == pytest.approx(expected[group][lit].mean(axis=0), rel=0.1)
         off, stale = (np.sqrt(((one[group] - expected[group])[lit] ** 2).mean()) for one in (ours, before))
         assert off < 0.25 * stale
-
-
-def test_pictures_are_linear_in_the_mix_and_as_baked_without_an_edit(store: Store, scene: BakedScene) -> None:
-    device, red = open_device(), answered_red(store, scene)
-
-    def image(light: dict[str, tuple[float, float, float]]) -> np.ndarray:
-        return Renderer(device, red).image(replace(VIEW, light=light)).astype(float)
-
-    first, second = image({"wall lamp": DARK}), image({"lamp": DARK})
-    assert image({}) == pytest.approx(first + second, rel=0.01, abs=3e-3)
-    mix = {"lamp": (0.2, 0.4, 0.6), "wall lamp": (2.0, 1.0, 0.0)}
-    expected = first * mix["lamp"] + second * mix["wall lamp"]
-    assert image(mix) == pytest.approx(expected, rel=0.01, abs=5e-3)
-    assert first.mean() > 0.02 and second.mean() > 0.02
 
 
 def test_light_answers_on_the_gpu_as_in_a_new_scene_and_comes_back(store: Store, scene: BakedScene) -> None:

@@ -67,10 +67,6 @@ def test_points_are_dense_along_a_contact_and_as_many_as_allowed() -> None:
     assert found.block[column < 4].max() < found.block[column >= 16].min() == 4
     far = refined_points(spots, SIZE, coarse, np.full(len(coarse.texel), 1e3))
     assert np.array_equal(far.texel, coarse.texel), "in the open nothing changes"
-
-
-def test_points_at_each_texel_are_no_finer() -> None:
-    spots = plane()
     finest = gather_points(spots, SIZE, 1)
     assert refined_points(spots, SIZE, finest, np.full(len(finest.texel), 0.1)) is finest
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
+from lambent.bake.light_fields import choosing
 from lambent.bake.light_fields.choice import SHARE, WORTH, chosen, worth_trying
 from lambent.bake.light_fields.request import as_asked, light_fields_of, noted
 from lambent.bake.light_fields.trial import COUNTS, PROBE, Option, ProbeLight, Trial, helps, options_of
@@ -21,6 +22,7 @@ from lambent.core.geometry.directions import normalize
 from lambent.core.views.camera import Camera
 from lambent.scenes.geometry import box, placed
 from lambent.scenes.scene import LightFieldWish, Scene, SceneObject, SunSky
+from lambent.store.store import Store
 from tests.bake.small_scenes import MIRROR, TINY, room_with_step
 
 MB = 64**2 * 8 / 1e6  # of a point with maps of 64 texels a side
@@ -58,13 +60,9 @@ def test_points_go_where_they_take_most_away() -> None:
     assert counts(85) == {"large": 64, "small": 16} and counts(1000) == {"large": 64, "small": 64}
     one = chosen(trials, 16 * MB, 8, no_sample_map)[0]
     assert one.megabytes == pytest.approx(16 * MB) and (one.probe_error, one.error) == (0.4, 0.2)
-    assert chosen({}, 100.0, 8, no_sample_map) == []
-
-
-def test_small_gains_are_taken_where_they_are_certain() -> None:
-    for noise, expected in ((0.01, ["one"]), (0.5, [])):
-        trials = {"one": trial(0.4, of_points({16: 0.37}), 1.0, noise)}
-        assert [one.object for one in chosen(trials, 100.0, 8, no_sample_map)] == expected
+    for noise, expected in ((0.01, ["one"]), (0.5, [])):  # small gains are taken where they are certain
+        small = {"one": trial(0.4, of_points({16: 0.37}), 1.0, noise)}
+        assert [one.object for one in chosen(small, 100.0, 8, no_sample_map)] == expected
 
 
 def test_memory_buys_points_or_texels_by_what_they_gain() -> None:
@@ -94,33 +92,21 @@ def test_sizes_are_those_that_trials_tell_apart() -> None:
     assert all(count in COUNTS for count, _ in options_of(94)) and Option(1024, 190) not in options_of(94)
     assert {one.texels for one in options_of(310)} == {310}, "206 and 620 would be tried with as many texels"
     assert all(one.texels >= 8 for one in options_of(8))
-
-
-def test_more_points_or_texels_help_where_errors_fall() -> None:
     errors = {Option(16, 30): 0.4, Option(64, 30): 0.3, Option(64, 94): 0.2, Option(256, 30): 0.3}
     assert [helps(errors, one) for one in errors] == [True, True, True, False]
     assert not helps(errors | {Option(64, 190): 0.2}, Option(64, 190))
-
-
-def test_a_count_comes_down_to_an_error_or_is_the_best() -> None:
     found = trial(0.4, of_points({16: 0.2, 64: 0.1, 256: 0.11}), 1.0)
     assert [found.count_for(error) for error in (0.3, 0.15, 0.01)] == [16, 64, 64]
 
 
-def test_only_the_worst_are_tried() -> None:
-    wrong = {"a": 1.0, "b": 10.0, "c": 11 * SHARE / 2, "d": 0.0}
-    assert worth_trying(wrong) == ["b", "a"]
-    assert worth_trying({}) == [] and worth_trying({"a": 0.0}) == []
-
-
-def test_of_very_many_the_largest_are_looked_at(mi: Any) -> None:
-    from lambent.bake.light_fields.choosing import look_largest
-
+def test_of_very_many_the_largest_are_looked_at_and_the_worst_tried(mi: Any) -> None:
     meshes = {f"{k}": placed(box((0.1 * k, 0.1, 0.1)), (float(k % 2), 0, 0)) for k in range(1, 9)}
     scene = Scene("many", tuple(SceneObject(name, mesh, "mirror") for name, mesh in meshes.items()), {"mirror": MIRROR})
     places = np.array([[0.5, 0, 4.0], [0.5, 3.0, 2.0]])
-    assert look_largest(scene, list(meshes), places, 3) == ["6", "7", "8"]
-    assert look_largest(scene, list(meshes), places, 8) == list(meshes)
+    assert choosing.look_largest(scene, list(meshes), places, 3) == ["6", "7", "8"]
+    assert choosing.look_largest(scene, list(meshes), places, 8) == list(meshes)
+    assert worth_trying({"a": 1.0, "b": 10.0, "c": 11 * SHARE / 2, "d": 0.0}) == ["b", "a"]
+    assert worth_trying({"a": 0.0}) == []
 
 
 def test_a_probe_is_looked_up_as_the_renderer_does() -> None:
@@ -166,8 +152,6 @@ def beside() -> Scene:
 
 
 def test_reflectors_show_shares_of_areas(beside: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
-    from lambent.bake.light_fields import choosing
-
     parts = [SimpleNamespace(object=name, area_m2=0.25) for name in ("corner", "corner", "gone")]
     record = SimpleNamespace(reflectors=[SimpleNamespace(parts=parts)])
     monkeypatch.setattr(choosing, "scene_record", lambda store: record)
@@ -178,41 +162,48 @@ def test_reflectors_show_shares_of_areas(beside: Scene, monkeypatch: pytest.Monk
 def test_a_bake_chooses_and_keeps_its_choice(
     beside: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    from lambent.bake.light_fields import choosing
+    monkeypatch.setattr("lambent.bake.light_fields.trial.COUNTS", (16, 32))
+    monkeypatch.setattr("lambent.bake.light_fields.trial.FINENESS", (1,))
+    quality = TINY.changed("tiny", light_field={"points": 12, "texels": 30, "strata": 1})
 
-    quality = TINY.changed("tiny", light_field={"points": 12, "texels": 46, "strata": 1})
-    store = bake(beside, tmp_path / "s", quality=quality, light_fields="auto")
+    def baked(**asked: Any) -> Store:
+        return bake(beside, tmp_path / "s", quality=quality, only=("light_field",), **asked)
+
+    store = baked(light_fields="auto")
     fields = {one["object"]: one for one in light_fields_of(store)}
     assert "ball" in fields
     for name, one in fields.items():
         assert one["error"] < (1 - WORTH) * one["probe_error"] and one["seconds"] > 0
         side = read_light_field(store, name).radiance.shape[1]
-        assert side in {option.texels for option in options_of(46)}
+        assert side == 30
     keys, steps = {a.name: a.key for a in store.artefacts()}, list[str]()
-    store = bake(beside, tmp_path / "s", quality=quality, progress=lambda done, total, what: steps.append(what))
+    store = baked(progress=lambda done, total, what: steps.append(what))
     assert {a.name: a.key for a in store.artefacts()} == keys and not steps, "chosen once, as the store says"
     assert "shiny objects" not in caplog.text
     monkeypatch.setattr(choosing, "MOST_WATCHED", 1)
-    store = bake(beside, tmp_path / "s", quality=quality, light_field_mb=100)
-    assert {one["object"] for one in light_fields_of(store)} == {"ball"}, "the larger one"
+    assert {one["object"] for one in light_fields_of(baked(light_field_mb=100))} == {"ball"}, "the larger one"
     assert "tried on 1 of 2 shiny objects" in caplog.text
-    store = bake(beside, tmp_path / "s", quality=quality, light_fields="none")
+    store = baked(light_fields="none")
     assert not light_fields_of(store) and not store.artefacts("light_field")
 
 
 def test_an_error_that_is_asked_for_decides_how_many_points(beside: Scene, tmp_path: Path) -> None:
-    quality = TINY.changed("tiny", light_field={"points": 40, "texels": 8, "strata": 1})
+    quality = TINY.changed("tiny", light_field={"points": 24, "texels": 8, "strata": 1})
     counts = []
     for error in (100.0, 1e-6):
         asked = replace(beside, light_fields={"ball": LightFieldWish(error=error)})
-        counts.append(light_fields_of(bake(asked, tmp_path / "s", quality=quality))[0]["points"])
-    assert counts[0] == 16 and counts[0] <= counts[1] <= 40
+        store = bake(asked, tmp_path / "s", quality=quality, only=("light_field",))
+        counts.append(light_fields_of(store)[0]["points"])
+    assert counts[0] == 16 and counts[0] <= counts[1] <= 24
 
 
-def test_what_stands_alone_under_the_sky_keeps_its_probe(tmp_path: Path) -> None:
+def test_what_stands_alone_under_the_sky_keeps_its_probe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A convex box far from everything: the probe is right."""
+    monkeypatch.setattr("lambent.bake.light_fields.trial.COUNTS", (16, 32))
+    monkeypatch.setattr("lambent.bake.light_fields.trial.FINENESS", (1,))
     objects = (SceneObject("box", box((0.4, 0.3, 0.2)), "mirror"),)
     eyes = (Camera("a", (1.0, 0.8, 1.2), (0, 0, 0)), Camera("b", (-1.2, -0.6, 0.7), (0, 0, 0)))
     scene = Scene("alone", objects, {"mirror": MIRROR}, environment=SunSky((0.39, 0.86, -0.32)), cameras=eyes)
-    quality = TINY.changed("tiny", light_field={"points": 12, "texels": 46, "strata": 1})
-    assert light_fields_of(bake(scene, tmp_path / "s", quality=quality, light_fields="auto")) == []
+    quality = TINY.changed("tiny", light_field={"points": 12, "texels": 30, "strata": 1})
+    store = bake(scene, tmp_path / "s", quality=quality, light_fields="auto", only=("light_field",))
+    assert light_fields_of(store) == []

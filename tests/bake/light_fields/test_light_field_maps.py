@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lambent.bake.artefacts import light_field
 from lambent.bake.bake import bake
+from lambent.bake.light_fields.acquisition import (
+    Around,
+    TracedMaps,
+    covered_distances,
+    direction,
+    inverse_distances,
+    radiance_maps,
+)
+from lambent.bake.quality import Quality
+from lambent.bake.sky.sun import sun_of
+from lambent.bake.tracing.lights.sun import Sun
+from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.baked.light_fields.light_field import NO_POINT
 from lambent.baked.light_fields.stored import read_light_field
 from lambent.core.geometry.directions import normalize
@@ -26,8 +40,20 @@ SMALL = TINY.changed("small", light_field={"points": 24, "texels": 14, "strata":
 PARTS = ("points", "normals", "blocks", "distances", "sample_map")
 
 
+def baked(scene: Scene, folder: Path, quality: Quality = SMALL, **more: Any) -> Store:
+    return bake(scene, folder, quality=quality, only=("light_field",), **more)
+
+
 def with_field(scene: Scene, **asked: Any) -> Scene:
     return replace(scene, light_fields={"ball": LightFieldWish(**asked)})
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
+    """The coloured room with a light field of the ball, baked in four chunks."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(light_field, "PATHS_OF_A_CHUNK", 6 * 14 * 14)
+        yield baked(with_field(coloured_room()), tmp_path_factory.mktemp("field") / "s")
 
 
 def read(store: Store, part: str) -> np.ndarray:
@@ -39,8 +65,6 @@ def light(store: Store) -> np.ndarray:
 
 
 def test_directions_are_those_of_core(mi: Any) -> None:
-    from lambent.bake.light_fields.acquisition import direction
-
     uv = np.random.default_rng(0).random((1000, 2))
     found = direction(mi.Point2f(mi.Float(uv[:, 0]), mi.Float(uv[:, 1])))
     np.testing.assert_allclose(np.array(found).T, from_square(uv), atol=2e-6)
@@ -48,9 +72,6 @@ def test_directions_are_those_of_core(mi: Any) -> None:
 
 def test_every_texel_sees_the_wall_behind_it(mi: Any) -> None:
     """Walls 2 m from the origin; from any point within, by hand, which one a direction meets and how far it is."""
-    from lambent.bake.light_fields.acquisition import Around, inverse_distances, radiance_maps
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-
     room = coloured_room()
     scene = SceneBuilder(replace(room, objects=room.objects[:-1])).build()
     points, n = np.array([[0.0, 0, 0], [1.5, -0.7, 0.3], [-1.9, 1.9, -1.9]]), 32
@@ -74,9 +95,6 @@ def test_every_texel_sees_the_wall_behind_it(mi: Any) -> None:
 
 
 def test_what_is_open_is_at_no_distance_and_shows_the_sky(mi: Any) -> None:
-    from lambent.bake.light_fields.acquisition import Around, inverse_distances, radiance_maps
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-
     floor = SceneObject("floor", patch((-50, 0, 50), (100, 0, 0), (0, 0, -100)), "black")
     sky = ConstantEnvironment((0.25, 0.5, 1.0))
     scene = SceneBuilder(Scene("s", (floor,), {"black": BLACK}, environment=sky)).build()
@@ -89,8 +107,7 @@ def test_what_is_open_is_at_no_distance_and_shows_the_sky(mi: Any) -> None:
     assert (light[down] == 0).all()
 
 
-def test_a_bake_writes_what_the_contract_says(tmp_path: Path) -> None:
-    store = bake(with_field(coloured_room()), tmp_path / "s", quality=SMALL)
+def test_a_bake_writes_what_the_contract_says(store: Store) -> None:
     points, normals, blocks, distances, sample_map = (read(store, part) for part in PARTS)
     assert points.shape == normals.shape == (24, 3) and points.dtype == np.float32
     assert blocks.shape == (24, 4, 4, 4) and distances.shape == (24, 6, 4, 2)
@@ -104,8 +121,7 @@ def test_a_bake_writes_what_the_contract_says(tmp_path: Path) -> None:
     )
     assert np.allclose(normalize(points), normals, atol=0.05)
     outwards = texel_directions(14) @ normals[0] > 0.3
-    side = np.abs(texel_directions(14))[outwards]
-    assert (side.max(axis=-1) > 0).all() and (radiance[0][outwards].max(axis=-1) > 0.85).mean() > 0.8
+    assert (radiance[0][outwards].max(axis=-1) > 0.85).mean() > 0.8
     assert (inverse > 0).all(), "a closed room"
     rows, columns = meta["grid"]
     top, left = meta["corner"]
@@ -119,28 +135,22 @@ def test_a_bake_writes_what_the_contract_says(tmp_path: Path) -> None:
     assert (away < np.linalg.norm(points[None] - p[:, None], axis=-1).min(axis=1) + 0.1).all()
 
 
-def test_an_interrupted_bake_ends_with_the_same_bits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from lambent.bake.artefacts import light_field
-
-    monkeypatch.setattr(light_field, "PATHS_OF_A_CHUNK", 6 * 14 * 14)  # four chunks
+def test_an_interrupted_bake_ends_with_the_same_bits(store: Store, tmp_path: Path) -> None:
     scene = with_field(coloured_room())
-    whole = bake(scene, tmp_path / "whole", quality=SMALL)
-    seen: list[str] = []
 
     def stop(done: float, total: float, what: str) -> None:
-        seen.append(what)
         if what == "light field of ball" and done / total > 0.3:
             raise Cancelled
 
     with pytest.raises(Cancelled):
-        bake(scene, tmp_path / "part", quality=SMALL, progress=stop)
+        baked(scene, tmp_path / "part", progress=stop)
     part = Store.open(tmp_path / "part")
     state, share = part.availability(light_field_name("ball", "blocks"))
     assert state == "partial" and 0 < share < 1 and light_field_name("ball", "sample_map") not in part
     before = part.artefact(light_field_name("ball", "blocks")).done
-    again = bake(scene, tmp_path / "part", quality=SMALL)
+    again = baked(scene, tmp_path / "part")
     for name in PARTS:
-        assert read(again, name).tobytes() == read(whole, name).tobytes(), name
+        assert read(again, name).tobytes() == read(store, name).tobytes(), name
     after = again.artefact(light_field_name("ball", "blocks")).done
     assert before.items() <= after.items() and len(after) == 4
 
@@ -148,26 +158,19 @@ def test_an_interrupted_bake_ends_with_the_same_bits(tmp_path: Path, monkeypatch
 def test_only_what_is_asked_is_baked_and_what_is_no_longer_asked_goes(tmp_path: Path) -> None:
     scene = coloured_room()
     names = {light_field_name("ball", part) for part in PARTS}
-    store = bake(with_field(scene, points=5, texels=10, offset_m=0.25), tmp_path / "s", quality=SMALL)
+    store = baked(with_field(scene, points=5, texels=10, offset_m=0.25), tmp_path / "s")
     assert light(store).shape == (5, 10, 10, 3)
     assert store.artefact(light_field_name("ball", "points")).meta["offset_m"] == 0.25
     assert np.allclose(np.linalg.norm(read(store, "points"), axis=1), 0.55, atol=0.02)
     kept = {a.name: a.key for a in store.artefacts() if a.name not in names}
-    own, all_levels = texel_directions(10) @ read(store, "normals").T < -0.9, light(store)
-    bare = SMALL.changed(light_field={"levels": 1})
-    store = bake(with_field(scene, points=5, texels=10, offset_m=0.25), tmp_path / "s", quality=bare)
-    seen = np.moveaxis(own, -1, 0)
-    assert light(store)[seen].max() < 0.01 and (all_levels[seen] > 0.5).any(axis=-1).mean() > 0.8
-    store = bake(scene, tmp_path / "s", quality=SMALL)
+    store = baked(scene, tmp_path / "s")
     assert {a.name: a.key for a in store.artefacts()} == kept, "nothing else is baked again"
 
 
 def test_traced_whole_it_is_the_same_within_noise(tmp_path: Path) -> None:
     scene = replace(room_with_step(), light_fields={"ball": LightFieldWish(points=24, texels=14)})
     quality = TINY.changed(light_field={"strata": 4})
-    cached, traced = (
-        light(bake(scene, tmp_path / "s", quality=quality, probes=method)) for method in ("cached", "traced")
-    )
+    cached, traced = (light(baked(scene, tmp_path / "s", quality, probes=method)) for method in ("cached", "traced"))
     assert not np.array_equal(cached, traced)
     assert traced.mean() == pytest.approx(cached.mean(), rel=0.03)
     squares = [a.reshape(24, 7, 2, 7, 2, 3).mean(axis=(2, 4, 5)) for a in (cached, traced)]
@@ -177,33 +180,24 @@ def test_traced_whole_it_is_the_same_within_noise(tmp_path: Path) -> None:
 def test_a_matte_object_gets_none_and_is_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     scene = with_field(coloured_room())
     matte = replace(scene, materials={**scene.materials, "mirror": Material(kd=0.5)})
-    store = bake(matte, tmp_path / "s", quality=SMALL)
+    store = baked(matte, tmp_path / "s")
     assert not store.artefacts("light_field")
     assert "ball" in caplog.text and "light_field" in caplog.text
 
 
-def test_texels_hold_the_light_of_what_their_middle_meets(mi: Any) -> None:
-    """A black square before a white sky: no texel mixes both, though the square ends within texels."""
-    from lambent.bake.light_fields.acquisition import Around, inverse_distances, radiance_maps
-    from lambent.bake.tracing.scene_builder import SceneBuilder
+def test_quarters_of_texels_tell_where_a_square_ends(mi: Any) -> None:
+    """A black square before a white sky, which ends within texels: those whose middle meets it show it alone.
 
+    With `covers`, texels with any quarter whose middle is before it, by hand, show it, and its distance.
+    """
     square = SceneObject("square", patch((-1.03, -1, 1.07), (2, 0, 0), (0, 0, -2)), "black")
     scene = Scene("s", (square,), {"black": BLACK}, environment=ConstantEnvironment((1.0, 1.0, 1.0)))
     built, point, n = SceneBuilder(scene).build(), np.zeros((1, 3)), 31
-    light = radiance_maps(Around(built, None, 2), point, n, 4, 0)[0][0]
+    around = Around(built, None, 2)
     met = inverse_distances(built, point, n)[0] > 0
     assert 0.05 < met.mean() < 0.3
-    np.testing.assert_allclose(light, np.where(met[..., None], 0.0, 1.0) * np.ones(3), atol=1e-6)
-
-
-def test_quarters_of_texels_tell_where_a_square_ends(mi: Any) -> None:
-    """Every quarter whose middle is before the square, by hand; texels with any of these show it, and its distance."""
-    from lambent.bake.light_fields.acquisition import Around, covered_distances, radiance_maps
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-
-    square = SceneObject("square", patch((-1.03, -1, 1.07), (2, 0, 0), (0, 0, -2)), "black")
-    scene = Scene("s", (square,), {"black": BLACK}, environment=ConstantEnvironment((1.0, 1.0, 1.0)))
-    built, point, n = SceneBuilder(scene).build(), np.zeros((1, 3)), 31
+    by_middles = radiance_maps(around, point, n, 4, 0)[0][0]
+    np.testing.assert_allclose(by_middles, np.where(met[..., None], 0.0, 1.0) * np.ones(3), atol=1e-6)
     inverse, cover = covered_distances(built, point, n)
     w = texel_directions(2 * n)
     x, z = (-w[..., axis] / np.minimum(w[..., 1], -1e-9) for axis in (0, 2))
@@ -212,7 +206,7 @@ def test_quarters_of_texels_tell_where_a_square_ends(mi: Any) -> None:
     np.testing.assert_array_equal(cover[0], (bits * [1, 2, 4, 8]).sum(axis=-1))
     mixed = bits.any(axis=-1) & ~bits.all(axis=-1)
     assert mixed.sum() > 20 and (inverse[0][bits.any(axis=-1)] > 0).all()
-    maps, shows = radiance_maps(Around(built, None, 2), point, n, 2, 0, covers=True)
+    maps, shows = radiance_maps(around, point, n, 2, 0, covers=True)
     light = maps[0, ..., 0]
     np.testing.assert_array_equal(shows[0], bits.any(axis=-1))
     assert (light[bits.all(axis=-1)] == 0).all()
@@ -222,9 +216,6 @@ def test_quarters_of_texels_tell_where_a_square_ends(mi: Any) -> None:
 
 def test_lamps_smaller_than_texels_keep_their_light(mi: Any) -> None:
     """A square lamp of .6 texels a side: most places see it through no middle of a texel."""
-    from lambent.bake.light_fields.acquisition import Around, radiance_maps
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-
     n, side_m = 32, 0.055
     lamp = SceneObject(
         "lamp", patch((-side_m / 2, 1, -side_m / 2), (side_m, 0, 0), (0, 0, side_m)), "black", (100.0,) * 3
@@ -248,11 +239,6 @@ def test_lamps_smaller_than_texels_keep_their_light(mi: Any) -> None:
 
 def test_the_disc_of_the_sun_is_left_out(mi: Any) -> None:
     """Pixels add it. Seen from an open place, maps with and without it differ by the irradiance that it has."""
-    from lambent.bake.light_fields.acquisition import Around, radiance_maps
-    from lambent.bake.sky.sun import sun_of
-    from lambent.bake.tracing.lights.sun import Sun
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-
     floor = SceneObject("floor", patch((-1, -5, 1), (2, 0, 0), (0, 0, -2)), "black")
     scene = Scene("s", (floor,), {"black": BLACK}, environment=SunSky((0.39, 0.86, -0.32)))
     found, n, strata = sun_of(scene), 16, 128
@@ -267,9 +253,6 @@ def test_the_disc_of_the_sun_is_left_out(mi: Any) -> None:
 
 
 def test_maps_that_are_traced_where_they_are_read_are_those_of_a_bake(mi: Any) -> None:
-    from lambent.bake.light_fields.acquisition import Around, TracedMaps, radiance_maps
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-
     room = coloured_room()
     around = Around(SceneBuilder(replace(room, objects=room.objects[:-1])).build(), None, 1)
     points = np.array([[0.0, 0, 0], [1.5, -0.7, 0.3]])

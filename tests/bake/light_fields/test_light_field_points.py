@@ -8,23 +8,19 @@ import numpy as np
 import pytest
 
 from lambent.bake.light_fields import sampling
-from lambent.bake.light_fields.sampling import (
-    SurfacePoints,
-    curvatures,
-    densities,
-    eliminated,
-    spread_evenly,
-    thinned,
-)
+from lambent.bake.light_fields.placing import Placing
+from lambent.bake.light_fields.sampling import SurfacePoints, curvatures, densities, eliminated, spread_evenly, thinned
+from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.errors import UserError
 from lambent.core.geometry.triangles import triangle_areas
 from lambent.materials.document import Material
-from lambent.scenes.geometry import box, merge, patch, placed, sphere
+from lambent.scenes.geometry import box, cylinder, merge, patch, placed, sphere
 from lambent.scenes.geometry.teapot import teapot
 from lambent.scenes.scene import Mesh, Scene, SceneObject
 from tests.bake.small_scenes import MIRROR
 
 GREY = Material(kd=0.5)
+LINE = Mesh(*(np.zeros((3, n), np.float32) for n in (3, 3, 3, 2)), faces=np.array([[0, 1, 2]], np.uint32))  # of no area
 
 
 def nearest_m(points: np.ndarray) -> np.ndarray:
@@ -96,18 +92,14 @@ def test_both_sides_of_a_thin_sheet_have_points() -> None:
 
 
 def test_meshes_without_area_and_with_few_candidates() -> None:
-    point = Mesh(*(np.zeros((3, n), np.float32) for n in (3, 3, 3, 2)), faces=np.array([[0, 1, 2]], np.uint32))
-    assert not len(spread_evenly(point, 10, np.random.default_rng(0)))
+    assert not len(spread_evenly(LINE, 10, np.random.default_rng(0)))
     few = SurfacePoints(np.eye(3), np.eye(3))
     assert len(eliminated(few, np.ones(3), 5)) == 3 and len(thinned(few, np.ones(3), 2, np.random.default_rng(0))) == 2
     same = SurfacePoints(np.zeros((60, 3)), np.tile([0.0, 1.0, 0.0], (60, 1)))
     assert len(eliminated(same, np.ones(60), 7)) == 7, "all in one place"
 
 
-def placing_of(*objects: SceneObject) -> Any:
-    from lambent.bake.light_fields.placing import Placing
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-
+def placing_of(*objects: SceneObject) -> Placing:
     builder = SceneBuilder(Scene("s", objects, {"m": MIRROR, "d": GREY}))
     return Placing(builder, builder.build())
 
@@ -135,24 +127,18 @@ def test_points_of_a_ball_on_the_floor_stand_in_the_gap_or_nowhere(mi: Any) -> N
     np.testing.assert_allclose(height, np.where(gap > 0, np.minimum(0.1, gap / 2), 0.1), atol=4e-3)
 
 
-def test_a_box_within_a_box_has_no_points_and_says_so(mi: Any) -> None:
+def test_what_is_hidden_everywhere_has_no_points_and_says_so(mi: Any) -> None:
+    """A box within a box, and an object without area."""
     inner, outer = SceneObject("inner", box((0.5, 0.5, 0.5)), "m"), SceneObject("outer", box((1, 1, 1)), "d")
     placing = placing_of(inner, outer)
     assert len(placing.points(outer.mesh, 50, 0)) == 50
-    with pytest.raises(UserError, match="its surface is hidden everywhere"):
-        placing.points(inner.mesh, 50, 0)
-
-
-def test_an_object_without_area_says_so(mi: Any) -> None:
-    line = Mesh(*(np.zeros((3, n), np.float32) for n in (3, 3, 3, 2)), faces=np.array([[0, 1, 2]], np.uint32))
-    with pytest.raises(UserError, match="hidden everywhere"):
-        placing_of(SceneObject("ball", sphere(0.3, 8, 4), "d")).points(line, 10, 0)
+    for hidden in (inner.mesh, LINE):
+        with pytest.raises(UserError, match="its surface is hidden everywhere"):
+            placing.points(hidden, 50, 0)
 
 
 def test_the_root_of_a_spout_within_an_open_vessel_has_no_points(mi: Any) -> None:
     """A lid-less cylinder is not closed; all that a ball within it sees, but for the opening, is its inner side."""
-    from lambent.scenes.geometry import cylinder
-
     vessel = cylinder(0.2, 1.0, 48)
     up = np.isclose(vessel.positions[vessel.faces][:, :, 1], vessel.positions[:, 1].max()).all(axis=1)
     opened = Mesh(vessel.positions, vessel.normals, vessel.tangents, vessel.uv, vessel.faces[~up])

@@ -5,14 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.bake.light_fields.sample_map import (
-    GUTTER,
-    LONGEST,
-    MOST_TEXELS,
-    finer_by,
-    sample_map,
-    with_gutters,
-)
+from lambent.bake.light_fields.sample_map import GUTTER, LONGEST, MOST_TEXELS, finer_by, sample_map, with_gutters
 from lambent.baked.light_fields.light_field import CANDIDATES, NO_POINT
 from lambent.baked.light_fields.nearest_points import HORIZON_DEG, nearest_points
 from lambent.core.arrays import Floats

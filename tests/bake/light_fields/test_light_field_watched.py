@@ -8,6 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lambent.bake.light_fields.acquisition import Around
+from lambent.bake.light_fields.trial import ProbeLight
+from lambent.bake.light_fields.watched import Watched, watched
+from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.baked.probes.irradiance import irradiance_of
 from lambent.materials.document import Lobe, Material
 from tests.bake.small_scenes import coloured_room
@@ -18,21 +22,23 @@ GLASS = Material(
 )
 
 
-def seen_of(material: Material) -> Any:
-    from lambent.bake.light_fields.acquisition import Around
-    from lambent.bake.light_fields.watched import watched
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-
+def seen_of(material: Material) -> Watched:
     room = coloured_room()
     scene = replace(room, materials={**room.materials, "mirror": material})
     around = Around(SceneBuilder(scene).build(), None, 6)
-    return watched(scene.object("ball").mesh, material, EYES, around, 1)
+    found = watched(scene.object("ball").mesh, material, EYES, around, 1)
+    assert found is not None
+    return found
 
 
-def test_a_mirror_shows_the_share_of_its_lobe(mi: Any) -> None:
+@pytest.fixture(scope="module")
+def seen(mi: Any) -> Watched:
+    return seen_of(Material(name="mirror", lobes=(Lobe(mx=0.001, my=0.001, r0=0.5),)))
+
+
+def test_a_mirror_shows_the_share_of_its_lobe(seen: Watched) -> None:
     """Walls are at 0 or 1 in each channel: a mirror of r0 = .5 shows them by Schlick's term."""
-    seen = seen_of(Material(name="mirror", lobes=(Lobe(mx=0.001, my=0.001, r0=0.5),)))
-    assert seen is not None and seen.directions.shape[1] == 8 and len(seen.x) > 200
+    assert seen.directions.shape[1] == 8 and len(seen.x) > 200
     mirrored = seen.directions.mean(axis=1)
     cosine = np.sum(mirrored * seen.normals, axis=1)
     expected = 0.5 + 0.5 * (1 - cosine.clip(0, 1)) ** 5
@@ -51,8 +57,7 @@ def test_glass_is_seen_by_both_sides(mi: Any) -> None:
     np.testing.assert_allclose(seen.share.sum(axis=1), 1, atol=1e-6)
 
 
-def test_diffuse_light_hides_errors_and_points_are_halved(mi: Any) -> None:
-    seen = seen_of(Material(name="mirror", lobes=(Lobe(mx=0.001, my=0.001, r0=0.5),)))
+def test_diffuse_light_hides_errors_and_points_are_halved(seen: Watched) -> None:
     nothing = np.zeros(seen.directions.shape)
     brighter = replace(seen, own=seen.own + 10, light=seen.light + 10)
     assert brighter.error(nothing, 1.0) < 0.2 * seen.error(nothing, 1.0)
@@ -62,11 +67,8 @@ def test_diffuse_light_hides_errors_and_points_are_halved(mi: Any) -> None:
     assert np.average(both, weights=[first.sum(), second.sum()]) == pytest.approx(seen.error(nothing, 1.0))
 
 
-def test_a_probe_is_scaled_as_the_renderer_scales_it(mi: Any) -> None:
+def test_a_probe_is_scaled_as_the_renderer_scales_it(seen: Watched) -> None:
     """A uniform probe, of which the light map has half."""
-    from lambent.bake.light_fields.trial import ProbeLight
-
-    seen = seen_of(Material(name="mirror", lobes=(Lobe(mx=0.001, my=0.001, r0=0.5),)))
     cube = np.full((6, 8, 8, 3), 2.0)
     planes = np.array([[1, 0, 0, 2.0], [-1, 0, 0, 2], [0, 1, 0, 2], [0, -1, 0, 2], [0, 0, 1, 2], [0, 0, -1, 2]])
     half = replace(seen, irradiance=np.full(len(seen.x), np.pi))

@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
+from lambent.bake.light_fields.volume import volume_points
+from lambent.bake.quality import Quality
+from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.baked.light_fields.light_field import LightField
 from lambent.baked.light_fields.stored import read_light_field
 from lambent.core.errors import UserError
@@ -25,6 +28,10 @@ THICK = 0.02
 GLASS = Material(name="glass", lobes=(Lobe(side="transmission", mx=0.002, my=0.002, k=0.9, r0=0.04, alpha=0.5),))
 
 
+def baked(scene: Scene, folder: Path, quality: Quality = SMALL, **more: Any) -> Store:
+    return bake(scene, folder, quality=quality, only=("light_field",), **more)
+
+
 def sees_walls_alone(field: LightField) -> bool:
     """Whether all maps see the walls, 2 m from the middle along an axis, and nothing before them."""
     w, p = texel_directions(field.inverse_distance.shape[1]), field.points.astype(float)[:, None, None]
@@ -35,7 +42,7 @@ def sees_walls_alone(field: LightField) -> bool:
 
 def test_points_fill_the_box_and_see_past_the_object(tmp_path: Path) -> None:
     scene = replace(coloured_room(), light_fields={"ball": LightFieldWish(volume=True)})
-    field = read_light_field(bake(scene, tmp_path / "s", quality=SMALL), "ball")
+    field = read_light_field(baked(scene, tmp_path / "s"), "ball")
     low, high = scene.object("ball").mesh.bounds
     margin = (high - low).max() / 8
     assert field.volume and field.without_object and len(field.points) == 32
@@ -47,8 +54,6 @@ def test_points_fill_the_box_and_see_past_the_object(tmp_path: Path) -> None:
 
 def test_points_behind_other_things_are_left_out(mi: Any) -> None:
     """The box stands on a plate: none is below it, or within a block that cuts into the box."""
-    from lambent.bake.light_fields.volume import volume_points
-    from lambent.bake.tracing.scene_builder import SceneBuilder
 
     def block(name: str, size: tuple[float, ...], at: tuple[float, ...]) -> SceneObject:
         mesh = box(size)
@@ -74,7 +79,7 @@ def pane_room() -> Scene:
 
 
 def test_glass_knows_the_face_behind_each_place(tmp_path: Path) -> None:
-    store = bake(pane_room(), tmp_path / "s", quality=SMALL)
+    store = baked(pane_room(), tmp_path / "s")
     field = read_light_field(store, "pane")
     glass = field.glass
     assert glass is not None and sees_walls_alone(field)
@@ -85,9 +90,9 @@ def test_glass_knows_the_face_behind_each_place(tmp_path: Path) -> None:
     assert thin.mean() > 0.3
     np.testing.assert_allclose(glass.exits[thin][:, 3], THICK, rtol=0.01)
     np.testing.assert_allclose(np.abs(glass.exits[thin][:, :3]), np.broadcast_to([0, 0, 1], (thin.sum(), 3)), atol=1e-3)
-    first = bake(pane_room(), tmp_path / "s", quality=SMALL)
+    first = baked(pane_room(), tmp_path / "s")
     assert {a.name: a.key for a in first.artefacts()} == {a.name: a.key for a in store.artefacts()}
-    gone = bake(replace(pane_room(), light_fields={"pane": LightFieldWish()}), tmp_path / "s", quality=SMALL)
+    gone = baked(replace(pane_room(), light_fields={"pane": LightFieldWish()}), tmp_path / "s")
     assert not [a.name for a in gone.artefacts() if a.name.endswith("exits")]
     assert read_light_field(gone, "pane").glass is None
 
@@ -95,5 +100,5 @@ def test_glass_knows_the_face_behind_each_place(tmp_path: Path) -> None:
 def test_what_transmits_nothing_cannot_refract(tmp_path: Path) -> None:
     scene = replace(coloured_room(), light_fields={"ball": LightFieldWish(refracts=True)})
     with pytest.raises(UserError, match=r"light_field of ball.*transmits nothing.*leave out `refracts`"):
-        bake(scene, tmp_path / "s", quality=SMALL)
+        baked(scene, tmp_path / "s")
     assert not Store.open(tmp_path / "s").artefacts("light_field")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import drjit as dr
 import numpy as np
 import pytest
 
@@ -41,7 +44,7 @@ def test_a_point_a_centimetre_from_a_ceiling_of_two_metres() -> None:
     assert integral(CEILING).sum() / np.pi == pytest.approx(overhead(200, 100), rel=1e-9)
 
 
-@pytest.mark.parametrize("below", [0.0, 0.5, 3.0, 1e3])
+@pytest.mark.parametrize("below", [0.0, 0.5, 1e3])
 def test_what_is_below_the_horizon_is_nothing(below: float) -> None:
     a, b, c, d = (0, 1, -below), (2, 1, -below), (2, 1, 1.5), (0, 1, 1.5)
     assert integral(np.array([[a, b, c], [a, c, d]], float)).sum() / np.pi == pytest.approx(beside(2, 1.5), rel=1e-9)
@@ -68,28 +71,14 @@ def test_triangles_anywhere_by_quadrature() -> None:
         assert found[k] == pytest.approx(4 * np.pi * (w[:, 2] * inside).mean(), abs=0.02)
 
 
-def test_the_place_that_is_looked_at_is_above_the_horizon() -> None:
-    import drjit as dr
-
-    from lambent.bake.engine import engine
-
-    engine()
-    import mitsuba as mi
-
+def test_the_place_that_is_looked_at_is_above_the_horizon(mi: Any) -> None:
     corners = [mi.Vector3f(*c) for c in ((0, 1, -3), (1, 1, -3), (0.5, 1, 0.2))]
     up, centre = mi.Vector3f(0, 0, 1), mi.Vector3f(0.5, 1, -5.8 / 3)
     assert np.allclose(np.array(highest_part(centre, corners, up, dr)).ravel(), (0.5, 1, 0.2))
     assert np.allclose(np.array(highest_part(centre, corners, -up, dr)).ravel(), np.array(centre).ravel())
 
 
-def test_the_path_tracers_numbers_are_numpys() -> None:
-    import drjit as dr
-
-    from lambent.bake.engine import engine
-
-    engine()
-    import mitsuba as mi
-
+def test_the_path_tracers_numbers_are_numpys(mi: Any) -> None:
     corners = np.random.default_rng(2).normal(size=(3, 3, 1000)).astype(np.float32)
     found = cosine_integral(*(tuple(mi.Float(x.copy()) for x in corner) for corner in corners), dr)
     expected = cosine_integral(*map(tuple, corners.astype(float)), NUMPY)
@@ -100,9 +89,10 @@ INSIDE = Camera("inside", (0.3, 0.2, 0.4), (-0.5, -0.3, -1.0), fov_y_deg=100.0) 
 POLISHED = Material(kd=0.9, kd_coupled=True, lobes=(Lobe(mx=0.01, my=0.01, r0=0.1, alpha=0.5),))
 
 
-@pytest.mark.parametrize("largest_m", [2.0, 0.6])
 @pytest.mark.parametrize(
-    ("material", "tolerance"), [(Material(kd=1.0), 1e-4), (POLISHED, 2e-3)], ids=["white", "glossy"]
+    ("material", "tolerance", "largest_m"),
+    [(Material(kd=1.0), 1e-4, 2.0), (POLISHED, 2e-3, 0.6)],
+    ids=["white", "glossy"],
 )
 def test_direct_light_of_walls_that_touch_is_white(material: Material, tolerance: float, largest_m: float) -> None:
     """At every point of the diffuse walls, in the mean of the glossy ones."""

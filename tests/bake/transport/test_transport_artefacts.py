@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lambent.bake.artefacts import transport, visibility
 from lambent.bake.artefacts.transport import Settings
 from lambent.bake.bake import bake
 from lambent.bake.quality import quality_named
 from lambent.bake.transport.view import View
+from lambent.bake.transport.view_tracer import ViewTracer
 from lambent.baked.shared_exponent import unpacked_rgb
 from lambent.baked.transport.wavelets import transformed
 from lambent.core.errors import UserError
@@ -86,8 +88,6 @@ def editables(scene: Scene) -> dict[str, Editable]:
 
 def test_pictures_from_the_store_are_the_sum_over_its_lights(store: Store, scene: Scene) -> None:
     """Half floats and pairs that are left out cost less than 1/1000 of a pixel."""
-    from lambent.bake.transport.view_tracer import ViewTracer
-
     lights = ViewTracer(scene).lights(200)
     assert 150 < len(lights) <= 200
     assert 60 < np.count_nonzero(lights.near) <= 100
@@ -129,8 +129,6 @@ def test_the_backdrop_is_what_shines_by_itself(store: Store, scene: Scene) -> No
 def test_an_interrupted_bake_goes_on_and_ends_with_the_same_arrays(
     store: Store, scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from lambent.bake.artefacts import transport, visibility
-
     for module, constant in ((transport, "POINTS"), (visibility, "POINTS")):
         monkeypatch.setattr(module, constant, 6)
     monkeypatch.setattr(transport, "ENTRIES", 1000)
@@ -161,16 +159,6 @@ def test_nothing_is_baked_twice_and_scales_and_curves_are_no_inputs(store: Store
     assert {a.name: (a.key, a.done) for a in again.artefacts()} == before
 
 
-def test_materials_may_be_edited_as_something_else(scene: Scene, tmp_path: Path) -> None:
-    plain = of_material(Material(kd=0.5))
-    other = bake_view(scene, tmp_path / "s", editables={"glossy": plain})
-    terms = other.artefact(name("transport", "60/terms")).meta["terms"]
-    assert [(t["material"], t["term"], t["curves"]) for t in terms] == [
-        ("grey", 0, [["diffuse", 16]]),
-        ("glossy", 0, [["diffuse", 16]]),
-    ]
-
-
 def test_textures_are_in_the_transport(tmp_path: Path) -> None:
     """A floor whose texture halves green, under even light: radiance kd texture."""
     texels = np.broadcast_to(np.array([1.0, 0.5, 1.0], np.float16), (2, 2, 3))
@@ -185,10 +173,13 @@ def test_textures_are_in_the_transport(tmp_path: Path) -> None:
 def test_a_material_that_the_view_does_not_show_has_empty_arrays(scene: Scene, tmp_path: Path) -> None:
     behind = SceneObject("behind", patch((-1, 0, 8), (1, 0, 0), (0, 1, 0)), "other")
     more = replace(scene, objects=(*scene.objects, behind), materials={**scene.materials, "other": GLOSSY})
-    store = bake_view(more, tmp_path / "s")
+    store = bake_view(more, tmp_path / "s", editables={"glossy": of_material(Material(kd=0.5))})
+    terms = store.artefact(name("transport", "60/terms")).meta["terms"]
+    assert [t["curves"] for t in terms if t["material"] == "glossy"] == [[["diffuse", 16]]], "edited as something else"
     assert store.read(name("transport", "60/other/0/rows")).shape == (16, 3, 0)
     assert store.read(name("transport", "60/other/1/spans")).shape == (0, 2)
-    assert np.isfinite(picture(store, 60, editables(more))).all()
+    shown = {**editables(more), "glossy": of_material(Material(kd=0.5))}
+    assert np.isfinite(picture(store, 60, shown)).all()
 
 
 def test_light_from_behind_shows_where_a_material_transmits(tmp_path: Path) -> None:
@@ -224,9 +215,3 @@ def test_small_bright_lamps_are_stored_as_exactly_as_large_ones(scene: Scene, tm
         found.append(picture(store, 200, {name: of_material(m) for name, m in lit.materials.items()}))
     assert found[0].max() > 0.05
     assert np.abs(found[1] - found[0]).max() < 2e-3 * found[0].max()
-
-
-def test_a_scene_without_light_has_transport_without_light(scene: Scene, tmp_path: Path) -> None:
-    dark = replace(scene, objects=scene.objects[:-1], environment=None)
-    store = bake_view(dark, tmp_path / "s")
-    assert not picture(store, 200, {name: of_material(m) for name, m in dark.materials.items()}).any()

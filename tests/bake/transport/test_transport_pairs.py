@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import drjit as dr
 import numpy as np
 import pytest
 
+from lambent.bake.tracing.scene_builder import SceneBuilder
+from lambent.bake.transport import bands
+from lambent.bake.transport.bands import Bands, Pairs, _merge, _threads, pair_transport
+from lambent.bake.transport.visibility import visibility
 from lambent.baked.shared_exponent import ONES, unpacked_rgb
 from lambent.core.geometry.directions import normalize
 from lambent.core.views.camera import Camera
@@ -31,11 +36,9 @@ def outdoors() -> View:
 
 
 def pairs_of(seen: View, material: Material, counts: tuple[int, int], least: float = 0.0, **more: Any) -> Any:
-    from lambent.bake.transport.bands import Bands, Pairs, pair_transport
-
     term = of_material(material).terms[-1]
-    bands = [Bands(factor, count) for factor, count in zip(term.factors, counts, strict=True)]
-    blocks = pair_transport(seen.points, seen.lights, seen.seen, term, bands, 1 / 256, least=least, **more)
+    both = [Bands(factor, count) for factor, count in zip(term.factors, counts, strict=True)]
+    blocks = pair_transport(seen.points, seen.lights, seen.seen, term, both, 1 / 256, least=least, **more)
     return Pairs(*map(np.concatenate, zip(*blocks, strict=True)))
 
 
@@ -47,12 +50,10 @@ def matrix(found: Any, counts: tuple[int, int]) -> np.ndarray:
     return whole.reshape(-1, *counts, 3)
 
 
-@pytest.mark.parametrize("own", [16, 64, 100])
+@pytest.mark.parametrize("own", [16, 100])
 def test_parts_of_the_bands_and_blocks_of_points_change_nothing(
     outdoors: View, monkeypatch: pytest.MonkeyPatch, own: int
 ) -> None:
-    from lambent.bake.transport import bands
-
     whole = pairs_of(outdoors, SATIN, (32, 16))
     monkeypatch.setattr(bands, "OWN_PAIRS", own)
     monkeypatch.setattr(bands, "PAIRS_AT_ONCE", 32 * 16 * 37)
@@ -86,10 +87,6 @@ def test_small_entries_move_along_the_second_curve_alone(outdoors: View) -> None
 
 def test_small_entries_join_the_large_one_before_them_or_the_first(mi: Any) -> None:
     """Two bands of five entries; a tenth of a band's light is large."""
-    import drjit as dr
-
-    from lambent.bake.transport.bands import _merge
-
     before = np.array([[0.5, 0.25, 6, 0.5, 4], [3, 0.5, 0.25, 9, 0.125]])
     after = [[0, 0, 7.25, 0, 4], [3.75, 0, 0, 9.125, 0]]
     row = dr.alloc_local(mi.Float, 30)
@@ -101,21 +98,13 @@ def test_small_entries_join_the_large_one_before_them_or_the_first(mi: Any) -> N
     assert np.allclose(found, np.multiply.outer(after, [1, 2, 3]))
 
 
-@pytest.mark.parametrize("points", [1, 15, 16, 17, 16_384, 40_001])
+@pytest.mark.parametrize("points", [1, 17, 16_384, 40_001])
 def test_every_point_has_one_thread(outdoors: View, points: int) -> None:
-    from lambent.bake.transport.bands import _threads
-
     pixel, active = (np.array(one) for one in _threads(points))
     assert sorted(pixel[active]) == list(range(points))
 
 
 def test_lights_behind_the_surface_are_traced_where_they_count(outdoors: View) -> None:
-    from lambent.bake.engine import engine
-
-    engine()
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.transport.visibility import visibility
-
     traced, p, lights = SceneBuilder(outdoors.scene).build(), outdoors.points, outdoors.lights
     m = np.arange(len(lights))
     front = lights.centres @ p.n.T.astype(float)
