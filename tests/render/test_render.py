@@ -18,7 +18,7 @@ from lambent.core.views.camera import CameraPath
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
-from lambent.render import Settings, film, images, still, write_frames
+from lambent.render import Settings, film, images, still
 from lambent.store.contract import scene_record, write_scene_record
 from lambent.store.store import Store
 from tests.viewer.small_store import FRONT, SIDE, write_small_store
@@ -43,13 +43,6 @@ def test_a_camera_by_name_by_itself_or_the_first(store: Path, tmp_path: Path) ->
     np.testing.assert_array_equal(found["first"], found["front"])
     np.testing.assert_array_equal(found["side"], found["itself"])
     assert not np.array_equal(found["front"], found["side"])
-
-
-def test_images_are_arrays(store: Path) -> None:
-    drawn = images(Store.open(store), replace(SMALL, view="linear"))
-    radiance, displayed = drawn.radiance(FRONT), drawn.displayed(FRONT)
-    assert radiance.shape == displayed.shape == (32, 48, 3)
-    assert (radiance.dtype, displayed.dtype) == (np.float32, np.uint8) and radiance.mean() > 0.05
 
 
 def test_a_film_along_any_path(store: Path, tmp_path: Path) -> None:
@@ -114,15 +107,6 @@ def test_the_path_tracer_sees_the_scene_that_was_baked(mi, tmp_path: Path) -> No
 def test_nonsense(store: Path, change: dict, word: str) -> None:
     with pytest.raises(UserError, match=word):
         images(Store.open(store), replace(SMALL, **change))
-
-
-def test_frames_are_written_as_they_are_drawn(tmp_path: Path) -> None:
-    def draw(camera):
-        return np.full((16, 16, 3), 100 if camera is FRONT else 200, np.uint8)
-
-    write_frames(tmp_path / "a.png", [FRONT, SIDE, FRONT], draw, (16, 16), 30)
-    means = [round(255 * float(read_encoded(tmp_path / f"a-000{k}.png").mean())) for k in (1, 2, 3)]
-    assert means == [100, 200, 100]
 
 
 def test_exposure_in_stops_is_the_scenes_unless_told(tmp_path: Path) -> None:

@@ -66,10 +66,3 @@ def test_a_store_without_groups_says_what_to_bake(adapter: None, tmp_path: Path)
     bare = write_small_store(tmp_path / "s")
     with pytest.raises(UserError, match=r"--light: the store has no light groups.*--light-groups scene"):
         still(bare, tmp_path / "a.exr", "front", DIMMED)
-
-
-def test_a_mix_of_a_group_that_is_gone_is_noted(adapter: None, tmp_path: Path) -> None:
-    bare, notes = write_small_store(tmp_path / "s"), list[str]()
-    change_views(bare, lambda views: views.model_copy(update={"lights": {"front": HALF}}))
-    still(bare, tmp_path / "a.exr", "front", SMALL, note=notes.append)
-    assert any("not applied: the store has no light group lamp, sky, sun" in note for note in notes)

@@ -61,18 +61,6 @@ def test_denoising_is_a_choice(store: Path) -> None:
     assert clean < 0.7 * noisy
 
 
-def test_pictures_of_few_samples_are_denoised_fast(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from lambent.traced.picture import TracedPicture
-
-    fast, denoised = [], TracedPicture.denoised
-    monkeypatch.setattr(
-        TracedPicture, "denoised", lambda one, **how: (fast.append((one.samples, how["fast"])), denoised(one, **how))[1]
-    )
-    for samples in (15, 16):
-        drawn(store, replace(TRACED, samples=samples))
-    assert fast == [(15, True), (16, False)]
-
-
 @pytest.mark.parametrize("integrator", ["traced", "path"])
 def test_mixes_colours_and_variants_show(store: Path, integrator: str) -> None:
     usual = replace(TRACED, integrator=integrator, samples=64)

@@ -15,7 +15,7 @@ from lambent.core.pictures.images import read_encoded, read_image, write_shown
 from lambent.core.views.camera import Camera, CameraPath
 from lambent.render import Settings, film, sheet, still
 from lambent.render.captions import caption_font
-from lambent.render.sheet import Exposures, laid_out, shape_of, with_the_baked_state
+from lambent.render.sheet import laid_out, shape_of, with_the_baked_state
 from lambent.scenes.looks.image_textures import mean_and_detail
 from lambent.scenes.looks.look_track import LookTrack
 from lambent.scenes.scene import ImageTexture, Look, MaterialTextures, Texture, Variant
@@ -32,6 +32,7 @@ WITHIN = Camera("in", (1.4, 1.2, -1.4), (-0.8, 0.5, 0.0), fov_y_deg=70)
 SMALL = Settings(48, 32, integrator="rings")
 RED = Look(MATERIALS["plaster"].model_copy(update={"kd": (0.6, 0.0, 0.0)}))
 DIM = LightMix({name: GroupMix(intensity=0.5) for name in ("lamp", "sky", "sun")})
+COLOUR = (0.5, 0.05, 0.05)
 VARIANTS = (Variant("red", {"plaster": RED}), Variant("dim", light=DIM))
 
 
@@ -100,32 +101,52 @@ def test_states_of_the_session_are_variants(adapter: None, store: Path, tmp_path
         image(store, replace(SMALL, variant="dim"), tmp_path)
 
 
-def test_light_answers_a_variant_as_it_answers_the_same_colour(adapter: None, mi: object, tmp_path: Path) -> None:
-    scene = room_with_step()
-    colour = (0.5, 0.05, 0.05)
-    red = Look(scene.materials["grey"].model_copy(update={"kd": colour}))
+@pytest.fixture(scope="module")
+def room(mi: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A baked room with a red variant, one of marble, and one whose image is gone after the bake."""
+    scene, folder = room_with_step(), tmp_path_factory.mktemp("room")
+    picture, grey = folder / "bricks.png", scene.materials["grey"]
+    write_shown(picture, np.array([[[255, 0, 0], [0, 0, 255]]] * 2, np.uint8))
+    looks = {"red": Look(grey.model_copy(update={"kd": COLOUR})), "marble": Look(grey, "unworn"),
+             "bricks": Look(grey, ImageTexture(str(picture)))}  # fmt: skip
+    variants = tuple(Variant(name, {"grey": look}) for name, look in looks.items())
     marble = MaterialTextures(diffuse=Texture(np.full((2, 2, 3), 0.5, np.float16)))
-    whole = replace(scene, variants=(Variant("red", {"grey": red}),), textures={"unworn": marble},
-                    materials={**scene.materials, "unworn": scene.materials["grey"]})  # fmt: skip
-    baked = bake(whole, tmp_path / "s", quality=TINY)
-    baked.close()
-    by_variant = image(tmp_path / "s", replace(SMALL, variant="red"), tmp_path)
-    recoloured = image(tmp_path / "s", replace(SMALL, recolour={"grey": colour}), tmp_path)
-    assert np.array_equal(by_variant, recoloured)
-    plain = image(tmp_path / "s", SMALL, tmp_path)
+    scene = replace(
+        scene, variants=variants, textures={"unworn": marble}, materials={**scene.materials, "unworn": grey}
+    )
+    bake(scene, folder / "s", quality=TINY, light_groups="scene").close()
+    picture.unlink()
+    return folder / "s"
+
+
+def test_light_answers_a_variant_as_it_answers_the_same_colour(adapter: None, room: Path, tmp_path: Path) -> None:
+    recolour = {"grey": COLOUR}
+    by_variant = image(room, replace(SMALL, variant="red"), tmp_path)
+    assert np.array_equal(by_variant, image(room, replace(SMALL, recolour=recolour), tmp_path))
+    half = image(room, replace(SMALL, recolour=recolour, light=parse_light(["lamp=0.5"])), tmp_path)
+    assert half == pytest.approx(by_variant / 2, rel=6e-3, abs=2e-3)
+    plain = image(room, SMALL, tmp_path)
     assert by_variant.mean(axis=(0, 1))[1] < 0.7 * plain.mean(axis=(0, 1))[1]
-    add_variants(tmp_path / "s", (Variant("marble", {"grey": Look(scene.materials["grey"], "unworn")}),))
-    textured = image(tmp_path / "s", replace(SMALL, variant="marble", show="diffuse"), tmp_path)
-    assert 0.3 < textured.mean() / image(tmp_path / "s", replace(SMALL, show="diffuse"), tmp_path).mean() < 0.9
+    diffuse, textured = (image(room, replace(SMALL, variant=v, show="diffuse"), tmp_path) for v in (None, "marble"))
+    assert 0.3 < textured.mean() / diffuse.mean() < 0.9
 
 
-def test_a_mix_and_other_colours_go_together(adapter: None, mi: object, tmp_path: Path) -> None:
-    bake(room_with_step(), tmp_path / "s", quality=TINY, light_groups="scene").close()
-    red = {"grey": (0.5, 0.05, 0.05)}
-    whole = image(tmp_path / "s", replace(SMALL, recolour=red), tmp_path)
-    half = image(tmp_path / "s", replace(SMALL, recolour=red, light=parse_light(["lamp=0.5"])), tmp_path)
-    assert half == pytest.approx(whole / 2, rel=6e-3, abs=2e-3)
-    assert whole.mean(axis=(0, 1))[1] < 0.7 * image(tmp_path / "s", SMALL, tmp_path).mean(axis=(0, 1))[1]
+def test_every_frame_of_changing_paint_is_a_still_of_that_paint(adapter: None, room: Path, tmp_path: Path) -> None:
+    colours = [(0.5, 0.5, 0.5), (0.5, 0.3, 0.3), (0.5, 0.1, 0.1)]
+    keys = "".join(f"[[keys]]\nat = {at}\nmaterials.grey.kd = {list(colours[2 * at])}\n" for at in (0, 1))
+    settings, paths = replace(SMALL, samples=4), [CameraPath("rest", (WITHIN, WITHIN), s) for s in (1.5, 0.5)]
+    shown = frames(room, tmp_path / "f", keys, settings, paths[0])
+    for number in (1, 2):
+        paint = f"[[keys]]\nat = 0\nmaterials.grey.kd = {list(colours[number])}\n"
+        expected, *_ = frames(room, tmp_path / str(number), paint, settings, paths[1])
+        assert shown[number] == pytest.approx(expected, rel=2e-3, abs=1e-4)
+    assert shown[2].mean(axis=(0, 1))[1] < 0.5 * shown[0].mean(axis=(0, 1))[1]
+
+
+def test_a_baked_variant_keeps_a_copy_of_its_image(room: Path) -> None:
+    (bricks,) = (one for one in variants_of(Store.open(room)) if one.name == "bricks")
+    kept = Path(bricks.looks["grey"].textures.file)
+    assert kept.is_file() and kept.parent == room / "images"
 
 
 def test_a_sheet_has_every_variant_and_its_name(adapter: None, store: Path, tmp_path: Path) -> None:
@@ -194,29 +215,6 @@ def test_films_are_linear_in_the_mix_between_keyframes(adapter: None, store: Pat
         frames(store, tmp_path / "twice", keys, replace(SMALL, light=parse_light(["sun=off"])), "tour")
 
 
-def test_every_frame_of_changing_paint_is_a_still_of_that_paint(adapter: None, mi: object, tmp_path: Path) -> None:
-    bake(room_with_step(), tmp_path / "s", quality=TINY).close()
-    keys = (
-        "[[keys]]\nat = 0\nmaterials.grey.kd = [0.5, 0.5, 0.5]\n[[keys]]\nat = 1\nmaterials.grey.kd = [0.5, 0.1, 0.1]\n"
-    )
-    still_there = CameraPath("rest", (WITHIN, WITHIN), 1.5)
-    shown = frames(tmp_path / "s", tmp_path / "f", keys, replace(SMALL, samples=4), still_there)
-    for picture, green in zip(shown, (0.5, 0.3, 0.1), strict=True):
-        track = LookTrack({"grey": ((0.0, Look(room_with_step().materials["grey"].model_copy(
-            update={"kd": (0.5, green, green)}))),)})  # fmt: skip
-        expected, *_ = frames_of_track(tmp_path / "s", tmp_path / f"{green}", track, still_there)
-        assert picture == pytest.approx(expected, rel=2e-3, abs=1e-4)
-    assert shown[2].mean(axis=(0, 1))[1] < 0.5 * shown[0].mean(axis=(0, 1))[1]
-
-
-def frames_of_track(store: Path, folder: Path, track: LookTrack, path: CameraPath) -> list[np.ndarray]:
-    """Frames with looks that stay."""
-    folder.mkdir()
-    short = CameraPath(path.name, path.keys, 0.5)
-    film(store, folder / "f-#.exr", short, replace(SMALL, samples=4, looks=track), fps=2)
-    return [read_image(file) for file in sorted(folder.glob("*.exr"))]
-
-
 def test_pictures_of_a_sheet_share_an_exposure_by_their_light(adapter: None, store: Path, tmp_path: Path) -> None:
     """Half the light is metered one stop above the light as baked, which has the exposure of its scene."""
     done = sheet(store, tmp_path / "a.png", "front", SMALL)
@@ -228,22 +226,6 @@ def test_pictures_of_a_sheet_share_an_exposure_by_their_light(adapter: None, sto
     assert each["dim"] == found["dim"] == pytest.approx(each["as baked"] - 1, abs=0.03)
     with pytest.raises(UserError, match="--exposure: unknown exposure of a sheet; found all"):
         sheet(store, tmp_path / "a.png", "front", SMALL, exposures="all")
-
-
-def test_the_exposure_of_the_scene_is_that_of_light_as_baked() -> None:
-    shared = Exposures("light", 2.0)
-    assert shared.wanted(LightMix()) == 2.0
-    shared.take(2.0)
-    assert shared.wanted(DIM) is None
-    shared.take(3.0)
-    assert (shared.wanted(LightMix()), shared.wanted(DIM)) == (2.0, 3.0)
-    assert Exposures("one", 2.0).wanted(DIM) == 2.0 and Exposures("each", 2.0).wanted(LightMix()) is None
-    one = Exposures("one", None)
-    assert one.wanted(LightMix()) is None
-    one.take(1.5)
-    assert one.wanted(DIM) == 1.5 and not one.differ and one.notes == [""]
-    shared.take(2.0)
-    assert shared.differ and len(set(shared.notes)) == 2
 
 
 def test_a_stored_state_brings_its_light_to_a_saved_view(adapter: None, store: Path, tmp_path: Path) -> None:
@@ -260,20 +242,6 @@ def test_a_stored_state_brings_its_light_to_a_saved_view(adapter: None, store: P
         return float(found)
 
     assert mean("red") == pytest.approx(mean("plain") / 2, rel=6e-3)
-
-
-def test_a_baked_variant_keeps_a_copy_of_its_image(adapter: None, store: Path, tmp_path: Path) -> None:
-    picture = tmp_path / "bricks.png"
-    write_shown(picture, np.array([[[255, 0, 0], [0, 0, 255]]] * 2, np.uint8))
-    scene = room_with_step()
-    name = scene.objects[0].material
-    look = Look(scene.materials[name], ImageTexture(str(picture)))
-    baked = bake(replace(scene, variants=(Variant("bricks", {name: look}),)), tmp_path / "b", quality=TINY,
-                 only=["geometry"])  # fmt: skip
-    content = picture.read_bytes()
-    picture.unlink()
-    (kept,) = (one.looks[name].textures for one in variants_of(baked))
-    assert Path(kept.file).read_bytes() == content and Path(kept.file).parent == baked.folder / "images"
 
 
 def test_a_variant_shows_the_image_of_the_store(adapter: None, store: Path, tmp_path: Path) -> None:

@@ -147,13 +147,6 @@ def test_a_forked_child_does_not_inherit_the_right(tmp_path: Path, monkeypatch: 
     assert not lock.held
 
 
-def test_what_an_early_death_leaves_is_no_obstacle(tmp_path: Path) -> None:
-    (tmp_path / FILE).write_text("12345\n")
-    (tmp_path / ".manifest.x1.json").write_text("{")
-    Store.create(tmp_path, {}).put("a", "a", ONE, key="k")
-    assert Store.open(tmp_path).read("a").tolist() == [1, 1, 1]
-
-
 def test_a_damaged_store_is_not_held(tmp_path: Path) -> None:
     Store.create(tmp_path, {}).close()
     (tmp_path / "manifest.json").write_text("{")

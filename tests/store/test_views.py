@@ -8,7 +8,6 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.views.camera import Camera, CameraPath
-from lambent.scenes.camera_paths import camera_at
 from lambent.store.contract import SceneRecord
 from lambent.store.kept.views import FILE, Views, change_views, checked_name, free_name, read_views, with_views
 
@@ -79,18 +78,6 @@ def test_the_scene_hides_saved_names():
     )  # fmt: skip
     whole = with_views(scene, Views(cameras=(replace(A, fov_y_deg=9), B), paths=(WALK,)))
     assert whole.cameras == (A, B) and whole.paths == scene.paths
-
-
-def test_a_recorded_path_keeps_its_times():
-    """It stands still for two of its three seconds; then it walks, through its keys."""
-    for time_s, x in ((-1, 0), (0, 0), (2, 0), (3, 2), (9, 2)):
-        assert camera_at(WALK, time_s).position == pytest.approx((x, 1, 0)), time_s
-    assert camera_at(WALK, 1.0).position[0] == pytest.approx(0, abs=0.2)
-    assert 0.3 < camera_at(WALK, 2.5).position[0] < 1.5
-    assert camera_at(WALK, 2.5).name == "w" and 45 < camera_at(WALK, 2.5).fov_y_deg < 60
-    straight = tuple(replace(A, position=(float(k), 0.0, 0.0)) for k in range(4))
-    even = CameraPath(name="e", keys=straight, seconds=3.0, times_s=(0.0, 1.0, 2.0, 3.0))
-    assert [camera_at(even, t).position[0] for t in (1.25, 1.5, 1.75)] == pytest.approx([1.25, 1.5, 1.75])
 
 
 def test_two_changes_at_once_wait_for_each_other(tmp_path):

@@ -10,7 +10,7 @@ import pytest
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.export import mitsuba
 from lambent.materials.export.resampling.pairs import pairs_of
-from tests.materials.export.export_materials import ALL, BRUSHED, FOIL
+from tests.materials.export.export_materials import ALL, BRUSHED, FOIL, GOLD, PAPER
 from tests.tools.in_mitsuba import f_cos
 
 
@@ -19,12 +19,13 @@ def evaluated(bsdf, samples):
     return f_cos(bsdf, samples.wi, samples.wo) / samples.wi[:, 2:]
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", [one.name for one in (BRUSHED, GOLD, FOIL, PAPER)])
 def test_mitsuba_evaluates_what_is_claimed(mi, name, tmp_path):
     material = ALL[name]
     path = tmp_path / "scene.xml"
     cost = mitsuba.write(material, path)
-    (ball,) = [shape for shape in mi.load_file(str(path)).shapes() if not shape.is_emitter()]
+    scene = mi.load_file(str(path))
+    (ball,) = [shape for shape in scene.shapes() if not shape.is_emitter()]
     pairs = pairs_of(material, 11, seed=5)
     value = evaluated(ball.bsdf(), pairs.samples)
     found, _ = mitsuba.likeness(material)
@@ -32,20 +33,11 @@ def test_mitsuba_evaluates_what_is_claimed(mi, name, tmp_path):
     np.testing.assert_allclose(value, claimed, rtol=2e-3, atol=1e-5)
     if not material.transmits:
         assert cost.share["cuberoot"] < 0.08
-
-
-def test_the_comment_holds_the_exact_material(mi, tmp_path):
-    path = tmp_path / "scene.xml"
-    mitsuba.write(FOIL, path)
-    exact = re.search(r'<bsdf type="lambent_material".*?</bsdf>', path.read_text(), re.DOTALL)
-    bsdf = mi.load_string(exact[0].replace("<bsdf ", '<bsdf version="3.0.0" ', 1))
-    samples = pairs_of(FOIL, 10, seed=5).samples
-    np.testing.assert_allclose(evaluated(bsdf, samples), MaterialBSDF(FOIL).eval(samples.wi, samples.wo), rtol=1e-3)
-
-
-def test_the_scene_renders(mi, tmp_path):
-    path = tmp_path / "scene.xml"
-    mitsuba.write(BRUSHED, path)
-    image = np.array(mi.render(mi.load_file(str(path)), spp=2))
-    assert image.shape == (512, 512, 3) and np.isfinite(image).all()
-    assert image[200:300, 200:300].mean() > 0.1
+    if material is FOIL:
+        exact = re.search(r'<bsdf type="lambent_material".*?</bsdf>', path.read_text(), re.DOTALL)
+        bsdf = mi.load_string(exact[0].replace("<bsdf ", '<bsdf version="3.0.0" ', 1))
+        expected = MaterialBSDF(FOIL).eval(pairs.samples.wi, pairs.samples.wo)
+        np.testing.assert_allclose(evaluated(bsdf, pairs.samples), expected, rtol=1e-3)
+    if material is BRUSHED:
+        image = np.array(mi.render(scene, spp=1))
+        assert image.shape == (512, 512, 3) and np.isfinite(image).all() and image[200:300, 200:300].mean() > 0.1

@@ -16,7 +16,7 @@ from lambent.materials.measured.tables.half_vector_grid import GridShape
 from lambent.scenes.scene import ImageEnvironment
 
 SMALL = {"size_px": 48, "spp": 16}
-CLEAN = {"noise": 0.0, "floor": 0.0, "sector_deg": 0.0, "step_deg": 6.0, "fine_deg": 3.0}
+CLEAN = {"noise": 0.0, "floor": 0.0, "sector_deg": 0.0, "step_deg": 7.5, "fine_deg": 3.75}
 BRUSHED = Material(name="brushed", kd=0.02, lobes=(Lobe(k=0.9, mx=0.07, my=0.3, r0=0.8, alpha=0.4),))
 
 

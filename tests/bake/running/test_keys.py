@@ -73,6 +73,7 @@ def of_terms(*terms: str) -> tuple[str, ...]:
     return tuple(SEEN.name("transport", f"{n}/{part}") for n in (400,) for part in ("terms", *terms))
 
 
+Keys = Callable[..., dict[str, str]]
 Answers = dict[str, tuple[Any, tuple[str, ...]]]  # by field: a value that it has not yet, and prefixes of stale arrays
 VIEW = Camera("view", (0.0, 1.0, 3.0), (0.0, 1.0, 0.0))
 
@@ -153,7 +154,6 @@ WISH: Answers = {
     "texels": (12, FIELDS),
     "offset_m": (0.02, FIELDS),
     "error": (0.1, FIELDS),
-    "levels": (1, FIELDS),
     "volume": (True, FIELDS),
     "refracts": (True, FIELDS),
 }
@@ -254,7 +254,6 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
         "texels": (12, FIELDS),
         "strata": (3, FIELDS),
         "onward": (3, FIELDS),
-        "levels": (1, FIELDS),
     },
     "answer": {
         "patches": (8, ANSWER),
@@ -282,11 +281,16 @@ def with_sheet(scene: Scene, sheet: Material) -> Scene:
     return replace(scene, materials={**scene.materials, "sheet": sheet})
 
 
-@pytest.fixture
-def scene(tmp_path: Path) -> Scene:
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("keys")
+
+
+@pytest.fixture(scope="module")
+def scene(folder: Path) -> Scene:
     """Something of everything that a bake can depend on."""
     for name, radiance in {"noon": 1.0, "dusk": 0.25}.items():
-        write_image(tmp_path / f"{name}.exr", np.full((4, 8, 3), radiance, np.float32))
+        write_image(folder / f"{name}.exr", np.full((4, 8, 3), radiance, np.float32))
     textures = {part: Texture(np.full((2, 2, n), 0.75, np.float16)) for part, n in CHANNELS.items()}
     objects = (
         SceneObject("floor", patch((-2, 0, 2), (4, 0, 0), (0, 0, -4)), "grey"),
@@ -300,7 +304,7 @@ def scene(tmp_path: Path) -> Scene:
         "small",
         objects,
         {"grey": GREY, "mirror": MIRROR, "sheet": Material(kd=0.2, kt_d=0.1, lobes=(rough,)), "worn": GREY},
-        environment=ImageEnvironment(tmp_path / "noon.exr"),
+        environment=ImageEnvironment(folder / "noon.exr"),
         lights=(
             PointLight((0.0, 2.0, 0.0), (5.0, 5.0, 5.0), (0.0, -1.0, 0.0), 10.0, 30.0),
             DirectionalLight((0.0, -1.0, 0.0), (1.0, 1.0, 1.0)),
@@ -309,14 +313,14 @@ def scene(tmp_path: Path) -> Scene:
         probe_planes={"ball": np.array([[0.0, 1.0, 0.0, 0.0]])},
         probe_centres={"ball": (0.0, 1.0, 0.0)},
         light_fields={"ball": LightFieldWish(points=8)},
-        measured={"grey": tmp_path / "noon.exr"},
+        measured={"grey": folder / "noon.exr"},
     )
 
 
-@pytest.fixture
-def keys(tmp_path: Path) -> Callable[..., dict[str, str]]:
+@pytest.fixture(scope="module")
+def keys(folder: Path) -> Keys:
     """The key of every array of a bake, by name."""
-    store = Store.create(tmp_path / "store", {})
+    store = Store.create(folder / "store", {})
 
     def found_keys(
         scene: Scene,
@@ -334,6 +338,11 @@ def keys(tmp_path: Path) -> Callable[..., dict[str, str]]:
     return found_keys
 
 
+@pytest.fixture(scope="module")
+def before(scene: Scene, keys: Keys) -> dict[str, str]:
+    return keys(scene)
+
+
 def stale(before: dict[str, str], after: dict[str, str]) -> set[str]:
     return {name for name in before.keys() | after.keys() if before.get(name) != after.get(name)}
 
@@ -342,24 +351,22 @@ def starting(names: dict[str, str], prefixes: tuple[str, ...]) -> set[str]:
     return {name for name in names if name.startswith(prefixes)}
 
 
-def test_the_scene_has_every_array(scene: Scene, keys: Callable[..., dict[str, str]]) -> None:
-    names = set(keys(scene))
-    assert {
-        f"probe/{ball}/{part}" for ball in ("ball", "other ball") for part in ("radiance", "distance", "planes")
-    } < (names)
+def test_the_scene_has_every_array(scene: Scene, keys: Keys, before: dict[str, str]) -> None:
+    names, balls, parts = set(before), ("ball", "other ball"), ("radiance", "distance", "planes")
+    assert {f"probe/{ball}/{part}" for ball in balls for part in parts} < names
     assert {"light_map/irradiance", "light_map/irradiance_back", "light_map/noise_back", "light_map/lean"} < names
     assert {"geometry/tangents", "environment/radiance"} < names
-    assert keys(scene) == keys(replace(scene)), "the same inputs, the same keys"
+    assert before == keys(replace(scene)), "the same inputs, the same keys"
 
 
 ANSWERS = [(kind, field) for kind, answers, _, _ in CASES for field in answers if answers[field][1] is not None]
 
 
 @pytest.mark.parametrize(("kind", "field"), ANSWERS, ids=[f"{kind.__name__}.{field}" for kind, field in ANSWERS])
-def test_a_change_of_the_scene(scene: Scene, keys: Callable[..., dict[str, str]], kind: type, field: str) -> None:
+def test_a_change_of_the_scene(scene: Scene, keys: Keys, before: dict[str, str], kind: type, field: str) -> None:
     _, answers, inner, outer = next(case for case in CASES if case[0] is kind)
     value, prefixes = answers[field]
-    before, after = keys(scene), keys(outer(scene, changed(inner(scene), field, value)))
+    after = keys(outer(scene, changed(inner(scene), field, value)))
     assert stale(before, after) == starting(before | after, prefixes)
 
 
@@ -370,15 +377,13 @@ def of_daylight() -> Iterator[tuple[Any, str, Any]]:
 
 
 @pytest.mark.parametrize(("environment", "field", "value"), list(of_daylight()))
-def test_a_change_of_the_environment(
-    scene: Scene, keys: Callable[..., dict[str, str]], environment: Any, field: str, value: Any
-) -> None:
+def test_a_change_of_the_environment(scene: Scene, keys: Keys, environment: Any, field: str, value: Any) -> None:
     before = keys(replace(scene, environment=environment))
     after = keys(replace(scene, environment=changed(environment, field, value)))
     assert stale(before, after) == starting(before, SKY)
 
 
-def test_kinds_of_environments_differ(scene: Scene, keys: Callable[..., dict[str, str]]) -> None:
+def test_kinds_of_environments_differ(scene: Scene, keys: Keys) -> None:
     computed = (ComputedEnvironment("gallery"), ComputedEnvironment("nave"))
     environments = (None, scene.environment, SunSky((0.0, 1.0, 0.0)), ConstantEnvironment((1.0, 1.0, 1.0)), *computed)
     some = [keys(replace(scene, environment=environment)) for environment in environments]
@@ -386,25 +391,24 @@ def test_kinds_of_environments_differ(scene: Scene, keys: Callable[..., dict[str
         assert all(stale(one, other) == starting(one, SKY) for other in some[:i])
 
 
-def test_files_count_by_their_content(scene: Scene, keys: Callable[..., dict[str, str]], tmp_path: Path) -> None:
-    before, moved = keys(scene), tmp_path / "moved.exr"
-    moved.write_bytes((tmp_path / "noon.exr").read_bytes())
+def test_files_count_by_their_content(scene: Scene, keys: Keys, before: dict[str, str], folder: Path) -> None:
+    moved = folder / "moved.exr"
+    moved.write_bytes((folder / "noon.exr").read_bytes())
     elsewhere = replace(scene, environment=ImageEnvironment(moved), measured={"grey": moved})
     assert not stale(before, keys(elsewhere))
-    moved.write_bytes((tmp_path / "dusk.exr").read_bytes())
+    moved.write_bytes((folder / "dusk.exr").read_bytes())
     assert stale(before, keys(replace(scene, environment=ImageEnvironment(moved)))) == starting(before, SKY)
     assert stale(before, keys(replace(scene, measured={"grey": moved}))) == starting(before, LIT)
 
 
 @pytest.mark.parametrize(("kind", "field"), [(kind, field) for kind, of in SETTINGS.items() for field in of])
-def test_a_setting(scene: Scene, keys: Callable[..., dict[str, str]], kind: str, field: str) -> None:
+def test_a_setting(scene: Scene, keys: Keys, before: dict[str, str], kind: str, field: str) -> None:
     value, prefixes = SETTINGS[kind][field]
-    before, after = keys(scene), keys(scene, TINY.changed(**{kind: {field: value}}))
+    after = keys(scene, TINY.changed(**{kind: {field: value}}))
     assert stale(before, after) == starting(before | after, prefixes)
 
 
-def test_the_bake_itself(scene: Scene, keys: Callable[..., dict[str, str]]) -> None:
-    before = keys(scene)
+def test_the_bake_itself(scene: Scene, keys: Keys, before: dict[str, str]) -> None:
     assert not stale(before, keys(scene, TINY.changed("another name")))
     assert stale(before, keys(scene, seed=1)) == starting(before, (*LIT, BOUNCED))
     more = stale(before, keys(scene, bounces=Bounces(samples=4096)))
@@ -419,7 +423,7 @@ def test_the_bake_itself(scene: Scene, keys: Callable[..., dict[str, str]]) -> N
     assert stale(photons, more) == starting(photons, BAKED)
 
 
-def test_what_a_material_is_edited_as(scene: Scene, keys: Callable[..., dict[str, str]]) -> None:
+def test_what_a_material_is_edited_as(scene: Scene, keys: Keys) -> None:
     """The quotient and the angles are inputs of direct light; curves and scales are not, but of interreflections."""
     phong = {"sheet": editable(Phong())}
     before, mine = keys(scene, editables=phong), of_terms("sheet/0/")

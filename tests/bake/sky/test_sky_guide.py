@@ -133,7 +133,7 @@ def test_window_is_sampled_with_a_fraction_of_the_variance(lit_pit: tuple[SceneB
 def test_small_bright_sun_is_neither_lost_nor_an_explosion(tmp_path: Path) -> None:
     scene = pit(sunny(tmp_path))
     guided, plain = built(scene)[1], built(scene, guided=False)[1]
-    for at in ((0.0, 0.0, 0.0), (0.66, 0.0, 0.2), (-0.2, 0.0, 0.7), (1.0, 0.0, 1.0)):
+    for at in ((0.0, 0.0, 0.0), (0.66, 0.0, 0.2)):
         ours, theirs = irradiance(guided, at, 1 << 16), irradiance(plain, at, 1 << 16, seed=1)
         error = np.hypot(ours.std(), theirs.std()) / 256
         assert abs(ours.mean() - theirs.mean()) < 4 * error

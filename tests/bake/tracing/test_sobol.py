@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
 from scipy.stats import qmc
 
 
@@ -60,12 +59,3 @@ def test_dimensions_pixels_and_seeds_are_independent(mi: Any) -> None:
     assert np.abs(12 * covariance - np.eye(10)).max() < 0.03
     others = points(SobolSampler.of_pixels(2, range(512), 0, 64), 512)
     assert abs(np.corrcoef(pairs[0].ravel(), others.ravel())[0, 1]) < 0.02
-
-
-@pytest.mark.parametrize("function", [lambda x, y: x * y, lambda x, y: np.sin(9 * x) ** 2 + y**3])
-def test_integrals_converge_faster_than_at_random(mi: Any, function: Any) -> None:
-    from lambent.bake.tracing.sobol import SobolSampler
-
-    found = function(*np.moveaxis(points(SobolSampler.of_pixels(5, range(256), 0, 64), 256), -1, 0)).mean(axis=1)
-    rng = np.random.default_rng(0).random((256, 64, 2))
-    assert found.std() < 0.3 * function(rng[..., 0], rng[..., 1]).mean(axis=1).std()
