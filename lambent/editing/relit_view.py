@@ -74,8 +74,10 @@ class RelitView:
         UserError
             If it is daylight, which only a bake can compute, or its file cannot be read.
         """
-        self._around = None if environment is None else environment_picture(environment)
-        self._light = self._baked if self._around is None else TurningLight.of_picture(self._tree, self._around)
+        self._environment = None if environment is None else environment_picture(environment)
+        self._light = (
+            self._baked if self._environment is None else TurningLight.of_picture(self._tree, self._environment)
+        )
         self._laid = orientation(environment) if isinstance(environment, ImageEnvironment) else np.eye(3)
         self.turn(0.0)
 
@@ -87,13 +89,13 @@ class RelitView:
     def image(self) -> Image:
         """(H, W, 3) float32, linear radiance."""
         image = self._backdrop.copy()
-        around = np.ones(len(image), bool)
-        around[self._pixel] = False
-        w = self._rays[around] @ self._turn
-        if self._around is not None:
-            image[around] = seen_at(self._around, w)
+        is_background = np.ones(len(image), bool)
+        is_background[self._pixel] = False
+        w = self._rays[is_background] @ self._turn
+        if self._environment is not None:
+            image[is_background] = seen_at(self._environment, w)
         elif not self._is_upright:
-            image[around] = self._light.seen(w)
+            image[is_background] = self._light.seen(w)
         image[self._pixel] += self._picture.T + self._lamps
         return image.reshape(self._shape)
 

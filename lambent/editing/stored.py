@@ -106,14 +106,15 @@ def parts_of(store: Store, session: Session, materials: Mapping[str, Editable], 
         return view_artefact_name(view.camera, *view.size, kind, part)
 
     pixel, number, theta_o = (store.read(name("view_points", part)) for part in ("pixel", "object", "theta_o"))
-    worn = np.array([material for _, material in store.artefact(name("view_points", "object")).meta["objects"]])[number]
+    objects = store.artefact(name("view_points", "object")).meta["objects"]
+    owner = np.array([material for _, material in objects])[number]
     said = store.artefact(name("transport", f"{lights}/terms")).meta["terms"]
     if any(one.get("basis") != TRANSPORT_BASIS for one in said):
         what = "transport was baked by an earlier version of Lambent"
         raise NotBaked(what, file=store.folder, hint="bake the view for editing again")
     parts = {}
     for material, start in materials.items():
-        mine = worn == material
+        mine = owner == material
         if not mine.any():
             continue
         baked = {one["term"]: one for one in said if one["material"] == material}

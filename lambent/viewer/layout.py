@@ -11,7 +11,7 @@ from pathlib import Path
 import imgui_bundle
 from imgui_bundle import imgui, implot
 
-from lambent.viewer.mode import Beside, Drawing, Mode, Textures
+from lambent.viewer.mode import Drawing, Mode, SidePlots, Textures
 from lambent.viewer.panels import closing
 from lambent.viewer.panels.widgets import explain, shadowed
 from lambent.viewer.screen import Rect
@@ -78,7 +78,7 @@ def regions(mode: Mode, width: float, height: float) -> Regions:
     wide = min(COLUMN_PX, int(MOST_SHARE * width)) if mode.screen.panels_shown else 0
     left, down = max(1, round(width) - wide), max(1, round(height))
     column = Rect(round(width) - wide, 0, wide, down)
-    if mode.beside is None or not mode.screen.panels_shown:
+    if mode.side_plots is None or not mode.screen.panels_shown:
         return Regions(mode.drawing.within(Rect(0, 0, left, down)), column)
     across, below = round(mode.across * left), round(mode.down * down)
     right, under = across + BORDER_PX, below + BORDER_PX
@@ -91,10 +91,10 @@ def draw(mode: Mode, textures: Textures | None = None) -> bool:
     textures = textures or {}
     width, height = imgui.get_io().display_size
     imgui.get_style().font_scale_main = max(LEAST_FONT, min(1.0, MOST_SHARE * width / COLUMN_PX))
-    shared, beside = regions(mode, width, height), mode.beside
+    shared, side_plots = regions(mode, width, height), mode.side_plots
     dragged = _pictures(mode.drawing, shared.picture, textures)
-    if beside is not None and shared.plots is not None:
-        _beside(mode, beside, *shared.plots, textures)
+    if side_plots is not None and shared.plots is not None:
+        _draw_side_plots(mode, side_plots, *shared.plots, textures)
     if mode.screen.panels_shown:
         _window("panels", shared.column, FIXED)
         _column(mode)
@@ -143,7 +143,7 @@ def _scroll_to(top_y: float, bottom_y: float) -> None:
 
 def _pictures(drawing: Drawing, place: Rect, textures: Textures) -> bool:
     """Draw the picture, or A and B with a divider; return whether the mouse is at the divider."""
-    behind = imgui.get_background_draw_list()
+    draw_list = imgui.get_background_draw_list()
     begin, end = place.point(0, 0), place.point(1, 1)
     a, b = textures.get("picture A"), textures.get("picture B")
     if a is None:
@@ -153,20 +153,20 @@ def _pictures(drawing: Drawing, place: Rect, textures: Textures) -> bool:
     at, _ = place.point(share, 0)
     tint, before = imgui.get_color_u32((1, 1, 1, drawing.share)), textures.get("before A")
     if before is not None:
-        behind.add_image(before, begin, (at, end[1]), (0, 0), (share, 1))
-    behind.add_image(a, begin, (at, end[1]), (0, 0), (share, 1), tint if before is not None else 0xFFFFFFFF)
+        draw_list.add_image(before, begin, (at, end[1]), (0, 0), (share, 1))
+    draw_list.add_image(a, begin, (at, end[1]), (0, 0), (share, 1), tint if before is not None else 0xFFFFFFFF)
     if b is None or divider is None:
         return False
-    behind.add_image(b, (at, begin[1]), end, (share, 0), (1, 1))
+    draw_list.add_image(b, (at, begin[1]), end, (share, 0), (1, 1))
     held, at = _border("divider", (at, place.y), place.height, upright=True)
     divider.move((at - place.x) / place.width)
     for text, x in ((divider.a_label, at - 12 - imgui.calc_text_size(divider.a_label).x), (divider.b_label, at + 12)):
-        shadowed(behind, (x, place.y + 8), text, (1, 1, 1, 0.95))
+        shadowed(draw_list, (x, place.y + 8), text, (1, 1, 1, 0.95))
     return held
 
 
-def _beside(mode: Mode, beside: Beside, right: Rect, below: Rect, textures: Textures) -> None:
-    for name, place, draw_plot in (("right", right, beside.right), ("below", below, beside.below)):
+def _draw_side_plots(mode: Mode, plots: SidePlots, right: Rect, below: Rect, textures: Textures) -> None:
+    for name, place, draw_plot in (("right", right, plots.right), ("below", below, plots.below)):
         _window(name, place, FIXED | imgui.WindowFlags_.no_scroll_with_mouse | imgui.WindowFlags_.no_scrollbar)
         draw_plot(textures)
         imgui.end()

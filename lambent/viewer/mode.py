@@ -46,7 +46,7 @@ class Panel:
 
 
 @dataclass(frozen=True)
-class Beside:
+class SidePlots:
     """Plots right of the picture and below it; `images` are textures they need in addition to the drawing's."""
 
     right: Callable[[Textures], None]
@@ -109,7 +109,7 @@ class Mode:
         self.across, self.down = 0.5, 0.6  # where the plots begin, as shares of the window left of the column
 
     @property
-    def beside(self) -> Beside | None:
+    def side_plots(self) -> SidePlots | None:
         return None
 
     def draw_over(self, textures: Textures) -> None:

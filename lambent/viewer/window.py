@@ -135,11 +135,11 @@ class Window:
 
     def _register(self) -> None:
         """Register new textures of the layout with Dear ImGui."""
-        drawing, beside = self.mode.drawing, self.mode.beside
+        drawing, side_plots = self.mode.drawing, self.mode.side_plots
         wanted: dict[str, Any] = {f"picture {'AB'[i]}": view for i, view in enumerate(drawing.views)}
         wanted |= drawing.images
-        if beside is not None:
-            wanted |= beside.images
+        if side_plots is not None:
+            wanted |= side_plots.images
         known = {id(source): self._textures[name] for name, source in self._made_of.items()}
         shown = {id(source) for source in wanted.values()}
         # By their source: Dear ImGui forgets a view after the frame, also one that got another name in it.

@@ -90,11 +90,12 @@ def interreflections(
         )  # fmt: skip
     tails = Tails.of(known_tails.meta["tails"])
     pixel, number, theta_o = (store.read(name("view_points", part)) for part in ("pixel", "object", "theta_o"))
-    worn = np.array([material for _, material in store.artefact(name("view_points", "object")).meta["objects"]])[number]
+    objects = store.artefact(name("view_points", "object")).meta["objects"]
+    owner = np.array([material for _, material in objects])[number]
     edited = {material for material, _ in tails.slots}
     parts, samples = {}, []
     for material, start in materials.items():
-        mine = worn == material
+        mine = owner == material
         if not mine.any():
             continue
         is_edited = material in edited

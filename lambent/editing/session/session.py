@@ -232,8 +232,8 @@ class Session:
         """Multiply a term by a colour, replacing its previous tint; (1, 1, 1) is the original."""
         one = self._material(material)
         known("term", term, [t.name for t in self.original(material).terms])
-        given = _checked(EditedMaterial, source=one.source, tints={term: colour})
-        self._change(material, one.model_copy(update={"tints": {**one.tints, **given.tints}}))
+        checked = _checked(EditedMaterial, source=one.source, tints={term: colour})
+        self._change(material, one.model_copy(update={"tints": {**one.tints, **checked.tints}}))
 
     def reset(self, material: str, curve: str | None = None) -> None:
         """Drop the edits of a curve, or of all curves and terms of a material."""

@@ -81,8 +81,8 @@ def nearer(camera: Camera, pivot: Triple, share: float) -> Camera:
 def look(camera: Camera, dx_px: float, dy_px: float) -> Camera:
     """Turn on the spot, in the direction of the drag."""
     yaw, pitch = yaw_pitch(camera)
-    sight = direction(yaw + TURN_RAD_PX * dx_px, pitch - TURN_RAD_PX * dy_px)
-    return _placed(camera, camera.position, np.array(camera.position) + sight * _distance(camera))
+    forward = direction(yaw + TURN_RAD_PX * dx_px, pitch - TURN_RAD_PX * dy_px)
+    return _placed(camera, camera.position, np.array(camera.position) + forward * _distance(camera))
 
 
 @dataclass

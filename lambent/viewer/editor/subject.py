@@ -25,7 +25,7 @@ class Subject:
 
     def __post_init__(self) -> None:
         self.loaded = self.material
-        self._restrictions = Restrictions(keep=partial(self.edits.keep_beside, self.name))
+        self._restrictions = Restrictions(keep=partial(self.edits.keep_note, self.name))
         self._origins = [self.loaded]  # materials as loaded or fitted, with their provenance
 
     @property
@@ -35,7 +35,7 @@ class Subject:
     @property
     def restrictions(self) -> Restrictions:
         """Restrictions of the material's parameters in a fit; every change is a step of undo."""
-        kept = cast(Kept | None, self.edits.beside(self.name))
+        kept = cast(Kept | None, self.edits.note_of(self.name))
         self._restrictions.restore(kept or (frozenset(), ()))
         return self._restrictions
 

@@ -23,7 +23,7 @@ class _State:
     room: RoomState = field(default_factory=RoomState)
     other: RoomState | None = None
     stored: Mapping[str, RoomState] = field(default_factory=dict)
-    beside: Mapping[str, Hashable] = field(default_factory=dict)
+    notes: Mapping[str, Hashable] = field(default_factory=dict)
     tracks: Mapping[str, MixTrack | None] = field(default_factory=dict)  # light along paths that was changed, by path
 
 
@@ -92,8 +92,8 @@ class MaterialEdits:
         """Set the state of the whole room as one stroke; ignore materials that the scene does not have."""
         self._step(room=self._room(room))
 
-    def wear(self, name: str, of: str | ImageTexture | None, kd: Triple | None) -> None:
-        """Show a texture on a material, None for its own, and set its diffuse colour if given, as one stroke."""
+    def set_texture(self, name: str, of: str | ImageTexture | None, kd: Triple | None) -> None:
+        """Show a texture on a material, None for its own, and set its diffuse colour unless None, as one stroke."""
         material = self.current(name) if kd is None else self.current(name).model_copy(update={"kd": kd})
         self.end_stroke()
         self.show_texture(name, of)
@@ -102,7 +102,7 @@ class MaterialEdits:
 
     def show_texture(self, name: str, of: str | ImageTexture | None) -> None:
         """Show a texture on a material, None for its own, within the present stroke, or begin a stroke."""
-        others = {other: worn for other, worn in self.room.textures.items() if other != name}
+        others = {other: used for other, used in self.room.textures.items() if other != name}
         textures = others if of is None else {**others, name: of}
         self._go_on(room=self._room(self.room.model_copy(update={"textures": textures})))
 
@@ -112,7 +112,7 @@ class MaterialEdits:
         update = {"materials": {**self.edited, **materials}, "textures": textures}
         self._step(room=self._room(self.room.model_copy(update=update)))
 
-    def put_beside(self, other: RoomState | None) -> None:
+    def compare_with(self, other: RoomState | None) -> None:
         """Compare the room with this state from now on, as one stroke."""
         self._step(other=other)
 
@@ -145,13 +145,13 @@ class MaterialEdits:
         self._first_tracks.setdefault(path, before)
         self._step(tracks={**self._history.now.tracks, path: track})
 
-    def beside(self, name: str) -> Hashable:
+    def note_of(self, name: str) -> Hashable:
         """Data kept with a material; None without."""
-        return self._history.now.beside.get(name)
+        return self._history.now.notes.get(name)
 
-    def keep_beside(self, name: str, value: Hashable) -> None:
+    def keep_note(self, name: str, value: Hashable) -> None:
         """Keep data with a material, such as restrictions of a fit; undo restores the data of before."""
-        self._go_on(beside={**self._history.now.beside, name: value})
+        self._go_on(notes={**self._history.now.notes, name: value})
 
     def _step(self, **changes: Any) -> None:
         self.end_stroke()
@@ -173,7 +173,7 @@ class MaterialEdits:
     def go_to(self, session: WalkSession) -> None:
         """Take a whole session, as one stroke."""
         self.end_stroke()
-        self._history.change(replace(self._state_of(session), beside=self._history.now.beside, tracks=self.tracks))
+        self._history.change(replace(self._state_of(session), notes=self._history.now.notes, tracks=self.tracks))
 
     def _state_of(self, session: WalkSession) -> _State:
         return _State(self._room(session.now), session.beside, session.states)

@@ -67,18 +67,18 @@ def scale_bar(picture: Rect, marks: Sequence[tuple[float, str]], stops: np.ndarr
     y0, y1 = picture.y + MARGIN_PX + 2 * line, picture.y + picture.height - MARGIN_PX - line
     if y1 - y0 < 3 * line or x0 < picture.x:
         return
-    behind = imgui.get_background_draw_list()
-    behind.add_rect_filled((x0 - MARGIN_PX, picture.y), picture.point(1, 1), imgui.get_color_u32(SHADE))
+    draw_list = imgui.get_background_draw_list()
+    draw_list.add_rect_filled((x0 - MARGIN_PX, picture.y), picture.point(1, 1), imgui.get_color_u32(SHADE))
     white = imgui.get_color_u32((1, 1, 1, 1))
-    behind.add_text((x0, picture.y + MARGIN_PX), white, unit)
+    draw_list.add_text((x0, picture.y + MARGIN_PX), white, unit)
     height = (y1 - y0) / STEPS
     for step, colour in enumerate(ramp(1 - (np.arange(STEPS) + 0.5) / STEPS, stops)):
         begin, end = (x0, y0 + step * height), (x0 + BAR_PX, y0 + (step + 1) * height + 1)
-        behind.add_rect_filled(begin, end, imgui.get_color_u32((*triple(colour), 1)))
+        draw_list.add_rect_filled(begin, end, imgui.get_color_u32((*triple(colour), 1)))
     last = float("inf")
     for share, text in marks:
         y = y1 - share * (y1 - y0)
         if last - y >= line:  # skip a number that would touch the one below
-            behind.add_line((x0 + BAR_PX - 4, y), (x0 + BAR_PX, y), white)
-            behind.add_text((x0 + BAR_PX + 6, y - line / 2), white, text)
+            draw_list.add_line((x0 + BAR_PX - 4, y), (x0 + BAR_PX, y), white)
+            draw_list.add_text((x0 + BAR_PX + 6, y - line / 2), white, text)
             last = y

@@ -12,7 +12,7 @@ from lambent.core.arrays import Floats
 from lambent.viewer.editor.editor import Editor
 from lambent.viewer.editor.matrix import Matrix, matrix
 from lambent.viewer.editor.shown import CHANNELS, SCALES, Curves, Plots
-from lambent.viewer.mode import Beside, Textures
+from lambent.viewer.mode import SidePlots, Textures
 from lambent.viewer.panels.widgets import Colour, choice, coloured, explain
 
 BRIGHTER_PX, BRIGHTER_STOPS = 120.0, (0.0, 20.0)
@@ -30,11 +30,11 @@ _PLOT = implot.Flags_.no_menus | implot.Flags_.no_box_select | implot.Flags_.no_
 X, Y = implot.ImAxis_.x1, implot.ImAxis_.y1
 
 
-def beside(editor: Editor | None) -> Beside | None:
+def side_plots(editor: Editor | None) -> SidePlots | None:
     """The plots of an open editor."""
     if editor is None or not editor.plots.visible:
         return None
-    return Beside(partial(_disks, editor), partial(_curves, editor), editor.shown.images)
+    return SidePlots(partial(_disks, editor), partial(_curves, editor), editor.shown.images)
 
 
 def _title(editor: Editor, kind: str) -> str:

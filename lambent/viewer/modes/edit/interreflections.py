@@ -68,7 +68,7 @@ class Bounced:
         self._is_own = False  # whether the user chose what is fixed
         self._reading: Work | None = None
         self._folder: Path | None = None
-        self._given: object = None  # view and light of the samples
+        self._source: object = None  # view and light of the samples
         self._light: tuple[int, Pixels] | None = None  # samples and light of the last pass
 
     @property
@@ -109,8 +109,8 @@ class Bounced:
         source = session.document.environment, folder
         if not idle or self._reading is not None or self.baking is not None:
             return
-        if source != self._given:
-            self._given, self._folder = source, folder
+        if source != self._source:
+            self._source, self._folder = source, folder
             self.begin_anew()
             if (folder / MANIFEST).exists():
                 self._read(session)

@@ -95,7 +95,7 @@ class Painter:
         self._light: Interreflections | None = None
         self._picture = self._anew(np.zeros((*size, 3), np.float32))
         self._parts: dict[str, list[Part]] = {}  # the present one first, then earlier ones
-        self._given: dict[str, Editable] = {}  # materials last passed to the picture
+        self._in_picture: dict[str, Editable] = {}  # materials last passed to the picture
         self._fade: Image | None = None
         self._fade_from_s = 0.0
         self._compared: tuple[Materials, Image] | None = None
@@ -145,7 +145,7 @@ class Painter:
         """Restart with the backdrop and without transport, which does not apply to the new light."""
         before = self._image()
         self._picture.close()
-        self._parts, self._given, self._light, self._compared = {}, {}, None, None
+        self._parts, self._in_picture, self._light, self._compared = {}, {}, None, None
         self._picture = self._anew(backdrop)
         if before.any():
             self._fade_over(before)
@@ -162,12 +162,12 @@ class Painter:
     def give(self, light: Interreflections) -> None:
         """Add interreflections, or replace them with less noisy ones."""
         self._light = light
-        self._picture.give(light, {name: self._given.get(name, part.start) for name, part in light.parts.items()})
+        self._picture.give(light, {name: self._in_picture.get(name, part.start) for name, part in light.parts.items()})
         self._compared = None
 
     def activate(self, material: str, curve: str) -> None:
         """Fold the curves that are not dragged into the transport, before the first movement of a drag."""
-        if material in self._given:
+        if material in self._in_picture:
             self._picture.activate(material, curve)
 
     def _work(self) -> None:
@@ -221,11 +221,11 @@ class Painter:
 
     def _show(self, name: str, made: Editable) -> bool:
         """Change the picture to a material; return False without transport for it."""
-        if name not in self._parts or self._given.get(name) is made:
+        if name not in self._parts or self._in_picture.get(name) is made:
             return True
         with suppress(TransportNeeded):
             self._picture.show(name, made)
-            self._given[name] = made
+            self._in_picture[name] = made
             return True
         part = next((one for one in self._parts[name][1:] if same_quotients(one.start, made)), None)
         if part is None:
@@ -237,7 +237,7 @@ class Painter:
 
     def _place(self, name: str, part: Part, made: Editable | None) -> None:
         self._picture.direct.put(name, part)
-        self._given.pop(name, None)
+        self._in_picture.pop(name, None)
         if made is not None and self._show(name, made):
             self._picture.draw()
 
@@ -272,7 +272,7 @@ class Painter:
     def _go_on_without_gpu(self, wish: Wish) -> None:
         """Continue on the CPU with everything in the picture."""
         self._picture.close()
-        self._backend, self._given = self._backend.without_gpu(), {}
+        self._backend, self._in_picture = self._backend.without_gpu(), {}
         self._picture, self._compared = self._anew(self._backdrop), None
         for name, (part, *_) in self._parts.items():
             self._place(name, part, wish.now.get(name))

@@ -155,10 +155,10 @@ def _changes(
         changes["size"] = picture
     for name in (*session.document.merged, *session.document.merged.values()):
         known("material", name, scene.materials, field="merged")
-    worn = {o.material: scene.materials[o.material] for o in scene.merged(session.document.merged).objects}
+    used = {o.material: scene.materials[o.material] for o in scene.merged(session.document.merged).objects}
     for name in session.document.materials:
-        known("material", name, worn, field="materials")
-    rest = {name: material for name, material in worn.items() if name not in session.document.materials}
+        known("material", name, used, field="materials")
+    rest = {name: material for name, material in used.items() if name not in session.document.materials}
     found = Session.new(session.document.scene, session.document.camera, rest)
     return {**changes, "materials": {**session.document.materials, **found.document.materials}}
 
@@ -221,8 +221,8 @@ def _scene_at(place: str, crease_deg: float | None) -> Scene:
 
 def _merged_in(base: Path | None, scene: Scene) -> dict[str, str]:
     """Replacements of materials that were merged before the store's views were baked, by name."""
-    worn = materials_in_views(Store.open(base)) if base is not None else {}
-    pairs = {o.material: worn.get(o.name, o.material) for o in scene.objects}
+    of_objects = materials_in_views(Store.open(base)) if base is not None else {}
+    pairs = {o.material: of_objects.get(o.name, o.material) for o in scene.objects}
     return {name: other for name, other in pairs.items() if name != other and other in scene.materials}
 
 

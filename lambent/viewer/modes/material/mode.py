@@ -20,11 +20,11 @@ from lambent.viewer.editor.measurement import Measurement, read_measurement, sta
 from lambent.viewer.edits.edits import MaterialEdits, rescue
 from lambent.viewer.input import Input
 from lambent.viewer.look import SHOWS, Look
-from lambent.viewer.mode import Beside, Drawing, Mode, Panel, Textures
+from lambent.viewer.mode import Drawing, Mode, Panel, SidePlots, Textures
 from lambent.viewer.modes.material.preview import BOUNDS, CAMERA, SHAPES, Preview
 from lambent.viewer.panels import editing, overlay, statistics
 from lambent.viewer.panels import look as looks
-from lambent.viewer.panels.plots import beside
+from lambent.viewer.panels.plots import side_plots
 from lambent.viewer.panels.widgets import check, choice, rows, typed_field
 from lambent.viewer.screen import Screen
 
@@ -116,8 +116,8 @@ class MaterialMode(Mode):
         self.head = partial(editing.draw_head, state.editor)
 
     @property
-    def beside(self) -> Beside | None:
-        return beside(self.state.editor)
+    def side_plots(self) -> SidePlots | None:
+        return side_plots(self.state.editor)
 
     def draw_over(self, textures: Textures) -> None:
         overlay.false_colour_bar(self.screen.picture, self.state.look)

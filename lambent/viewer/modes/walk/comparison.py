@@ -137,7 +137,7 @@ class Comparison:
         def failed(_: object) -> None:
             self._flip = None  # PSNR and mean difference remain
 
-        self._work = Work(lambda progress: flip_beside(reference, test, progress), done, failed)
+        self._work = Work(lambda progress: flip_in_process(reference, test, progress), done, failed)
 
 
 def difference(a: Floats, b: Floats) -> Floats:
@@ -168,7 +168,7 @@ def _shrunk(encoded: Floats, step: int) -> Floats:
     return np.asarray(blocks.mean(axis=(1, 3)))
 
 
-def flip_beside(reference: Floats, test: Floats, progress: Progress) -> Floats:
+def flip_in_process(reference: Floats, test: Floats, progress: Progress) -> Floats:
     """FLIP error (H, W) of two encoded pictures (H, W, 3); `progress` may raise `Cancelled`.
 
     It runs in another process: the library holds Python's global lock, which would freeze the window.

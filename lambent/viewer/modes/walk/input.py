@@ -137,11 +137,11 @@ class WalkInput(Input):
             self.screen.say("nothing to frame: select an object first")
             return
         eye, bounds = navigation.camera.position, navigation.bounds
-        around = cameras.is_within(eye, found.bounds)  # such as walls: seen from within
+        is_enclosing = cameras.is_within(eye, found.bounds)  # such as walls: seen from within
 
         def free_m(point: Floats, direction: Floats) -> float:
             out_m = cameras.way_out_m(point, direction, bounds) if cameras.is_within(eye, bounds) else math.inf
-            return min(self._geometry.free_m(point, direction, "" if around else found.name), out_m)
+            return min(self._geometry.free_m(point, direction, "" if is_enclosing else found.name), out_m)
 
         navigation.move(framed(navigation.camera, found.bounds, place.width / place.height, free_m))
         navigation.movement, self._state.selection.pointed = "orbit", None

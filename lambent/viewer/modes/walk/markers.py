@@ -111,18 +111,18 @@ def mirror_ball(
 ) -> Image:
     """RGBA (size, size, 4) of a perfect mirror ball at `centre` that reflects the probe's cube map."""
     _, up, ahead = camera_axes(camera)
-    sight = np.subtract(centre, camera.position, dtype=float)
-    sight = normalize(sight) if np.linalg.norm(sight) > 1e-6 else ahead
-    across = normalize(np.cross(sight, up))
-    above = np.cross(across, sight)
+    towards_centre = np.subtract(centre, camera.position, dtype=float)
+    towards_centre = normalize(towards_centre) if np.linalg.norm(towards_centre) > 1e-6 else ahead
+    across = normalize(np.cross(towards_centre, up))
+    above = np.cross(across, towards_centre)
     at = (np.arange(size) + 0.5) / size * 2 - 1
     u, v = np.meshgrid(at, -at)
     r = np.hypot(u, v)
     inside = np.minimum(r, 0.999)
     towards = np.sqrt(1 - inside**2)
     shrink = inside / np.maximum(r, 1e-9)
-    normal = (u * shrink)[..., None] * across + (v * shrink)[..., None] * above - towards[..., None] * sight
-    out = -reflect(sight, normal)
+    normal = (u * shrink)[..., None] * across + (v * shrink)[..., None] * above - towards[..., None] * towards_centre
+    out = -reflect(towards_centre, normal)
     rgba = np.empty((size, size, 4), np.uint8)
     rgba[..., :3] = to_bytes(shown(np.asarray(sample(cube, out), np.float32), view, exposure_ev))
     rgba[..., 3] = to_bytes(np.clip((1 - r) * size / 2 + 0.5, 0, 1))

@@ -23,7 +23,7 @@ from lambent.viewer.background.lost import rescued
 from lambent.viewer.background.work import POLL_S
 from lambent.viewer.cameras.navigation import Movement
 from lambent.viewer.cameras.picking import Geometry
-from lambent.viewer.mode import Beside, Drawing, Mode, Panel, Textures
+from lambent.viewer.mode import Drawing, Mode, Panel, SidePlots, Textures
 from lambent.viewer.modes.walk.comparison import error_scale
 from lambent.viewer.modes.walk.input import SHORTCUTS, WalkInput
 from lambent.viewer.modes.walk.light.answering import AnsweringLight
@@ -44,7 +44,7 @@ from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.session.texturing import ENDINGS
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels import overlay, statistics
-from lambent.viewer.panels.plots import beside
+from lambent.viewer.panels.plots import side_plots
 from lambent.viewer.panels.widgets import rows
 from lambent.viewer.screen import Screen, least
 
@@ -102,8 +102,8 @@ class WalkMode(Mode):
         self.head = partial(room.draw, state)
 
     @property
-    def beside(self) -> Beside | None:
-        return beside(self.state.materials.editor)
+    def side_plots(self) -> SidePlots | None:
+        return side_plots(self.state.materials.editor)
 
     @property
     def moving(self) -> bool:

@@ -43,7 +43,7 @@ class Pictures(Pair):
         super().__init__(renderer.device)
         self._state = state
         self._lane = Lane.of(renderer, state.screen, answering, state.answering, state.store)
-        self._beside: Lane | None = None  # lane of the state that the room is compared with
+        self._other_lane: Lane | None = None  # lane of the state that the room is compared with
         self._rebaked = (
             None if state.store is None else RebakedLight(state.store, renderer.scene, state.screen, state.rebaking)
         )
@@ -187,11 +187,11 @@ class Pictures(Pair):
         light = self._lane.wait_s()
         if light is not None and not draws:
             light = POLL_S  # it is not shown
-        beside = self._beside.wait_s() if self._beside is not None and self._state.states.split else None
+        other = self._other_lane.wait_s() if self._other_lane is not None and self._state.states.split else None
         compares = POLL_S if len(self.shown) == 2 and self._state.comparison.busy else None
         rebakes = None if self._rebaked is None else self._rebaked.wait_s()
         resting = self._at_rest.wait_s()
-        return least(super().wait_s(), loading, light, beside, compares, rebakes, resting)
+        return least(super().wait_s(), loading, light, other, compares, rebakes, resting)
 
     def save(self) -> None:
         """Write the picture A, and a shown error map."""
@@ -212,7 +212,7 @@ class Pictures(Pair):
         """Cancel FLIP, path tracing, the running film, and light computations."""
         if self._rebaked is not None:
             self._rebaked.close()
-        for lane in (self._lane, self._beside):
+        for lane in (self._lane, self._other_lane):
             if lane is not None:
                 lane.close()
         self._state.comparison.forget()
@@ -224,11 +224,11 @@ class Pictures(Pair):
 
     def _follow_exchange(self) -> None:
         """Swap the lanes after the room and the other state were swapped."""
-        edits, lane, beside = self._state.materials.edits, self._lane, self._beside
-        if beside is None or edits.room == edits.other:
+        edits, lane, other = self._state.materials.edits, self._lane, self._other_lane
+        if other is None or edits.room == edits.other:
             return
-        if beside.room == edits.room and lane.room == edits.other:
-            self._lane, self._beside, self._state.answering = beside, lane, beside.shown
+        if other.room == edits.room and lane.room == edits.other:
+            self._lane, self._other_lane, self._state.answering = other, lane, other.shown
             self._b = self._film_renderer = self._glare_renderer = None  # they share the light of the previous lane
 
     def _compare_states(self, wanted: FrameState) -> None:
@@ -236,14 +236,14 @@ class Pictures(Pair):
         state, edits = self._state, self._state.materials.edits
         state.comparison.forget()
         state.comparison.figures = None
-        if self._beside is None:
-            self._beside = self._lane.another(state.screen)
-        other, beside = edits.other, self._beside
+        if self._other_lane is None:
+            self._other_lane = self._lane.another(state.screen)
+        other, lane = edits.other, self._other_lane
         assert other is not None, "no split without a second lane"
-        beside.shown.on = state.answering.on
-        beside.answer(other.only(state.scene.materials))
-        self.shown = (self._a, beside.picture)
-        beside.picture.update(beside.frame(wanted, state.lights.known(other.light.factors)), share=SHARED)
+        lane.shown.on = state.answering.on
+        lane.answer(other.only(state.scene.materials))
+        self.shown = (self._a, lane.picture)
+        lane.picture.update(lane.frame(wanted, state.lights.known(other.light.factors)), share=SHARED)
         self._a.update(wanted, share=SHARED)  # last, because the window shows its statistics
         state.states.label()
 
@@ -281,10 +281,10 @@ class Pictures(Pair):
             renderer = self._another_renderer()
             renderer.waits = False
             self._b = Picture(renderer, self._state.screen)
-        beside = replace(wanted, integrator=comparison.integrator)
+        frame = replace(wanted, integrator=comparison.integrator)
         if comparison.look_up != AS_A:
-            beside = replace(beside, lookup=comparison.look_up, lookups={})
-        self._b.update(beside, share=SHARED)
+            frame = replace(frame, lookup=comparison.look_up, lookups={})
+        self._b.update(frame, share=SHARED)
         return self._b
 
     def _another_renderer(self) -> Renderer:

@@ -13,7 +13,7 @@ from lambent.core.progress import Cancelled, silent
 from lambent.core.views.camera import Camera
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.light.baked import Probe
-from lambent.viewer.modes.walk.comparison import Comparison, difference, flip_beside
+from lambent.viewer.modes.walk.comparison import Comparison, difference, flip_in_process
 from lambent.viewer.modes.walk.light.glare import GlareDrawing, GlareMeter
 from lambent.viewer.modes.walk.light.metering import read
 from lambent.viewer.modes.walk.markers import Marks, mirror_ball, outline, projected
@@ -53,7 +53,7 @@ def test_the_difference_is_relative_to_b():
 
 def test_flip_of_another_process_is_the_same():
     a, b = np.random.default_rng(3).random((2, 40, 50, 3)).astype(np.float32)
-    np.testing.assert_allclose(flip_beside(a, b, silent), flip_error(a, b), atol=1e-6)
+    np.testing.assert_allclose(flip_in_process(a, b, silent), flip_error(a, b), atol=1e-6)
 
 
 def test_flip_can_be_cancelled():
@@ -61,7 +61,7 @@ def test_flip_can_be_cancelled():
         raise Cancelled
 
     with pytest.raises(Cancelled):
-        flip_beside(np.zeros((64, 64, 3)), np.zeros((64, 64, 3)), stop)
+        flip_in_process(np.zeros((64, 64, 3)), np.zeros((64, 64, 3)), stop)
 
 
 def test_figures_and_maps():

@@ -78,7 +78,7 @@ def test_each_side_is_its_state_and_both_follow_the_camera(pictures, state, stor
     edits = state.materials.edits
     edits.change("plaster", RED)
     edits.mix(OFF)
-    edits.put_beside(AS_BAKED)
+    edits.compare_with(AS_BAKED)
     state.states.split = True
     for camera in (state.navigation.camera, SIDE):
         state.navigation.camera = camera
@@ -97,14 +97,14 @@ def test_an_exchange_takes_one_frame_and_computes_nothing(pictures, state):
     state.states.split = True
     rested(pictures, state)
     a, b = (picture.read() for picture in pictures.shown)
-    versions = {lane.renderer.mixer.version for lane in (pictures._lane, pictures._beside)}
+    versions = {lane.renderer.mixer.version for lane in (pictures._lane, pictures._other_lane)}
     for first, second in ((b, a), (a, b)):
         state.states.exchange()
         pictures.update(PLACE, 1.0)
         now = [picture.read() for picture in pictures.shown]
         np.testing.assert_array_equal(now[0], first)
         np.testing.assert_array_equal(now[1], second)
-    assert versions == {lane.renderer.mixer.version for lane in (pictures._lane, pictures._beside)}
+    assert versions == {lane.renderer.mixer.version for lane in (pictures._lane, pictures._other_lane)}
     edits.undo()
     edits.undo()
     pictures.update(PLACE, 1.0)

@@ -87,7 +87,7 @@ def peak(values: Floats) -> Region | None:
     if span <= 1e-9 * float(mean.max()):
         return None
     top = int(mean.argmax())
-    (b, c), (a, d) = (_around(mean >= least + share * span, top) for share in (0.5, 0.1))
+    (b, c), (a, d) = (_run_about(mean >= least + share * span, top) for share in (0.5, 0.1))
     ramp = max(c - b, 1.0)
     begin = min(a, b - GAP_DEG) if b > 0 else -ramp
     return region_of(begin, b, c, max(d, c + GAP_DEG) if c < END_DEG else END_DEG + ramp)
@@ -142,7 +142,7 @@ def grip_at(region: Region, axes: Axes, x: float, y: float) -> Grip | None:
     return "curve" if region.a < angle < region.d else None
 
 
-def _around(above: NDArray[np.bool_], at: int) -> tuple[float, float]:
+def _run_about(above: NDArray[np.bool_], at: int) -> tuple[float, float]:
     """First and last angle in degrees of the run about knot `at`."""
     below = np.flatnonzero(~above)
     before, after = below[below < at], below[below > at]

@@ -146,8 +146,8 @@ class AnsweringLight:
             self._answer = AnsweredLight(self._renderer.scene, read_answer(self._store))
         scene = self._renderer.scene
         looks = {name: Look(scene.record.materials[name], of) for name, of in wanted.textures.items()}
-        worn = {name: textures_in_look(name, look, scene.textures) for name, look in looks.items()}
-        light = self._answer.lit(wanted.materials, worn)
+        textures = {name: textures_in_look(name, look, scene.textures) for name, look in looks.items()}
+        light = self._answer.lit(wanted.materials, textures)
         groups = self._answer.groups(light)
         off = None if light.is_baked else self._answer.likely_error(light, self._renderer.mixer.factors)
         return _Maps(light, None if groups else self._answer.layers(light), groups, off)

@@ -61,14 +61,14 @@ def warn_of_look_up(state: WalkState) -> None:
 
 def draw_over(view: FieldView, picture: Rect, textures: Textures) -> None:
     """Draw discs over the picture, and the map in its upper left corner."""
-    behind = imgui.get_background_draw_list()
+    draw_list = imgui.get_background_draw_list()
     if (discs := textures.get("points")) is not None:
-        behind.add_image(discs, picture.point(0, 0), picture.point(1, 1))
+        draw_list.add_image(discs, picture.point(0, 0), picture.point(1, 1))
     if (square := textures.get("map")) is None:
         return
     size = MAP_SHARE * min(picture.width, picture.height)
     (x, y), line = picture.point(0, 0), imgui.get_text_line_height()
     x, y = x + MARGIN_PX, y + MARGIN_PX + line
-    behind.add_image(square, (x, y), (x + size, y + size))
-    behind.add_rect((x - 1, y - 1), (x + size + 1, y + size + 1), imgui.get_color_u32(AMBER))
-    shadowed(behind, (x, y - line - 2), f"point {view.point}: {view.shows}", AMBER, 1.0)
+    draw_list.add_image(square, (x, y), (x + size, y + size))
+    draw_list.add_rect((x - 1, y - 1), (x + size + 1, y + size + 1), imgui.get_color_u32(AMBER))
+    shadowed(draw_list, (x, y - line - 2), f"point {view.point}: {view.shows}", AMBER, 1.0)

@@ -74,10 +74,10 @@ def _texture(texturing: Texturing, name: str) -> None:
     texturing.typed, wanted = path_field("image", texturing.typed, "show", "image file...", meaning)
     if wanted:
         texturing.open(name, texturing.typed)
-    worn = texturing.edits.room.textures.get(name)
-    if isinstance(worn, ImageTexture):
-        times = slider("repeat", worn.repeat, LEAST_REPEAT, MOST_SHOWN_REPEAT, "how often the image repeats", log=True)
-        if times != worn.repeat:
+    used = texturing.edits.room.textures.get(name)
+    if isinstance(used, ImageTexture):
+        times = slider("repeat", used.repeat, LEAST_REPEAT, MOST_SHOWN_REPEAT, "how often the image repeats", log=True)
+        if times != used.repeat:
             texturing.repeat(name, times)
 
 

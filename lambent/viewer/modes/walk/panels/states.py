@@ -50,7 +50,7 @@ def _row(states: States, name: str, room: RoomState, own: str) -> None:
         edits.take(room)
     imgui.same_line()
     if press(f"split##{own}", f"shows the room and '{name}' side by side", small=True):
-        states.show_beside(room)
+        states.split_with(room)
     imgui.same_line()
     marks = [mark for mark, here in (("now", edits.room == room), ("beside", edits.other == room)) if here]
     imgui.text_unformatted(f"{name}  ({', '.join(marks)})" if marks else name)

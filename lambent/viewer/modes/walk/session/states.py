@@ -39,12 +39,12 @@ class States:
     def split(self, on: bool) -> None:
         self._split = on
         if on and self.edits.other is None:
-            self.edits.put_beside(AS_BAKED)
+            self.edits.compare_with(AS_BAKED)
 
     def exchange(self) -> None:
-        """Swap the room with the state beside it, or with the bake."""
+        """Swap the room with the state it is compared with, or with the bake."""
         if self.edits.other is None:
-            self.edits.put_beside(AS_BAKED)
+            self.edits.compare_with(AS_BAKED)
         self.edits.exchange()
 
     def store(self) -> str:
@@ -62,12 +62,12 @@ class States:
         return name
 
     def compare(self, name: str) -> None:
-        """Show the room beside a stored state or the bake."""
-        self.show_beside(self.all[name])
+        """Split the picture between the room and a stored state or the bake."""
+        self.split_with(self.all[name])
 
-    def show_beside(self, room: RoomState) -> None:
-        """Show the room beside another state."""
-        self.edits.put_beside(room)
+    def split_with(self, room: RoomState) -> None:
+        """Split the picture between the room and another state."""
+        self.edits.compare_with(room)
         self._split = True
 
     @property

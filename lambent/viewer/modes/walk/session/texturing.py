@@ -52,15 +52,15 @@ class Texturing:
         """What a material can show, by label; None for its own texture, or for none if it has no own."""
         others = [other for other in self.textures if other != name]
         last: dict[str, str | ImageTexture | None] = {f"of {other}": other for other in others}
-        worn = self.edits.room.textures.get(name)
-        if isinstance(worn, ImageTexture):
-            last[label_of(worn)] = worn
+        used = self.edits.room.textures.get(name)
+        if isinstance(used, ImageTexture):
+            last[label_of(used)] = used
         return {**({OWN: None, NONE: ""} if name in self.textures else {NONE: None}), **last}
 
     def shown(self, name: str) -> str:
         """The label of the present choice."""
-        worn = self.edits.room.textures.get(name)
-        return next((label for label, of in self.choices(name).items() if of == worn), NONE)
+        used = self.edits.room.textures.get(name)
+        return next((label for label, of in self.choices(name).items() if of == used), NONE)
 
     def thumbnail(self, name: str, of: str | ImageTexture | None) -> Thumbnail | None:
         """The thumbnail of a choice of `choices`; None for none, and until it is made."""
@@ -77,7 +77,7 @@ class Texturing:
         """Show a texture, with its mean as the diffuse colour, as one stroke."""
         try:
             mean = self._mean(name, of)
-            self.edits.wear(name, of, mean and possible_kd(self.edits.current(name), mean))
+            self.edits.set_texture(name, of, mean and possible_kd(self.edits.current(name), mean))
         except UserError as error:
             self.screen.say(f"not shown: {error}")
 
@@ -116,10 +116,10 @@ class Texturing:
 
     def repeat(self, name: str, times: float) -> None:
         """Repeat the image of a material this many times, within the present stroke."""
-        worn = self.edits.room.textures.get(name)
-        if isinstance(worn, ImageTexture):
+        used = self.edits.room.textures.get(name)
+        if isinstance(used, ImageTexture):
             times = min(max(times, 1 / MOST_REPEAT), MOST_REPEAT)
-            self.edits.show_texture(name, replace(worn, repeat=times))
+            self.edits.show_texture(name, replace(used, repeat=times))
 
 
 def _reflectance(mean: Triple, detail: Texture | None) -> Floats:

@@ -353,8 +353,8 @@ def test_a_state_that_goes_beside_keeps_its_light_and_undo_of_all_is_as_baked(op
         room.frame()
     state.states.exchange()
     room.frame()
-    room.until(lambda: not (room.pictures._lane.busy or room.pictures._beside.busy))
-    assert not state.rebaking.exact and room.pictures._beside.renderer is room.renderer
+    room.until(lambda: not (room.pictures._lane.busy or room.pictures._other_lane.busy))
+    assert not state.rebaking.exact and room.pictures._other_lane.renderer is room.renderer
     beside = image_of(room.renderer, state, edits.other.materials)
     np.testing.assert_allclose(beside, exact, rtol=2e-3, atol=1e-5)
     np.testing.assert_allclose(image(room.pictures._lane.renderer, state), baked, rtol=2e-3, atol=1e-5)

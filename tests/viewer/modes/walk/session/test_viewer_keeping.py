@@ -55,7 +55,7 @@ def test_a_saved_session_is_there_again(window, tmp_path):
     window.edits.mix(DIM)
     window.edits.end_stroke()
     window.edits.store("evening")
-    window.edits.put_beside(RoomState())
+    window.edits.compare_with(RoomState())
     assert set(window.keeper.unsaved) >= {"plaster", "the light mix", "stored states"}
     assert window.keeper.save() and window.keeper.unsaved == ()
     window.keeper.close()
