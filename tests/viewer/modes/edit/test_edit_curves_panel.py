@@ -73,17 +73,6 @@ def test_a_drag_pulls_the_curve_and_is_one_step(panel):
     assert panel.layers() == (up, across)
 
 
-def test_modifier_keys(panel):
-    panel.key(imgui.Key.mod_shift, True)
-    panel.pull((2.0, 20.0), (4.0, 25.0))
-    panel.key(imgui.Key.mod_shift, False)
-    assert [layer.kind for layer in panel.layers()] == ["translate_y"]
-    panel.key(imgui.Key.mod_ctrl, True)
-    panel.pull((2.0, 20.0), (4.0, 25.0))
-    panel.key(imgui.Key.mod_ctrl, False)
-    assert [layer.kind for layer in panel.layers()] == ["translate_y", "translate_x"]
-
-
 def test_a_modifier_key_answers_while_the_mouse_rests(panel):
     axes = panel.editor.axes
     panel.move(*axes.pixel(2.0, 20.0))
@@ -125,17 +114,6 @@ def test_keys_work_over_the_plot_alone(panel):
     panel.tap(imgui.Key.f)
     panel.tap(imgui.Key.t)
     assert panel.view.x.high < 30 and panel.editor.state.tool == "translate"
-
-
-def test_the_base_of_amplification(panel):
-    assert "##base y" not in panel.rects
-    panel.click("amplify")
-    panel.slide("##base x", 0.1, 0.9)
-    panel.view.base = (panel.view.base[0], 1.0)
-    assert panel.view.base[0] > 0
-    panel.click("y")
-    panel.pull((2.0, 11.0), (2.0, 21.0))
-    assert panel.layers()[0].size == pytest.approx(2, abs=0.05) and panel.layers()[0].base == 1.0
 
 
 def test_freehand(panel):

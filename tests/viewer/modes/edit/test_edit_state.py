@@ -325,14 +325,6 @@ def test_bytes_are_those_of_the_view_transform(view):
     assert np.abs(made[1:, :, :3] - wanted).max() <= 1
 
 
-def test_false_colours_are_of_luminance():
-    light = np.geomspace(1e-3, 1e2, 300, dtype=np.float32).reshape(10, 10, 3)
-    scale = Range(0.1, 1000.0)
-    wanted = to_bytes(false_colour(photometric(light), scale)).astype(int)
-    made = displayed(light, "false-colour", 3.0, scale)[..., :3]
-    assert np.abs(made - wanted).max() <= 2
-
-
 def test_the_bytes_of_a_drag_are_those_of_the_table():
     """Every rounding, infinity and what is no number included."""
     rng = np.random.default_rng(2)
