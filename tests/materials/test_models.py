@@ -17,6 +17,13 @@ from tests.tools.reciprocity import assert_reciprocal
 MODELS = models()
 
 
+@pytest.fixture(autouse=True)
+def few_directions(monkeypatch):
+    """Of the furnace: above all near grazing, where models fail; every model is mirror symmetric in phi."""
+    monkeypatch.setattr(check, "THETA_DEG", (0, 30, 60, 75, 84, 87, 89))
+    monkeypatch.setattr(check, "PHI_DEG", (0.0, 45.0, 90.0))
+
+
 def corners(kind: type[Model]) -> list[Model]:
     """The model at its defaults, at both ends of every parameter, and with all parameters high."""
     found = [kind(), kind(**{p.name: p.high for p in kind.parameters})]
@@ -27,7 +34,7 @@ def corners(kind: type[Model]) -> list[Model]:
 
 def assert_sampled(model: Model) -> None:
     for theta_deg in (0.0, 50.0, 85.0):
-        one = check.check_sampler(model, theta_deg, 30.0)
+        one = check.check_sampler(model, theta_deg, 30.0, samples=1 << 18)
         assert one.p_value > 1e-4, one
         assert abs(one.pdf_integral + one.rejected_share - 1) < check.INTEGRAL_LIMIT, one
         tolerance = 5 * one.albedo_error + check.INTEGRAL_LIMIT * one.albedo_quadrature
@@ -54,12 +61,6 @@ def cases():
 @pytest.mark.parametrize(("kind", "prop"), list(cases()))
 def test_property(kind, prop):
     HARNESS[prop](kind)
-
-
-def test_harness_covers_every_property():
-    assert HARNESS.keys() == PROPERTIES.keys()
-    for kind in MODELS.values():
-        assert kind.known_deficiencies.keys() <= PROPERTIES.keys()
 
 
 @pytest.mark.parametrize("kind", MODELS.values(), ids=MODELS)
@@ -92,19 +93,6 @@ def test_metadata(kind):
         kind(**{first + "x": 0.1})
 
 
-def test_the_wanted_models_are_there():
-    assert {"lambert", "kurt", "kurt-ggx", "kurt-transmission", "ggx", "phong", "blinn-phong"} <= MODELS.keys()
-    assert {"cook-torrance", "ward", "ward-original", "ashikhmin-shirley", "schlick", "oren-nayar"} <= MODELS.keys()
-    assert model_named("ggx") is MODELS["ggx"]
-    with pytest.raises(UserError, match="did you mean 'lambert'"):
-        model_named("lambret")
-
-
-def test_kurt_bounds_are_those_of_fitting():
-    bounds = {p.name: (p.low, p.high) for p in MODELS["kurt"].parameters}
-    assert bounds["mx"] == bounds["my"] == (0.003, 1.5) and bounds["r0"] == bounds["alpha"] == (0.0, 1.0)
-
-
 def test_ggx_density_is_mitsubas(mi):
     """Mitsuba's rough conductor samples the same visible normals."""
     plugin = mi.load_dict({"type": "roughconductor", "distribution": "ggx", "alpha_u": 0.1, "alpha_v": 0.4})
@@ -114,3 +102,8 @@ def test_ggx_density_is_mitsubas(mi):
     theirs = np.array(plugin.pdf(mi.BSDFContext(), interaction(wo), mi.Vector3f(wi.T)))
     ours = MODELS["ggx"](alpha_x=0.1, alpha_y=0.4).pdf(wi.astype(float), wo.astype(float))
     np.testing.assert_allclose(theirs, ours, rtol=1e-3, atol=1e-6)
+
+
+def test_an_unknown_model_names_the_nearest():
+    with pytest.raises(UserError, match="did you mean 'lambert'"):
+        model_named("lambret")

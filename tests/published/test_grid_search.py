@@ -13,8 +13,14 @@ from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.parameters import box_of, to_search
 from lambent.materials.fitting.problem import Mixture, problem_of
 from lambent.materials.measured.inspecting.metrics import METRICS
+from lambent.published import grid_search
 from lambent.published.grid_search import Schedule, fit_lobes, search
 from tests.materials.fitting.known_answers import FEW, PAINT, grey
+
+
+@pytest.fixture(autouse=True)
+def few_values(monkeypatch):
+    monkeypatch.setattr(grid_search, "VALUES", 4_000)
 
 
 @pytest.fixture(scope="module")

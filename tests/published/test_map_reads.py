@@ -40,11 +40,3 @@ def test_reads_on_demand_miss_what_was_not_read_of_an_item() -> None:
     assert partial_misses(reads, LeastRecent(2)) == 5 and partial_misses(reads, LeastRecent(3)) == 4
     items = [item for item, _ in reads]
     assert partial_misses(reads, KnownFuture(items, 2)) == 5 and partial_misses(reads, KnownFuture(items, 3)) == 4
-
-
-def test_the_optimum_of_faces_in_part_is_below_the_least_recent() -> None:
-    """Three faces in turn, and room for two: of the three, all miss; the optimum keeps one of them each time."""
-    items = [1, 2, 3] * 20
-    reads = [(item, 0) for item in items]
-    assert partial_misses(reads, LeastRecent(2)) == 60
-    assert partial_misses(reads, KnownFuture(items, 2)) < 35

@@ -9,7 +9,7 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import direction
-from lambent.published.merl_fits import MERL_CHANNELS, Published, read_fits
+from lambent.published.merl_fits import MERL_CHANNELS, read_fits
 
 WARD = "a-b = Aggregate(Lambertian(albedo = [.1, 0.2, 3e-1]), NganWard(albedo = [0.01, 0.02, 0.03], roughness = 0.1))"
 COOK = "c = Aggregate(Lambertian(albedo = [0, 0, 0]), NganCookTorrance(albedo = [1, 1, 1], eta = .04, roughness = .2))"
@@ -59,13 +59,10 @@ def test_reciprocal_and_black_below(tmp_path, line):
         (WARD.replace("NganWard", "NganWart"), "did you mean 'NganWard'"),
         (WARD.replace("roughness", "rough"), "wrong fields"),
         (WARD.replace("roughness = 0.1", "roughness = 0"), "roughness"),
-        (WARD.replace("roughness = 0.1", "roughness = nan"), "wrong fields"),
-        (WARD.replace("roughness = 0.1", "roughness = [1, 1, 1]"), "are numbers"),
         (WARD.replace("[0.01, 0.02, 0.03]", "0.5"), "albedo is"),
         (WARD.replace("[.1,", "[-.1,"), "Lambertian albedo"),
         (WARD.replace("3e-1]", "3e-1, 4]"), "line 3"),
         (COOK.replace("eta = .04", "eta = 1.5"), "eta"),
-        (LOW.replace("eta = 1.5", "eta = .5"), "eta"),
         (f"{WARD}\n{WARD}", "the same name"),
         ("# nothing", "no material"),
     ],
@@ -75,18 +72,8 @@ def test_nonsense_is_refused(tmp_path, line, complaint):
         read_fits(written(tmp_path, line))
 
 
-def test_bytes_are_refused(tmp_path):
-    (tmp_path / "x.fit").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(UserError, match="text file"):
-        read_fits(tmp_path / "x.fit")
-
-
 def test_the_published_files_are_read_whole(shared_data):
     files = list((shared_data / "fits").glob("*.fit"))
     counts = [len(read_fits(file)) for file in files]
     lines = [sum("Aggregate" in line for line in file.read_text().splitlines()) for file in files]
     assert counts == lines and min(counts) >= 86
-
-
-def test_models_name_their_fields():
-    assert Published.MODELS.keys() == {"NganWard", "NganCookTorrance", "LowCookTorrance"}

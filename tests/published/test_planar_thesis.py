@@ -15,7 +15,7 @@ from lambent.realtime.integrators.patterns import radius
 from lambent.realtime.light.baked import Probe
 from lambent.realtime.planar.planar_integrators import PLANAR
 from lambent.realtime.renderer import Renderer
-from tests.realtime.test_realtime_planar import HEIGHT, mirror, scene_of, state
+from tests.realtime.planar.test_realtime_planar import HEIGHT, mirror, scene_of, state
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -46,12 +45,6 @@ def test_every_pixel_is_evaluated_once_after_its_informers(method: Any, order: s
             assert (of[:, middle].mean(axis=-1) == at[:, middle]).all()
         done[step.pixels] += 1
     assert (done == 1).all()
-
-
-def test_the_finest_grid_has_half_of_the_pixels(method: Any) -> None:
-    steps = list(method.grid(65, 65))
-    assert len(steps[-1].pixels) == 65 * 65 // 2
-    assert len(steps[0].pixels) == 25 and steps[0].informers.shape == (25, 0)
 
 
 def some_directions(count: int) -> np.ndarray:
@@ -134,14 +127,6 @@ def test_predictions_are_wrong_no_more_often_than_stated(method: Any, view: Any,
     assert found.wrong_percent(truth) < most_wrong
     assert 5 < found.traced_percent < most_traced
     assert found.wrong_percent(~truth) > 90
-
-
-@pytest.mark.parametrize("name", LIMITS)
-def test_where_no_pixel_informs_another_all_is_traced_and_exact(method: Any, view: Any, name: str) -> None:
-    traced, points, lights, truth = view
-    alone = replace(points, object=np.arange(len(points)))
-    found = method.predicted_visibility(traced, alone, lights.centres, SIZE, SIZE, method.VARIANTS[name])
-    assert (found.traced_percent, found.wrong_percent(truth)) == (100.0, 0.0)
 
 
 def test_warped_blockers_stand_where_the_next_point_sees_them(method: Any) -> None:

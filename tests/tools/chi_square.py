@@ -27,9 +27,11 @@ def sampler_test(bsdf: Scatters, theta_deg: float, phi_deg: float, *, samples: i
     )
 
 
-def assert_sampler(bsdf: Scatters, theta_deg: float, phi_deg: float, folder: Path, *, seed: int = 0) -> None:
+def assert_sampler(
+    bsdf: Scatters, theta_deg: float, phi_deg: float, folder: Path, *, samples: int = 1_000_000, seed: int = 0
+) -> None:
     """Fail where samples do not follow the density; the picture of both lies in `folder`."""
-    test = sampler_test(bsdf, theta_deg, phi_deg, seed=seed)
+    test = sampler_test(bsdf, theta_deg, phi_deg, samples=samples, seed=seed)
     if test.p_value < LEVEL:
         raise AssertionError(explain(test, folder / "chi_square.png"))
 

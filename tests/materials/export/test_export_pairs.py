@@ -6,27 +6,8 @@ import numpy as np
 import pytest
 
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.document import Lobe, Material
 from lambent.materials.export.resampling.pairs import pairs_of
-from lambent.materials.models import model_named
-from tests.materials.export.export_materials import BRUSHED, FOIL, PLASTIC
-
-
-def test_facets_equal_the_ggx_model():
-    pairs = pairs_of(BRUSHED, 10, seed=3)
-    model = model_named("ggx")(f0=1.0, alpha_x=0.3, alpha_y=0.1)
-    expected = model.eval(pairs.samples.wi, pairs.samples.wo)[:, 0]
-    np.testing.assert_allclose(pairs.facets(0.3, 0.1), expected, rtol=1e-9)
-
-
-def test_facets_have_our_distributions():
-    """Without masking and cosines, the lobe of exponent 0 remains."""
-    for distribution in ("ggx", "beckmann"):
-        lobe = Lobe(distribution=distribution, mx=0.3, my=0.1, r0=1.0)
-        pairs = pairs_of(Material(lobes=(lobe,)), 10, seed=3)
-        masking = pairs._masking(0.3, 0.1, "separable", distribution)
-        d = pairs.facets(0.3, 0.1, "separable", distribution) / masking * pairs.wi[2] * pairs.wo[2]
-        np.testing.assert_allclose(d / pairs.cos_d, pairs.samples.f[:, 0], rtol=1e-9)
+from tests.materials.export.export_materials import FOIL, PLASTIC
 
 
 @pytest.mark.parametrize("material", [PLASTIC, FOIL], ids=lambda m: m.name)

@@ -17,7 +17,7 @@ from lambent.materials.measured import load
 from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, record, synthesise
 from lambent.materials.measured.tables.gonio import GonioTable
-from tests.tools.in_mitsuba import f_cos, interaction
+from tests.tools.in_mitsuba import f_cos
 
 GLOSSY = Material(name="glossy", kd=(0.3, 0.2, 0.1), lobes=(Lobe(k=(0.4,) * 3, mx=0.2, my=0.2, r0=(0.3,) * 3),))
 BRUSHED = Material(name="brushed", kd=(0.05,) * 3, lobes=(Lobe(mx=0.25, my=0.12, r0=(0.9,) * 3, k=(0.8, 0.7, 0.6)),))
@@ -94,23 +94,6 @@ def test_rgl_is_what_mitsuba_reads(tmp_path: Path, mi: Any, material: Material) 
     assert np.quantile(off, 0.99) < 5e-3 and np.median(off) < 1e-4
 
 
-def test_mitsuba_samples_what_it_evaluates(tmp_path: Path, mi: Any) -> None:
-    """Chi-square of the plugin's sampler against its own density, on a written file."""
-    path = tmp_path / "a.bsdf"
-    rgl.write(GLOSSY, path)
-    bsdf = mi.load_dict({"type": "measured", "filename": str(path)})
-    n = 200_000
-    wi = direction(0.7, 0.3)
-    si = interaction(np.tile(wi, (n, 1)))
-    u = np.random.default_rng(0).random((n, 3)).astype(np.float32)
-    bs, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(u[:, 0]), mi.Point2f(u[:, 1], u[:, 2]))
-    albedo = np.array(weight, dtype=float).T.mean(axis=0)
-    np.testing.assert_allclose(albedo, load(path).reflectivity(wi), rtol=0.02)
-    pdf, p = np.array(bs.pdf, dtype=float), np.array(bsdf.eval(mi.BSDFContext(), si, bs.wo), dtype=float).T[:, 0]
-    ratio = np.divide(p, pdf, out=np.zeros(n), where=pdf > 0)
-    assert ratio[pdf > 0].std() < 0.5 * ratio[pdf > 0].mean()  # the density follows the light
-
-
 def test_rgl_keeps_a_narrow_lobe_and_reports_lost_transmission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(rgl.NODES, "isotropic", 64)
     mirrorlike = Material(name="mirror", lobes=(Lobe(mx=0.01, my=0.01, r0=(0.9,) * 3, k=(1.0,) * 3),))
@@ -129,11 +112,3 @@ def test_gonio_text_keeps_the_tuples_of_a_gonio_table(tmp_path: Path) -> None:
     back = load(tmp_path / "a.txt")
     assert cost.lost == () and cost.share["l1"] < 1e-4 and isinstance(back, GonioTable)
     assert len(back.samples()) == len(table.samples()) and back.symmetry == "quadrant"
-
-
-def test_gonio_text_of_a_material(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(gonio_text.THETA_I_DEG, "isotropic", tuple(range(0, 81, 10)))
-    cost = gonio_text.write(GLOSSY, tmp_path / "a.txt")
-    assert "9 incident directions" in cost.lost[0] and cost.share["cuberoot"] < 0.03
-    foil = gonio_text.write(FOIL, tmp_path / "b.txt")
-    assert load(tmp_path / "b.txt").info.transmits and foil.share["l1"] < 0.02

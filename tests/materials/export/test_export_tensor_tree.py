@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.geometry.directions import FLIP_Z, Floats, direction, normalize
+from lambent.core.geometry.directions import Floats, direction, normalize
 from lambent.core.geometry.sequences import r2
 from lambent.core.light.colour import luminance
 from lambent.core.progress import Cancelled
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import tensor_tree
-from lambent.materials.export.matching.proposal import knows_the_back
 from lambent.materials.export.resampling import tree_growth
 from lambent.materials.measured.lbnl_xml import read
 from lambent.materials.measured.parts.tensor_tree import Rank, disk_of
@@ -161,16 +160,6 @@ def test_colour_by_hand(tmp_path: Path, small: Callable[[int], None]) -> None:
     assert len(leaves_of(trees["Visible", "Reflection Back"])) <= 16  # nothing varies, so nothing is divided
 
 
-def test_colour_of_a_lobe_keeps_every_channel(tmp_path: Path, small: Callable[[int], None]) -> None:
-    """The lobe is grey, so the albedos differ by the diffuse coefficients alone: .3, .1 and .05."""
-    small(13)
-    tensor_tree.write(PLASTIC, tmp_path / "a.xml")
-    asked = on_sphere(disk_of(r2(128)))
-    red, green, blue = read(tmp_path / "a.xml").reflectivity(asked).mean(axis=0)
-    assert (red - green, green - blue) == pytest.approx((0.2, 0.05), rel=0.005)
-    assert green == pytest.approx(MaterialBSDF(PLASTIC).albedo(asked)[:, 1].mean(), rel=0.02)
-
-
 @pytest.mark.parametrize("rank", [3, 4])
 def test_trees_that_were_read_are_written_as_they_are(tmp_path: Path, rank: int) -> None:
     """To the last digit, cell by cell, in colour, each side with its own."""
@@ -214,36 +203,6 @@ def test_radiance_reads_what_was_grown(tmp_path: Path, small: Callable[[int], No
     f, r, t = (luminance(v) if v.shape[1] == 3 else v[:, 0] for v in (f, r, t))
     np.testing.assert_allclose(f, answers["xyz"][:, 1], rtol=5e-4, atol=1e-9)
     np.testing.assert_allclose(np.stack([r, t], axis=1), answers["hemi"], rtol=1e-3, atol=1e-9)
-
-
-def test_a_back_that_is_dark_from_most_directions_is_found(tmp_path: Path) -> None:
-    """A spot in one of four quarters of the incident light, stated by a file and by a formula."""
-    spot = "{ 0 0 0 0 0 0 0 0.25 0 0 0 0 0 0 0 0 }"
-    blocks = [("Visible", way, spot) for way in ("Reflection Front", "Reflection Back")]
-    (tmp_path / "a.xml").write_text(file_of("TensorTree4", blocks))
-    assert knows_the_back(read(tmp_path / "a.xml"))
-
-    def quarter(wi: Floats, wo: Floats) -> Floats:
-        return np.asarray((wi[..., 2] * wo[..., 2] > 0) * (wi[..., 0] < 0) * (wi[..., 1] > 0) * 0.1)[..., None]
-
-    assert knows_the_back(FormulaTable(quarter))
-    assert not knows_the_back(FormulaTable(lambda wi, wo: (wi[..., 2:] > 0) * 0.1))
-
-
-def test_both_sides_of_a_material_are_equal(tmp_path: Path, small: Callable[[int], None]) -> None:
-    small(14)
-    tensor_tree.write(BRUSHED, tmp_path / "a.xml")
-    rank, trees = read_by_hand(tmp_path / "a.xml")
-    assert rank == 4 and set(trees) == {("Visible", way) for way in WAYS}
-    assert trees["Visible", "Reflection Back"] == trees["Visible", "Reflection Front"]
-    wi, wo = steep_pairs(200, 5)
-    table = read(tmp_path / "a.xml")
-    np.testing.assert_allclose(table.eval(wi, wo * FLIP_Z), 0.2 / np.pi, rtol=1e-5)
-    brushed, turned = (
-        MaterialBSDF(BRUSHED).eval(*pair)[:, 0] for pair in ((wi, wo), (wi[:, [1, 0, 2]], wo[:, [1, 0, 2]]))
-    )
-    written = table.eval(wi, wo)[:, 0]
-    assert np.abs(written - brushed).mean() < np.abs(written - turned).mean() / 4
 
 
 def test_what_cannot_be_written(tmp_path: Path, small: Callable[[int], None]) -> None:

@@ -16,15 +16,6 @@ def test_band_means_are_integrals() -> None:
     assert np.allclose(means, exact[:, None], rtol=1e-6)
 
 
-def test_a_moving_peak_does_not_pop() -> None:
-    """A peak narrower than a band keeps its sum over the bands wherever it is."""
-    sums = [
-        Curve.of(lambda x, at=at: np.exp(-(((x - at) / 0.004) ** 2))).band_means(64).sum() * END_RAD / 64
-        for at in np.linspace(0.5, 0.55, 41)
-    ]
-    assert np.ptp(sums) < 1e-6 * np.mean(sums)
-
-
 def test_channels_and_constant_ends() -> None:
     curve = Curve.through(np.array([0.2, 0.4]), np.array([[1, 2, 3], [3, 2, 1.0]]))
     assert np.allclose(curve.at(np.array([0.0, 0.3, 1.0])), [[1, 2, 3], [2, 2, 2], [3, 2, 1]], atol=1e-3)
@@ -41,15 +32,6 @@ def test_values_are_checked_and_read_only() -> None:
     with pytest.raises(ValueError, match="read-only"):
         Curve.constant().values[0] = 2
     assert len(angles_rad()) == KNOTS + 1
-
-
-@pytest.mark.parametrize("width", [0.03, 0.06, 0.3])
-def test_lines_between_nodes_follow_smooth_curves_better_than_steps(width: float) -> None:
-    curve, nodes = Curve.of(lambda x: np.exp(-((np.tan(x) / width) ** 2))), 128
-    lines = Curve.through((np.arange(nodes) + 0.5) * END_RAD / nodes, curve.node_values(nodes)).values
-    steps = curve.band_means(nodes)[np.minimum(np.arange(KNOTS + 1) * nodes // KNOTS, nodes - 1)]
-    errors = [np.abs(found - curve.values).mean() for found in (lines, steps)]
-    assert errors[0] < 0.2 * errors[1]
 
 
 @pytest.mark.parametrize(("nodes", "polar"), [(16, 2), (128, 1)])

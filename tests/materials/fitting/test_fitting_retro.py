@@ -15,7 +15,6 @@ from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.parameters import box_of, check, to_search
 from lambent.materials.fitting.problem import Candidate, Mixture, problem_of
-from lambent.materials.fitting.shown.slices import slices
 from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, synthesise
 from lambent.materials.measured.tables.retro import towards_light
@@ -77,17 +76,6 @@ def test_it_is_not_tried_where_nothing_is_brighter_near_the_light():
     assert not any("retro" in note for note in result.material.provenance.notes)
 
 
-def test_it_is_not_taken_for_little():
-    """Faint, but seen: the note says how little it would remove."""
-    faint = BEADS.lobes[1].model_copy(update={"k": (0.0004,) * 3})
-    material = BEADS.model_copy(update={"lobes": (BEADS.lobes[0], faint)})
-    samples = synthesise(material, replace(SETUP, noise=0.1)).samples()
-    result = fit(samples, ranges={"r_mx": (0.01, 0.1)})
-    assert not any(lobe.retro for lobe in result.material.lobes)
-    assert any("not added" in note for note in result.material.provenance.notes)
-    assert fit(samples, retro=True).material.lobes[-1].retro
-
-
 def test_its_parameters_have_names(beads):
     check({"r_mx": 0.002, "r_alpha": -3.0, "kr": 0.2}, {}, lobes=1)
     with pytest.raises(UserError, match="out of bounds"):
@@ -119,9 +107,3 @@ def test_the_problem_evaluates_as_the_document_does(beads):
     found = problem.evaluate(Mixture(np.array(BEADS.kd), tuple(lobes)))
     np.testing.assert_allclose(found.T, MaterialBSDF(BEADS).eval(beads.wi, beads.wo), rtol=1e-6)
     assert box_of("retro", 0, True, 1, {}, {}).retro
-
-
-def test_slices_about_its_optimum(beads):
-    material = fit(beads).material
-    for one in slices(beads, material, 1, METRICS["cuberoot"], steps=5):
-        assert np.unravel_index(one.error.argmin(), one.error.shape) != (0, 0) and np.isfinite(one.error).all()

@@ -9,10 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lambent.materials.measured import load
 from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, synthesise
 from lambent.materials.measured.parts.gonio_text import write_gonio
+from lambent.materials.measured.protocol import MeasuredTable
 from tests.materials.measured.measured_files import (
     GLOSSY,
+    Loaded,
     cornell_rows,
     cornell_text,
     merl_bytes,
@@ -32,6 +35,17 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     paths["cornell"].write_text(cornell_text(cornell_rows(), np.linspace(400, 700, 5)))
     write_gonio(paths["gonio"], synthesise(GLOSSY, coarse))
     return paths
+
+
+@pytest.fixture
+def loaded(tmp_path: Path) -> Loaded:
+    """The table of a file of the given content."""
+
+    def table(content: str | bytes, name: str = "a.bsdf") -> MeasuredTable:
+        (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
+        return load(tmp_path / name)
+
+    return table
 
 
 @pytest.fixture

@@ -13,15 +13,18 @@ from lambent.materials.measured.parts.gonio_text import write_gonio
 from tests.materials.measured.lbnl_files import angle_basis, lbnl_xml, random_tree, words
 from tests.materials.measured.measured_files import (
     GLOSSY,
+    alta_text,
+    beam,
     cornell_rows,
     cornell_text,
+    ddr,
     fred_text,
+    lighttools,
     merl_bytes,
     rgl_fields,
     tensor_bytes,
     zemax_text,
 )
-from tests.materials.measured.vendor_files import alta_text, beam, ddr, lighttools
 
 
 def seeds() -> dict[str, list[bytes]]:

@@ -11,7 +11,7 @@ from lambent.core.errors import UserError
 from lambent.core.geometry.directions import angles, direction, half_vector
 from lambent.materials.measured import load
 from lambent.materials.measured.parts.alta_directions import PARAMETRISATIONS
-from tests.materials.measured.vendor_files import alta_text
+from tests.materials.measured.measured_files import Loaded, alta_text
 
 
 def f_of(wi, wo):
@@ -71,21 +71,17 @@ def test_parametrisations_are_those_of_alta(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", FULL)
-def test_files_give_the_values_at_their_own_pairs(tmp_path: Path, name: str) -> None:
+def test_files_give_the_values_at_their_own_pairs(loaded: Loaded, name: str) -> None:
     light, view = pairs(300)
-    path = tmp_path / "felt.alta"
-    path.write_text(alta_text(name, np.stack(columns_of(light, view)[name], axis=-1), f_of(light, view)))
-    table = load(path)
+    table = loaded(alta_text(name, np.stack(columns_of(light, view)[name], axis=-1), f_of(light, view)), "felt.alta")
     assert table.info.format == "ALTA text" and name in table.info.notes[0] and len(table.samples()) > 250
     np.testing.assert_allclose(table.eval(light, view)[:, 0], f_of(light, view), rtol=1e-4)
 
 
-def test_known_answers_by_hand(tmp_path: Path) -> None:
+def test_known_answers_by_hand(loaded: Loaded) -> None:
     """theta_h = 30 degrees, theta_d = 0: light and view are both at 30 degrees. theta_d alone: they straddle n."""
     rows = [f"{np.radians(30):.9f} 0 0 0.7", f"0 {np.radians(50):.9f} 0 0.3", f"1.2 1.2 {np.pi:.9f} .9"]
-    path = tmp_path / "a.txt"
-    path.write_text("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n" + "\n".join(rows) + "\n")
-    table = load(path)
+    table = loaded("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n" + "\n".join(rows) + "\n")
     at30, left, right = direction(np.radians([30, 50, 50]), [0.4, 0.4, 0.4 + np.pi])
     assert float(table.eval(at30, at30)[0]) == pytest.approx(0.7, rel=1e-6)
     assert float(table.eval(left, right)[0]) == pytest.approx(0.3, rel=1e-6)
@@ -98,10 +94,8 @@ def grid_text(out: str, values, vs: str = "", count: int = 3) -> str:
     return alta_text("ISOTROPIC_TV_TL_DPHI", rows, values(direction(tl, dphi), direction(tv, 0 * tv)), out, vs)
 
 
-def test_incident_angles_of_their_own_make_a_gonio_table(tmp_path: Path) -> None:
-    path = tmp_path / "a.alta"
-    path.write_text(grid_text("INV_STERADIAN", f_of))
-    table = load(path)
+def test_incident_angles_of_their_own_make_a_gonio_table(loaded: Loaded) -> None:
+    table = loaded(grid_text("INV_STERADIAN", f_of))
     assert table.info.sizes["theta_i"] == 2 and table.info.isotropic and table.info.channels == 1
     wi, wo = direction(0.8, 0.0), direction(0.9, 0.7)
     np.testing.assert_allclose(table.eval(wi, wo), f_of(wi, wo), rtol=1e-4)
@@ -111,18 +105,20 @@ def test_incident_angles_of_their_own_make_a_gonio_table(tmp_path: Path) -> None
     ("out", "stored", "factor"),
     [("INV_STERADIAN", "f", 1.0), ("INV_STERADIAN_COSINE_FACTOR", "f_cos", np.cos(0.9)), ("RGB_COLOR", "f", 1.0)],
 )
-def test_quantities(tmp_path: Path, out: str, stored: str, factor: float) -> None:
-    path = tmp_path / "a.alta"
-    path.write_text(grid_text(out, lambda wi, wo: np.full((len(wi), 3), (0.3, 0.2, 0.1))))
-    table = load(path)
+def test_quantities(loaded: Loaded, out: str, stored: str, factor: float) -> None:
+    table = loaded(grid_text(out, lambda wi, wo: np.full((len(wi), 3), (0.3, 0.2, 0.1))))
     assert table.info.stored == stored and table.info.channels == 3
     np.testing.assert_allclose(table.eval(direction(0.8, 0), direction(0.9, 0.7)) * factor, (0.3, 0.2, 0.1), rtol=1e-5)
 
 
-def test_white_xyz_is_white(tmp_path: Path) -> None:
-    path = tmp_path / "a.alta"
-    path.write_text(grid_text("XYZ_COLOR", lambda wi, wo: np.full((len(wi), 3), (0.95047, 1.0, 1.08883)) * 0.4))
-    np.testing.assert_allclose(load(path).eval(direction(0.8, 0), direction(0.9, 0.7)), [0.4] * 3, rtol=2e-3)
+def test_white_xyz_is_white(loaded: Loaded) -> None:
+    np.testing.assert_allclose(
+        loaded(grid_text("XYZ_COLOR", lambda wi, wo: np.full((len(wi), 3), (0.95047, 1.0, 1.08883)) * 0.4)).eval(
+            direction(0.8, 0), direction(0.9, 0.7)
+        ),
+        [0.4] * 3,
+        rtol=2e-3,
+    )
 
 
 @pytest.mark.parametrize(("vs", "further"), [("0", 0), ("1", 1), ("2", 2), ("1 1 1", 3), ("2 2 2", 6)])
@@ -148,12 +144,10 @@ def test_what_the_next_file_looks_like(tmp_path: Path) -> None:
     np.testing.assert_allclose(load(path).eval(wi, wo), f_of(wi, wo), rtol=1e-4)
 
 
-def test_bivariate_tables_hold_at_every_azimuth(tmp_path: Path) -> None:
+def test_bivariate_tables_hold_at_every_azimuth(loaded: Loaded) -> None:
     th, td = (a.ravel() for a in np.meshgrid(np.radians(np.arange(0, 81, 4)), np.radians(np.arange(0, 81, 4))))
     for name, columns in (("RUSIN_TH_TD", (th, td)), ("COS_TH_TD", (np.cos(th), np.cos(td)))):
-        path = tmp_path / "a.alta"
-        path.write_text(alta_text(name, np.stack(columns, axis=-1), 0.1 + np.cos(th) ** 20))
-        table = load(path)
+        table = loaded(alta_text(name, np.stack(columns, axis=-1), 0.1 + np.cos(th) ** 20))
         assert any("without an azimuth" in note for note in table.info.notes)
         light, view = pairs(200, seed=1)
         expected = 0.1 + half_vector(light, view)[:, 2] ** 20
@@ -167,7 +161,6 @@ def test_bivariate_tables_hold_at_every_azimuth(tmp_path: Path) -> None:
     [
         ("#DIM 1 3\n#PARAM_IN COS_TH\n#PARAM_OUT RGB_COLOR\n0.9 .1 .2 .3\n", "slice.*COS_TH.*half vector alone"),
         ("#DIM 1 1\n#PARAM_IN COS_TLR\n#PARAM_OUT INV_STERADIAN\n0.9 .1\n", "slice.*mirrored view alone"),
-        ("#DIM 3 1\n#PARAM_IN RUSIN_VH\n#PARAM_OUT INV_STERADIAN\n0 0 1 .1\n", "slice.*half vector alone"),
         ("#DIM 1 1\n0.5 2.5\n", "curve over one variable"),
         ("#PARAM_IN UNKNOWN_PARAMETRIZATION \n#DIM 1 1 \n#VS 2 \n 0.1 1 .5 1.5\n", "curve over one variable"),
         ("#ALTA FUNC HEADER\n#DIM 3 3\n#PARAM_IN COS_TH\n#ALTA HEADER END\n\n#FUNC lafortune\n1 2\n", "fitted by ALTA"),
@@ -177,15 +170,10 @@ def test_bivariate_tables_hold_at_every_azimuth(tmp_path: Path) -> None:
         ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n0 0 0 1\n", "PARAM_OUT: quantity.*is not stated.*INV_STERADIAN"),
         ("#DIM 3 7\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n" + "0 " * 10, "wavelengths"),
         ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n0 0 0 1 2\n", "wrong number of columns"),
-        ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n0 0 0 x\n", "not a number; found x"),
-        ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n0 0 0,2 1\n", "decimal commas|columns"),
         ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n30 20 90 1\n", "more than a turn.*radians"),
-        ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n", "no rows"),
         ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n1.5 1.5 3 1\n", "above the horizon"),
     ],
 )  # fmt: skip
-def test_refusals_say_what_the_file_is(tmp_path: Path, text: str, said: str) -> None:
-    path = tmp_path / "a.alta"
-    path.write_text(text)
+def test_refusals_say_what_the_file_is(loaded: Loaded, text: str, said: str) -> None:
     with pytest.raises(UserError, match=said):
-        load(path)
+        loaded(text)

@@ -10,7 +10,7 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.materials.measured import load
 from lambent.materials.measured.parts.spectral import rgb_of_spectra
-from tests.materials.measured.measured_files import cornell_rows, cornell_text
+from tests.materials.measured.measured_files import Loaded, cornell_rows, cornell_text
 
 BANDS_NM = np.linspace(400, 700, 31)
 
@@ -45,20 +45,10 @@ def test_real_files(shared_data: Path, name: str) -> None:
     assert any("saturated" in note for note in table.info.notes)
 
 
-def test_constant_material(tmp_path: Path, hemisphere) -> None:
-    path = tmp_path / "a"
-    path.write_text(cornell_text(cornell_rows(0.2), np.linspace(400, 700, 5)))
-    table = load(path)
-    np.testing.assert_allclose(table.eval(hemisphere(50, 1), hemisphere(50, 2)), 0.2, rtol=1e-6)
-    np.testing.assert_allclose(table.albedo(np.array([0, 0, 1.0])), 0.2 * np.pi, rtol=5e-3)
-
-
-def test_bad_samples_are_counted(tmp_path: Path) -> None:
+def test_bad_samples_are_counted(loaded: Loaded) -> None:
     rows = cornell_rows()
     rows[3, 5], rows[4, 6], rows[5, 6] = np.nan, -0.1, -0.2
-    path = tmp_path / "a"
-    path.write_text(cornell_text(rows, np.linspace(400, 700, 5)))
-    samples = load(path).samples()
+    samples = loaded(cornell_text(rows, np.linspace(400, 700, 5))).samples()
     assert (len(samples), samples.left_out.shadowed) == (len(rows) - 1, 1)
     assert (samples.f[[3, 4], 1] < 0.1).all()  # their green reading is below zero
     np.testing.assert_allclose(np.delete(samples.f, [3, 4], axis=0), 0.2, rtol=1e-6)
@@ -74,8 +64,6 @@ def test_bad_samples_are_counted(tmp_path: Path) -> None:
         (lambda text: text.replace(" 0.2 0.2 0.2 0.2 0.2", " -1 nan -1 -1 -1"), "no measured value"),
     ],
 )
-def test_broken_files(tmp_path: Path, change, expected: str) -> None:
-    path = tmp_path / "a"
-    path.write_text(change(cornell_text(cornell_rows(), np.linspace(400, 700, 5))))
+def test_broken_files(loaded: Loaded, change, expected: str) -> None:
     with pytest.raises(UserError, match=expected):
-        load(path)
+        loaded(change(cornell_text(cornell_rows(), np.linspace(400, 700, 5))))

@@ -78,16 +78,6 @@ def test_curves_and_quotient_are_the_textures(tmp_path: Path, uneven: float) -> 
     assert np.allclose(p, 0.4 + 0.3 * np.sin(np.radians([5.0, 30, 60])), atol=0.01)
 
 
-def test_an_edit_of_p_counts_for_light_and_viewer(tmp_path: Path) -> None:
-    factors(tmp_path)
-    (tmp_path / "alpha").write_text(ALPHA)
-    editable = editable_of(tmp_path / "alpha").editable
-    curve = editable.curves["P"]
-    doubled = editable.with_curve("P", type(curve)(2 * curve.values))
-    wi, wo = direction(0.3, 1.0), direction(0.9, 0.0)
-    assert np.allclose(doubled.eval(wi, wo), 4 * editable.eval(wi, wo))
-
-
 BROKEN = {
     "textures P and Q; found 0 pairs": ("alpha", ALPHA, ()),
     "textures P and Q; found 2 pairs": ("alpha", ALPHA, (("ap.png", "aq.png"), ("bp.png", "bq.png"))),

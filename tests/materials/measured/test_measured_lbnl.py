@@ -48,7 +48,7 @@ def agree(path: Path, folder: Path, n: int = 1000, tolerance: float = JITTER, un
 
     `unhandled`: Radiance does not integrate what it evaluates when a rank 3 tree is used backwards; it says 0.
     """
-    table = read(path)
+    table = load(path)
     asked = angles_away_from_borders(n)
     answers = ask_radiance(path, folder, asked, asked[:300, :2])
     f = grey(table.eval(towards(asked[:, :2]), towards(asked[:, 2:])))
@@ -129,12 +129,9 @@ def test_random_trees_agree_with_radiance(tmp_path: Path, rank: int) -> None:
     ("structure", "only", "other"),
     [
         ("Columns", "Front", "absent"),
-        ("Columns", "Back", "absent"),
-        ("Columns", "Front", "zero"),
+        ("Columns", "Back", "zero"),
         ("TensorTree3", "Front", "zero"),
-        ("TensorTree3", "Back", "absent"),
-        ("TensorTree4", "Front", "absent"),
-        ("TensorTree4", "Back", "zero"),
+        ("TensorTree4", "Back", "absent"),
     ],
 )
 def test_missing_transmission_follows_by_reciprocity(tmp_path: Path, structure: str, only: str, other: str) -> None:
@@ -149,7 +146,7 @@ def test_missing_transmission_follows_by_reciprocity(tmp_path: Path, structure: 
     blocks += [("Visible", f"Transmission {missing}", zero)] if other == "zero" else []
     path = tmp_path / "r.xml"
     path.write_text(lbnl_xml(structure, blocks))
-    table = read(path)
+    table = load(path)
     asked = angles_away_from_borders(300)
     answers = ask_radiance(path, tmp_path, asked, asked[:100, :2])
     wi, wo = towards(asked[:, :2]), towards(asked[:, 2:])

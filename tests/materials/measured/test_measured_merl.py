@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +10,7 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.materials.measured import load
 from lambent.materials.measured.merl import directions_of, half_difference_angles
-from tests.materials.measured.measured_files import merl_bytes
+from tests.materials.measured.measured_files import Loaded, merl_bytes
 
 SHAPE = (30, 20, 24)
 
@@ -45,12 +42,6 @@ def test_the_last_bin_of_phi_d_is_followed_by_the_first(tmp_path: Path) -> None:
     np.testing.assert_allclose(table.eval(wi, wo), f[4:8, 3:6, [0, -1]].mean(axis=2), rtol=1e-5)
 
 
-def test_bins_follow_the_square_root() -> None:
-    """theta_h = floor(90 sqrt(2 theta_h / pi)): the map that MERL's own look-up code uses."""
-    theta_h = np.radians([0.0, 0.02, 1.0, 22.5, 89.9])
-    np.testing.assert_array_equal(np.floor(90 * np.sqrt(2 * theta_h / np.pi)), [0, 1, 9, 45, 89])
-
-
 def test_angles_round_trip_and_reciprocity(hemisphere, tmp_path: Path) -> None:
     theta_h, theta_d, phi_d = (a.ravel() for a in _centres())
     for value, expected in zip(
@@ -71,23 +62,20 @@ def test_white_lambert_has_albedo_one(tmp_path: Path) -> None:
     assert table.samples().weight.sum() == pytest.approx(cap**2, rel=0.02)
 
 
-def test_holes_in_any_channel_are_counted_and_filled(tmp_path: Path) -> None:
+def test_holes_in_any_channel_are_counted_and_filled(loaded: Loaded) -> None:
     f = np.full((*SHAPE, 3), 0.5)
     f[3, 4, 5, 1] = np.nan
     raw = bytearray(merl_bytes(f))
     raw[12 + 8 * 7 : 12 + 8 * 8] = np.array([np.nan]).tobytes()
-    path = tmp_path / "a"
-    path.write_bytes(raw)
-    table = load(path)
+    table = loaded(raw)
     left_out = table.samples().left_out
     assert (left_out.shadowed, left_out.not_finite) == (1, 1)
     wi, wo = directions_of(*(a[3, 4, 5] for a in _centres()))
     np.testing.assert_allclose(table.eval(wi, wo), 0.5, rtol=1e-5)
 
 
-def test_broken_files(tmp_path: Path) -> None:
+def test_broken_files(loaded: Loaded) -> None:
     good = merl_bytes(np.full((90, 90, 180, 3), 0.1))
-    path = tmp_path / "a"
     for content, expected in (
         (good[:-8], "size does not match"),
         (good[:5000], "size does not match"),
@@ -95,24 +83,5 @@ def test_broken_files(tmp_path: Path) -> None:
         (merl_bytes(np.full((4, 4, 4, 3), np.nan)), "no measured value"),
         (np.array([4, 4, 4], "<i4").tobytes() + np.full(192, np.nan).tobytes(), "no measured value"),
     ):
-        path.write_bytes(content)
         with pytest.raises(UserError, match=expected):
-            load(path)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(importlib.util.find_spec("h5py") is None, reason="h5py decodes the neural MERL files")
-def test_neural_merl(shared_data: Path, tmp_path: Path) -> None:
-    folder = shared_data / "measured" / "merl-neural"
-    command = [
-        sys.executable,
-        folder / "decode_nbrdf.py",
-        folder / "merl_nbrdf_subset.zip",
-        "alum-bronze",
-        tmp_path / "a",
-    ]
-    subprocess.run(command, check=True)
-    table = load(tmp_path / "a")
-    albedo = table.albedo(np.array([[0.0, 0.0, 1.0], [0.5, 0.0, np.sqrt(0.75)]]))
-    assert ((albedo > 0.05) & (albedo < 1)).all()
-    assert table.samples(10000).left_out.shadowed >= 0
+            loaded(content)

@@ -1,4 +1,4 @@
-"""RGL: the numpy evaluation equals Mitsuba's `measured` plugin; samples agree with eval."""
+"""RGL: evaluation equals Mitsuba's `measured` plugin, samples agree with it, and azimuths wrap round without a step."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from lambent.core.errors import UserError
+from lambent.core.geometry.directions import direction
 from lambent.materials.measured import load
+from lambent.materials.measured.parts.azimuths import Azimuths
 from lambent.materials.measured.tables.marginal import Corners, Warp
-from tests.materials.measured.measured_files import rgl_fields, tensor_bytes
+from tests.materials.measured.measured_files import Loaded, rgl_fields, tensor_bytes
 from tests.tools.in_mitsuba import f_cos
 
 REAL = ("paper_white_rgb", "satin_rosaline_rgb", "cc_ibiza_sunset_rgb")
@@ -106,22 +108,9 @@ def test_warp_inverts_itself(seed: int, u: float, v: float) -> None:
         ({"ndf": np.zeros((1, 8), np.float32)}, "too small"),
     ],
 )
-def test_impossible_tensors(tmp_path: Path, change: dict[str, np.ndarray], expected: str) -> None:
-    path = tmp_path / "a"
-    path.write_bytes(tensor_bytes(rgl_fields(np.zeros(1)) | change))
+def test_impossible_tensors(loaded: Loaded, change: dict[str, np.ndarray], expected: str) -> None:
     with pytest.raises(UserError, match=expected):
-        load(path)
-
-
-def test_few_bad_nodes_are_counted(tmp_path: Path) -> None:
-    fields = rgl_fields(np.zeros(1))
-    fields["rgb"][0, 1, 0, 3, 3] = np.nan
-    fields["rgb"][0, 1, 0, 3, 2] = -0.1
-    path = tmp_path / "a"
-    path.write_bytes(tensor_bytes(fields))
-    table = load(path)
-    samples = table.samples()
-    assert (samples.left_out.not_finite, samples.below_zero) == (1, 1) and len(table.info.notes) == 2
+        loaded(tensor_bytes(rgl_fields(np.zeros(1)) | change))
 
 
 def _flat(phi_i: np.ndarray, ndf: np.ndarray, vndf: float = 1.0) -> dict[str, np.ndarray]:
@@ -143,15 +132,13 @@ def _flat(phi_i: np.ndarray, ndf: np.ndarray, vndf: float = 1.0) -> dict[str, np
 
 @pytest.mark.parametrize("phi_i", [np.zeros(1), np.linspace(-np.pi, np.pi, 5)], ids=["isotropic", "whole"])
 @pytest.mark.parametrize("ndf", [1.0, 0.5])
-def test_nodes_and_weights_of_an_even_warp(tmp_path: Path, phi_i: np.ndarray, ndf: float) -> None:
+def test_nodes_and_weights_of_an_even_warp(loaded: Loaded, phi_i: np.ndarray, ndf: float) -> None:
     """By hand: u = (column, row)/8 is theta_m = u0^2 pi/2 and phi_m = (2 u1 - 1) pi; f cos_o = ndf/4.
 
     The weight is the node's share of the square, 1/64, half of it at each border, times d_wo/du: sin(theta_m)
     d(theta_m)/du0 d(phi_m)/du1 is 2 pi^2 u0 sin(theta_m), and a turn of the half vector turns wo by 4 (wi.m) more.
     """
-    path = tmp_path / "a"
-    path.write_bytes(tensor_bytes(_flat(phi_i, np.full((2, 2), ndf))))
-    samples = load(path).samples()
+    samples = loaded(tensor_bytes(_flat(phi_i, np.full((2, 2), ndf)))).samples()
     expected = []
     for phi in phi_i:
         for theta in (0.0, 0.4, 0.8):
@@ -172,30 +159,105 @@ def test_nodes_and_weights_of_an_even_warp(tmp_path: Path, phi_i: np.ndarray, nd
     assert max(off) < 1e-4, "all columns at once, whatever the order"
 
 
-def test_weights_add_up_to_the_albedo(tmp_path: Path) -> None:
-    """f = 1/pi from the normal: the file holds cos_o/pi times 4 sigma/D; the sum is the albedo up to 84 degrees."""
-    fields = _flat(np.zeros(1), np.ones((2, 2)))
-    fields["rgb"] = np.zeros((1, 3, 3, 65, 65), np.float32)
-    fields["luminance"] = np.ones((1, 3, 65, 65), np.float32)
-    tilt = np.linspace(0, 1, 65) ** 2 * np.pi / 2
-    fields["rgb"][:] = np.maximum(np.cos(2 * tilt), 0) * 4 / np.pi
-    path = tmp_path / "a"
-    path.write_bytes(tensor_bytes(fields))
-    samples = load(path).samples()
-    normal = samples.wi[:, 2] > 0.999
-    total = (samples.p[normal] * samples.weight[normal, None]).sum(axis=0)
-    np.testing.assert_allclose(total, np.sin(np.radians(84)) ** 2, rtol=5e-3)
-
-
-def test_weights_fill_the_hemisphere_whatever_the_warp(tmp_path: Path) -> None:
+def test_weights_fill_the_hemisphere_whatever_the_warp(loaded: Loaded) -> None:
     """Projected solid angles from the normal add up to pi sin^2(84 degrees), also where the nodes crowd together."""
     fields = _flat(np.zeros(1), np.ones((2, 2)))
     fields["vndf"] = np.broadcast_to(np.array([[1.5, 0.3], [0.5, 1.0]], np.float32), (1, 3, 2, 2)).copy()
     fields["rgb"] = np.ones((1, 3, 3, 129, 129), np.float32)
     fields["luminance"] = np.ones((1, 3, 129, 129), np.float32)
-    path = tmp_path / "a"
-    path.write_bytes(tensor_bytes(fields))
-    samples = load(path).samples()
+    samples = loaded(tensor_bytes(fields)).samples()
     normal = samples.wi[:, 2] > 0.999
     total = (samples.wo[normal, 2] * samples.weight[normal]).sum()
     assert total == pytest.approx(np.pi * np.sin(np.radians(84)) ** 2, rel=0.02)
+
+
+OF_PHI_I = {  # nodes of phi_i, and the factor at each; the ends of a period are one direction
+    "isotropic": (np.zeros(1), np.ones(1)),
+    "half": (np.linspace(-np.pi, 0, 4), np.array([1.0, 0.4, 0.7, 1.0])),
+    "whole": (np.linspace(-np.pi, np.pi, 6), np.array([1.0, 0.4, 0.7, 0.2, 0.5, 1.0])),
+}
+OF_PHI_M = np.array([0.9, 0.3, 0.6, 0.8, 0.9, 0.3, 0.6, 0.8, 0.9])  # at phi_m = -pi to pi; half a turn changes nothing
+
+
+def file_bytes(phi_i: np.ndarray, factors: np.ndarray) -> bytes:
+    """An even warp, D = sigma = 1: f cos_o is a quarter of the factor at phi_i times that at phi_m."""
+    theta_i = np.array([0.0, 0.8, 1.5], np.float32)
+    incident = (len(phi_i), len(theta_i))
+    rgb = factors[:, None, None, None, None] * OF_PHI_M[:, None] * np.ones((*incident, 3, 9, 9))
+    ones = {"ndf": (2, 2), "sigma": (2, 2), "vndf": (*incident, 2, 2), "luminance": (*incident, 9, 9)}
+    return tensor_bytes(
+        {
+            "description": np.frombuffer(b"seams", dtype=np.uint8),
+            "phi_i": phi_i.astype(np.float32),
+            "theta_i": theta_i,
+            "rgb": rgb.astype(np.float32),
+            "jacobian": np.array([1], dtype=np.uint8),
+            **{name: np.ones(shape, np.float32) for name, shape in ones.items()},
+        }
+    )
+
+
+def mirrored_at(m: np.ndarray, wi: np.ndarray) -> np.ndarray:
+    return 2 * (wi * m).sum(axis=1, keepdims=True) * m - wi
+
+
+@pytest.mark.parametrize("kind", OF_PHI_I)
+def test_round_a_whole_turn(tmp_path: Path, kind: str) -> None:
+    """Light and half vector turn round independently, through every seam; every value is interpolated by hand."""
+    nodes, factors = OF_PHI_I[kind]
+    path = tmp_path / "a.bsdf"
+    path.write_bytes(file_bytes(nodes, factors))
+    phi_i, phi_m = (grid.ravel() for grid in np.meshgrid(np.linspace(-3.5, 3.5, 141), np.linspace(-3.3, 3.3, 67)))
+    wi = direction(np.full(len(phi_i), 0.3), phi_i)
+    wo = mirrored_at(direction(np.full(len(phi_m), 0.2), phi_m), wi)
+    turn = {"isotropic": 2 * np.pi, "half": np.pi, "whole": 2 * np.pi}[kind]
+    turned = phi_i if kind == "isotropic" else 0.0
+    at_i = np.interp((phi_i + np.pi) % turn - np.pi, nodes, factors)
+    at_m = np.interp((phi_m - turned + np.pi) % (2 * np.pi), np.linspace(0, 2 * np.pi, 9), OF_PHI_M)
+    found = load(path).eval(wi, wo) * wo[:, 2:] * 4
+    np.testing.assert_allclose(found, np.repeat((at_i * at_m)[:, None], 3, axis=1), atol=2e-5)
+
+
+OPEN = {  # nodes without the closing one; factors at them and at their images
+    "whole": (np.radians(np.arange(-180, 180, 45.0)), 2 * np.pi),
+    "whole from 0": (np.radians(np.arange(0, 360, 30.0)), 2 * np.pi),
+    "half": (np.radians(np.arange(-180, 0, 30.0)), np.pi),
+    "half from 0": (np.radians(np.arange(0, 180, 22.5)), np.pi),
+    "half, uneven": (np.radians([-180.0, -150.0, -130.0, -100.0, -60.0, -30.0]), np.pi),
+}
+
+
+@pytest.mark.parametrize("kind", OPEN)
+def test_the_closing_node_may_be_left_out(tmp_path: Path, kind: str) -> None:
+    """f goes from the last node to the image of the first in a straight line, as with the node it does."""
+    nodes, period = OPEN[kind]
+    factors = np.linspace(0.2, 1.0, len(nodes))
+    path = tmp_path / "a.bsdf"
+    path.write_bytes(file_bytes(nodes, factors))
+    phi_i = np.linspace(-3.5, 6.5, 401)
+    wi, m = direction(np.full(401, 0.5), phi_i), direction(np.full(401, 0.2), np.full(401, 1.1))
+    wo = mirrored_at(m, wi)
+    closed = np.append(nodes, nodes[0] + period), np.append(factors, factors[0])
+    at_i = np.interp((phi_i - nodes[0]) % period + nodes[0], *closed)
+    at_m = np.interp(1.1 + np.pi, np.linspace(0, 2 * np.pi, 9), OF_PHI_M)
+    found = load(path).eval(wi, wo)[:, 0] * wo[:, 2] * 4
+    np.testing.assert_allclose(found, at_i * at_m, atol=1e-4)
+
+
+@pytest.mark.parametrize("begin", [-180, -90, 0, 90, 270])
+def test_a_quarter_is_mirrored_with_and_without_its_ends(begin: float) -> None:
+    """A function of |cos| is mirrored in x and y; between a node and its image it is that of the node."""
+    wi = direction(np.full(721, 0.7), np.linspace(-np.pi, np.pi, 721))
+    for nodes_deg in ([0, 30, 60, 90], [0, 30, 60], [15, 45, 75]):
+        nodes = np.radians(begin + np.array(nodes_deg, float))
+        azimuths = Azimuths.of(nodes)
+        assert azimuths.parts == 4
+        folded, _, phi = azimuths.folded(wi, wi)
+        np.testing.assert_allclose(direction(np.full(721, 0.7), phi), folded, atol=1e-12)
+        np.testing.assert_allclose(np.abs(folded), np.abs(wi))
+        value, (flip, there, share) = np.interp(phi, nodes, np.cos(nodes) ** 2), azimuths.beyond(phi)
+        np.testing.assert_allclose(
+            direction(np.full(721, 0.7), there)[share > 0], (folded * flip)[share > 0], atol=1e-12
+        )
+        found = value + share * (np.interp(there, nodes, np.cos(nodes) ** 2) - value)
+        assert share.max() <= 0.5 + 1e-9 and np.abs(np.diff(found)).max() < 0.02, "no step"

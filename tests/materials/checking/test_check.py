@@ -1,4 +1,4 @@
-"""The check names faults and passes sound materials."""
+"""The check names faults and passes sound materials; every energy warning comes well below twice the light."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ import json
 import numpy as np
 import pytest
 
-from lambent.materials.bsdf import MaterialBSDF
+from lambent.core.geometry.directions import direction
+from lambent.materials.bsdf import MaterialBSDF, more_than_arrives
 from lambent.materials.checking import check as module
 from lambent.materials.checking.check import check, check_sampler, furnace
 from lambent.materials.document import Lobe, Material
+from lambent.materials.fitting.fit import fit
+from tests.materials.fitting.known_answers import FEW, PAINT, grey
 
 FOIL = Material(
     kd=0.76,
@@ -24,8 +27,9 @@ BRUSHED = Material(lobes=(Lobe(k=0.98, mx=0.0068, my=0.0297, r0=0.84, alpha=0.49
 
 @pytest.fixture
 def quick(monkeypatch):
-    """One wo for the sampler, for speed."""
+    """One wo for the sampler, and two azimuths of the furnace, for speed."""
     monkeypatch.setattr(module, "SAMPLER_THETA_DEG", (45.0,))
+    monkeypatch.setattr(module, "PHI_DEG", (0.0, 90.0))
 
 
 def test_a_published_metal_passes_and_the_report_is_json():
@@ -70,12 +74,12 @@ class LeavesAPartUnsampled(MaterialBSDF):
 
 
 @pytest.mark.parametrize(
-    ("kind", "complaint"),
-    [(NotReciprocal, "not reciprocal"), (WrongPdf, "do not follow the density"), (WrongPdf, "by quadrature")],
+    ("kind", "complaints"),
+    [(NotReciprocal, ["not reciprocal"]), (WrongPdf, ["do not follow the density", "by quadrature"])],
 )
-def test_faults_are_named(quick, kind, complaint):
-    report = check(kind(Material(kd=0.5, lobes=(Lobe(mx=0.3, my=0.2),))))
-    assert any(complaint in failure for failure in report.failures), report.failures
+def test_faults_are_named(quick, kind, complaints):
+    said = "; ".join(check(kind(Material(kd=0.5, lobes=(Lobe(mx=0.3, my=0.2),)))).failures)
+    assert all(complaint in said for complaint in complaints), said
 
 
 def test_an_unsampled_part_shows_in_the_two_albedos(quick):
@@ -102,3 +106,17 @@ def test_the_check_is_deterministic_and_shows_progress(quick):
     first = check(FOIL, seed=3, progress=lambda done, total, what: seen.append((done, total, what)))
     assert first.to_json() == check(FOIL, seed=3).to_json()
     assert seen[0][0] == 0 and seen[-1][0] == seen[-1][1]
+
+
+@pytest.mark.parametrize(("albedo", "warned"), [(0.9, False), (1.0, False), (1.005, False), (1.02, True), (1.5, True)])
+def test_two_per_cent_more_than_arrives_are_too_many(albedo: float, warned: bool) -> None:
+    assert more_than_arrives(np.array([0.2, albedo])).tolist() == [False, warned]
+
+
+@pytest.mark.parametrize(("kd", "warned"), [(0.5, False), (1.0, True)])
+def test_a_fit_says_that_it_returns_more_than_arrives(kd: float, warned: bool) -> None:
+    result = fit(grey(PAINT, FEW), fix={"kd": kd, "ks": 0.7, "mx": 0.15, "r0": 0.06, "alpha": 0.0})
+    theta = np.radians([0.0, 45.0, 80.0])
+    highest = MaterialBSDF(result.material).albedo(direction(theta, 0.0)).max()
+    assert 1.02 < highest < 1.5 if warned else highest < 0.99
+    assert any("scatters more light than it receives" in line for line in result.warnings) is warned

@@ -1,4 +1,4 @@
-"""The dense grid agrees with the table, and its sampler with its density."""
+"""The dense grid agrees with the table, its sampler with its density, and a table on it is a BSDF."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ import pytest
 
 from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF, components
+from lambent.materials.checking import check
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.protocol import TableInfo
 from lambent.materials.measured.tables import half_vector_resampling
 from lambent.materials.measured.tables.half_vector_grid import GridShape
 from lambent.materials.measured.tables.half_vector_resampling import grid_of
+from lambent.materials.measured.tables.table_bsdf import TableBSDF
+from tests.materials.export.formula_table import FormulaTable
 
 SMALL = GridShape(12, 8, 64, 32)
 
@@ -110,3 +113,37 @@ def test_the_albedo_by_sampling_is_the_models(theta_deg):
     gain = np.divide(np.abs(wi[:, 2]), pdf, out=np.zeros_like(pdf), where=pdf > 0)
     expected = table.bsdf.albedo(wo[0], samples=200_000)
     np.testing.assert_allclose((table.eval(wi, wo) * gain[:, None]).mean(axis=0), expected, rtol=0.01)
+
+
+COATED = MaterialBSDF(
+    Material(
+        kd=(0.1, 0.2, 0.3),
+        lobes=(
+            Lobe(mx=0.3, my=0.3, k=0.5, r0=(0.8, 0.6, 0.4), alpha=0.2),
+            Lobe(side="transmission", mx=0.4, my=0.4, k=0.4, r0=0.1),
+        ),
+    )
+)
+
+
+@pytest.fixture(scope="module")
+def lit_from_above():
+    """The BSDF of a table without gaps, measured with light from above."""
+    table = FormulaTable(
+        lambda wi, wo: np.where(wi[..., 2:] > 0, COATED.eval(wi, wo), 0.0), channels=3, isotropic=True, transmits=True
+    )
+    return TableBSDF(table, GridShape(24, 1, 64, 32))
+
+
+@pytest.mark.parametrize("theta_deg", [0.0, 60.0, 120.0])
+def test_a_table_as_bsdf_passes_the_check_of_samplers(lit_from_above, theta_deg):
+    one = check.check_sampler(lit_from_above, theta_deg, 20.0, samples=200_000)
+    assert one.p_value > 1e-4
+    assert abs(one.pdf_integral + one.rejected_share - 1) < check.INTEGRAL_LIMIT
+    assert abs(one.albedo_sampled - one.albedo_quadrature) < 5 * one.albedo_error + 2e-3 * one.albedo_quadrature
+
+
+def test_light_from_below_is_the_mirrored_pair(lit_from_above):
+    wi, wo, down = direction(np.radians(40), 0.7), direction(np.radians([20, 70, 110]), [0.1, 2, 4]), (1, 1, -1)
+    np.testing.assert_array_equal(lit_from_above.eval(wi, wo), lit_from_above.eval(wi * down, wo * down))
+    assert lit_from_above.eval(wi, wo).min() > 0

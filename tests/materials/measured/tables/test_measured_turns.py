@@ -9,7 +9,7 @@ import pytest
 
 from lambent.core.geometry.directions import direction
 from lambent.materials.measured import load
-from tests.materials.measured.measured_files import zemax_text
+from tests.materials.measured.measured_files import Loaded, zemax_text
 
 THETA_I, THETA_O = (10.0, 40.0, 70.0), (20.0, 40.0, 60.0)
 
@@ -55,20 +55,16 @@ GONIO = "theta_i phi_i theta_o phi_o f"
     ],
     ids=["quadrant, stated", "quadrant, spanned", "half, stated", "half, spanned", "none"],
 )
-def test_other_quarters_are_those_of_the_symmetry(tmp_path: Path, head, f, phi_i_deg, symmetry: str) -> None:
-    path = tmp_path / "a"
-    path.write_text(head + text_of(GONIO, rows_of(f, phi_i_deg)))
-    table = load(path)
+def test_other_quarters_are_those_of_the_symmetry(loaded: Loaded, head, f, phi_i_deg, symmetry: str) -> None:
+    table = loaded(head + text_of(GONIO, rows_of(f, phi_i_deg)))
     assert table.symmetry == symmetry
     angles = np.array([row[:4] for row in rows_of(f, ROUND)])
     wi, wo = (direction(*np.radians(angles[:, k : k + 2].T)) for k in (0, 2))
     np.testing.assert_allclose(table.eval(wi, wo)[:, 0], f(wi, wo), rtol=1e-5)
 
 
-def test_a_zemax_file_over_a_quarter_is_mirrored(tmp_path: Path) -> None:
-    path = tmp_path / "a"
-    path.write_text(zemax_text(lambda wi, wo: mirrored(wi, wo)[..., None], "Asymmetrical4D", rotations=(0, 45, 90)))
-    table = load(path)
+def test_a_zemax_file_over_a_quarter_is_mirrored(loaded: Loaded) -> None:
+    table = loaded(zemax_text(lambda wi, wo: mirrored(wi, wo)[..., None], "Asymmetrical4D", rotations=(0, 45, 90)))
     samples = table.samples()
     np.testing.assert_allclose(samples.f[:, 0], mirrored(samples.wi, samples.wo), rtol=1e-4)
     for flip in ((-1, 1, 1), (1, -1, 1), (-1, -1, 1)):

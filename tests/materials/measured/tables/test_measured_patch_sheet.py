@@ -114,14 +114,6 @@ def test_the_sampler_draws_its_density_and_the_albedo_is_a_quadrature(table, the
     assert one.albedo_sampled == pytest.approx(one.albedo_quadrature, abs=5 * one.albedo_error + 1e-4)
 
 
-def test_a_wrong_row_is_found():
-    class Turned(TableBSDF):
-        def sample(self, wo, u):
-            return super().sample(wo, u) * [-1, -1, 1]
-
-    assert check_sampler(Turned(LbnlTable("full", TABLES["full"])), 50.0, 200.0, samples=100_000).p_value < 1e-6
-
-
 def test_other_tables_have_no_patches(files):
     assert patch_sheet_of(load(files["merl"])) is None
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from lambent.core.geometry.directions import Floats, direction
 from lambent.core.geometry.sequences import r2
-from lambent.materials.measured.lbnl_xml import LbnlTable, read
+from lambent.materials.measured.lbnl_xml import LbnlTable
 from lambent.materials.measured.parts.klems import BUILT_IN, KLEMS_FULL, AngleBasis, PatchMatrix
 from lambent.materials.measured.parts.tensor_tree import Malformed, disk_of, parse_tree, square_of
-from lambent.materials.measured.parts.tree_part import TreePart
 from tests.materials.measured.lbnl_files import angle_basis, lbnl_xml, random_tree, words
+from tests.materials.measured.measured_files import Loaded
 
 
 def test_klems_bases() -> None:
@@ -82,22 +80,17 @@ def test_walk_meets_every_leaf_once(rank) -> None:
     ("text", "why"),
     [
         ("", "no braces"),
-        ("1 2", "after the last"),
         ("{ 1", "after the last"),
         ("{ {1} {2}", "not closed"),
         ("{ 1 } }", "too many"),
-        ("{ 1 } 2", "after the last"),
         ("{ 1 } { 2 }", "after the last"),
         ("{ 1 2 3 }", "power of 8"),
-        ("{ }", "power of 8"),
         ("{ {1} {2} }", "8 branches"),
         ("{" + "{1} " * 9 + "}", "more than 8"),
         ("{ 1 {2} }", "outside"),
         ("{" + "{1} " * 8 + "2 }", "beside"),
         ("{ x }", "not a number"),
-        ("{ 1x }", "not a number"),
         ("{" * 100000, "levels"),
-        ("{" * 30 + "1" + "}" * 30, "levels"),
     ],
 )
 def test_broken_trees(text: str, why: str) -> None:
@@ -112,11 +105,9 @@ def lambertian(structure: str, albedo: float, direction_: str = "Reflection Back
 
 
 @pytest.mark.parametrize("structure", ["Columns", "TensorTree3", "TensorTree4"])
-def test_lambertian_sheet(tmp_path: Path, structure: str) -> None:
+def test_lambertian_sheet(loaded: Loaded, structure: str) -> None:
     """A white wall of albedo .8 from all directions; its tuples integrate to that."""
-    path = tmp_path / "w.xml"
-    path.write_text(lambertian(structure, 0.8))
-    table = read(path)
+    table = loaded(lambertian(structure, 0.8))
     wi = direction(np.radians([0, 20, 50, 85]), 1.0)
     np.testing.assert_allclose(table.reflectivity(wi), 0.8, rtol=1e-6)
     assert (table.transmissivity(wi) == 0).all() and not table.info.transmits
@@ -129,13 +120,11 @@ def test_lambertian_sheet(tmp_path: Path, structure: str) -> None:
     np.testing.assert_allclose(integral, 0.8 / np.pi, rtol=1e-6)
 
 
-def test_a_single_lit_patch(tmp_path: Path) -> None:
+def test_a_single_lit_patch(loaded: Loaded) -> None:
     """Light that comes from phi 225 travels towards phi 45: patch 2 of the incident basis. It leaves by patch 1."""
     values = np.zeros((145, 145))
     values[1, 2] = 4.0
-    path = tmp_path / "p.xml"
-    path.write_text(lbnl_xml("Columns", [("Visible", "Transmission Back", words(values))]))
-    table = read(path)
+    table = loaded(lbnl_xml("Columns", [("Visible", "Transmission Back", words(values))]))
     wi, wo = direction(np.radians(10), np.radians(225)), direction(np.radians(170), 0)
     assert table.eval(wi, wo) == 4 and table.eval(wo, wi) == 4 and table.eval(wi * (-1, -1, 1), wo) == 0
     projected = np.pi * (np.cos(np.radians(5)) ** 2 - np.cos(np.radians(15)) ** 2) / 8
@@ -155,7 +144,7 @@ def sums_by_direction(table: LbnlTable) -> tuple[Floats, Floats, Floats]:
 
 @pytest.mark.parametrize("structure", ["Columns", "TensorTree3", "TensorTree4"])
 @pytest.mark.parametrize("transmission", ["Front", "Back"])
-def test_tuples_sum_to_the_albedos(tmp_path: Path, structure: str, transmission: str) -> None:
+def test_tuples_sum_to_the_albedos(loaded: Loaded, structure: str, transmission: str) -> None:
     """Front alone is reversed for the back."""
     random = np.random.default_rng(8)
     blocks = []
@@ -163,9 +152,7 @@ def test_tuples_sum_to_the_albedos(tmp_path: Path, structure: str, transmission:
         rank = int(structure[-1]) if structure.startswith("Tensor") else 0
         tree = "{" + " ".join(random_tree(random, rank, 1) for _ in range(1 << rank)) + "}" if rank else ""
         blocks.append(("Visible", way, tree or words(random.random((145, 145)) * 0.2)))
-    path = tmp_path / "s.xml"
-    path.write_text(lbnl_xml(structure, blocks))
-    table = read(path)
+    table = loaded(lbnl_xml(structure, blocks))
     wi, r, t = sums_by_direction(table)
     keep = wi[:, 2] > 0.3
     tolerance = 0.06  # what a fit leaves out near the horizon is missing from the sums
@@ -192,10 +179,8 @@ def test_tuples_of_a_matrix_sum_to_its_hemispherical_values(backwards: bool) -> 
     np.testing.assert_array_equal(again, f)
 
 
-def test_a_file_of_light_from_behind_is_turned_over_for_a_fit(tmp_path: Path) -> None:
-    path = tmp_path / "b.xml"
-    path.write_text(lambertian("Columns", 0.5, "Reflection Front"))
-    table = read(path)
+def test_a_file_of_light_from_behind_is_turned_over_for_a_fit(loaded: Loaded) -> None:
+    table = loaded(lambertian("Columns", 0.5, "Reflection Front"))
     assert (table.reflectivity(direction(0.3, 0)) == 0).all()
     np.testing.assert_allclose(table.reflectivity(direction(np.pi - 0.3, 0)), 0.5, rtol=1e-6)
     samples = table.samples()
@@ -204,56 +189,14 @@ def test_a_file_of_light_from_behind_is_turned_over_for_a_fit(tmp_path: Path) ->
     assert any("turned over" in note for note in table.info.notes)
 
 
-def test_negative_values_are_tuples_and_looked_up_as_zero(tmp_path: Path) -> None:
-    values = np.full((145, 145), 0.2)
-    values[3, 4] = values[5, 6] = -0.1
-    path = tmp_path / "n.xml"
-    path.write_text(lbnl_xml("Columns", [("Visible", "Reflection Back", words(values))]))
-    table = read(path)
-    assert table.samples().below_zero == 2 * 9  # each pair gives nine tuples
-    assert any("2 values are negative" in note for note in table.info.notes)
-    back = np.array((-1, -1, 1))
-    assert table.eval(KLEMS_FULL.centres[4] * back, KLEMS_FULL.centres[3]) == 0
-
-
-def test_choices_are_noted(tmp_path: Path) -> None:
-    """Solar replaces a missing Visible; of repeated blocks the later one counts."""
-    low, high = (words(np.full((145, 145), v)) for v in (0.1, 0.2))
-    path = tmp_path / "n.xml"
-    path.write_text(lbnl_xml("Columns", [("Solar", "Reflection Back", low), ("Solar", "Reflection Back", high)]))
-    table = read(path)
-    np.testing.assert_allclose(table.eval(direction(0.1, 0), direction(0.1, 0)), 0.2)
-    notes = " ".join(table.info.notes)
-    assert "no Visible" in notes and "twice" in notes and "side -z" in notes
-
-
-def test_a_basis_of_the_file_replaces_the_builtin_of_that_name(tmp_path: Path) -> None:
+def test_a_basis_of_the_file_replaces_the_builtin_of_that_name(loaded: Loaded) -> None:
     """The Klems half basis of older tools had 73 patches."""
-    rings = [
-        (0, 6.5, 1),
-        (6.5, 19.5, 8),
-        (19.5, 32.5, 12),
-        (32.5, 46.5, 16),
-        (46.5, 61.5, 20),
-        (61.5, 76.5, 12),
-        (76.5, 90, 4),
-    ]
-    path = tmp_path / "h.xml"
+    edges, counts = (0, 6.5, 19.5, 32.5, 46.5, 61.5, 76.5, 90), (1, 8, 12, 16, 20, 12, 4)
+    rings = list(zip(edges, edges[1:], counts, strict=False))
     blocks = [("Visible", "Reflection Back", words(np.full((73, 73), 0.1)))]
-    path.write_text(lbnl_xml("Columns", blocks, angle_basis("LBNL/Klems Half", rings), "LBNL/Klems Half"))
-    table = read(path)
+    table = loaded(lbnl_xml("Columns", blocks, angle_basis("LBNL/Klems Half", rings), "LBNL/Klems Half"))
     np.testing.assert_allclose(table.reflectivity(direction(0.2, 0)), 0.1 * np.pi)
     assert any("Klems Half" in note for note in table.info.notes)
-
-
-def test_the_notes_of_a_pane_name_straight_transmission(tmp_path: Path) -> None:
-    path = tmp_path / "pane.xml"
-    values = np.diag(0.9 / KLEMS_FULL.projected_sr)
-    path.write_text(lbnl_xml("Columns", [("Visible", "Transmission Back", words(values))]))
-    table = read(path)
-    np.testing.assert_allclose(table.transmissivity(direction(0.7, 2)), 0.9, rtol=1e-6)
-    assert any("100 %" in note and "straight" in note for note in table.info.notes)
-    assert not table.info.isotropic or table.parts[("transmission", 1)].anisotropy < 1e-6
 
 
 def test_anisotropy_of_matrices() -> None:
@@ -263,10 +206,3 @@ def test_anisotropy_of_matrices() -> None:
     assert PatchMatrix(KLEMS_FULL, KLEMS_FULL, isotropic[..., None]).anisotropy < 1e-12
     brushed = np.broadcast_to(0.2 + 0.1 * i[..., 0], isotropic.shape)
     assert PatchMatrix(KLEMS_FULL, KLEMS_FULL, brushed[..., None]).anisotropy > 0.05
-
-
-def test_fine_trees_give_no_more_tuples_than_a_fit_can_use() -> None:
-    text = " ".join(["1"] * 16**4)
-    part = TreePart((parse_tree(f"{{ {text} }}".encode(), 4),))
-    _, _, f, weight = part.tuples()
-    assert 50_000 < len(f) <= 500_000 and (f == 1).all() and (weight > 0).all()

@@ -10,7 +10,6 @@ import pytest
 from lambent.core.geometry.directions import direction, normalize
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.measured import load
 from lambent.materials.measured.inspecting.faults import extrapolation
 from lambent.materials.measured.inspecting.inspection import inspect_table
 from lambent.materials.measured.tables.scattered import NEIGHBOURS, ScatteredTable, _place
@@ -69,31 +68,6 @@ def test_no_value_is_outside_the_range_of_the_nearest_tuples(name, hemisphere):
     over, under = outside(table, hemisphere(4000, 5), hemisphere(4000, 6))
     assert over <= 1 + 1e-9
     assert under <= 1 + 1e-9
-
-
-@pytest.mark.parametrize("name", ["garnet_red", "krylon_blue"])
-def test_real_files_have_no_peaks_of_their_own(name, shared_data, hemisphere):
-    table = load(shared_data / "measured" / "cornell" / f"{name}.brdf")
-    assert outside(table, hemisphere(4000, 5), hemisphere(4000, 6))[0] <= 1 + 1e-9
-    share, said = extrapolation(table)
-    assert 0.1 < share < 0.25
-    assert "beyond theta 80 degrees" in said[0]
-
-
-@pytest.mark.parametrize("name", TRUTHS)
-def test_it_is_closer_to_the_truth_than_a_weighted_mean(name, hemisphere):
-    """In logarithms, because values span decades; the mean has the same weights."""
-    wi, wo = hemisphere(1500, 1, 75), hemisphere(1500, 2, 75)
-    table = table_of(TRUTHS[name], wi, wo)
-    asked = hemisphere(3000, 3, 65), hemisphere(3000, 4, 65)
-    truth = TRUTHS[name](*asked)
-    f, dark = table.eval(*asked), 0.05 * np.median(truth)
-    distance, index = table._tree.query(_place(*asked), k=NEIGHBOURS)
-    d = distance / distance[:, -1:]
-    weight = (1 - d**2) ** 2 / d**2
-    mean = (table._f[index] * (weight / weight.sum(axis=1, keepdims=True))[..., None]).sum(axis=1)
-    ours, theirs = (float(np.std(np.log((one + dark) / (truth + dark)))) for one in (f, mean))
-    assert ours < max(theirs, 0.02) * 1.1
 
 
 def test_it_is_exact_at_tuples_continuous_and_reciprocal(hemisphere):

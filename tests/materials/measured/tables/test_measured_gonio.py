@@ -13,9 +13,9 @@ from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured import load
-from lambent.materials.measured.inspecting.synthetic import ANISOTROPIC, ISOTROPIC, outgoing_grid, synthesise
+from lambent.materials.measured.inspecting.synthetic import ANISOTROPIC, ISOTROPIC, synthesise
 from lambent.materials.measured.parts.gonio_text import write_gonio
-from tests.materials.measured.measured_files import GLOSSY
+from tests.materials.measured.measured_files import GLOSSY, Loaded
 
 WHITE = (1.0, 1.0, 1.0)
 BRUSHED = Material(
@@ -74,14 +74,6 @@ def test_weights_tile_the_hemisphere() -> None:
     assert samples.weight[one].sum() == pytest.approx(2 * np.pi * (1 - np.cos(last_edge)), rel=1e-6)
 
 
-def test_f_stays_in_bounds_at_the_horizon() -> None:
-    """p of a neighbour does not vanish where wo's cosine does: their quotient is limited."""
-    table = synthesise(GLOSSY, replace(ISOTROPIC, **CLEAN))
-    wi = np.broadcast_to(direction(np.radians(40), 0.0), (500, 3))
-    wo = direction(np.radians(np.linspace(80, 89.999, 500)), np.pi)
-    assert table.eval(wi, wo).max() < 4 * MaterialBSDF(GLOSSY).eval(wi, wo).max()
-
-
 def test_isotropic_table_turns_with_the_pair(hemisphere) -> None:
     table = synthesise(GLOSSY, replace(ISOTROPIC, step_deg=5, fine_deg=5))
     wi, wo = hemisphere(100, 1), hemisphere(100, 2)
@@ -90,68 +82,12 @@ def test_isotropic_table_turns_with_the_pair(hemisphere) -> None:
     np.testing.assert_allclose(table.eval(wi @ turn.T, wo @ turn.T), table.eval(wi, wo), rtol=1e-6, atol=1e-9)
 
 
-def test_half_a_turn_of_an_isotropic_table_is_mirrored(tmp_path: Path) -> None:
-    path = tmp_path / "a"
+def test_half_a_turn_of_an_isotropic_table_is_mirrored(loaded: Loaded) -> None:
     rows = "".join(f"20 0 {t} {p} {0.1 + p / 1000}\n" for t in (0, 30, 60) for p in (0, 60, 120, 180))
-    path.write_text(f"# symmetry: isotropic\ntheta_i phi_i theta_o phi_o f\n{rows}")
-    table = load(path)
+    table = loaded(f"# symmetry: isotropic\ntheta_i phi_i theta_o phi_o f\n{rows}")
     wi, wo = direction(np.radians(20), 0.0), direction(np.radians(30), np.radians(np.array([60.0, 300.0])))
     quadrilinear = replace(table, reconstruction="quadrilinear")
     np.testing.assert_allclose(quadrilinear.eval(np.broadcast_to(wi, (2, 3)), wo)[:, 0], 0.16)
-
-
-def test_noise_is_seeded_and_of_the_stated_size() -> None:
-    setup = replace(ISOTROPIC, floor=0.0, noise=0.05, step_deg=5)
-    first, again, other = (synthesise(GLOSSY, replace(setup, seed=s)).samples() for s in (1, 1, 2))
-    np.testing.assert_array_equal(first.f, again.f)
-    assert (first.f != other.f).any()
-    ratio = first.f / MaterialBSDF(GLOSSY).eval(first.wi, first.wo)
-    assert ratio.std() == pytest.approx(0.05, rel=0.05) and ratio.mean() == pytest.approx(1, abs=0.002)
-
-
-def test_sector_hides_what_is_near_the_lamp() -> None:
-    table = synthesise(GLOSSY, replace(ISOTROPIC, sector_deg=8))
-    sheet = table.reflected[3][0]
-    wo = direction(*np.radians(np.meshgrid(sheet.theta_deg, sheet.phi_deg, indexing="ij")))
-    near = wo @ direction(np.radians(33), 0.0) > np.cos(np.radians(8))
-    np.testing.assert_array_equal(np.isnan(sheet.f).all(axis=-1), near)
-    assert near.any()
-
-
-def test_outgoing_grid_is_closer_at_the_mirror_direction() -> None:
-    theta, phi = outgoing_grid(47, 0, ISOTROPIC)
-    assert np.diff(theta)[(theta[:-1] > 40) & (theta[:-1] < 53)].max() <= 1.0 + 1e-9
-    assert np.diff(phi)[np.abs(phi[:-1] - 180) < 8].max() * np.sin(np.radians(47)) <= 1.0 + 1e-3
-    assert np.diff(theta).max() <= 2.5 and np.diff(phi).max() <= 2.5
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("theta_i phi_i theta_o phi_o\n0 0 0 0\n", "unknown value columns; found none"),
-        ("theta_i phi_i theta_o phi_o value\n0 0 0 0 1\n", "quantity of the value columns is not stated"),
-        ("theta_i phi_i theta_o phi_o f_r f_g\n0 0 0 0 1 1\n", "unknown value columns; found f_r f_g"),
-        ("theta_i phi_i theta_o phi_o p\n", "no rows"),
-        ("theta_i phi_i theta_o phi_o p\n# only this\n", "no rows"),
-        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 x\n", "found x"),
-        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 1\n0 0 10\n", "one value per column name"),
-        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 1 2\n", "one value per column name"),
-        ("theta_i phi_i theta_o phi_o p\n95 0 0 0 1\n", "outside its range"),
-        ("theta_i phi_i theta_o phi_o p\n0 0 200 0 1\n", "outside its range"),
-        ("theta_i phi_i theta_o phi_o p\n0 nan 20 0 1\n", "outside its range"),
-        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 nan\n", "has no measured value"),
-        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 -3\n", "no measured value"),
-        ("theta_i phi_i theta_o phi_o p\n0,5 0 0 0 1\n", "decimal commas"),
-        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 1\n20 40 0 0 1\n", "do not form a grid"),
-        ("# symmetry: isotropc\ntheta_i phi_i theta_o phi_o p\n0 0 0 0 1\n", "did you mean 'isotropic'"),
-        ("# symmetry: quadrant\ntheta_i phi_i theta_o phi_o p\n0 0 0 0 1\n0 100 0 0 1\n", "more than the symmetry"),
-    ],
-)
-def test_broken_files(tmp_path: Path, text: str, expected: str) -> None:
-    path = tmp_path / "a"
-    path.write_text(text)
-    with pytest.raises(UserError, match=expected):
-        load(path)
 
 
 def test_impossible_setups() -> None:

@@ -10,7 +10,15 @@ from lambent.materials.checking import check
 from lambent.materials.checking.check import check_sampler, furnace
 from lambent.materials.checking.normalise import NOTE, change, normalisation, normalised, with_less_alpha, with_less_k
 from lambent.materials.document import Lobe, Material, Provenance
-from tests.materials.test_check import BRUSHED, FOIL
+from tests.materials.checking.test_check import BRUSHED, FOIL
+
+
+@pytest.fixture(autouse=True)
+def few_directions(monkeypatch):
+    """Of the furnace: the axes, and above all near grazing."""
+    monkeypatch.setattr(check, "THETA_DEG", (0, 45, 75, 82, 85, 87, 89))
+    monkeypatch.setattr(check, "PHI_DEG", (0.0, 90.0))
+
 
 STEEP = Material(lobes=(Lobe(mx=0.5, my=0.5, r0=1, alpha=1),))
 BRIGHT = Material(kd=0.2, lobes=(Lobe(k=2, mx=0.2, my=0.2, r0=0.7, alpha=0.0),))
@@ -42,13 +50,6 @@ def test_normalised_refuses_diffuse_terms_over_one():
         normalised(Material(kd=0.8, kt_d=0.3))
 
 
-@pytest.fixture
-def one_azimuth(monkeypatch):
-    """Isotropic materials need one azimuth only."""
-    monkeypatch.setattr(check, "PHI_DEG", (0.0,))
-
-
-@pytest.mark.usefixtures("one_azimuth")
 def test_the_report_names_the_changes():
     provenance = Provenance(source="steep.txt", notes=("first",))
     done = normalisation(STEEP.model_copy(update={"provenance": provenance}))
@@ -60,7 +61,6 @@ def test_the_report_names_the_changes():
     assert done.after.provenance.notes == ("first", NOTE)
 
 
-@pytest.mark.usefixtures("one_azimuth")
 def test_scaling_k_is_an_error_of_its_share():
     """k alone is scaled where alpha is 0: f of the lobe by one factor, so L1 is that share of a lobe without kd."""
     done = normalisation(Material(lobes=(Lobe(k=1.6, mx=0.2, my=0.2, r0=1),)))

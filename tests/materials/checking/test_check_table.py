@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from lambent.materials.checking import check_table as module
 from lambent.materials.checking.check_table import check_table
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import lbnl_xml
+from lambent.materials.export.resampling import patch_mean
 from lambent.materials.measured import load
 from lambent.materials.measured.protocol import MeasuredTable, TableInfo, collect
 from lambent.materials.measured.tables.half_vector_grid import GridShape
@@ -57,7 +58,11 @@ class FCosTakenForF(Exact):
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     monkeypatch.setattr(check, "SAMPLER_THETA_DEG", (45.0,))
+    monkeypatch.setattr(check, "check_sampler", partial(check.check_sampler, samples=1 << 18))
     monkeypatch.setattr(module, "INTEGRAL_THETA_DEG", (40.0,))
+    monkeypatch.setattr(module, "PAIRS", 20_000)
+    for place in (check, module):
+        monkeypatch.setattr(place, "THETA_DEG", (0, 30, 60, 75, 84, 89))
 
 
 def test_a_sound_table_passes_and_the_report_is_json():
@@ -68,7 +73,7 @@ def test_a_sound_table_passes_and_the_report_is_json():
     expected = MaterialBSDF(GLOSSY).albedo(np.array([0, 0, 1.0]), samples=200_000)
     np.testing.assert_allclose(report.furnace.albedo[0, 0], expected, rtol=0.01)
     data = json.loads(json.dumps(report.to_json()))
-    assert data["passed"] and np.shape(data["furnace"]["albedo"]) == (24, 1, 3) and len(data["sampler"]) == 1
+    assert data["passed"] and np.shape(data["furnace"]["albedo"]) == (6, 1, 3) and len(data["sampler"]) == 1
 
 
 @pytest.mark.parametrize(("strength", "passes"), [(0.1, True), (1.0, False)])
@@ -91,11 +96,13 @@ def test_an_albedo_that_is_not_the_integral_fails():
     assert any("its quadrature" in text for text in report.failures), report
 
 
-@pytest.fixture
-def film(tmp_path):
-    """A BSDF file of a diffusing film, with transmission alone."""
-    path = tmp_path / "film.xml"
-    lbnl_xml.write(Material(name="film", kt_d=0.6), path)
+@pytest.fixture(scope="module")
+def film(tmp_path_factory):
+    """A BSDF file of a diffusing film, with transmission alone; the same with any number of directions."""
+    path = tmp_path_factory.mktemp("film") / "film.xml"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(patch_mean, "LOBES_LOG2", 5)
+        lbnl_xml.write(Material(name="film", kt_d=0.6), path)
     return path
 
 
@@ -110,20 +117,6 @@ def test_a_table_answers_no_question_with_no_values(film):
     table, none = load(film), np.zeros((0, 3))
     assert table.eval(none, none).shape == (0, 1)
     assert all(look_up(none).shape == (0, 1) for look_up in (table.reflectivity, table.transmissivity, table.albedo))
-
-
-@pytest.mark.parametrize("name", ["simple_klems_through_refl_trans", "blinds_20deg_noGlazing_Klems"])
-def test_transmission_alone_of_real_files(shared_data, tmp_path, name):
-    text = (shared_data / "measured" / "lbnl" / f"{name}.xml").read_text()
-    blocks = re.findall("<WavelengthData>.*?</WavelengthData>", text, re.DOTALL)
-    for block in blocks:
-        if "Reflection" in block:
-            text = text.replace(block, "")
-    (tmp_path / "t.xml").write_text(text)
-    table = load(tmp_path / "t.xml")
-    assert table.info.transmits and not table.reflectivity(np.array([[0.6, 0.0, 0.8]])).any()
-    report = check_table(table)
-    assert report.reciprocity_share == 0 and not any("swapping" in text for text in report.failures)
 
 
 def test_a_scattered_table_warns_where_nothing_was_measured(monkeypatch):

@@ -9,8 +9,6 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import direction
-from lambent.materials.measured import load
-from lambent.materials.measured.inspecting.inspection import inspect_table
 from lambent.materials.measured.lbnl_xml import read as read_xml
 from lambent.materials.measured.parts.spectral import rgb_of_measured, rgb_of_xyz
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect, negative_readings
@@ -19,12 +17,11 @@ from lambent.materials.measured.tables.sheets import ScatteredSheet, Sheet
 from lambent.materials.measured.tables.table import MARKS
 from tests.materials.measured.lbnl_files import lbnl_xml, words
 from tests.materials.measured.measured_files import (
+    Loaded,
     cornell_rows,
     cornell_text,
     fred_text,
     merl_bytes,
-    rgl_fields,
-    tensor_bytes,
     zemax_text,
 )
 
@@ -47,23 +44,6 @@ def test_a_negative_channel_does_not_cost_the_tuple() -> None:
     assert negative_readings(collected(np.abs(f))) == ""
 
 
-def test_a_channel_that_is_negative_throughout_does_not_cost_the_file(tmp_path: Path) -> None:
-    fields = rgl_fields(np.zeros(1))
-    fields["rgb"][:, :, 2] = -0.005
-    (tmp_path / "yellow.bsdf").write_bytes(tensor_bytes(fields))
-    table = load(tmp_path / "yellow.bsdf")
-    samples = table.samples()
-    assert samples.left_out.not_finite == 0 and samples.counts["below_zero"] == samples.counts["used"] > 0
-    light = table.eval(samples.wi, samples.wo)
-    assert (light[:, :2] > 0).all() and (light[:, 2] == 0).all()
-
-
-def test_noise_keeps_its_mean() -> None:
-    noise = np.random.default_rng(0).normal(0, 0.01, (4000, 1))
-    noise[0] = 0.2
-    assert abs(collected(noise).f[1:].mean()) < 5e-4  # clamped at 0 it would be .004
-
-
 @pytest.mark.parametrize("mark", [-0.5, -50.0, -32768.0, -1e30])
 def test_what_no_noise_reaches_is_no_reading(mark: float) -> None:
     """Other programs' marks: further below zero than the brightest tuple is above."""
@@ -73,58 +53,45 @@ def test_what_no_noise_reaches_is_no_reading(mark: float) -> None:
     assert len(samples) == COUNT - 1 and samples.left_out.not_finite == 1 and samples.below_zero == 0
 
 
-def test_noise_near_the_horizon_is_noise() -> None:
-    """There f = p / cos theta_o is large on either side of zero."""
-    theta_o = np.radians(np.linspace(0, 83, COUNT))
-    f = np.where(np.arange(COUNT)[:, None] % 2, -0.01, 0.05) / np.cos(theta_o)[:, None]
-    assert collected(f, theta_o).below_zero == COUNT // 2
-
-
 def test_nothing_above_zero_is_nothing_measured() -> None:
     with pytest.raises(UserError, match="has no measured value"):
         collected(np.full((COUNT, 1), -0.1))
 
 
-def test_marks_in_columns(tmp_path: Path) -> None:
+def test_marks_in_columns(loaded: Loaded) -> None:
     """Exactly -1, -99, -999 and -9999; numbers beside them are readings, and -.5 of a table up to 1.2 is one too."""
     values = [*MARKS, -0.01, -0.5, 0.2, 0.3, 1.2, 0.4, 0.5, 0.6]
     rows = [f"10 0 {t} {p}" for t in (20, 40, 60) for p in (0, 90, 180, 270)]
-    path = tmp_path / "a"
-    path.write_text(
+    samples = loaded(
         "\n".join(
             ["theta_i phi_i theta_o phi_o f", *(f"{row} {value}" for row, value in zip(rows, values, strict=True))]
         )
         + "\n"
-    )
-    samples = load(path).samples()
+    ).samples()
     assert samples.left_out.shadowed == len(MARKS) and samples.left_out.total == len(MARKS)
     assert samples.below_zero == 2 and len(samples) == len(values) - len(MARKS)
 
 
-def test_marks_in_other_texts(tmp_path: Path) -> None:
+def test_marks_in_other_texts(loaded: Loaded) -> None:
     rows = cornell_rows()
     rows[2, 4:], rows[3, 6] = -1, -99
-    path = tmp_path / "a"
-    path.write_text(cornell_text(rows, np.linspace(400, 700, 5)))
-    assert load(path).samples().left_out.shadowed == 2
+    assert loaded(cornell_text(rows, np.linspace(400, 700, 5))).samples().left_out.shadowed == 2
     blocks = {(30.0, 0.0): (np.array([(t, p) for t in (10, 20, 40) for p in (0, 120, 240)], float), np.full(9, 0.2))}
     blocks[30.0, 0.0][1][4] = -999
-    path.write_text(fred_text(blocks))
-    assert load(path).samples().left_out.shadowed == 1
-    path.write_text(
+    assert loaded(fred_text(blocks)).samples().left_out.shadowed == 1
+    fewer = loaded(
         zemax_text(lambda wi, wo: 0.2 + 0 * wo[..., 2:], "PlaneSymmetrical").replace("2.000000e-01", "-1", 1)
+    ).samples()
+    assert (
+        len(loaded(zemax_text(lambda wi, wo: 0.2 + 0 * wo[..., 2:], "PlaneSymmetrical")).samples()) == len(fewer) + 1
+        and fewer.below_zero == 0
     )
-    fewer = load(path).samples()
-    path.write_text(zemax_text(lambda wi, wo: 0.2 + 0 * wo[..., 2:], "PlaneSymmetrical"))
-    assert len(load(path).samples()) == len(fewer) + 1 and fewer.below_zero == 0
 
 
-def test_negative_merl_values_are_marks(tmp_path: Path) -> None:
+def test_negative_merl_values_are_marks(loaded: Loaded) -> None:
     f = np.full((6, 6, 12, 3), 0.2)
     f[1, 1, :3, 2] = -0.001
-    path = tmp_path / "a"
-    path.write_bytes(merl_bytes(f))
-    samples = load(path).samples()
+    samples = loaded(merl_bytes(f)).samples()
     assert samples.left_out.shadowed == 3 and samples.below_zero == 0
 
 
@@ -152,26 +119,6 @@ def test_colour_of_a_matrix_with_one_negative_reading(tmp_path: Path) -> None:
     f = table.eval(up, up)
     assert f[2] == 0 and f[0] > 0.15 and f[1] > 0.15
     assert table.samples().below_zero == 9
-
-
-def test_inspect_tells_what_is_kept(tmp_path: Path) -> None:
-    path = tmp_path / "a"
-    path.write_text(zemax_text(lambda wi, wo: 0.1 * wo[..., 2:] - 0.03, "PlaneSymmetrical"))
-    report = inspect_table(load(path))
-    count = report["tuples"]["below_zero"]
-    assert 0 < count < report["tuples"]["used"]
-    assert report["faults"]["negative_percent"] == pytest.approx(100 * count / report["tuples"]["used"])
-    (line,) = (line for line in report["findings"] if "below zero" in line)
-    assert line.startswith(f"{count} of ") and "a fit keeps them" in line and "left out" not in line
-
-
-def test_what_is_drawn_is_nowhere_negative(tmp_path: Path) -> None:
-    path = tmp_path / "a"
-    path.write_text(zemax_text(lambda wi, wo: 0.1 * wo[..., 2:] - 0.03, "PlaneSymmetrical"))
-    rng = np.random.default_rng(0)
-    wi, wo = (direction(np.arccos(rng.random(500)), 2 * np.pi * rng.random(500)) for _ in range(2))
-    f = load(path).eval(wi, wo)
-    assert (f >= 0).all() and f.max() > 0.05
 
 
 THETA_DEG, PHI_DEG = np.arange(0, 81, 10.0), np.arange(0, 360, 30.0)
