@@ -125,8 +125,8 @@ def draw_source(axis: Any, theta_deg: float, limit: float) -> None:
 def save_figure(figure: Any, path: Path, dpi: int = 120) -> None:
     """Write a figure, atomically, in the format of the suffix: .png, .pdf or .svg."""
     made_by = "Software" if path.suffix.lower() == ".png" else "Creator"
-    with atomic_path(path) as beside:
-        figure.savefig(beside, dpi=dpi, metadata={made_by: MARK})
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=dpi, metadata={made_by: MARK})
 
 
 def _draw_plane(figure: Any, evals: Mapping[str, Eval], transmits: bool) -> None:

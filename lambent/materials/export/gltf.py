@@ -124,13 +124,13 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     material = match.material_of(subject)
     fitted, cost = likeness(material, progress)
     document, buffer = _sphere(fitted, material)
-    with atomic_path(path) as beside:
+    with atomic_path(path) as temporary:
         if path.suffix.lower() == ".glb":
-            beside.write_bytes(_binary(document, buffer))
+            temporary.write_bytes(_binary(document, buffer))
         else:
             uri = f"data:application/octet-stream;base64,{base64.b64encode(buffer).decode()}"
             document["buffers"][0]["uri"] = uri
-            beside.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+            temporary.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return cost
 
 

@@ -31,7 +31,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     """Write the file and return its losses."""
     scatterer = scatterer_of(subject)
     planes, order = _planes(scatterer, progress)
-    with atomic_path(Path(path)) as beside, beside.open("wb") as file:
+    with atomic_path(Path(path)) as temporary, temporary.open("wb") as file:
         file.write(struct.pack("<3i", *SHAPE))
         file.write(planes.astype("<f8").tobytes())
     lost = [LOST_TRANSMISSION] if scatterer.transmits else []

@@ -132,8 +132,8 @@ def _exact(material: Material) -> Any:
     ET.SubElement(bsdf, "string", name="material", value=exact)
     text = ET.tostring(bsdf, encoding="unicode")
     return ET.Comment(
-        " Below is an approximation that every Mitsuba loads. Exact, where Lambent is installed: this in its place,\n"
-        "  after `from lambent.bake.material_plugin import register_material_plugin; register_material_plugin()`.\n"
+        " Below is an approximation for every Mitsuba. Exact, where Lambent is installed: this in its place, after\n"
+        "  `from lambent.bake.bsdfs.material_plugin import register_material_plugin; register_material_plugin()`.\n"
         f"  {text}\n  "
     )
 

@@ -40,8 +40,8 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     """Write the file and return its losses."""
     scatterer = scatterer_of(subject)
     content = tensor_bytes(_tensors(scatterer, progress))
-    with atomic_path(Path(path)) as beside:
-        beside.write_bytes(content)
+    with atomic_path(Path(path)) as temporary:
+        temporary.write_bytes(content)
     return read_back(subject, Path(path), (LOST_TRANSMISSION,) if scatterer.transmits else ())
 
 

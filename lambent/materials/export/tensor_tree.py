@@ -63,7 +63,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent, rank: Rank 
     trees, lost = (own, []) if own else _grown(subject, scatterer, rank, progress)
     if not trees:
         raise UserError("scatters no light: there is nothing to write", file=scatterer.name)
-    with atomic_path(Path(path)) as beside, beside.open("w", encoding="utf-8") as file:
+    with atomic_path(Path(path)) as temporary, temporary.open("w", encoding="utf-8") as file:
         file.writelines(_document(scatterer.name, trees, _ALL_DIGITS if own else _DIGITS))
     return read_back(subject, Path(path), tuple(lost))
 

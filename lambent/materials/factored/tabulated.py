@@ -78,7 +78,7 @@ class Grid:
             np.sqrt(theta_h) * np.sin(theta_h) * np.sin(theta_d) * np.cos(theta_d), self.shape
         ).ravel()
 
-    def around(self, wi: Vector, wo: Vector, ops: Any) -> Iterator[tuple[Any, Any]]:
+    def corners(self, wi: Vector, wo: Vector, ops: Any) -> Iterator[tuple[Any, Any]]:
         """Indices of the nodes around a pair of directions on the upper side, with their weights."""
         h = half_vector(wi, wo, ops)
         sin_h = ops.sqrt(h[0] * h[0] + h[1] * h[1])
@@ -128,7 +128,7 @@ class Tabulated:
     def evaluate(self, wi: Vector, wo: Vector, ops: Any = NUMPY) -> Vector:
         """rho_q as RGB; `ops` has `gather` and `whole` as well."""
         value: list[Any] = [0.0, 0.0, 0.0]
-        for node, share in self.grid.around(wi, wo, ops):
+        for node, share in self.grid.corners(wi, wo, ops):
             value = [total + share * ops.gather(self.ratios, 3 * node + c) for c, total in enumerate(value)]
         base = self.base.evaluate(wi, wo, ops)
         parts = base if isinstance(base, tuple) else (base, base, base)

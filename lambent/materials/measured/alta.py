@@ -77,12 +77,12 @@ def read(path: Path) -> MeasuredTable:
     if widest > _A_TURN:
         raise UserError("an angle is more than a turn", file=path, got=f"{widest:g}", expected="radians")
     notes = (f"parametrisation {keys['PARAM_IN']}, angles in radians", *parametrisation.notes)
-    given = rows[:, :inputs]
+    coordinates = rows[:, :inputs]
     if parametrisation.bivariate:
-        given = np.column_stack([np.repeat(given, len(AZIMUTHS), axis=0), np.tile(AZIMUTHS, len(rows))])
+        coordinates = np.column_stack([np.repeat(coordinates, len(AZIMUTHS), axis=0), np.tile(AZIMUTHS, len(rows))])
         rows = np.repeat(rows, len(AZIMUTHS), axis=0)
         notes += (f"f is given without an azimuth: a value counts as measured at {len(AZIMUTHS)} azimuths",)
-    wi, wo = parametrisation.directions(given)
+    wi, wo = parametrisation.directions(coordinates)
     above = np.isfinite(wi).all(axis=1) & np.isfinite(wo).all(axis=1) & (wi[:, 2] > _ABOVE) & (wo[:, 2] > _ABOVE)
     if not above.all():
         notes += (f"{int((~above).sum())} of {len(above)} pairs are below the horizon and left out",)

@@ -104,11 +104,11 @@ def _beams(text: bytes, path: Path) -> list[_Beam]:
     for comment in [*_COMMENTS.finditer(text), None]:
         body += text[end : comment.start() if comment else len(text)]
         found = _KEY.findall(shown(comment[0])) if comment else []
-        given = {key.lower().rstrip(":"): value for key, value in found}
-        if comment is None or (body.strip() and {"intheta", "incident_angle"} & set(given)):
+        stated = {key.lower().rstrip(":"): value for key, value in found}
+        if comment is None or (body.strip() and {"intheta", "incident_angle"} & set(stated)):
             beams.append(_beam(keys, body, path, len(beams) + 1))
             keys, body = {}, b""
-        keys |= given
+        keys |= stated
         end = comment.end() if comment else end
     return beams
 

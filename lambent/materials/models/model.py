@@ -69,10 +69,10 @@ class Model(ABC):
 
     def __init__(self, **values: object) -> None:
         known = {p.name: p for p in self.parameters}
-        for given in values:
-            if given not in known:
-                hint = did_you_mean(given, known)
-                raise UserError(f"the {self.name} model has no such parameter", field=given, hint=hint)
+        for name in values:
+            if name not in known:
+                hint = did_you_mean(name, known)
+                raise UserError(f"the {self.name} model has no such parameter", field=name, hint=hint)
         self.values: dict[str, Value] = {n: p.checked(values.get(n, p.default)) for n, p in known.items()}
 
     def number(self, name: str) -> float:

@@ -8,7 +8,7 @@ from typing import Literal
 
 from lambent.materials.document import Side
 
-# E relative to the subject's own size: (faithful up to, approximate up to). L1 is light in wrong directions; the cube
+# E relative to the subject's own size: (faithful up to, approximate up to). L1 is light in wrong directions; the
 # cube root is close to what is seen; Ngan's L2 sees peaks above all: beyond 1 they are worse than a black surface.
 LIMITS: dict[str, tuple[float, float]] = {
     "l1": (0.1, 0.5),

@@ -91,11 +91,11 @@ def _of_the_peak_about_the_light(samples: MeasuredSamples, f: Floats) -> list[st
     apart = np.linalg.norm(samples.wi - samples.wo, axis=1)
     near = (apart < np.radians(PEAK_DEG)) & ~samples.transmitted
     light = (samples.weight * np.abs(samples.wo[:, 2]))[near]
-    given, held = (light @ values[near].mean(axis=1) for values in (samples.f, f))
-    misplaced = (light @ np.abs(f - samples.f)[near].mean(axis=1)) / max(given, 1e-30)
+    expected, kept = (light @ values[near].mean(axis=1) for values in (samples.f, f))
+    misplaced = (light @ np.abs(f - samples.f)[near].mean(axis=1)) / max(expected, 1e-30)
     if misplaced < PEAK_TOLERANCE:
         return []
     return [
-        f"the retro-reflective peak: within {PEAK_DEG:g} degrees of it the file returns {held / given:.2f} times as "
+        f"the retro-reflective peak: within {PEAK_DEG:g} degrees of it the file returns {kept / expected:.2f} times as "
         f"much light, {misplaced:.0%} of it misplaced"
     ]

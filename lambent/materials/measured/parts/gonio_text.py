@@ -27,7 +27,7 @@ def write_gonio(path: Path, table: GonioTable, quantity: Quantity = "p") -> None
     channels = ("",) if table.info.channels == 1 else ("_r", "_g", "_b")
     names = " ".join([*ANGLES, *(quantity + channel for channel in channels)])
     formats = ["%.8g"] * len(ANGLES) + ["%.6g"] * len(channels)
-    with atomic_path(Path(path)) as beside, beside.open("w", encoding="utf-8") as file:
+    with atomic_path(Path(path)) as temporary, temporary.open("w", encoding="utf-8") as file:
         file.write(f"# name: {printable(table.name)}\n# symmetry: {table.symmetry}\n{names}\n")
         for entry in table.entries():
             np.savetxt(file, _columns(*entry, quantity), fmt=formats)

@@ -95,9 +95,11 @@ class GonioTable(MeasuredTable):
             return
         samples = self.samples(_MOST_LEFT_OUT)
         for k in left_out[:: -(-len(left_out) // _MOST_FOLDS)]:
-            beside = [i for i in (k - 1, k + 1) if 0 <= i < count]
-            near, far = (tuple(rows[i] for i in beside) if rows else () for rows in (self.reflected, self.transmitted))
-            rest = replace(self, theta_i_deg=self.theta_i_deg[beside], reflected=near, transmitted=far)
+            neighbours = [i for i in (k - 1, k + 1) if 0 <= i < count]
+            near, far = (
+                tuple(rows[i] for i in neighbours) if rows else () for rows in (self.reflected, self.transmitted)
+            )
+            rest = replace(self, theta_i_deg=self.theta_i_deg[neighbours], reflected=near, transmitted=far)
 
             def predicted(way: Reconstruction, asked: MeasuredSamples, rest: GonioTable = rest) -> Floats:
                 return replace(rest, reconstruction=way).eval(asked.wi, asked.wo)

@@ -182,8 +182,8 @@ class HalfVectorGrid:
             up_to = up_to + weight
         page = self._page(viewers, across, ops) + node
         row, along = _drawn(u1, self.marginal, page * shape.theta_h, shape.theta_h, ops)
-        column, beside = _drawn(u2, self.conditional, (page * shape.theta_h + row) * shape.phi_h, shape.phi_h, ops)
-        x, y, z = reflect(viewers.up, _within(row, along, column, beside, shape, ops))
+        column, within = _drawn(u2, self.conditional, (page * shape.theta_h + row) * shape.phi_h, shape.phi_h, ops)
+        x, y, z = reflect(viewers.up, _within(row, along, column, within, shape, ops))
         c, s = viewers.turn
         x, y = c * x - s * y, s * x + c * y
 
@@ -227,14 +227,14 @@ class HalfVectorGrid:
             length = ops.maximum(sin_theta, 1e-7)
             turn = half_turn * ops.select(off, x / length, 1.0), half_turn * ops.select(off, y / length, 0.0)
             return _Viewers([(row, 1 - share), (row + 1, share)], (sin_theta, 0 * z, z), turn, face)
-        around = turns(y, x, ops) * shape.viewer_phi
-        left = ops.minimum(ops.floor(around), shape.viewer_phi - 1.0)
-        beside, first = around - left, ops.whole(left)
+        place = turns(y, x, ops) * shape.viewer_phi
+        left = ops.minimum(ops.floor(place), shape.viewer_phi - 1.0)
+        share_phi, first = place - left, ops.whole(left)
         second = ops.whole(ops.select(left + 1.5 > shape.viewer_phi, 0.0, left + 1))
         nodes = [
             (row + step * shape.viewer_phi + column, along * across)
             for step, along in ((0, 1 - share), (1, share))
-            for column, across in ((first, 1 - beside), (second, beside))
+            for column, across in ((first, 1 - share_phi), (second, share_phi))
         ]
         return _Viewers(nodes, (x, y, z), (half_turn + 0 * z, 0.0 * z), face)
 
@@ -279,10 +279,10 @@ def _drawn(u: Any, table: Any, first: Any, count: int, ops: ArrayOps) -> tuple[A
     return found, ops.minimum((u - low) / ops.maximum(high - low, 1e-12), 1 - 1e-6)
 
 
-def _within(row: Any, along: Any, column: Any, beside: Any, shape: GridShape, ops: ArrayOps) -> Vector:
+def _within(row: Any, along: Any, column: Any, within: Any, shape: GridShape, ops: ArrayOps) -> Vector:
     """Half vector at these fractions of a cell's solid angle."""
     low, high = (ops.sin(((row + step) / shape.theta_h) ** 2 * (np.pi / 4)) ** 2 for step in (0.0, 1.0))
     half = low + along * (high - low)  # sin^2(theta/2)
-    phi = (column + beside) * (2 * np.pi / shape.phi_h)
+    phi = (column + within) * (2 * np.pi / shape.phi_h)
     sin_theta = 2 * ops.sqrt(half * (1 - half))
     return sin_theta * ops.cos(phi), sin_theta * ops.sin(phi), 1 - 2 * half

@@ -88,10 +88,10 @@ def _symmetric_viewers(table: TwoSided, shape: GridShape) -> list[tuple[int, Any
     rng = np.random.default_rng(1)
     wi, wo = direction(np.arccos(rng.uniform(0.1, 1, (2, 256))), rng.uniform(0, 2 * np.pi, (2, 256)))
     wo = wo * np.where(rng.random((256, 1)) < (0.5 if table.info.transmits else 0), FLIP_Z, 1.0)
-    given = table.eval(wi, wo)
+    expected = table.eval(wi, wo)
 
     def same(flip: list[int]) -> bool:
-        return np.allclose(table.eval(wi * flip, wo * flip), given, rtol=1e-4, atol=1e-5 * given.max())
+        return np.allclose(table.eval(wi * flip, wo * flip), expected, rtol=1e-4, atol=1e-5 * expected.max())
 
     def ordered(column: Any) -> Any:
         return (np.arange(shape.theta_h)[:, None] * columns + column % columns).ravel()

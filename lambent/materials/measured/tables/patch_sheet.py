@@ -215,9 +215,9 @@ def patch_sheet_of(table: MeasuredTable, *, reverse: bool = False) -> PatchSheet
     pages = []
     for face in range(faces):
         for way in _WAYS[:kinds]:
-            given: Side = -1 if face else 1
+            side_of_face: Side = -1 if face else 1
             # keys of `uses` refer to the light's side
-            side: Side = given if reverse or way == "reflection" else (1 if given == -1 else -1)
+            side: Side = side_of_face if reverse or way == "reflection" else (1 if side_of_face == -1 else -1)
             pages.append(_page_of(table.uses.get((way, side)), reverse, patches, rings))
     flat = {name: np.stack([page[name] for page in pages]).astype(np.float32).ravel() for name in pages[0]}
     return PatchSheet(faces, kinds, patches, rings, **flat)

@@ -8,11 +8,11 @@ from lambent.core.geometry.directions import Floats, angles, direction, normaliz
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 from lambent.materials.measured.tables.gonio import GonioTable
 
-RETRO_RATIO = 1.5  # f around the light over f beside it, above which it is a peak
+RETRO_RATIO = 1.5  # f towards the light over that of the background, above which it is a peak
 _INNER_DEG = np.array([0.0, 0.2, 0.5, 1.5, 3.0])  # rings about the light; peaks of prisms are narrower than 1 degree
-_OUTER_DEG = np.array([7.0, 12.0, 18.0, 24.0])  # rings farther out; the last two are beside the light
+_OUTER_DEG = np.array([7.0, 12.0, 18.0, 24.0])  # rings farther out; the last two are the background
 _LEVEL = 1.05  # a ring exceeding the next inner one by less than this noise counts as level
-_NEAR_DEG, _BESIDE_DEG, _LEAST_NEAR = (0.15, 0.4, 1.0, 3.0, 10.0), (18.0, 30.0), 3
+_NEAR_DEG, _BACKGROUND_DEG, _LEAST_NEAR = (0.15, 0.4, 1.0, 3.0, 10.0), (18.0, 30.0), 3
 
 
 def retro(table: MeasuredTable, samples: MeasuredSamples) -> tuple[float, list[str]]:
@@ -28,8 +28,8 @@ def retro(table: MeasuredTable, samples: MeasuredSamples) -> tuple[float, list[s
         wi = direction(np.radians(theta_deg), np.radians(phi_deg))
         inner, rings = float(_rings(table, wi, _INNER_DEG).max()), _rings(table, wi, _OUTER_DEG)
         falling = (rings[1:-1] <= _LEVEL * rings[:-2]).all() and inner > max(rings[0], _LEVEL * rings[:-1].max())
-        beside = max(float(rings[-2:].mean()), 1e-9)
-        found.append((inner / beside if falling else 1.0, theta_deg))
+        background = max(float(rings[-2:].mean()), 1e-9)
+        found.append((inner / background if falling else 1.0, theta_deg))
     if not found or np.median([ratio for ratio, _ in found]) < RETRO_RATIO:
         return 1.0, []
     ratio, theta_i = max(found)
@@ -47,11 +47,11 @@ def towards_light(samples: MeasuredSamples) -> float:
     theta_i = np.degrees(angles(samples.wi)[0])
     apart_deg = np.degrees(2 * np.arcsin((np.linalg.norm(samples.wi - samples.wo, axis=1) / 2).clip(0, 1)))
     counted, f = (theta_i > 20) & (theta_i < 70) & ~samples.transmitted, samples.f.mean(axis=1)
-    beside = counted & (apart_deg >= _BESIDE_DEG[0]) & (apart_deg < _BESIDE_DEG[1])
+    background = counted & (apart_deg >= _BACKGROUND_DEG[0]) & (apart_deg < _BACKGROUND_DEG[1])
     near = [part for part in (counted & (apart_deg < reach) for reach in _NEAR_DEG) if part.sum() >= _LEAST_NEAR]
-    if not near or beside.sum() < _LEAST_NEAR:
+    if not near or background.sum() < _LEAST_NEAR:
         return 1.0
-    return max(float(np.median(f[part])) for part in near) / max(float(np.median(f[beside])), 1e-9)
+    return max(float(np.median(f[part])) for part in near) / max(float(np.median(f[background])), 1e-9)
 
 
 def _between(table: MeasuredTable) -> str:
@@ -81,8 +81,8 @@ def _rings(table: MeasuredTable, wi: Floats, radii_deg: Floats) -> Floats:
     """(R,) median of f, mean over channels, on rings about wi."""
     x = normalize(np.cross(wi, np.array([0.0, 1.0, 0.0])))
     y = np.cross(wi, x)
-    around = np.arange(24) * (2 * np.pi / 24)
-    offset = np.cos(around)[:, None] * x + np.sin(around)[:, None] * y
+    phi = np.arange(24) * (2 * np.pi / 24)
+    offset = np.cos(phi)[:, None] * x + np.sin(phi)[:, None] * y
     r = np.radians(radii_deg)[:, None, None]
     wo = np.cos(r) * wi + np.sin(r) * offset
     f = table.eval(np.broadcast_to(wi, wo.shape), wo).mean(axis=-1)
