@@ -23,7 +23,7 @@ from lambent.core.light.colour import luminance
 from lambent.scenes.scene import Scene
 
 POINTS, SAMPLES = 8192, 16
-FLOOR = 0.1  # relative to the mean weight: light missed by the pre-pass costs noise, but is not lost
+FLOOR = 1.0  # of the mean weight, added to each: half of all samples are uniform, for lamps that light little, but nearby
 
 
 def balance_emitters(builder: SceneBuilder, effort: float = 1.0) -> None:
