@@ -23,7 +23,7 @@ from lambent.core.light.colour import luminance
 from lambent.scenes.scene import Scene
 
 POINTS, SAMPLES = 8192, 16
-FLOOR = 1.0  # of the mean weight, added to each: half of all samples are uniform, for lamps that light little, but nearby
+FLOOR = 1.0  # of the mean weight, added to each: half of all samples are uniform, for dim lamps that are near
 
 
 def balance_emitters(builder: SceneBuilder, effort: float = 1.0) -> None:
