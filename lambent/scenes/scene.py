@@ -265,18 +265,17 @@ class Variant:
 class LightFieldWish:
     """Settings of an object's offset surface light field (`baked.light_fields.light_field`); None lets the bake decide.
 
-    At most `points` points, each with a map of `texels` a side, at `offset_m` off the surface; with one of `levels`,
-    the object shows itself without its lobes. With an `error`, the mean difference in log(1 + L/median) from what
-    viewers see mirrored, the bake uses only as many points as that error needs. With `volume`, points fill the object's
-    bounding box, and maps leave the object out, so that another may stand there (thesis R, "Object Replacement"). With
-    `refracts`, maps leave it out too, and light that it transmits is refracted ("Thin Lens Refractions").
+    At most `points` points, each with a map of `texels` a side, at `offset_m` off the surface. With an `error`, the
+    mean difference in log(1 + L/median) from what viewers see mirrored, the bake uses only as many points as that error
+    needs. With `volume`, points fill the object's bounding box, and maps leave the object out, so that another may
+    stand there (thesis R, "Object Replacement"). With `refracts`, maps leave it out too, and light that it transmits is
+    refracted ("Thin Lens Refractions").
     """
 
     points: int | None = None
     texels: int | None = None
     offset_m: float | None = None
     error: float | None = None
-    levels: int | None = None
     volume: bool = False
     refracts: bool = False
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Set
 from typing import Any
 
 import drjit as dr
@@ -26,15 +26,6 @@ from lambent.materials.document import Material
 MOST_OWN = 64  # surfaces of its own object that a ray of a probe passes
 
 
-@dataclass(frozen=True, eq=False)
-class ProbeSpots:
-    """spots (6, N, N) uint32 as `baked.answering.stored` has them, tint (6, N, N, 3), sun (6, N, N)."""
-
-    spots: NDArray[np.uint32]
-    tint: NDArray[np.float16]
-    sun: NDArray[np.float16]
-
-
 class ProbeEyes:
     """Rays from the centres of probes through the middles of their texels."""
 
@@ -49,8 +40,13 @@ class ProbeEyes:
         self._sun = None if traced.sun is None else SunRays(traced.sun, self._whole)
         self._sun_y = 1.0 if traced.sun is None else float(mi.luminance(mi.Color3f(*traced.sun.record.irradiance))[0])
 
-    def look(self, centre: Floats, texels: int, passed: frozenset[str]) -> ProbeSpots:
-        """What a probe at `centre` (3,) with faces of so many texels sees, the objects `passed` left out."""
+    def look(
+        self, centre: Floats, texels: int, passed: Set[str]
+    ) -> tuple[NDArray[np.uint32], NDArray[np.float16], NDArray[np.float16]]:
+        """What a probe at `centre` (3,) with faces of N texels a side sees, the objects `passed` left out.
+
+        spots (6, N, N) as `baked.answering.stored` has them, tint (6, N, N, 3), sun (6, N, N).
+        """
         directions = normalize(face_directions(texels)).reshape(-1, 3)
         own = mi.Bool(np.array([name in passed for name in self._names], bool))
         si = _behind(self._whole, rays_from(centre, directions), self._numbers, own, rays.has_holes(self._whole))
@@ -68,9 +64,8 @@ class ProbeEyes:
         dr.eval(spot, lit)
         shape = 6, texels, texels
         colours = np.where(np.array(met)[:, None], array_of(tint), 0.0).reshape(*shape, 3)
-        return ProbeSpots(
-            np.array(spot).reshape(shape), colours.astype(np.float16), np.array(lit).reshape(shape).astype(np.float16)
-        )
+        sun_share = np.array(lit).reshape(shape).astype(np.float16)
+        return np.array(spot).reshape(shape), colours.astype(np.float16), sun_share
 
 
 @dr.syntax

@@ -42,10 +42,10 @@ class RayEnds:
         self._whole, self._numbers = traced.whole(diffuse=False), builder.numbers
         self._size = traced.texels.width, traced.texels.height
         looks = dict(builder.scene.materials) | dict.fromkeys(builder.measured, Material())
-        worn = [looks[o.material] for o in builder.scene.objects]
-        diffuse = np.array([float(luminance(np.array(m.kd)) + luminance(np.array(m.kt_d))) for m in worn])
+        materials = [looks[o.material] for o in builder.scene.objects]
+        diffuse = np.array([float(luminance(np.array(m.kd)) + luminance(np.array(m.kt_d))) for m in materials])
         self._diffuse = mi.Float(np.maximum(diffuse, LEAST_DIFFUSE).astype(np.float32))
-        self._coupled = mi.Bool(np.array([m.kd_coupled for m in worn], bool))
+        self._coupled = mi.Bool(np.array([m.kd_coupled for m in materials], bool))
         self._textured = any(t.diffuse for t in builder.scene.textures.values())
 
     def from_texels(self, sides: Sides, mine: Indices, count: int, seed: int) -> tuple[NDArray[np.uint32], Floats]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, finished_groups, finished_maps, keeps_direct
+from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, finished_groups, finished_maps, keeps_direct, side_count
 from lambent.bake.artefacts.probe import sharing
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
@@ -37,19 +36,9 @@ REVISION = 11
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
-BETWEEN = (
-    "transfer",
-    "rays",
-    "receiver_rays",
-    "points",
-    "point_sun",
-    "point_direct",
-    "point_light",
-    "point_other",
-    "texels",
-    "near",
-    "shares",
-)
+RAYS = ("rays", "receiver_rays")
+POINTS = ("points", "point_sun", "point_direct", "point_light", "point_other", "texels", "near", "shares")
+BETWEEN = ("transfer", *RAYS, *POINTS)
 SEEN = ("spots", "tint", "sun")
 TILES = 16  # tiles of rays
 
@@ -83,17 +72,15 @@ def keys(context: BakeContext) -> dict[str, str]:
     how: Settings = context.settings(KIND)
     of_map, ready = context.keys("light_map"), keeps_direct(context)
     light = [of_map[name] for name in (IRRADIANCE[0], group_name(SIDES[0], direct=True)) if name in of_map]
-    count = 2 if any(context.two_sided) else 1
+    count = side_count(context)
     samples = 0 if ready else how.lobe_samples if sorts_light(context.methods) else how.direct_samples
-    effort = [
-        how.patches, how.gather_rays, how.receiver_rays, how.block, samples, how.importance_rays,
-    ]  # fmt: skip
+    effort = [how.patches, how.gather_rays, how.receiver_rays, how.block, samples, how.importance_rays]
     key = key_of(KIND, REVISION, light, effort, context.seed)
     sampled = () if ready else TRACED[:count]
     by_group = map(_by_group, sampled) if sorts_light(context.methods) else ()
     found = dict.fromkeys((*sampled, *by_group, *(() if ready else MAPS[:count])), key)
-    worn = [(o.name, o.material) for o in context.scene.objects]  # each patch has one material, by name
-    found |= dict.fromkeys(map(answer_name, (*PATCH, *BETWEEN)), key_of(KIND, REVISION, key, worn))
+    by_object = [(o.name, o.material) for o in context.scene.objects]  # each patch has one material, by name
+    found |= dict.fromkeys(map(answer_name, (*PATCH, *BETWEEN)), key_of(KIND, REVISION, key, by_object))
     of_probes = context.keys("probe")
     for o in context.scene.objects:
         if radiance := of_probes.get(probe_name(o.name, "radiance")):
@@ -112,7 +99,7 @@ def bake(context: BakeContext) -> None:
 
     stale = context.stale(KIND)
     if stale & {*TRACED, *MAPS, *map(answer_name, (*PATCH, *BETWEEN))}:
-        directs = [_direct(context, side) for side in range(2 if any(context.two_sided) else 1)]
+        directs = [_direct(context, side) for side in range(side_count(context))]
         spots = _spots(context, directs)
         ends = RayEnds(context.traced)
         clusters = _clusters(context, ends, spots)
@@ -125,14 +112,11 @@ def _direct(context: BakeContext, side: int) -> Floats:
 
     Light that arrives through lobes alone counts as direct.
     """
-    if keeps_direct(context):
-        return np.asarray(context.store.read(_direct_name(context, side)))
-    if MAPS[side] not in context.stale(KIND):
-        return np.asarray(context.store.read(MAPS[side]))
-    lit = _lit(context)[side]
-    direct = np.minimum(_sampled_direct(context, side, lit), np.asarray(lit, np.float16))
-    context.put(KIND, MAPS[side], direct, context.provenance())
-    return np.asarray(direct)
+    if not keeps_direct(context) and MAPS[side] in context.stale(KIND):
+        lit = _lit(context)[side]
+        direct = np.minimum(_sampled_direct(context, side, lit), np.asarray(lit, np.float16))
+        context.put(KIND, MAPS[side], direct, context.provenance())
+    return np.asarray(context.store.read(_direct_name(context, side)))
 
 
 def _direct_name(context: BakeContext, side: int) -> str:
@@ -193,8 +177,8 @@ def _direct_samples(context: BakeContext, side: int) -> Indices:
     sampling = Sampling((2 * half, 2 * half), 0.0, depth, half, unseen=traced.unseen(diffuse=False))
     if grouped:
         parts = 2 * len(traced.sorted_lights.groups)  # all direct light, and the part straight from emitters
-        beside = context.samples(KIND, _by_group(TRACED[side]), (1, *size, 3 * parts), (1, tile, tile, 3 * parts))
-        writer = BothWriters(whole, beside)
+        of_parts = context.samples(KIND, _by_group(TRACED[side]), (1, *size, 3 * parts), (1, tile, tile, 3 * parts))
+        writer = BothWriters(whole, of_parts)
         sampling = replace(sampling, tally=traced.tally(diffuse=False, direct=Direct.straight), parts=parts)
     scene = traced.whole(diffuse=False)
     sides, labels = traced.in_view(SIGNS[side])
@@ -226,7 +210,7 @@ def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
         return Clusters(np.where(of == NO_PATCH, -1, of), material, paired)
     how: Settings = context.settings(KIND)
     context.progress(0, 1, "patches")
-    sides = [context.traced.in_view(sign)[0] for sign in SIGNS[: 2 if any(context.two_sided) else 1]]
+    sides = [context.traced.in_view(sign)[0] for sign in SIGNS[: side_count(context)]]
     hits = hits_from_viewed(ends, spots, sides, how.importance_rays, context.seed)
     found = clustered(spots, hits, how.patches)
     patch = np.full((2, texels.width * texels.height), NO_PATCH, np.uint16)
@@ -256,7 +240,7 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
 
     how: Settings = context.settings(KIND)
     width = context.traced.texels.width
-    sides = [context.traced.in_view(sign)[0] for sign in SIGNS[: 2 if any(context.two_sided) else 1]]
+    sides = [context.traced.in_view(sign)[0] for sign in SIGNS[: side_count(context)]]
     coarse = bounded_points(spots, width, how.block, clusters.count)
     distance = np.zeros(len(coarse.texel))
     for side, of_side in enumerate(sides):
@@ -264,11 +248,11 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
         distance[mine] = ends.distance_in_texels(of_side, coarse.texel[mine], how.importance_rays, context.seed)
     exitance = spots.exitance(context.scene)
 
-    def sighted(of: GatherPoints) -> GatherPoints:
+    def not_blind(of: GatherPoints) -> GatherPoints:
         return seeing(spots, of, light_seen(ends, spots, sides, of, exitance, how.importance_rays // 2, context.seed))
 
-    points = sighted(refined_points(spots, width, coarse, distance))
-    receivers = sighted(receiving_points(spots, width, coarse, distance, points))
+    points = not_blind(refined_points(spots, width, coarse, distance))
+    receivers = not_blind(receiving_points(spots, width, coarse, distance, points))
     everyone = points.followed_by(receivers)
     closest = points_near(spots, *neighbours(spots, points))
     codes, near = neighbours(spots, everyone)
@@ -276,25 +260,21 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     other = np.where(across >= 0, across, np.arange(len(across)))
     between = Between(ends, spots, sides, closest, exitance, len(points.texel))
 
-    def rays(
-        of: GatherPoints, starts: Indices, traced: int, kept: int
-    ) -> Callable[[tuple[slice, ...], int], NDArray[np.uint8]]:
+    def gather(part: str, of: GatherPoints, starts: Indices, count: int, kept: int, what: str) -> None:
+        """Write the rays of points from texels `starts` (n, m): `kept` of `count` rays each."""
+
         def tile(region: tuple[slice, ...], seed: int) -> NDArray[np.uint8]:
-            return np.moveaxis(between.gathered_rays(of[region[1]], starts[region[1]], traced, kept, seed), -1, 0)
+            return np.moveaxis(between.gathered_rays(of[region[1]], starts[region[1]], count, kept, seed), -1, 0)
 
-        return tile
-
-    of_contacts = max(how.gather_rays // 2, how.receiver_rays)
-    around = texels_around(spots, closest, points)
-    arrays = (("rays", points, around, how.gather_rays, how.gather_rays, "gathering"),
-              ("receiver_rays", receivers, receivers.texel[:, None], of_contacts, how.receiver_rays,
-               "gathering beside contacts"))  # fmt: skip
-    for part, of, starts, count, kept, what in arrays:
-        shape, chunk = (3, len(of.texel), kept), (3, max(1, -(-len(of.texel) // TILES)), kept)
-        key = context.keys(KIND)[answer_name(part)]
-        writer = context.store.begin(answer_name(part), KIND, shape, chunk, "uint8", key=key, meta=context.provenance())
-        run_tiles(writer, rays(of, starts, count, kept), seed=context.seed, progress=context.progress, what=what)
+        name, shape, chunk = answer_name(part), (3, len(of.texel), kept), (3, max(1, -(-len(of.texel) // TILES)), kept)
+        key, meta = context.keys(KIND)[name], context.provenance()
+        writer = context.store.begin(name, KIND, shape, chunk, "uint8", key=key, meta=meta)
+        run_tiles(writer, tile, seed=context.seed, progress=context.progress, what=what)
         writer.finish()
+
+    gather(RAYS[0], points, texels_around(spots, closest, points), how.gather_rays, how.gather_rays, "gathering")
+    of_contacts, kept = max(how.gather_rays // 2, how.receiver_rays), how.receiver_rays
+    gather(RAYS[1], receivers, receivers.texel[:, None], of_contacts, kept, "gathering beside contacts")
     sending = Rays.of(np.moveaxis(context.store.read(answer_name("rays")), 0, -1))
     sends = closest >= 0
     areas: Floats = np.broadcast_to(spots.area, closest.shape)[sends]
@@ -307,7 +287,7 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     of_group = (spots.direct, spots.irradiance)
     sent = (np.stack([sender_means(spots, closest, one, len(points.texel)) for one in light]) for light in of_group)
     values = (of_points, own_sun, *(one.astype(np.float32) for one in sent), of_other, of_texels, of_near, near.shares)
-    for part, array in zip(BETWEEN[3:], values, strict=True):
+    for part, array in zip(POINTS, values, strict=True):
         context.put(KIND, answer_name(part), array, context.provenance())
 
 
@@ -327,8 +307,8 @@ def _seen_by_probes(context: BakeContext, stale: set[str]) -> None:
         own: set[str] = set()
         if radiance.meta.get("object_left_out", True):
             own = set().union(*(family(scene.parts, one) for one in (name, *sharing(owners, name))))
-        found = eyes.look(np.array(radiance.meta["centre"]), radiance.shape[1], frozenset(own))
-        for part in SEEN:
-            values = delta_bytes(found.spots) if part == "spots" else getattr(found, part)
+        spots, tint, sun = eyes.look(np.array(radiance.meta["centre"]), radiance.shape[1], own)
+        arrays: tuple[NDArray[Any], ...] = delta_bytes(spots), tint, sun
+        for part, values in zip(SEEN, arrays, strict=True):
             context.put(KIND, probe_spots_name(name, part), values, context.provenance())
     context.progress(len(names), len(names), "answer of probes")

@@ -62,8 +62,8 @@ def describe(context: BakeContext) -> None:
     write_textures(context.store, context.scene.textures)
     store = context.store
     scene = replace(context.scene, variants=with_kept_images(store.folder, context.scene.variants))
-    worn = [(o.name, scene.materials[o.material].model_dump(mode="json")) for o in scene.objects]
-    key = key_of(REFLECTORS, 1, *geometry_inputs(scene), worn, list(map(asdict, scene.reflector_rules)))
+    materials = [(o.name, scene.materials[o.material].model_dump(mode="json")) for o in scene.objects]
+    key = key_of(REFLECTORS, 1, *geometry_inputs(scene), materials, list(map(asdict, scene.reflector_rules)))
     if store.documents.get(REFLECTORS) == key and SCENE in store.documents:
         reflectors = tuple(map(ReflectorRecord.model_validate, store.documents[SCENE]["reflectors"]))
     else:

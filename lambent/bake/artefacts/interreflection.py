@@ -16,7 +16,7 @@ from lambent.bake.artefacts.view_points import points_key
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
 from lambent.bake.interreflection.as_baked import SCATTERING_TEXTURES, shapes_of, state_of
-from lambent.bake.interreflection.series import Bins, bins_of, tails_of, worn
+from lambent.bake.interreflection.series import Bins, bins_of, tails_of, used_materials
 from lambent.bake.interreflection.tiles import Job, Tile, TileTracer
 from lambent.bake.running.keys import key_of, light_inputs, texture_inputs
 from lambent.bake.running.tiles import slices
@@ -177,4 +177,4 @@ def _as_baked(context: BakeContext) -> list[Any]:
 
 
 def _editables(context: BakeContext) -> dict[str, Editable]:
-    return {name: context.editable(name) for name in worn(context.in_views)}
+    return {name: context.editable(name) for name in used_materials(context.in_views)}

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lambent.bake.artefacts.light_map import finished_maps
+from lambent.bake.artefacts.probe import cached
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
 from lambent.bake.light_fields import request
-from lambent.bake.methods import ProbeMethod
 from lambent.bake.quality import QualityName
 from lambent.bake.running.keys import key_of
 from lambent.bake.running.tiles import run_tiles, seed_of
@@ -40,7 +40,7 @@ NEEDS = ("geometry", "light_map", "probe")
 REVISION = 8
 MATTE = "%s: light_field is ignored: its material is purely diffuse"
 PATHS_OF_A_CHUNK = 1 << 21
-MIRROR_DEPTH = 6  # glossy surfaces in a row on paths of level 1, of objects without light fields
+MIRROR_DEPTH = 6  # glossy surfaces in a row on a path
 BYTES_PER_TEXEL = 1.76  # of light and distances
 log = logging.getLogger(__name__)
 
@@ -50,15 +50,12 @@ class Settings:
     """`points` on each object, with maps of `texels` a side, best 4 k - 2; `strata` x `strata` rays go through each.
 
     `onward` paths go on from each glossy surface that a ray meets: only there is there noise to speak of.
-    Paths meet `levels` glossy surfaces in a row. At 1, the objects that the scene gives light fields show each other
-    and themselves their diffuse light alone.
     """
 
     points: int
     texels: int
     strata: int = 2
     onward: int = 1
-    levels: int = 6
 
 
 SETTINGS = {
@@ -72,20 +69,17 @@ SETTINGS = {
 class Traced:
     """The scene that points are placed in, what they see, and the unit of its light in half floats.
 
-    Points of objects whose light fields have one level see `bare`; those whose maps are without the object, `without`.
+    Points whose maps are without their object see `without` of its name.
     """
 
     placing: Placing
     around: Around
     unit: float
-    bare: Around
     without: Callable[[str], Around]
 
-    def seen(self, name: str, how: Settings, wish: LightFieldWish) -> Around:
+    def seen(self, name: str, wish: LightFieldWish) -> Around:
         """What points of an object see."""
-        if wish.without_object:
-            return self.without(name)
-        return self.bare if how.levels == 1 else self.around
+        return self.without(name) if wish.without_object else self.around
 
 
 def keys(context: BakeContext) -> dict[str, str]:
@@ -94,7 +88,7 @@ def keys(context: BakeContext) -> dict[str, str]:
         how = settings_of(context, wish)
         inputs: list[Any] = [context.keys("light_map")["light_map/irradiance"], name, _said(how)]
         inputs += [wish.offset_m, wish.error, context.seed, context.methods["probes"]]
-        if not _cached(context):
+        if not cached(context):
             inputs.append(context.settings("light_map").max_depth)
         if wish.error is not None:
             inputs.append("texels traced where they are read")  # decides the number of points
@@ -145,13 +139,13 @@ def parts_of(wish: LightFieldWish) -> tuple[str, ...]:
 
 
 def _said(how: Settings) -> dict[str, Any]:
-    """Settings as inputs of a key; maps were not always stored in blocks."""
-    return {**asdict(how), "blocks": True}
+    """Settings as inputs of a key; depth and storage of the maps were settings once."""
+    return {**asdict(how), "levels": MIRROR_DEPTH, "blocks": True}
 
 
 def settings_of(context: BakeContext, wish: LightFieldWish) -> Settings:
     """This bake's settings, with what is asked of one object."""
-    asked = {name: value for name in ("points", "texels", "levels") if (value := getattr(wish, name)) is not None}
+    asked = {name: value for name in ("points", "texels") if (value := getattr(wish, name)) is not None}
     how: Settings = context.settings(KIND)
     return replace(how, **asked)
 
@@ -159,10 +153,6 @@ def settings_of(context: BakeContext, wish: LightFieldWish) -> Settings:
 def _shiny(context: BakeContext) -> list[str]:
     """Names of the objects that mirror what is around them."""
     return [o.name for o in context.scene.objects if needs_probe(context.scene.materials[o.material])]
-
-
-def _cached(context: BakeContext) -> bool:
-    return context.methods["probes"] == ProbeMethod.cached
 
 
 def _choice(context: BakeContext) -> list[dict[str, Any]]:
@@ -206,23 +196,15 @@ def _traced(context: BakeContext) -> Traced:
     from lambent.bake.light_fields.placing import Placing
     from lambent.bake.light_fields.surroundings import around, unit_of
 
-    levels, traced, maps = context.settings(KIND).levels, context.traced, finished_maps(context)
-    wishes = context.scene.light_fields.items()
-    bare = [name for name, wish in wishes if settings_of(context, wish).levels == 1]
-    depth = MIRROR_DEPTH if levels == 1 else levels
-    cached = _cached(context)
-    maps_seen = maps if cached else None
-    depth = depth if cached else context.settings("light_map").max_depth
-    seen = around(traced, maps_seen, depth, bare if levels == 1 else ())
-    kind = {"diffuse": not cached}
-    placing = Placing(traced.builder(**kind), traced.whole(**kind))
-    unit = unit_of(context.scene, maps[0], traced.sun)
+    traced, maps, by_map = context.traced, finished_maps(context), cached(context)
+    depth = MIRROR_DEPTH if by_map else context.settings("light_map").max_depth
+    seen, kind = around(traced, maps if by_map else None, depth), {"diffuse": not by_map}
 
     def without(name: str) -> Around:
         return replace(seen, scene=traced.builder(**kind).build(leave_out={name}))
 
-    bare_seen = seen if levels == 1 or not bare else around(traced, maps_seen, depth, bare)
-    return Traced(placing, seen, unit, bare_seen, without)
+    placing = Placing(traced.builder(**kind), traced.whole(**kind))
+    return Traced(placing, seen, unit_of(context.scene, maps[0], traced.sun), without)
 
 
 def _chooser(context: BakeContext, traced: Traced) -> Chooser:
@@ -235,11 +217,7 @@ def _chooser(context: BakeContext, traced: Traced) -> Chooser:
 
 
 def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced, progress: Progress) -> None:
-    from lambent.bake.light_fields.acquisition import (
-        covered_distances,
-        inverse_distances,
-        radiance_maps,
-    )
+    from lambent.bake.light_fields.acquisition import covered_distances, inverse_distances, radiance_maps
     from lambent.baked.light_fields.blocks.blocks import (
         blocks_of,
         blocks_shape,
@@ -248,7 +226,7 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
     )
 
     start, how = time.perf_counter(), settings_of(context, wish)
-    seen = traced.seen(name, how, wish)
+    seen = traced.seen(name, wish)
     progress(0, 1, "points")
     points = _points(context, name, wish, traced)
     normals = context.store.read(light_field_name(name, "normals"))
@@ -311,7 +289,7 @@ def _placed(context: BakeContext, name: str, wish: LightFieldWish, traced: Trace
     how = settings_of(context, wish)
     count = most = how.points
     if wish.volume:
-        return volume_points(context.traced.builder(diffuse=not _cached(context)), mesh, name, most)
+        return volume_points(context.traced.builder(diffuse=not cached(context)), mesh, name, most)
     if wish.error is not None:
         chooser = _chooser(context, traced)
         if (seen := chooser.watched(name)) is not None:
@@ -327,21 +305,19 @@ def _sample_map(context: BakeContext, name: str, wish: LightFieldWish, traced: T
     from lambent.bake.light_fields.sample_map import sample_map
     from lambent.bake.light_fields.volume import spacing_m
 
-    how, mesh = settings_of(context, wish), context.scene.object(name).mesh
-    points = context.store.read(light_field_name(name, "points"))
+    mesh, points = context.scene.object(name).mesh, context.store.read(light_field_name(name, "points"))
     spacing = np.sqrt(triangle_areas(mesh.corners).sum() / len(points))
     if wish.volume:
         spacing = spacing_m(mesh, len(points))
     size = context.atlas.width, context.atlas.height
-    faces = _faces_of(context, name)
     behind = _exits(context, name) if wish.refracts else None
-    sees = views_in(traced.seen(name, how, wish).scene)
+    sees = views_in(traced.seen(name, wish).scene)
     side = side_seen(mesh, context.traced.places, traced.around.scene, seed_of(context.seed, KIND, name))
-    found = sample_map(context.geometry, faces, size, points, float(spacing), behind, sees, side)
+    found = sample_map(context.geometry, _faces_of(context, name), size, points, float(spacing), behind, sees, side)
     if found.exits is not None:
         context.put(KIND, light_field_name(name, EXITS), found.exits, context.provenance(glass=_glass(context, name)))
     offset_m = context.store.artefact(light_field_name(name, "points")).meta["offset_m"]
-    note = {"corner": list(found.corner), "grid": list(found.grid), "offset_m": offset_m, "levels": how.levels}
+    note = {"corner": list(found.corner), "grid": list(found.grid), "offset_m": offset_m}
     note |= {"volume": True} if wish.volume else {}
     seconds = round(time.perf_counter() - start, 2)
     name_of_map = light_field_name(name, "sample_map")
@@ -353,7 +329,7 @@ def _exits(context: BakeContext, name: str) -> Behind:
     from lambent.bake.light_fields.glass import Exits
 
     o = context.scene.object(name)
-    builder = context.traced.builder(diffuse=not _cached(context))
+    builder = context.traced.builder(diffuse=not cached(context))
     return Exits(builder, name, context.scene.materials[o.material]).behind
 
 

@@ -91,7 +91,7 @@ def keys(context: BakeContext) -> dict[str, str]:
     geometry = context.keys("geometry")["geometry/positions"]
     samples = key_of(KIND, REVISION, geometry, material_inputs(context.scene), light_inputs(context.scene), effort)
     filtered = key_of("irradiance", REVISION_OF_IRRADIANCE, samples)
-    count = _sides(context)
+    count = side_count(context)
     names = [*IRRADIANCE[:count], *NOISE[:count]]
     raw = [PHOTONS] if _by_photons(context) else [_of_side(stage, i) for stage in _stages(how) for i in range(count)]
     direct: list[str] = []  # direct light of the last stage
@@ -131,13 +131,13 @@ def bake(context: BakeContext) -> None:
 
 def finished_maps(context: BakeContext) -> tuple[Floats, Floats | None]:
     """The stored light map (H, W, 3) of both sides; None for the back if no surface is two-sided."""
-    front, *back = (context.store.read(name) for name in IRRADIANCE[: _sides(context)])
+    front, *back = (context.store.read(name) for name in IRRADIANCE[: side_count(context)])
     return front, back[0] if back else None
 
 
 def finished_groups(context: BakeContext) -> tuple[Floats, Floats | None]:
     """Likewise by light group, (n, H, W, 3)."""
-    front, *back = (context.store.read(group_name(side)) for side in SIDES[: _sides(context)])
+    front, *back = (context.store.read(group_name(side)) for side in SIDES[: side_count(context)])
     return front, back[0] if back else None
 
 
@@ -159,7 +159,8 @@ def may_have_sun(scene: Scene) -> bool:
     return not constant or any(isinstance(light, DirectionalLight) for light in scene.lights)
 
 
-def _sides(context: BakeContext) -> int:
+def side_count(context: BakeContext) -> int:
+    """1, or 2 if some surface has a light map on its back, too."""
     return 2 if any(context.two_sided) else 1
 
 
@@ -191,7 +192,7 @@ def _sampled_maps(context: BakeContext) -> Maps:
 
     def maps(stage: str, sampling: Sampling) -> Maps:
         found = []
-        for side in range(_sides(context)):
+        for side in range(side_count(context)):
             raw, labels = _samples(context, stage, side, sampling)
             context.progress(0, 1, "denoising")
             found.append(finished(raw, context.traced.texels, labels, context.traced.cuts))
@@ -225,7 +226,7 @@ def _sorted_maps(context: BakeContext) -> Maps:
         parts = count * (1 + (direct is not None))
         sampling = replace(sampling, tally=traced.tally(diffuse=diffuse, direct=direct), parts=parts)
         found = []
-        for side in range(_sides(context)):
+        for side in range(side_count(context)):
             raw, labels = _samples(context, stage, side, sampling)
             by_group = context.store.read(_parts(_of_side(stage, side)))[0]
             found.append(finished_groups(raw, by_group, count, traced.texels, labels, traced.cuts, context.progress))
@@ -317,7 +318,7 @@ def _photon_maps(context: BakeContext) -> Maps:
 def _photon_map(context: BakeContext) -> PhotonMap:
     from lambent.bake.photons.maps import PhotonMap
 
-    return PhotonMap(context.geometry, [context.traced.lit_sides(sign) for sign in SIGNS[: _sides(context)]])
+    return PhotonMap(context.geometry, [context.traced.lit_sides(sign) for sign in SIGNS[: side_count(context)]])
 
 
 def _dominant_direction(context: BakeContext) -> None:
@@ -340,7 +341,7 @@ def _noise(context: BakeContext) -> None:
     if _by_photons(context):
         halves = _photon_map(context).halves(context.store.read(PHOTONS))
     else:
-        raw = (_of_side(_stages(context.settings(KIND))[-1], side) for side in range(_sides(context)))
+        raw = (_of_side(_stages(context.settings(KIND))[-1], side) for side in range(side_count(context)))
         halves = (sampled_halves(context.store.read(name)) for name in raw)
     for name, (both, known) in zip(NOISE, halves, strict=False):
         context.put(KIND, name, noise_map(both, known, context.traced.labels), context.provenance())

@@ -71,7 +71,7 @@ def keys(context: BakeContext) -> dict[str, str]:
             inputs += [*staying, "not left out"]
         if name in backs:
             inputs.append("from both sides")
-        if not _cached(context):
+        if not cached(context):
             inputs += [context.methods["probes"], context.settings("light_map").max_depth]
         key = key_of(KIND, REVISION, *inputs)
         given = scene.probe_planes.get(name)
@@ -89,11 +89,11 @@ def bake(context: BakeContext) -> None:
     from lambent.bake.probes.probe_set import ProbeSet
 
     front, back = finished_maps(context)
-    front_or_none = front if _cached(context) else None
+    front_or_none = front if cached(context) else None
     depth = context.settings("light_map").max_depth
     probes = ProbeSet(context.traced, front_or_none, back, depth, backs_of(context.store), _held(context.store))
     if sorts_light(context.methods):
-        probes.sort_light(*(finished_groups(context) if _cached(context) else (None, None)))
+        probes.sort_light(*(finished_groups(context) if cached(context) else (None, None)))
     poor: list[tuple[float, str]] = []  # hidden share, and its words
     for i, name in enumerate(missing):
         context.progress(i, len(missing), f"probe of {name}")
@@ -127,8 +127,8 @@ def _owners(context: BakeContext) -> dict[str, str]:
     if not names or context.stale("geometry"):
         return {}
     given = [sorted(scene.probe_centres), sorted(scene.probe_planes)]
-    worn = [scene.materials[scene.object(name).material] for name in names]
-    look = [(m.transmits, [(lobe.mx, lobe.my) for lobe in m.lobes]) for m in worn]
+    materials = [scene.materials[scene.object(name).material] for name in names]
+    look = [(m.transmits, [(lobe.mx, lobe.my) for lobe in m.lobes]) for m in materials]
     lamps = [o.name for o in scene.objects if any(o.emission)]
     key = key_of(SHARED_PROBES, 7, names, look, given, lamps, *geometry_inputs(scene))
     said = store.documents.get(SHARED_PROBES)
@@ -148,11 +148,12 @@ def _shared(context: BakeContext, names: list[str]) -> Sharing:
     engine()  # before Mitsuba is imported
     from lambent.bake.probes.sharing import shared
 
-    traced, how = context.traced, {"diffuse": not _cached(context)}
+    traced, how = context.traced, {"diffuse": not cached(context)}
     return shared(traced.builder(**how), traced.whole(**how), traced.places, names)
 
 
-def _cached(context: BakeContext) -> bool:
+def cached(context: BakeContext) -> bool:
+    """Whether paths of probes and light fields end at the light map."""
     return context.methods["probes"] == ProbeMethod.cached
 
 

@@ -13,14 +13,7 @@ from lambent.bake.engine import engine
 from lambent.bake.running.keys import key_of
 from lambent.bake.running.tiles import seed_of
 from lambent.core.light.colour import luminance
-from lambent.store.contract import (
-    needs_probe,
-    probe_irradiance,
-    probe_name,
-    radiance_unit,
-    scene_record,
-    shared_probes,
-)
+from lambent.store.contract import needs_probe, probe_irradiance, probe_name, radiance_unit, scene_record, shared_probes
 from lambent.store.occlusion import PROBE_SHARE, has_even_niches, occlusion_gain
 
 if TYPE_CHECKING:

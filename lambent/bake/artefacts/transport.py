@@ -12,8 +12,9 @@ import numpy as np
 from lambent.bake.artefacts.visibility import lights_key, trace
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
+from lambent.bake.interreflection.series import SMOOTH_ANGLES
 from lambent.bake.quality import QualityName
-from lambent.bake.running.in_background import Behind, behind
+from lambent.bake.running.in_background import behind
 from lambent.bake.running.keys import key_of, texture_inputs
 from lambent.bake.transport.view import View
 from lambent.core.progress import Progress
@@ -35,12 +36,11 @@ POINTS = 1 << 15  # per chunk
 LEAST = 2.0**-10  # of the light of a band of the first curve: less is moved to a neighbour along a smooth second curve
 ENTRIES = 1 << 20  # of pairs, per chunk: each chunk costs milliseconds to write
 MANY_LIGHTS = 1000  # below this, two sharp curves have half the bands each
-SMOOTH = ("theta_i", "theta_o", "theta_d")  # angles over which curves have no narrow peaks
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Numbers of bands, powers of two, for curves with narrow peaks and `SMOOTH` ones, alone or as one of two."""
+    """Numbers of bands, powers of two, for curves with narrow peaks and smooth ones, alone or as one of two."""
 
     sharp: int
     smooth: int
@@ -110,10 +110,10 @@ def _bake_view(context: BakeContext, view: View, count: int) -> None:
     lights, points = context.view_tracer.lights(count), context.view_tracer.points(view)
     scale, sizes = scale_of(brightest(points.p, lights)), []
     seen = context.store.read(view.name("visibility", str(count)))
-    worn = np.array([o.material for o in context.in_views.objects])[points.object]
+    materials = np.array([o.material for o in context.in_views.objects])[points.object]
     parts = list(_parts(context, view, count))
     for material, terms in groupby(parts, lambda part: part.material):
-        mine = worn == material
+        mine = materials == material
         own = points.where(mine), lights, seen[:, mine], scale
         for part in terms:
             sizes.append(np.count_nonzero(mine))
@@ -161,7 +161,7 @@ class _Baking:
         from lambent.bake.transport.bands import pair_transport
 
         bands, many, term = self._bands(), len(self.points), self.part.term
-        least = LEAST if bands[1].factor.over in SMOOTH else 0.0
+        least = LEAST if bands[1].factor.over in SMOOTH_ANGLES else 0.0
         spans = self._begin(store, "spans", (many, 2), (POINTS, 2), "uint32")
         steps = self._begin(store, "steps", (0,), (ENTRIES,), "uint8", growing=True)
         values = self._begin(store, "values", (0,), (ENTRIES,), "uint32", growing=True)
@@ -173,16 +173,12 @@ class _Baking:
                 begin = -(-begin // ENTRIES) * ENTRIES
                 some = spans.artefact.region(chunk)[0]
                 points, seen, texture = self.points.where(some), self.seen[:, some], self._texture(some)
-                streams, counts = [_Stream(writer, begin, after) for writer in (steps, values)], []
-                for found in pair_transport(points, self.lights, seen, term, bands, self.scale, texture, least):
-                    counts.append(found.counts)
-                    streams[0].add(found.steps)
-                    streams[1].add(found.light)
-                for stream in streams:
-                    stream.end()
-                many_each = np.concatenate(counts)
-                ends = begin + np.cumsum(many_each)
-                after.do(spans.write, chunk, np.stack([ends - many_each, ends], axis=1).astype(np.uint32))
+                blocks = pair_transport(points, self.lights, seen, term, bands, self.scale, texture, least)
+                counts, of_steps, light = (np.concatenate(one) for one in zip(*blocks, strict=True))
+                after.do(append, steps, begin, of_steps)
+                after.do(append, values, begin, light)
+                ends = begin + np.cumsum(counts)
+                after.do(spans.write, chunk, np.stack([ends - counts, ends], axis=1).astype(np.uint32))
                 begin = int(ends[-1])
         for writer in (steps, values, spans):
             writer.finish()
@@ -197,14 +193,9 @@ class _Baking:
         return (self.points.diffuse if self.part.term.is_diffuse else self.points.specular)[some]
 
     def _begin(
-        self,
-        store: Store,
-        array: str,
-        shape: tuple[int, ...],
-        chunks: tuple[int, ...],
-        dtype: str,
+        self, store: Store, array: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: str,
         growing: bool = False,
-    ) -> Writer:
+    ) -> Writer:  # fmt: skip
         meta = {**self.part.view.meta, **self.part.said(self.scale)}
         name = self.part.name(array)
         return store.begin(name, KIND, shape, chunks, dtype, key=self.part.key, meta=meta, growing=growing)
@@ -218,43 +209,15 @@ class _Baking:
         self.progress(total, total, self.what)
 
 
-class _Stream:
-    """Writes entries into whole chunks from `begin`, the last one padded with zeros."""
-
-    def __init__(self, writer: Writer, begin: int, after: Behind) -> None:
-        self._writer, self._next, self._after = writer, begin // ENTRIES, after
-        self._chunk, self._filled = np.zeros(ENTRIES, writer.artefact.dtype), 0
-
-    def add(self, entries: np.ndarray) -> None:
-        while len(entries):
-            room = ENTRIES - self._filled
-            here, entries = entries[:room], entries[room:]
-            self._chunk[self._filled : self._filled + len(here)] = here
-            self._filled += len(here)
-            if self._filled == ENTRIES:
-                self.end()
-
-    def end(self) -> None:
-        if self._filled:
-            self._after.do(self._write, self._next, self._chunk)
-            self._chunk, self._filled = np.zeros(ENTRIES, self._writer.artefact.dtype), 0
-            self._next += 1
-
-    def _write(self, number: int, chunk: np.ndarray) -> None:
-        missing = (number + 1) * ENTRIES - self._writer.artefact.shape[0]
-        if missing > 0:
-            self._writer.extend(missing)
-        self._writer.write((number,), chunk)
-
-
 def append(writer: Writer, begin: int, entries: np.ndarray) -> None:
-    """Write entries into whole chunks from `begin`, the last one padded with zeros."""
+    """Write entries (n, ...) into whole chunks from `begin`, the last one padded with zeros."""
     size = -(-len(entries) // ENTRIES) * ENTRIES
-    padded = np.concatenate([entries, np.zeros((size - len(entries), entries.shape[1]), entries.dtype)])
+    padded = np.concatenate([entries, np.zeros((size - len(entries), *entries.shape[1:]), entries.dtype)])
     if begin + size > writer.artefact.shape[0]:
         writer.extend(begin + size - writer.artefact.shape[0])
     for first in range(0, size, ENTRIES):
-        writer.write(((begin + first) // ENTRIES, 0), padded[first : first + ENTRIES])
+        chunk = ((begin + first) // ENTRIES, *[0] * (entries.ndim - 1))
+        writer.write(chunk, padded[first : first + ENTRIES])
 
 
 def _parts(context: BakeContext, view: View, count: int) -> Iterator[_Part]:
@@ -280,9 +243,9 @@ def _bands(how: Settings, term: Term, lights: int) -> tuple[tuple[Factor, int], 
     """
     of_two = len(term.factors) == 2
     smooth, sharp = (how.smooth_of_two, how.sharp_of_two) if of_two else (how.smooth, how.sharp)
-    if of_two and lights < MANY_LIGHTS and not any(factor.over in SMOOTH for factor in term.factors):
+    if of_two and lights < MANY_LIGHTS and not any(factor.over in SMOOTH_ANGLES for factor in term.factors):
         sharp //= 2
-    return tuple((factor, smooth if factor.over in SMOOTH else sharp) for factor in term.factors)
+    return tuple((factor, smooth if factor.over in SMOOTH_ANGLES else sharp) for factor in term.factors)
 
 
 def _terms_name(view: View, count: int) -> str:

@@ -23,8 +23,10 @@ def points_key(context: BakeContext, view: View) -> str:
     """Key of a view's points and all their data."""
     scene = context.in_views
     places = [view.meta["view"]["camera"] | {"name": ""}, view.width, view.height]
-    worn = [o.material for o in scene.objects]
-    return key_of(KIND, REVISION, places, worn, texture_inputs(scene, "normal", "direction"), *geometry_inputs(scene))
+    materials = [o.material for o in scene.objects]
+    return key_of(
+        KIND, REVISION, places, materials, texture_inputs(scene, "normal", "direction"), *geometry_inputs(scene)
+    )
 
 
 def keys(context: BakeContext) -> dict[str, str]:

@@ -19,7 +19,6 @@ NEEDS = ("view_points",)
 OF_VIEWS = True
 REVISION = 3
 POINTS = 1 << 16  # per chunk
-BITS = 32
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ def bake(context: BakeContext) -> None:
 def trace(context: BakeContext, view: View, count: int) -> None:
     """Continue the visibility of this many lights until it is complete."""
     engine()  # before Mitsuba is imported
-    from lambent.bake.transport.visibility import visibility
+    from lambent.bake.transport.visibility import BITS, visibility
 
     name = view.name(KIND, str(count))
     if name not in context.stale(KIND):

@@ -44,7 +44,7 @@ class Surfaces:
         COSINE, BAKED or FIXED_BRDF.
     factors : (objects, 2 sides, 2, 3) float32
         `as_baked.over_albedo` of each object; for an uneditable one, factors that leave f unchanged.
-    worn, material : tuple of str, (objects,) int
+    names, material : tuple of str, (objects,) int
         Names of the materials, and the index of each object's material.
     """
 
@@ -53,12 +53,12 @@ class Surfaces:
     slots: np.ndarray
     scatters: np.ndarray
     factors: np.ndarray
-    worn: tuple[str, ...]
+    names: tuple[str, ...]
     material: np.ndarray
 
     @classmethod
     def of(
-        cls, scene: Any, numbers: ObjectNumbers, worn: Sequence[str], tails: Tails, shapes: Mapping[str, Floats]
+        cls, scene: Any, numbers: ObjectNumbers, materials: Sequence[str], tails: Tails, shapes: Mapping[str, Floats]
     ) -> Surfaces:
         """Describe objects by their materials; `shapes` as from `as_baked.shapes_of`."""
         number = {slot: k for k, slot in enumerate(tails.slots)}
@@ -69,14 +69,15 @@ class Surfaces:
                 number.get((material, side), NONE) if material in edited else fixed
                 for side in ("reflection", "transmission")
             ]
-            for material in worn
+            for material in materials
         ]
-        names, material = np.unique(worn, return_inverse=True)
+        names, material = np.unique(materials, return_inverse=True)
         scatters = [
-            (BAKED if name in shapes else COSINE) if name in edited or fixed == NONE else FIXED_BRDF for name in worn
+            (BAKED if name in shapes else COSINE) if name in edited or fixed == NONE else FIXED_BRDF
+            for name in materials
         ]
         as_it_is = np.broadcast_to(np.array([[1.0], [0.0]]), (2, 2, 3))
-        factors = [shapes[name] if how == BAKED else as_it_is for name, how in zip(worn, scatters, strict=True)]
+        factors = [shapes[name] if how == BAKED else as_it_is for name, how in zip(materials, scatters, strict=True)]
         return cls(
             scene, numbers, np.array(rows, np.uint32), np.array(scatters, np.uint32),
             np.array(factors, np.float32), tuple(map(str, names)), material,
@@ -90,7 +91,7 @@ class Second:
     Attributes
     ----------
     material : mi.UInt32
-        Index of the material in `Surfaces.worn`.
+        Index of the material in `Surfaces.names`.
     wo, wi_lit, wi : mi.Vector3f
         In the surface's frame: directions to the path's origin, to the sampled light, and of the path's continuation.
     """

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lambent.bake.engine import engine
-from lambent.bake.interreflection.series import bins_of, tails_of, worn
+from lambent.bake.interreflection.series import bins_of, tails_of, used_materials
 from lambent.bake.interreflection.settings import Bounces
 from lambent.bake.running.keys import material_inputs
 from lambent.bake.transport.view import View
@@ -235,7 +235,7 @@ def propose_all(
     edited = frozenset[str]().union(*(one.edited for one in found))
     if all(one.edited == edited for one in found):
         return found
-    same = replace(bounces, fixed=frozenset(worn(scene)) - edited)
+    same = replace(bounces, fixed=frozenset(used_materials(scene)) - edited)
     return [propose(scene, view, same, kept=edited, merging=False, **more) for view in views]
 
 
@@ -260,8 +260,8 @@ def held_by(folder: Path, scene: Scene, view: View, series: Sequence[int]) -> He
     if name not in store or store.artefact(name).meta["series"] != list(series):
         return None
     edited = frozenset(one for one, side in Tails.of(store.artefact(name).meta["tails"]).slots if side != FIXED)
-    worn_then, alike = materials_in_views(store), same_materials(scene)
-    pairs = {(o.material, worn_then.get(o.name, o.material)) for o in scene.objects}
+    materials_then, alike = materials_in_views(store), same_materials(scene)
+    pairs = {(o.material, materials_then.get(o.name, o.material)) for o in scene.objects}
     return Held(edited, {one: other for one, other in pairs if one != other and alike.get(one) == other})
 
 
@@ -276,7 +276,7 @@ def _proposal(
 ) -> Proposal:
     from lambent.bake.interreflection.trial import Trial
 
-    known = {name: given.get(name) or of_material(scene.materials[name]) for name in worn(scene)}
+    known = {name: given.get(name) or of_material(scene.materials[name]) for name in used_materials(scene)}
     trial = Trial(scene, view, known)
     total = sum(trial.shown.values())
     if not total:
@@ -341,7 +341,7 @@ def same_materials(scene: Scene, keep: Collection[str] = ()) -> dict[str, str]:
     look = dict(zip([o.material for o in scene.objects], (repr(one[1]) for one in looks), strict=True))
     first: dict[str, str] = {}
     found = {}
-    for name in worn(scene):
+    for name in used_materials(scene):
         if name not in keep:
             other = first.setdefault(look[name], name)
             if other != name:

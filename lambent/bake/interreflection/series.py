@@ -32,7 +32,7 @@ class Bins:
         return [int(np.prod([n for _, n in factors], dtype=int)) for _, factors in self.terms] or [1]
 
 
-def worn(scene: Scene) -> list[str]:
+def used_materials(scene: Scene) -> list[str]:
     """Names of the materials that objects use."""
     return list(dict.fromkeys(o.material for o in scene.objects))
 

@@ -35,19 +35,15 @@ class Bounces:
     diffuse_seen: bool = False
 
     def __post_init__(self) -> None:
-        said = ",".join(map(str, self.series))
-        if not 2 <= len(self.series) <= MOST_HITS:
-            raise UserError(
-                "cannot be read as a series of bands", field="series", got=said, expected=f"2 to {MOST_HITS} numbers"
-            )
-        if any(n < 1 or n > 256 or n & (n - 1) for n in self.series):
-            raise UserError(
-                "cannot be read as a series of bands", field="series", got=said, expected="powers of two up to 256"
-            )
-        if any(n > 1 for n in self.series[2:]):
-            raise UserError(
-                "bands beyond the second surface", field="series", got=said, expected="1 from the third number on"
-            )
+        wrong = "cannot be read as a series of bands"
+        faults = (
+            (not 2 <= len(self.series) <= MOST_HITS, wrong, f"2 to {MOST_HITS} numbers"),
+            (any(n < 1 or n > 256 or n & (n - 1) for n in self.series), wrong, "powers of two up to 256"),
+            (any(n > 1 for n in self.series[2:]), "bands beyond the second surface", "1 from the third number on"),
+        )
+        for fault, message, expected in faults:
+            if fault:
+                raise UserError(message, field="series", got=",".join(map(str, self.series)), expected=expected)
         if self.samples < 1:
             raise UserError("no samples", field="samples", got=self.samples, expected="at least 1")
 

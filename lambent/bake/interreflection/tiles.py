@@ -171,9 +171,9 @@ class TileTracer:
 
         editables = {name: bins.editable for name, bins in self.bins.items()}
         tracer = self._tracer = self._tracer or ViewTracer(self.scene, editables)  # created on demand, for its scene
-        worn = [o.material for o in self.scene.objects]
+        materials = [o.material for o in self.scene.objects]
         shapes = {} if self._diffuse_seen else shapes_of(self.scene, editables)
-        return Surfaces.of(tracer.scene, tracer.numbers, worn, self.tails, shapes)
+        return Surfaces.of(tracer.scene, tracer.numbers, materials, self.tails, shapes)
 
     @cached_property
     def _seconds(self) -> list[SecondTerm]:
@@ -187,7 +187,7 @@ class TileTracer:
             return SecondTerm(NONE, None, ())
         term = self.bins[one.material].editable.terms[one.term]
         factors = tuple(zip(term.factors, one.counts, strict=True))
-        return SecondTerm(self._surfaces.worn.index(one.material), term, tuple(_bands(factors)))
+        return SecondTerm(self._surfaces.names.index(one.material), term, tuple(_bands(factors)))
 
 
 def _bands(factors: Any) -> list[Bands]:

@@ -75,8 +75,8 @@ class Trial:
         self.scene, self.editables, self._tracer = scene, editables, ViewTracer(scene, editables)
         self._points = self._tracer.points(view)
         self.begin_s = time.perf_counter() - start
-        worn = np.array([o.material for o in scene.objects])[self._points.object]
-        self._at = {name: np.random.default_rng(0).permutation(np.flatnonzero(worn == name)) for name in editables}
+        by_object = np.array([o.material for o in scene.objects])[self._points.object]
+        self._at = {name: np.random.default_rng(0).permutation(np.flatnonzero(by_object == name)) for name in editables}
         self.shown = {name: len(at) for name, at in self._at.items()}
 
     def passed_on(self) -> dict[str, float]:

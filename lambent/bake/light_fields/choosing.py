@@ -24,13 +24,7 @@ from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.light.colour import luminance
 from lambent.core.progress import Progress, part_of
 from lambent.scenes.scene import Mesh, Scene
-from lambent.store.contract import (
-    probe_irradiance,
-    probe_name,
-    radiance_unit,
-    scene_record,
-    shared_probes,
-)
+from lambent.store.contract import probe_irradiance, probe_name, radiance_unit, scene_record, shared_probes
 from lambent.store.occlusion import has_even_niches, occlusion_gain
 from lambent.store.store import Store
 
@@ -62,7 +56,10 @@ class Chooser:
             if (seen := self.watched(name)) is not None:
                 looks[name] = replace(seen, size_sr=seen.size_sr * (1 - flat.get(name, 0.0)))
         level = usual_level(looks.values())
-        wrong = {name: seen.size_sr * self._probe_error(name, seen, level) for name, seen in looks.items()}
+        wrong = {
+            name: seen.size_sr * seen.error(probe_light(self._store, name).seen(seen), level)
+            for name, seen in looks.items()
+        }
         found, some = dict[str, Trial](), worth_trying(wrong)
         if len(largest) < len(curved) or len(some) == MOST_TRIED < len(wrong):
             log.warning(LEFT_OUT, len(some), len(curved))
@@ -93,9 +90,6 @@ class Chooser:
     def _turned(self, name: str) -> Mesh:
         mesh = self._scene.object(name).mesh
         return turned_to_viewers(mesh, self._places, self._around.scene, self._seed_of(name))
-
-    def _probe_error(self, name: str, seen: Watched, level: float) -> float:
-        return seen.error(probe_light(self._store, name).seen(seen), level)
 
     def _seed_of(self, name: str) -> int:
         return seed_of(self._seed, "light field", name)

@@ -14,13 +14,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from lambent.bake.light_fields.sampling import (
-    CANDIDATES,
-    SurfacePoints,
-    densities,
-    spread_evenly,
-    thinned,
-)
+from lambent.bake.light_fields.sampling import CANDIDATES, SurfacePoints, densities, spread_evenly, thinned
 from lambent.bake.running.tiles import slices
 from lambent.bake.tracing.rays import distances, leaving, vectors
 from lambent.bake.tracing.scene_builder import SceneBuilder

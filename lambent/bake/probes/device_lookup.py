@@ -11,14 +11,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from lambent.baked.probes.lookups import (
-    NEARNESS_MIN,
-    PLANE_ACTIVE_M,
-    SECANTS,
-    STEPS,
-    TINY,
-    inverse_depth,
-)
+from lambent.baked.probes.lookups import NEARNESS_MIN, PLANE_ACTIVE_M, SECANTS, STEPS, TINY, inverse_depth
 from lambent.core.arrays import Floats
 from lambent.core.light.colour import luminance
 

@@ -90,9 +90,9 @@ class ProbeSet:
                 surfaces[i] = np.concatenate([points, points]), np.concatenate([normals, -normals])
         points, normals = (np.concatenate(a) for a in zip(*surfaces, strict=True))
         each = [len(mine) for mine, _ in surfaces]
-        worn = [self._scene.materials[self._scene.object(name).material] for name in names]
-        clear = np.repeat([material.transmits for material in worn], each)
-        r0 = np.repeat([largest_r0(material) for material in worn], each)
+        materials = [self._scene.materials[self._scene.object(name).material] for name in names]
+        clear = np.repeat([material.transmits for material in materials], each)
+        r0 = np.repeat([largest_r0(material) for material in materials], each)
         return mirrored(
             points,
             normals,

@@ -36,7 +36,6 @@ from lambent.bake.tracing.rays import leaving, rays_from
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize, reflect
-from lambent.core.geometry.triangles import triangle_areas
 from lambent.scenes.mesh import boxes_of
 from lambent.scenes.scene import Mesh
 
@@ -171,9 +170,6 @@ def _looked(builder: SceneBuilder, whole: Any, places: Floats, names: list[str])
     scene, count = builder.scene, len(names)
     meshes = [scene.object(name).mesh for name in names]
     points, normals = (np.concatenate(a) for a in zip(*(spread(mesh, POINTS) for mesh in meshes), strict=True))
-    width = np.sqrt(
-        [triangle_areas(mesh.corners).sum() / 4 for mesh in meshes]
-    )  # mean shadow of a convex body (Cauchy)
     found, eyes = viewers_of(points, normals, places, whole, np.random.default_rng(0))
     view = normalize(np.where(found[:, None], eyes - points, normals))
     clear = np.repeat([scene.materials[scene.object(name).material].transmits for name in names], POINTS)
@@ -188,7 +184,7 @@ def _looked(builder: SceneBuilder, whole: Any, places: Floats, names: list[str])
     seen = [
         np.quantile(d[v], (CLOSEST, 0.5)) if v.any() else (np.inf,) * 2 for d, v in zip(distance, valid, strict=True)
     ]
-    largest, size = width / np.array(seen).T
+    largest, size = widths(meshes) / np.array(seen).T
     ways, hits = (a.reshape(count, POINTS, 3) for a in (directions, points + directions * t[:, None]))
     grid = count, POINTS
     return Looked(ways, hits, met.reshape(grid), open_.reshape(grid), valid, size, largest, reach)

@@ -160,12 +160,7 @@ class _Lit:
     """Points on the device, and the light they receive by one term."""
 
     def __init__(
-        self,
-        points: ViewPoints,
-        lights: TriangleLights,
-        seen: NDArray[np.uint32],
-        term: Term,
-        bands: Sequence[Bands],
+        self, points: ViewPoints, lights: TriangleLights, seen: NDArray[np.uint32], term: Term, bands: Sequence[Bands]
     ) -> None:
         self._bands, self._term, self._many = bands, term, len(points)
         self.counts = [b.count for b in bands]

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.baked.transport.wavelets import transformed
+from lambent.core.light.colour import HALF_MAX
 
 STEPS = 256  # brightest light in stored units: leaves room for quotients above 1 at grazing angles
 STEPS_OF_FLOAT = 1024  # exponents of positive floats, with their first two fraction bits
-HALF_MAX = float(np.finfo(np.float16).max)
 
 
 def scale_of(brightest: float) -> float:

@@ -120,7 +120,6 @@ class LightFieldSection(Section):
     texels: Annotated[int, Field(ge=LEAST_TEXELS, le=MOST_TEXELS)] | None = None
     offset_m: Annotated[float, Field(gt=0, le=1000)] | None = None
     error: Positive | None = None
-    levels: Literal[1] | None = None
     volume: bool = False
     refracts: bool = False
 
@@ -132,8 +131,6 @@ class LightFieldSection(Section):
             )
         if self.volume and (self.offset_m is not None or self.error is not None):
             raise ValueError("offset_m and error apply to points on the surface, not to a volume")
-        if self.levels is not None and (self.volume or self.refracts):
-            raise ValueError("levels applies to maps that show the object, not to a volume or to refraction")
         return self
 
     @property
