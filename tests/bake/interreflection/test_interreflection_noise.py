@@ -22,13 +22,8 @@ from lambent.store.store import Store
 from tests.bake.interreflection.test_interreflection import FROM_ABOVE, corner
 
 SIZE, BOUNCES = (20, 20), Bounces((16, 1, 1), 64, frozenset({"black"}))
-PAINT = Material(kd=(0.6, 0.4, 0.3))
-KINDS = {
-    "floor": PAINT,
-    "back": PAINT,
-    "side": Material(kd=0.5),
-    "ball": Material(kd=0.1, lobes=(Lobe(mx=0.3, my=0.3),)),
-}
+PAINT, SATIN = Material(kd=(0.6, 0.4, 0.3)), Material(kd=0.1, lobes=(Lobe(mx=0.3, my=0.3),))
+KINDS = {"floor": PAINT, "back": PAINT, "side": Material(kd=0.5), "ball": SATIN}
 SCENE = corner(KINDS)
 MATERIALS = {name: of_material(one) for name, one in SCENE.materials.items()}
 VIEW = View(FROM_ABOVE, *SIZE)

@@ -43,6 +43,7 @@ def with_small_things() -> Scene:
     return replace(scene, objects=(*scene.objects, bead, screen), materials={**scene.materials, **more})
 
 
+@pytest.mark.usefixtures("short_trials")
 def test_what_is_small_in_the_view_and_in_its_light_is_fixed() -> None:
     found = propose(with_small_things(), VIEW, replace(BOUNCES, fixed=frozenset({"ball"})))
     assert found.bounces.fixed == {"ball", "bead", "black"}  # the lamp reflects nothing
@@ -51,6 +52,9 @@ def test_what_is_small_in_the_view_and_in_its_light_is_fixed() -> None:
     assert sum(row.in_view for row in found.rows) == pytest.approx(1)
     assert sum(row.passed_on for row in found.rows) == pytest.approx(1)
     assert rows["bead"].cells < rows["floor"].cells
+    away = Camera("away", (0, 50, 0), (0, 90, 0.1))
+    with pytest.raises(UserError, match="away: the view shows no surface"):
+        propose(corner(KINDS), View(away, 8, 8), BOUNCES)
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +95,10 @@ def test_what_the_bake_takes_was_said_before(found: Proposal, tmp_path: Path, mo
     assert held <= found.edit_bytes <= 1.3 * held
     on_disk = sum(f.stat().st_size for f in (tmp_path / "s").rglob("*") if f.is_file() and f.suffix != ".json")
     assert 0.5 * on_disk < found.disk_bytes < 2 * on_disk  # folders of a small store count more
-    assert 0 < found.seconds < 300
+    assert found.seconds > 0
+    lines = found.lines()
+    assert [line.split()[0] for line in lines[1:6]] == [row.material for row in found.rows]
+    assert lines[-2].startswith("16,1,1 with 256 samples: ") and " on disk, " in lines[-1]
 
 
 def test_seconds_are_of_paths_calls_tiles_and_passes() -> None:
@@ -155,15 +162,3 @@ def test_a_store_goes_on_with_what_was_merged_for_it(tmp_path: Path) -> None:
     changed = held_by(folder, repainted, VIEW, bounces.series)
     assert changed is not None and not changed.same, "they no longer look the same"
     assert held_by(folder, twins, VIEW, (8, 1)) is None
-
-
-def test_the_table_names_every_material_and_the_sums(found: Proposal) -> None:
-    lines = found.lines()
-    assert [line.split()[0] for line in lines[1:6]] == [row.material for row in found.rows]
-    assert lines[-2].startswith("16,1,1 with 256 samples: ") and " on disk, " in lines[-1]
-
-
-def test_a_view_of_nothing() -> None:
-    away = Camera("away", (0, 50, 0), (0, 90, 0.1))
-    with pytest.raises(UserError, match="away: the view shows no surface"):
-        propose(corner(KINDS), View(away, 8, 8), BOUNCES)

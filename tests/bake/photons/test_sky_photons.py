@@ -24,13 +24,8 @@ def shot(store: Store) -> np.ndarray:
 
 
 def test_window_lets_in_the_flux_of_its_area(tmp_path: Path) -> None:
-    store = bake(
-        pit(ConstantEnvironment((1.0, 2.0, 1.0))),
-        tmp_path / "s",
-        quality=SMALL,
-        light_map="photons",
-        only=["light_map"],
-    )
+    scene = pit(ConstantEnvironment((1.0, 2.0, 1.0)))
+    store = bake(scene, tmp_path / "s", quality=SMALL, light_map="photons", only=["light_map"])
     flux = shot(store)[:, 0].sum(axis=(1, 2))  # black walls: each photon lands once
     error = flux.std(axis=0, ddof=1) / np.sqrt(len(flux))
     wanted = np.pi * (2 * HALF) ** 2 * np.array([1, 2, 1])
@@ -38,7 +33,6 @@ def test_window_lets_in_the_flux_of_its_area(tmp_path: Path) -> None:
 
 
 def test_landing_places_bring_the_same_light_as_the_disc(tmp_path: Path) -> None:
-
     scene = pit(sunny(tmp_path))
     scene = replace(scene, materials={"black": scene.materials["black"].model_copy(update={"kd": (0.5, 0.5, 0.5)})})
     builder, whole = built(scene)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.probes.centre import flat_axis, probe_centre
+from lambent.bake.probes.centre import probe_centre
 from lambent.bake.probes.planes import bounding_planes
 from lambent.bake.probes.probe import MOST, Surroundings, _blocks_needed, bake_probe, bake_small
 from lambent.bake.reference.path_traced import render_reference
@@ -20,32 +20,13 @@ from lambent.core.plain import Triple
 from lambent.core.views.camera import Camera
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
-from lambent.scenes.geometry import box, cylinder, merge, patch, placed, sphere
+from lambent.scenes.geometry import box, merge, patch, placed, sphere
 from lambent.scenes.scene import PointLight, Scene, SceneObject
 from lambent.store.contract import FAR
-from tests.bake.small_scenes import COLOURS, MIRROR, TINY, coloured_room, room_with_step
+from tests.bake.small_scenes import MIRROR, TINY, coloured_room, room_with_step
 
-VIEWS = [
-    (np.array(forward), up)
-    for forward, up in (
-        ((1, 0, 0), (0, 1, 0)),
-        ((-1, 0, 0), (0, 1, 0)),
-        ((0, 1, 0), (0, 0, -1)),
-        ((0, -1, 0), (0, 0, -1)),
-        ((0, 0, 1), (0, 1, 0)),
-        ((0, 0, -1), (0, 1, 0)),
-    )
-]
-
-
-def test_every_face_sees_its_wall(tmp_path: Path) -> None:
-    store = bake(coloured_room(), tmp_path / "s", quality=TINY)
-    radiance = store.read("probe/ball/radiance").astype(float)
-    for face, colour in enumerate(COLOURS):
-        assert np.allclose(radiance[face], colour, atol=1e-3), f"face {face}"
-    unit = normalize(face_directions(16))
-    assert np.allclose(store.read("probe/ball/distance"), 2 / np.abs(unit).max(axis=-1), rtol=1e-4)
-    assert np.allclose(store.artefact("probe/ball/radiance").meta["centre"], 0, atol=1e-6)
+LEVEL, STEEP = ((1, 0, 0), (-1, 0, 0), (0, 0, 1), (0, 0, -1)), ((0, 1, 0), (0, -1, 0))
+VIEWS = [*((forward, (0, 1, 0)) for forward in LEVEL), *((forward, (0, 0, -1)) for forward in STEEP)]
 
 
 def test_noisy_texels_get_more_paths() -> None:
@@ -57,33 +38,20 @@ def test_noisy_texels_get_more_paths() -> None:
     np.testing.assert_allclose(times, [1, 4 / samples / (0.1 * 2) ** 2, MOST])
 
 
-def test_planes_are_those_of_the_room_in_world_space(tmp_path: Path) -> None:
-    scene = coloured_room()
-    moved = tuple(replace(o, mesh=placed(o.mesh, (10, 0, 0))) for o in scene.objects)
-    store = bake(replace(scene, objects=moved), tmp_path / "s", quality=TINY)
-    planes = store.read("probe/ball/planes")
-    assert planes.shape == (6, 4)
-    for axis, sign in ((a, s) for a in range(3) for s in (1, -1)):
-        expected = [*(np.eye(3)[axis] * sign), 2 - sign * (10 if axis == 0 else 0)]
-        assert np.abs(planes - expected).max(axis=1).min() < 1e-3
-    centre = np.array([10, 0, 0])
-    assert (planes[:, :3] @ centre + planes[:, 3] > 0).all(), "normals point to the centre"
-
-
 def test_probe_agrees_with_path_traced_views(tmp_path: Path) -> None:
     scene = room_with_step()
     small = SceneObject("ball", placed(sphere(0.02, 16, 8), (-0.8, 0.5, 0)), "mirror")  # casts next to no shadow
     scene = replace(scene, objects=(*scene.objects[:-1], small))
     quality = TINY.changed(geometry={"texels": 128}, probe={"texels": 32, "samples": 32})
-    store = bake(scene, tmp_path / "s", quality=quality)
+    store = bake(scene, tmp_path / "s", quality=quality, only=("probe",))
     radiance = store.read("probe/ball/radiance").astype(float)
     centre = np.array(store.artefact("probe/ball/radiance").meta["centre"])
     without = replace(scene, objects=scene.objects[:-1])
     y, x = np.meshgrid(1 - (np.arange(24) + 0.5) / 12, (np.arange(24) + 0.5) / 12 - 1, indexing="ij")
     for forward, up in VIEWS:
-        camera = Camera("view", tuple(centre), tuple(centre + forward), up, 90.0)
+        camera = Camera("view", tuple(centre), tuple(centre + np.array(forward)), up, 90.0)
         image, _ = render_reference(without, camera, 24, 24, 128)
-        w = forward + x[..., None] * np.cross(forward, up) + y[..., None] * np.asarray(up)
+        w = np.asarray(forward) + x[..., None] * np.cross(forward, up) + y[..., None] * np.asarray(up)
         seen = sample(radiance, w)
         assert np.median(np.abs(seen - image) / (image + 0.02)) < 0.08, f"towards {forward}"
         assert seen.mean() == pytest.approx(image.mean(), rel=0.05), f"towards {forward}"
@@ -115,15 +83,13 @@ def test_open_sky_needs_few_planes() -> None:
 
 
 def test_given_planes_and_centre_are_kept_and_only_planes_are_made_anew(tmp_path: Path) -> None:
-    scene = coloured_room()
-    centred = replace(scene, probe_centres={"ball": (0.5, 0.0, 0.0)})
-    store = bake(centred, tmp_path / "s", quality=TINY)
-    assert store.artefact("probe/ball/radiance").meta["centre"] == [0.5, 0, 0]
-    key = store.artefact("probe/ball/radiance").key
+    centred = replace(coloured_room(), probe_centres={"ball": (0.5, 0.0, 0.0)})
+    first = bake(centred, tmp_path / "s", quality=TINY, only=("probe",)).artefact("probe/ball/radiance")
+    assert first.meta["centre"] == [0.5, 0, 0]
     planes = np.array([[0, 1, 0, 2.5]], np.float32)
-    store = bake(replace(centred, probe_planes={"ball": planes}), tmp_path / "s", quality=TINY)
+    store = bake(replace(centred, probe_planes={"ball": planes}), tmp_path / "s", quality=TINY, only=("probe",))
     assert np.array_equal(store.read("probe/ball/planes"), planes)
-    assert store.artefact("probe/ball/radiance").key == key
+    assert store.artefact("probe/ball/radiance").key == first.key
 
 
 def centre_of(objects: tuple[SceneObject, ...], name: str) -> np.ndarray:
@@ -148,7 +114,7 @@ def test_the_probe_of_a_floor_does_not_stand_below_the_table_in_its_middle(tmp_p
     cameras = (Camera("c", (3, 1.6, 2), (-1, 0, -1)), Camera("d", (-3, 1.6, -2), (1, 0, 1)))
     lamp = PointLight((2.0, 2.8, 0.0), (9.0, 9.0, 9.0))
     scene = Scene("s", (floor, walls, table), {"m": MIRROR, "d": Material(kd=0.5)}, cameras=cameras, lights=(lamp,))
-    meta = bake(scene, tmp_path / "s", quality=TINY).artefact("probe/floor/radiance").meta
+    meta = bake(scene, tmp_path / "s", quality=TINY, only=("probe",)).artefact("probe/floor/radiance").meta
     x, y, z = meta["centre"]
     assert max(abs(x), abs(z)) > 1 and 1 < y <= 1.6
     assert meta["hidden_share"] < 0.3
@@ -166,26 +132,10 @@ def panel_under_a_mast() -> tuple[SceneObject, ...]:
     return SceneObject("flat", placed(box((0.8, 0.02, 0.6)), (0, 2.0, 0)), "m"), mast
 
 
-def saucer_on_a_hanging_cloth() -> tuple[SceneObject, ...]:
-    cloth = [patch((-0.5, 0, 0.5), (1, 0, 0), (0, 0, -1)), patch((-0.5, -0.8, 0.5), (1, 0, 0), (0, 0.8, 0))]
-    dish = SceneObject("flat", placed(cylinder(0.08, 0.01, 24), (0.1, 0.001, 0.1)), "m")
-    return dish, SceneObject("cloth", merge(cloth), "d")
-
-
-def picture_on_a_house() -> tuple[SceneObject, ...]:
-    house = SceneObject("house", placed(box((6, 4, 8)), (0, 0, -4)), "d")
-    return SceneObject("flat", placed(box((0.8, 0.6, 0.02)), (0, 0.3, 0.02)), "m"), house
-
-
 @pytest.mark.parametrize(
     ("objects", "eye", "side"),
-    [
-        (tray_on_a_column(), (0.3, 1.2, 1.5), (0, 1, 0)),
-        (panel_under_a_mast(), (0.3, 0.5, 1.5), (0, -1, 0)),
-        (saucer_on_a_hanging_cloth(), (0.3, 0.6, 0.9), (0, 1, 0)),
-        (picture_on_a_house(), (0.6, 0.6, 2.0), (0, 0, 1)),
-    ],
-    ids=["tray", "panel", "saucer", "picture"],
+    [(tray_on_a_column(), (0.3, 1.2, 1.5), (0, 1, 0)), (panel_under_a_mast(), (0.3, 0.5, 1.5), (0, -1, 0))],
+    ids=["tray", "panel"],
 )
 def test_the_probe_of_a_flat_thing_stands_where_viewers_see_it(
     tmp_path: Path, objects: tuple[SceneObject, ...], eye: Triple, side: Triple
@@ -207,17 +157,11 @@ def test_the_probe_of_a_thing_within_another_is_moved_out() -> None:
     assert np.allclose(centre_of((block, ball), "ball"), (1.02, 0, 0), atol=0.06)
 
 
-def test_flat_and_not_flat() -> None:
-    mirror = patch((0, 0, 0), (1, 0, 1), (0, 1, 0))
-    axis = flat_axis(mirror)
-    assert axis is not None and abs(axis @ normalize(np.array([1.0, 0, -1.0]))) == pytest.approx(1)
-    assert flat_axis(sphere(1.0, 24, 12)) is None and flat_axis(box((1, 1, 1))) is None
-
-
 def test_a_glossy_room_of_one_mesh_sees_itself(tmp_path: Path) -> None:
     scene = room_with_step()
     glossy = Material(kd=0.5, lobes=(Lobe(mx=0.3, my=0.3),))
-    store = bake(replace(scene, materials={**scene.materials, "grey": glossy}), tmp_path / "s", quality=TINY)
+    scene = replace(scene, materials={**scene.materials, "grey": glossy})
+    store = bake(scene, tmp_path / "s", quality=TINY, only=("probe",))
     assert not store.artefact("probe/shell/radiance").meta["object_left_out"]
     assert store.artefact("probe/block/radiance").meta["object_left_out"]
 

@@ -11,8 +11,11 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.engine import engine
+from lambent.bake.probes.division import cuts_of, split
+from lambent.bake.surfaces.atlas import object_records
 from lambent.bake.surfaces.visible_triangles import Sight
-from lambent.bake.tracing.solids import closed
+from lambent.bake.tracing.scene_builder import SceneBuilder
+from lambent.bake.tracing.solids import SolidTest, closed
 from lambent.core.geometry.cubemap import texel_solid_angles
 from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.views.camera import Camera
@@ -20,7 +23,7 @@ from lambent.realtime.light.baked import read_baked
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.contract import scene_record, whole_objects
-from tests.bake.small_scenes import BLACK, GREY, MIRROR, TINY, furnace, room_with_step, turned_inwards
+from tests.bake.small_scenes import BLACK, GREY, MIRROR, TINY, furnace, turned_inwards
 
 
 def two_rooms() -> Scene:
@@ -39,7 +42,7 @@ def two_rooms() -> Scene:
 
 
 def test_object_in_two_rooms_has_a_probe_in_each(tmp_path: Path) -> None:
-    store = bake(two_rooms(), tmp_path / "s", quality=TINY)
+    store = bake(two_rooms(), tmp_path / "s", quality=TINY, only=("probe",))
     objects = {o.name: o for o in scene_record(store).objects}
     parts = sorted(name for name in objects if name.startswith("bar"))
     assert "ball" in objects and len(parts) > 1 and "bar" not in objects
@@ -58,14 +61,12 @@ def test_object_in_two_rooms_has_a_probe_in_each(tmp_path: Path) -> None:
     assert red[0] > 5 * red[2] and blue[2] > 2 * blue[0], "each sees its own room"
     ball = store.artefact("probe/ball/radiance").meta
     assert ball["hidden_share"] < 0.1
-    again = bake(two_rooms(), tmp_path / "s", quality=TINY)
+    again = bake(two_rooms(), tmp_path / "s", quality=TINY, only=("probe",))
     assert {a.name: a.key for a in again.artefacts()} == {a.name: a.key for a in store.artefacts()}
 
 
 def test_a_cut_that_viewers_do_not_see_is_not_made() -> None:
     """From a camera in the red room nobody sees the half of the bar that mirrors the blue one."""
-    from lambent.bake.probes.division import cuts_of
-
     assert set(cuts_of(Sight(two_rooms()))) == {"bar"}
     red = Camera("red", (-1.5, 0.5, 1.5), (-1.5, 0, 0))
     blue = replace(red, name="blue", position=(2.0, 0.5, 1.5), target=(2.0, 0.0, 0.0))
@@ -79,7 +80,7 @@ def test_too_few_probes_are_told(tmp_path: Path, caplog: pytest.LogCaptureFixtur
     coarse = SceneObject("bar", box((5.0, 0.3, 0.3)), "mirror")
     scene = replace(scene, objects=(*(o for o in scene.objects if o.name != "bar"), coarse))
     with caplog.at_level(logging.WARNING):
-        store = bake(scene, tmp_path / "s", quality=TINY)
+        store = bake(scene, tmp_path / "s", quality=TINY, only=("probe",))
     assert "bar" in [o.name for o in scene_record(store).objects]
     assert "object mirrors: bar (" in caplog.text and "ball" not in caplog.text
 
@@ -94,10 +95,6 @@ def test_missing_probes_are_one_line(tmp_path: Path) -> None:
 
 def test_parts_of_a_solid_are_solid() -> None:
     engine()
-    from lambent.bake.probes.division import split
-    from lambent.bake.surfaces.atlas import object_records
-    from lambent.bake.tracing.solids import SolidTest
-
     scene = two_rooms()
     cut = split(scene, {"bar": [((-1.0, 0.0, 0.0, 0.3),), ((1.0, 0.0, 0.0, -0.3),)]})
     assert cut.object("bar.part1").mesh.bounds[1][0] == cut.object("bar.part2").mesh.bounds[0][0] == np.float32(0.3)
@@ -107,8 +104,6 @@ def test_parts_of_a_solid_are_solid() -> None:
     parts = sum(len(o.mesh.faces) for o in cut.objects if o.name.startswith("bar."))
     faces = {o.name: len(o.mesh.faces) for o in scene.objects} | {"bar": parts}  # cut faces are two or three
     assert {o.name: o.face_count for o in wholes} == faces
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-
     builder = SceneBuilder(cut)
     within = SolidTest(builder, builder.build()).embedded(np.zeros((1, 3)), np.array([[0.0, 1.0, 0.0]]))
     assert within.all()
@@ -117,15 +112,7 @@ def test_parts_of_a_solid_are_solid() -> None:
 def test_traced_probe_of_the_furnace_has_radiance_one(tmp_path: Path) -> None:
     ball = SceneObject("ball", sphere(0.03, 16, 8), "mirror")  # takes next to nothing away
     scene = replace(furnace(), objects=(*furnace().objects, ball), materials={"grey": GREY, "mirror": MIRROR})
-    store = bake(scene, tmp_path / "s", quality=TINY.changed(probe={"samples": 128}), probes="traced")
+    store = bake(scene, tmp_path / "s", quality=TINY.changed(probe={"samples": 128}), probes="traced", only=("probe",))
     radiance = store.read("probe/ball/radiance").astype(float)
     assert radiance.mean() == pytest.approx(1.0, rel=0.01)
     assert store.artefact("probe/ball/radiance").meta["traced"]
-
-
-def test_traced_and_cached_probes_agree(tmp_path: Path) -> None:
-    quality = TINY.changed(probe={"samples": 256}, geometry={"texels": 96})
-    cached = bake(room_with_step(), tmp_path / "s", quality=quality)
-    one = cached.read("probe/ball/radiance").astype(float)
-    other = bake(room_with_step(), tmp_path / "s", quality=quality, probes="traced").read("probe/ball/radiance")
-    assert other.astype(float).mean() == pytest.approx(one.mean(), rel=0.02)

@@ -36,8 +36,16 @@ PAINT = Material(kd=0.5, lobes=(Lobe(distribution="ggx", mx=0.2, my=0.2, r0=0.04
 def rays(**given: object) -> Mirrored:
     one = np.array([[0.0, 0.0, 1.0]])
     values = {"origins": 0 * one, "directions": one, "normals": one, "radiance": one * 0 + 1.0}
-    scalars = {"irradiance": np.ones(1), "fresnel": np.ones(1), "own": np.zeros(1, bool)}
-    return Mirrored(**{**values, **scalars, **given})
+    return Mirrored(**{**values, "irradiance": np.ones(1), "fresnel": np.ones(1), "own": np.zeros(1, bool), **given})
+
+
+def under_a_white_sky(shown: np.ndarray, share: np.ndarray) -> tuple[Mirrored, Probe]:
+    """Rays upwards that show so much of the sky, from places of so large a share of its irradiance."""
+    up = np.tile([0.0, 0.0, 1.0], (100, 1))
+    light = np.repeat(shown[:, None], 3, axis=1)
+    sky = np.ones((6, 8, 8, 3), np.float32)
+    probe = Probe(sky, np.full((6, 8, 8), FAR, np.float32), sky)
+    return Mirrored(0 * up, up, up, light, np.pi * share, np.ones(100), np.zeros(100, bool)), probe
 
 
 def test_error_and_share_by_hand() -> None:
@@ -51,30 +59,21 @@ def test_error_and_share_by_hand() -> None:
 
 @pytest.mark.parametrize(("niches", "open_share", "gain"), [(20, 0.6, 2.0), (90, 1.0, 1.0), (0, 0.9, 0.0)])
 def test_gain_leaves_what_is_no_niche_its_light(niches: int, open_share: float, gain: float) -> None:
-    """Under a white sky: niches that show as much of it as their irradiance has, and open places that show all."""
-    share = np.where(np.arange(100) < niches, 0.2 / max(gain, 1.0), open_share)
-    shown = np.where(np.arange(100) < niches, 0.2, 1.0)
-    up = np.tile([0.0, 0.0, 1.0], (100, 1))
-    seen = Mirrored(
-        0 * up, up, up, np.repeat(shown[:, None], 3, axis=1), np.pi * share, np.ones(100), np.zeros(100, bool)
-    )
-    sky = np.ones((6, 8, 8, 3), np.float32)
-    found = judged(seen, Probe(sky, np.full((6, 8, 8), FAR, np.float32), sky), np.zeros(3), np.zeros((0, 4)))
+    """Niches show as much of the sky as their irradiance has, and open places show all."""
+    is_niche = np.arange(100) < niches
+    share = np.where(is_niche, 0.2 / max(gain, 1.0), open_share)
+    seen, probe = under_a_white_sky(np.where(is_niche, 0.2, 1.0), share)
+    found = judged(seen, probe, np.zeros(3), np.zeros((0, 4)))
     assert found.scaling == Scaling(gain) and found.best == pytest.approx(0, abs=1e-3)
-    assert judged(seen, Probe(sky, sky[..., 0], sky), np.zeros(3), np.zeros((0, 4)), through=True).scaling == UNSCALED
+    assert judged(seen, probe, np.zeros(3), np.zeros((0, 4)), through=True).scaling == UNSCALED
 
 
 def test_walls_of_a_niche_shine_where_they_hide_the_sky() -> None:
-    """Under a white sky: shelves with .4 of its irradiance, which show it in .36 of their directions."""
+    """Shelves with .4 of the sky's irradiance, which show it in .36 of their directions."""
     ratio = np.repeat([0.4, 1.0], 50)
-    up = np.tile([0.0, 0.0, 1.0], (100, 1))
     share = np.minimum(1.5 * ratio, 1)
-    shown = share**2 + (1 - share) * ratio
-    seen = Mirrored(
-        0 * up, up, up, np.repeat(shown[:, None], 3, axis=1), np.pi * ratio, np.ones(100), np.zeros(100, bool)
-    )
-    sky = np.ones((6, 8, 8, 3), np.float32)
-    found = judged(seen, Probe(sky, np.full((6, 8, 8), FAR, np.float32), sky), np.zeros(3), np.zeros((0, 4)))
+    seen, probe = under_a_white_sky(share**2 + (1 - share) * ratio, ratio)
+    found = judged(seen, probe, np.zeros(3), np.zeros((0, 4)))
     assert found.scaling == Scaling(1.5, even=True) and found.best == pytest.approx(0, abs=1e-3)
 
 
@@ -133,17 +132,11 @@ def test_the_distance_map_finds_the_wall_of_a_cup_before_the_sky(scale: float) -
 
 def well(folder: Path) -> Scene:
     """A pit of five painted walls, 1 m wide and 2 m deep, under a sky of radiance 1, and a painted ball above it."""
-    walls = [
-        patch((-0.5, -2, 0.5), (1, 0, 0), (0, 0, -1)),
-        patch((-0.5, -2, -0.5), (1, 0, 0), (0, 2, 0)),
-        patch((0.5, -2, 0.5), (-1, 0, 0), (0, 2, 0)),
-        patch((-0.5, -2, 0.5), (0, 0, -1), (0, 2, 0)),
-        patch((0.5, -2, -0.5), (0, 0, 1), (0, 2, 0)),
-    ]
-    objects = (
-        SceneObject("well", merge(walls), "paint"),
-        SceneObject("ball", sphere(0.2, 24, 12), "paint"),
-    )
+    x, z, up, half = np.array([1, 0, 0]), np.array([0, 0, 1]), np.array([0, 2, 0]), 0.5
+    corners = [(-half, -2, half), (-half, -2, -half), (half, -2, half), (-half, -2, half), (half, -2, -half)]
+    sides = [(x, -z), (x, up), (-x, up), (-z, up), (z, up)]
+    walls = [patch(corner, *edges) for corner, edges in zip(corners, sides, strict=True)]
+    objects = SceneObject("well", merge(walls), "paint"), SceneObject("ball", sphere(0.2, 24, 12), "paint")
     camera = Camera("above", (0.0, 2.0, 0.3), (0.0, 0.0, 0.0))
     return Scene("pit", objects, {"paint": PAINT}, environment=ImageEnvironment(constant_picture(folder)),
                  cameras=(camera,))  # fmt: skip
@@ -152,7 +145,7 @@ def well(folder: Path) -> Scene:
 def test_a_pit_is_shown_no_more_sky_than_it_sees(tmp_path: Path) -> None:
     scene = well(tmp_path)
     scene = replace(scene, objects=scene.objects[:1])
-    store = bake(scene, tmp_path / "s", quality=TINY.changed(light_map={"samples": (256, 256)}))
+    store = bake(scene, tmp_path / "s", quality=TINY.changed(light_map={"samples": (256, 256)}), only=("probe",))
     meta = store.artefact("probe/well/radiance").meta
     if meta["object_left_out"]:  # then the probe sees the sky alone
         assert meta["seen_irradiance"][0] == pytest.approx(np.pi, rel=0.01)
@@ -163,7 +156,7 @@ def test_a_pit_is_shown_no_more_sky_than_it_sees(tmp_path: Path) -> None:
 
 def test_a_ball_in_the_open_keeps_all_its_light(tmp_path: Path) -> None:
     scene = well(tmp_path)
-    store = bake(replace(scene, objects=scene.objects[1:]), tmp_path / "s", quality=TINY)
+    store = bake(replace(scene, objects=scene.objects[1:]), tmp_path / "s", quality=TINY, only=("probe",))
     meta = store.artefact("probe/ball/radiance").meta
     assert meta["object_left_out"] and "seen_irradiance" not in meta
     assert meta["mirror_error"] < 0.01

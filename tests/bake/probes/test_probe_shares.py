@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.engine import engine
+from lambent.bake.probes.device_lookup import DeviceProbe
+from lambent.bake.probes.shares import EQUATIONS, UPPER, share_along, solved
+from lambent.bake.tracing.rays import vectors
 from lambent.baked.probes.lookups import distance_lookup, inverse_depth, planes_lookup
 from lambent.core.geometry.cubemap import sample
 from lambent.core.geometry.directions import normalize
@@ -23,14 +26,8 @@ RNG = np.random.default_rng(3)
 GLOSSY = Material(kd=0.2, lobes=(Lobe(distribution="ggx", mx=0.2, my=0.2, r0=0.05),))
 
 
-@pytest.mark.parametrize("planes", [0, 1, 6, 8])
-def test_look_ups_on_the_device_are_those_of_numpy(planes: int) -> None:
-    engine()
-    import mitsuba as mi
-
-    from lambent.bake.probes.device_lookup import DeviceProbe
-    from lambent.bake.tracing.rays import vectors
-
+@pytest.mark.parametrize("planes", [0, 6, 8])
+def test_look_ups_on_the_device_are_those_of_numpy(mi: Any, planes: int) -> None:
     n, count = 12, 400
     radiance = np.repeat(RNG.uniform(0.1, 2.0, (6, n, n, 1)), 3, axis=-1)
     distance = RNG.uniform(0.8, 1.6, (6, n, n))
@@ -46,9 +43,6 @@ def test_look_ups_on_the_device_are_those_of_numpy(planes: int) -> None:
 
 
 def test_shares_that_are_linear_are_found_and_those_of_a_black_probe_are_bounded() -> None:
-    engine()
-    from lambent.bake.probes.shares import EQUATIONS, UPPER, share_along, solved
-
     w = normalize(RNG.normal(size=(600, 3)))
     probe, true = RNG.uniform(0.2, 3.0, 600), 0.8 + w @ [0.3, -0.2, 0.4]
     basis = np.concatenate([np.ones((600, 1)), w], axis=1) * probe[:, None]
@@ -67,14 +61,13 @@ def test_below_a_roof_no_light_comes_from_above_and_all_from_the_side(tmp_path: 
     sky = ImageEnvironment(constant_picture(tmp_path))
     camera = Camera("door", (1.5, 1.2, 3.0), (-0.5, 0.0, 0.0))
     scene = Scene("roof", (floor, roof), {"glossy": GLOSSY, "black": BLACK}, environment=sky, cameras=(camera,))
-    store = bake(scene, tmp_path / "s", quality=TINY)
+    store = bake(scene, tmp_path / "s", quality=TINY, only=("probe_share",))
     values, names = probe_shares(store)
     assert values is not None and names == {"floor"}
     uv2, positions = store.read("geometry/uv2"), store.read("geometry/positions")
     of_floor = np.flatnonzero(positions[:, 1] == 0)
-    to_uv2 = np.linalg.lstsq(np.c_[positions[of_floor][:, [0, 2]], np.ones(len(of_floor))], uv2[of_floor], rcond=None)[
-        0
-    ]
+    on_floor = np.c_[positions[of_floor][:, [0, 2]], np.ones(len(of_floor))]
+    to_uv2 = np.linalg.lstsq(on_floor, uv2[of_floor], rcond=None)[0]
 
     def share(x: float, w: tuple[float, float, float]) -> float:
         column, row = (np.array([x, 0.0, 1.0]) @ to_uv2) * values.shape[1::-1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,27 +19,39 @@ from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import ConstantEnvironment, Scene, SceneObject
 from lambent.store.contract import probe_name, scene_record, shared_probes
 from lambent.store.store import Store
-from tests.bake.small_scenes import BLACK, TINY, room_with_step
+from tests.bake.small_scenes import BLACK, GREY, TINY, room_with_step
 
 CAMERA = Camera("door", (-1.8, 1.5, 1.8), (0.0, 0.5, 0.0))
 
 
-def laid_table(camera: Camera | None = CAMERA) -> Scene:
+def laid_table() -> Scene:
     """A room with a block; six beads beside each other on one side of it, two far away, one as large as a pin."""
     room = room_with_step()
     row = [(-1.5 + 0.12 * i, 0.6, -1.5) for i in range(6)]
     beads = [SceneObject(f"bead{i}", placed(sphere(0.04, 12, 8), at), "mirror") for i, at in enumerate(row)]
     beads += [SceneObject("behind", placed(sphere(0.04, 12, 8), (1.9, 0.3, 1.9)), "mirror")]  # the block hides the row
     beads += [SceneObject("pin", placed(sphere(0.0005, 8, 6), (-1.0, 0.6, 0.5)), "mirror")]
-    return replace(room, objects=(*room.objects, *beads), cameras=(camera,) if camera else ())
+    return replace(room, objects=(*room.objects, *beads), cameras=(CAMERA,))
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store of the laid table's probes."""
+    folder = tmp_path_factory.mktemp("table") / "s"
+    bake_probes(laid_table(), folder).close()
+    return folder
+
+
+def bake_probes(scene: Scene, folder: Path) -> Store:
+    return bake(scene, folder, quality=TINY, only=("probe",))
 
 
 def probes_of(store: Store) -> set[str]:
     return {o.name for o in scene_record(store).objects if probe_name(o.name, "radiance") in store}
 
 
-def test_neighbours_share_and_a_pin_has_none(tmp_path: Path) -> None:
-    store = bake(laid_table(), tmp_path / "s", quality=TINY)
+def test_neighbours_share_and_a_pin_has_none(table: Path) -> None:
+    store = Store.open(table)
     owners, own = shared_probes(store), probes_of(store)
     row = {f"bead{i}" for i in range(6)}
     assert "pin" in owners and "ball" in own
@@ -50,29 +63,24 @@ def test_neighbours_share_and_a_pin_has_none(tmp_path: Path) -> None:
     for name, owner in owners.items():
         assert shown.probe_of(records[name]) is shown.probes[owner]
     before = {a.name: a.key for a in store.artefacts()}
-    assert {a.name: a.key for a in bake(laid_table(), tmp_path / "s", quality=TINY).artefacts()} == before
+    with bake_probes(laid_table(), table) as again:
+        assert {a.name: a.key for a in again.artefacts()} == before
 
 
-def test_without_viewers_nothing_is_shared(tmp_path: Path) -> None:
-    store = bake(laid_table(None), tmp_path / "s", quality=TINY)
-    assert not shared_probes(store) and "pin" in probes_of(store)
-
-
-def test_an_object_that_gets_its_own_probe_again_is_baked(tmp_path: Path) -> None:
-    store = bake(laid_table(), tmp_path / "s", quality=TINY)
-    shared = min(shared_probes(store))
-    centre = {shared: (0.0, 1.0, 0.0)}
-    again = bake(replace(laid_table(), probe_centres=centre), tmp_path / "s", quality=TINY)
-    assert shared in probes_of(again) and shared not in shared_probes(again)
-    assert again.artefact(probe_name(shared, "radiance")).meta["centre"] == [0.0, 1.0, 0.0]
-    back = bake(laid_table(), tmp_path / "s", quality=TINY)
-    assert shared not in probes_of(back), "what is no longer shown is dropped"
+def test_an_object_that_gets_its_own_probe_again_is_baked(table: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "s"
+    shutil.copytree(table, folder)
+    shared = min(shared_probes(Store.open(folder)))
+    with bake_probes(replace(laid_table(), probe_centres={shared: (0.0, 1.0, 0.0)}), folder) as again:
+        assert shared in probes_of(again) and shared not in shared_probes(again)
+        assert again.artefact(probe_name(shared, "radiance")).meta["centre"] == [0.0, 1.0, 0.0]
+    assert shared not in probes_of(bake_probes(laid_table(), folder)), "what is no longer shown is dropped"
 
 
 def test_a_lamp_is_not_left_out_of_its_neighbours_reflections(tmp_path: Path) -> None:
     scene = laid_table()
     lit = tuple(replace(o, emission=(3.0, 3.0, 3.0)) if o.name == "bead2" else o for o in scene.objects)
-    owners = shared_probes(bake(replace(scene, objects=lit), tmp_path / "s", quality=TINY))
+    owners = shared_probes(bake_probes(replace(scene, objects=lit), tmp_path / "s"))
     assert "bead2" not in owners.values() and "bead2" not in owners
 
 
@@ -91,7 +99,7 @@ def test_in_a_closed_room_no_probe_shows_the_sky(tmp_path: Path) -> None:
         "closed", (*slabs, ball, lamp), {"glossy": glossy, "black": BLACK},
         environment=ConstantEnvironment((1e3,) * 3), cameras=(Camera("door", (-1.5, 0.0, 1.5), (0.5, 0.0, 0.3)),),
     )  # fmt: skip
-    store = bake(scene, tmp_path / "s", quality=TINY)
+    store = bake_probes(scene, tmp_path / "s")
     own = probes_of(store)
     assert own, "some have a probe"
     for name in own:
@@ -130,9 +138,14 @@ def test_a_scene_has_so_many_probes_at_most_those_that_fill_the_view() -> None:
     assert len(_largest(owner[:9], worth[:9], size[:9], given[:9])) == 8, "few keep theirs"
 
 
-def test_objects_beyond_the_most_show_the_nearest_probe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_objects_beyond_the_most_show_the_nearest_probe(
+    table: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("lambent.bake.probes.sharing.MOST", 1)
-    store = bake(laid_table(), tmp_path / "s", quality=TINY)
+    shutil.copytree(table, tmp_path / "s")
+    with Store.open(tmp_path / "s") as kept:
+        kept.set_document("shared_probes", {})  # found again
+    store = bake_probes(laid_table(), tmp_path / "s")
     (own,) = probes_of(store)
     assert set(shared_probes(store).values()) == {own} and own not in shared_probes(store)
 
@@ -148,13 +161,10 @@ def test_a_ball_before_a_distant_facade_has_its_own_probe(tmp_path: Path) -> Non
     )
     mirror = Material(name="mirror", lobes=[Lobe(mx=0.02, my=0.02, r0=(0.9,) * 3, k=(1.0,) * 3)])
     scene = Scene(
-        name="yard",
-        objects=objects,
-        materials={"grey": Material(name="grey", kd=(0.5,) * 3), "mirror": mirror},
-        environment=ConstantEnvironment((1.0, 1.0, 1.0)),
+        "yard", objects, {"grey": GREY, "mirror": mirror}, ConstantEnvironment((1.0, 1.0, 1.0)),
         cameras=(Camera("front", (0.0, 1.6, 4.0), (0.0, 0.4, 0.0)),),
-    )
-    store = bake(scene, tmp_path / "s", quality=TINY, only=("probe",))
+    )  # fmt: skip
+    store = bake_probes(scene, tmp_path / "s")
     assert "ball" in probes_of(store), shared_probes(store)
 
 
