@@ -134,18 +134,30 @@ class Files:
 
     def save(self, measurement: Measurement | None) -> None:
         """Write the document with its provenance; replace an unrelated file only at the second try."""
-        try:
-            path = document_file(self._screen.folder, self.name)
-            if path.exists() and path.resolve() not in self._may_replace:
-                self._may_replace.add(path.resolve())
-                self._screen.say(f"{path.name} exists: save again to replace it")
-                return
-            material = self._subject.material
-            errors = measurement.exact_errors(material) if measurement else {}
-            with_account(material, self._subject.origin, measurement, errors).save(path)
-        except (UserError, OSError) as error:
-            self._screen.say(f"not saved: {error}")
-        else:
-            self._may_replace.add(path.resolve())
-            self._subject.edits.saved[self._subject.name] = material
-            self._screen.say(f"saved {path}")
+        subject = self._subject
+        errors = measurement.exact_errors(subject.material) if measurement else {}
+        document = with_account(subject.material, subject.origin, measurement, errors)
+        if write_document(document, self._screen, self.name, self._may_replace):
+            subject.edits.saved[subject.name] = subject.material
+
+
+def write_document(
+    document: Material, screen: Screen, name: str, may_replace: set[Path], *, bare: bool = False
+) -> bool:
+    """Write a material to the file of a typed name, and report success or failure; return whether it was written.
+
+    A file that is not in `may_replace` is replaced only at the second try; `name` and `bare` as in `document_file`.
+    """
+    try:
+        file = document_file(screen.folder, name, bare=bare)
+        if file.exists() and file.resolve() not in may_replace:
+            may_replace.add(file.resolve())
+            screen.say(f"{file.name} exists: save again to replace it")
+            return False
+        document.save(file)
+    except (UserError, OSError) as error:
+        screen.say(f"not saved: {error}")
+        return False
+    may_replace.add(file.resolve())
+    screen.say(f"saved {file}")
+    return True

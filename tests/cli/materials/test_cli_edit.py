@@ -11,7 +11,7 @@ from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.viewer.modes.material.mode import MaterialState
 from lambent.viewer.screen import Screen
-from tests.viewer.measured_specimens import BRASS, write_measurement
+from tests.viewer.editor.measured_specimens import BRASS, write_measurement
 
 ROOT = Path(__file__).parents[3]
 

@@ -8,7 +8,7 @@ from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.material.mode import MaterialMode, MaterialState
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels.plots import labels_apart
-from tests.viewer.measured_specimens import BRASS, FROSTED, write_measurement
+from tests.viewer.editor.measured_specimens import BRASS, FROSTED, write_measurement
 from tests.viewer.panel_driver import PanelDriver, walk_mode
 
 

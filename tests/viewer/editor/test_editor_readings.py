@@ -29,7 +29,7 @@ from lambent.viewer.editor.readings import (
     white_of,
 )
 from lambent.viewer.edits.edits import MaterialEdits
-from tests.viewer.measured_specimens import BRASS, BRUSHED, FEW, TURNED, write_measurement
+from tests.viewer.editor.measured_specimens import BRASS, BRUSHED, FEW, TURNED, write_measurement
 
 SHEET = Material(kd=(0.2, 0.4, 0.6), kt_d=(0.3, 0.1, 0.05))
 INCIDENTS = (Incident(0.0, 0.0), Incident(45.0, 90.0), Incident(60.0, 200.0))

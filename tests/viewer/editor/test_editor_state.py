@@ -14,7 +14,7 @@ from lambent.viewer.editor.measurement import read_measurement, start_material
 from lambent.viewer.editor.restrictions import Restrictions, lobe_names
 from lambent.viewer.editor.subject import same_numbers
 from lambent.viewer.edits.edits import MaterialEdits
-from tests.viewer.measured_specimens import BRASS, FROSTED, write_measurement
+from tests.viewer.editor.measured_specimens import BRASS, FROSTED, write_measurement
 
 PATIENCE_S = 180.0
 

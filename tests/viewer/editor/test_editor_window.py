@@ -3,7 +3,7 @@
 import pytest
 
 from lambent.materials.document import load_material
-from tests.viewer.measured_specimens import BRASS, write_measurement
+from tests.viewer.editor.measured_specimens import BRASS, write_measurement
 from tests.viewer.window_session import VirtualScreen, WindowSession, missing_tools
 
 pytestmark = pytest.mark.slow

@@ -19,7 +19,7 @@ from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels.widgets import press
 from tests.viewer import panel_driver
 from tests.viewer.edited_view import lit_state, until
-from tests.viewer.measured_specimens import BRASS, write_measurement
+from tests.viewer.editor.measured_specimens import BRASS, write_measurement
 from tests.viewer.panel_driver import PanelDriver, walk_mode
 
 MORE = ("input_float2", "drag_float", "invisible_button", "tree_node", "color_edit3", "input_int", "slider_angle")

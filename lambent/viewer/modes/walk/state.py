@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.errors import UserError
 from lambent.core.plain import Triple, plain_name, triple
 from lambent.store.contract import ObjectRecord, SceneRecord, whole_objects
 from lambent.viewer.cameras.navigation import Movement, Navigation
 from lambent.viewer.editor.editor import Editor
-from lambent.viewer.editor.files import document_file, with_account
+from lambent.viewer.editor.files import with_account, write_document
 from lambent.viewer.edits.edits import MaterialEdits, rescue
 from lambent.viewer.look import Look
 from lambent.viewer.mode import Divider
@@ -85,20 +84,10 @@ class Materials:
 
         Its provenance stays, with a note if numbers were changed by hand.
         """
-        file_name, material, folder = self.file_name(name), self.edits.current(name), self.screen.folder
-        try:
-            file = document_file(folder, file_name, bare=True)
-            if file.exists() and file not in self.may_replace:
-                self.may_replace.add(file)
-                self.screen.say(f"{file_name} exists: save again to replace it")
-                return
-            with_account(material, self.edits.scene[name], None, {}).save(file)
-        except UserError as error:
-            self.screen.say(f"not saved: {error}")
-        else:
-            self.may_replace.add(file)
+        material, origin = self.edits.current(name), self.edits.scene[name]
+        document = with_account(material, origin, None, {})
+        if write_document(document, self.screen, self.file_name(name), self.may_replace, bare=True):
             self.edits.saved[name] = material
-            self.screen.say(f"saved {file_name}")
 
     def rescue(self, names: Iterable[str]) -> Iterator[Path]:
         """Write materials to new files."""

@@ -11,7 +11,7 @@ from lambent.materials.factored.curve import KNOTS, Curve
 from lambent.materials.models import model_named
 from lambent.viewer.modes.edit.curves.axes import Axis
 from lambent.viewer.modes.edit.curves.regions import region_of
-from tests.viewer.curve_panel import NARROW, WIDE, Panel
+from tests.viewer.modes.edit.curve_panel import NARROW, WIDE, Panel
 from tests.viewer.panel_driver import point_of
 
 GOLD = Material(name="gold", kd=0.05, lobes=(Lobe(k=(0.9, 0.7, 0.3), mx=0.1, my=0.1, r0=(0.9, 0.7, 0.4)),))
