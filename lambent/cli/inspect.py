@@ -99,7 +99,7 @@ def inspect_material(file: str, plot: Path | None = None) -> Facts:
     if plot is not None:
         from lambent.materials.plots import plot_plane_of_incidence
 
-        plot_plane_of_incidence(plot, {material.name: bsdf.eval}, title=Path(file).name, transmits=material.transmits)
+        plot_plane_of_incidence(plot, bsdf.eval, material.name, title=Path(file).name, transmits=material.transmits)
     albedo = bsdf.albedo(direction(np.radians(ALBEDO_AT_DEG), 0.0))
     provenance = material.provenance.model_dump(mode="json") if material.provenance else {}
     return {

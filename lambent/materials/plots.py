@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -30,20 +30,18 @@ UNKNOWN, SOURCE = (0.66, 0.78, 0.93), "#ffb300"  # shade of unmeasured direction
 IN_PLANE_INCHES, DISK_INCHES = 3.2, 1.3
 
 
-def plot_plane_of_incidence(path: Path, evals: Mapping[str, Eval], *, title: str, transmits: bool) -> None:
+def plot_plane_of_incidence(path: Path, evaluate: Eval, name: str, *, title: str, transmits: bool) -> None:
     """Draw f in 1/sr, mean over channels, against theta_o in the plane of incidence, one panel per theta_i.
 
     Parameters
     ----------
     path : Path
         Image to write: .png, .pdf or .svg.
-    evals : mapping of name -> eval(wi, wo)
-        BSDFs to draw: the first as a thick pale line, the others as thin lines over it.
     transmits : bool
         Whether to show the far side as well; theta_o then runs from -180 to 180 degrees.
     """
     figure = new_figure(3 * len(THETA_I_DEG), IN_PLANE_INCHES)
-    _draw_plane(figure, evals, transmits)
+    _draw_plane(figure, evaluate, name, transmits)
     figure.suptitle(title, fontsize=10)
     save_figure(figure, path)
 
@@ -67,7 +65,7 @@ def plot_measurement(path: Path, table: MeasuredTable, *, title: str) -> None:
     matrix_inches = DISK_INCHES * max(rows, 1) + 0.6
     figure = new_figure(max(3.0 * len(THETA_I_DEG), DISK_INCHES * columns + 1), IN_PLANE_INCHES + matrix_inches)
     above, below = figure.subfigures(2, 1, height_ratios=(IN_PLANE_INCHES, matrix_inches))
-    _draw_plane(above, {"measured": table.eval}, samples.info.transmits)
+    _draw_plane(above, table.eval, "measured", samples.info.transmits)
     above.suptitle(title, fontsize=10)
     if shown:
         _draw_matrix(below, placed, (rows, columns))
@@ -129,7 +127,7 @@ def save_figure(figure: Any, path: Path, dpi: int = 120) -> None:
         figure.savefig(temporary, dpi=dpi, metadata={made_by: MARK})
 
 
-def _draw_plane(figure: Any, evals: Mapping[str, Eval], transmits: bool) -> None:
+def _draw_plane(figure: Any, evaluate: Eval, name: str, transmits: bool) -> None:
     """Draw a panel per theta_i; positive theta_o lies opposite the light, on the side of the mirror direction."""
     limit = 180 if transmits else 90
     theta_o = np.linspace(-limit, limit, STEPS)[1:-1]
@@ -137,9 +135,7 @@ def _draw_plane(figure: Any, evals: Mapping[str, Eval], transmits: bool) -> None
     axes = figure.subplots(1, len(THETA_I_DEG), sharey=True)
     for axis, theta_i in zip(axes, THETA_I_DEG, strict=True):
         wi = np.broadcast_to(direction(np.radians(theta_i), 0.0), wo.shape)
-        for index, (name, evaluate) in enumerate(evals.items()):
-            style = {"lw": 4, "color": "0.75"} if index == 0 and len(evals) > 1 else {"lw": 1.2}
-            axis.semilogy(theta_o, np.maximum(evaluate(wi, wo).mean(axis=-1), FLOOR), label=name, **style)
+        axis.semilogy(theta_o, np.maximum(evaluate(wi, wo).mean(axis=-1), FLOOR), label=name, lw=1.2)
         axis.axvline(theta_i, color="0.5", lw=0.5, ls=":")
         axis.set_title(f"light at {theta_i} deg", fontsize=9)
         axis.set_xlabel("theta_o (deg)", fontsize=8)

@@ -9,12 +9,14 @@ import pytest
 from PIL import Image
 
 from lambent.core.geometry.directions import direction
+from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.shown.incidence import incidences
 from lambent.materials.fitting.shown.plot import error_slices, save_plots
 from lambent.materials.fitting.shown.slices import slices
 from lambent.materials.measured.inspecting.metrics import METRICS
-from lambent.materials.measured.inspecting.synthetic import ANISOTROPIC
+from lambent.materials.measured.inspecting.synthetic import ANISOTROPIC, synthesise
+from lambent.materials.plots import disk_places, plot_measurement, plot_plane_of_incidence
 from tests.materials.fitting.known_answers import FEW, FOIL, PAINT, grey
 
 
@@ -93,3 +95,15 @@ def test_slices_are_drawn(tmp_path):
     figure.savefig(tmp_path / "slices.png")
     assert len(figure.axes) == 4  # two panels, two colour bars
     assert (tmp_path / "slices.png").stat().st_size > 10_000
+
+
+def test_measurements_and_materials_are_drawn(tmp_path):
+    """The plane of incidence of both, and the disks of the measurement: several incident directions, both sides."""
+    plot_plane_of_incidence(tmp_path / "m.png", MaterialBSDF(FOIL).eval, "foil", title="foil", transmits=True)
+    table = synthesise(FOIL, replace(COARSE, theta_i_deg=(5, 65)))
+    plot_measurement(tmp_path / "t.png", table, title="table")
+    for name in ("m", "t"):
+        picture = np.asarray(Image.open(tmp_path / f"{name}.png").convert("L"))
+        assert picture.min() < 60 and picture.max() == 255
+    placed, shape = disk_places(incidences(table.samples()), True)
+    assert shape == (4, 3) and [place for *_, place in placed[:4]] == [(0, 0), (1, 0), (0, 1), (1, 1)]

@@ -261,3 +261,10 @@ def test_a_quarter_is_mirrored_with_and_without_its_ends(begin: float) -> None:
         )
         found = value + share * (np.interp(there, nodes, np.cos(nodes) ** 2) - value)
         assert share.max() <= 0.5 + 1e-9 and np.abs(np.diff(found)).max() < 0.02, "no step"
+
+
+@pytest.mark.parametrize(
+    ("nodes_deg", "parts"), [((0, 30, 60, 90), 4), ((0, 30, 60, 95), 2), ((0, 60, 120, 180), 2), ((0, 62, 124, 186), 1)]
+)
+def test_nodes_reach_no_further_than_their_part_of_the_circle(nodes_deg: tuple[int, ...], parts: int) -> None:
+    assert Azimuths.of(np.radians(np.array(nodes_deg, float))).parts == parts
