@@ -55,8 +55,8 @@ class AppliedMaterials:
             self._note_limits(materials)
         if self.answers:
             answer, shown = self._shown
-            worn = {name: textures_in_look(name, look, scene.textures) for name, look in changed.items()}
-            shown.show(answer.lit(materials, worn))
+            exchanged = {name: textures_in_look(name, look, scene.textures) for name, look in changed.items()}
+            shown.show(answer.lit(materials, exchanged))
 
     @cached_property
     def _without_uv(self) -> frozenset[str]:
@@ -76,10 +76,10 @@ class AppliedMaterials:
         shared, has_probe = scene.shared_probes, {o.material for o in scene.record.objects if o.name in scene.probes}
         has_probe |= {o.material for o in scene.record.objects if shared.get(o.name) in scene.probes}
         for name, material in materials.items():
-            given = scene.record.materials[name]
-            if needs_probe(material) and not needs_probe(given) and name not in has_probe:
+            baked = scene.record.materials[name]
+            if needs_probe(material) and not needs_probe(baked) and name not in has_probe:
                 self._once(f"{name} was matte in the bake: its reflections come from the nearest probe")
-            if material.transmits and not given.transmits and scene.irradiance_back is None:
+            if material.transmits and not baked.transmits and scene.irradiance_back is None:
                 self._once(f"{name} was opaque in the bake: its far side stays dark")
 
     def _once(self, text: str) -> None:

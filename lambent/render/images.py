@@ -168,10 +168,10 @@ class Settings:
             check_shown(self.show, self.width, self.height)
         if self.integrator == PATH_TRACER and self.show != "full":
             raise UserError("the path tracer shows all light", field="--show", got=self.show, expected="full")
-        for option, given in (("--planar", self.planar), ("--lookup", self.lookup)):
-            if self.is_traced and given != "auto":
+        for option, method in (("--planar", self.planar), ("--lookup", self.lookup)):
+            if self.is_traced and method != "auto":
                 hint = "add --integrator lamps"
-                raise UserError("applies to drawn pictures only", field=option, got=given, expected="auto", hint=hint)
+                raise UserError("applies to drawn pictures only", field=option, got=method, expected="auto", hint=hint)
         known("view transform", self.view, VIEWS, field="--view")
         if self.scale is not None:
             self.scale.check()

@@ -48,12 +48,12 @@ class TracedImages(Images):
         self._limits = limits_of(settings, moving=moving)
         self._path = settings.integrator == PATH_TRACER
         self._note, self._noted = note, set[str]()
-        self._given = scene_of(store, scene)
-        if changed := changed_inputs(store, self._given):
+        self._scene = scene_of(store, scene)
+        if changed := changed_inputs(store, self._scene):
             traced = f"{scene} is traced as it is now" if scene else AS_THE_FILE_IS
             note(f"changed since the bake: {', '.join(changed)}; {traced}")
         how: dict[str, Any] = {"sky_turn_deg": settings.sky_turn_deg, "replacements": settings.replacements}
-        self._room = room_of_paths(self._given, **how) if self._path else room_of_store(store, self._given, **how)
+        self._room = room_of_paths(self._scene, **how) if self._path else room_of_store(store, self._scene, **how)
         self._light, self._looks = settings.light or MixTrack(), dict[str, Look]()
         if settings.variant:
             self._looks = dict(variant_named(variants_of(store), settings.variant).looks)
@@ -64,7 +64,7 @@ class TracedImages(Images):
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
         settings, edits = self.settings, self._edits()
-        self._room.wear(edits.looks, edits.materials)
+        self._room.set_materials(edits.looks, edits.materials)
         self._room.mix(self._light.factors_at(self.time_s))
         if edits.materials and not self._room.answers:
             self._once(f"light between surfaces stays as baked: {NO_ANSWER}")
@@ -86,7 +86,7 @@ class TracedImages(Images):
         """The changed materials of the next image."""
         settings, track = self.settings, self.settings.looks
         looks = {**self._looks, **(track.looks_at(self.time_s) if track else {})}
-        scene, bare = self._given, self._without_uv
+        scene, bare = self._scene, self._without_uv
         return edits_of(scene.materials, scene.textures, bare, looks, settings.recolour, settings.textures)
 
     def _once(self, text: str) -> None:
@@ -96,7 +96,7 @@ class TracedImages(Images):
 
     @cached_property
     def _without_uv(self) -> frozenset[str]:
-        return materials_without_uv([(o.material, o.mesh.uv) for o in self._given.objects])
+        return materials_without_uv([(o.material, o.mesh.uv) for o in self._scene.objects])
 
 
 def limits_of(settings: Settings, *, moving: bool) -> tuple[int, float | None]:

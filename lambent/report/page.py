@@ -86,10 +86,10 @@ def note(title: str, lines: Iterable[str]) -> str:
     return f"<aside><p>{escape(title)}</p>{bullets(lines)}</aside>"
 
 
-def facts(rows: Iterable[tuple[str, str]], caption: str = "") -> str:
+def facts(rows: Iterable[tuple[str, str]]) -> str:
     """A table of names and values."""
     lines = "".join(f'<tr><th scope="row">{escape(name)}</th><td>{escape(value)}</td></tr>' for name, value in rows)
-    return f'<div class="scroll"><table class="facts">{_caption(caption)}<tbody>{lines}</tbody></table></div>'
+    return f'<div class="scroll"><table class="facts"><tbody>{lines}</tbody></table></div>'
 
 
 def table(

@@ -83,8 +83,8 @@ def _check_names(store: Store, record: SceneRecord) -> None:
         raise store.broken("variants", "two variants have the same name")
     for variant in record.variants:
         textures = {look.textures for look in variant.looks.values() if isinstance(look.textures, str)}
-        worn = {*variant.looks, *(textures - {""})}
-        if strange := sorted(worn - set(record.materials)):
+        used = {*variant.looks, *(textures - {""})}
+        if strange := sorted(used - set(record.materials)):
             raise store.broken(f"variants.{variant.name}", "unknown material", strange[0])
     for number, reflector in enumerate(record.reflectors):
         for part in reflector.parts:

@@ -52,28 +52,28 @@ def write_source(store: Store, scene: Scene) -> None:
     store.set_document(CREASE_ANGLE, scene.crease_deg)
 
 
-def scene_of(store: Store, given: str | None = None) -> Scene:
-    """The scene of a store, with the materials, textures and emission of the bake; or `given`, entirely as it is.
+def scene_of(store: Store, file: str | None = None) -> Scene:
+    """The scene of a store, with the materials, textures and emission of the bake; or `file`, entirely as it is.
 
-    Without `given`, the scene is loaded from its location at the bake. Logs a warning if its geometry does not fit
+    Without `file`, the scene is loaded from its location at the bake. Logs a warning if its geometry does not fit
     the store.
 
     Raises
     ------
     UserError
-        If the location is unknown and `given` is None, or the scene cannot be loaded.
+        If the location is unknown and `file` is None, or the scene cannot be loaded.
     """
-    place = given or store.documents.get(SOURCE)
+    place = file or store.documents.get(SOURCE)
     if not isinstance(place, str):
         raise UserError("store has no path of its scene file", file=store.folder, hint="name it with --scene")
     crease_deg = store.documents.get(CREASE_ANGLE)
-    scene = load_scene(place if given or place.startswith("builtin:") else store.folder / place, crease_deg)
-    if given or SCENE not in store.documents:  # without the document: baked for edited views alone
+    scene = load_scene(place if file or place.startswith("builtin:") else store.folder / place, crease_deg)
+    if file or SCENE not in store.documents:  # without the document: baked for edited views alone
         return scene
     record = scene_record(store)
     if not record.objects:  # a store of edited views alone
-        worn = materials_in_views(store)
-        objects = (replace(o, material=worn.get(o.name, o.material)) for o in scene.objects)
+        names = materials_in_views(store)
+        objects = (replace(o, material=names.get(o.name, o.material)) for o in scene.objects)
         return replace(scene, objects=tuple(objects), materials={**scene.materials, **record.materials})
     cuts = set(store.documents.get(CUTS, {}).get("objects", ()))
     baked = {o.name: _parts_of(o.name, record) for o in scene.objects}

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from lambent.bake.pictures.tracer import LightMap
     from lambent.realtime.answering.answering import AnsweredLight, Lit
 
-Worn = Mapping[str, MaterialTextures | None]  # exchanged textures, by material
+Textures = Mapping[str, MaterialTextures | None]  # exchanged ones, by material
 
 
 class StoredLight:
@@ -33,7 +33,7 @@ class StoredLight:
         self._baked = read_baked(store, probes=False)
         self._lit: tuple[object, Lit] | None = None
 
-    def of(self, materials: Mapping[str, Material], textures: Worn, factors: Factors) -> LightMap:
+    def of(self, materials: Mapping[str, Material], textures: Textures, factors: Factors) -> LightMap:
         """The light map for edited materials, exchanged textures and factors of light groups, all by name."""
         from lambent.bake.pictures.tracer import LightMap  # imports Mitsuba, whose variant `engine` has set
 
@@ -57,7 +57,7 @@ class StoredLight:
             raise UserError(NO_GROUPS, field="--light", hint=BAKE_GROUPS)
         return self._baked.groups
 
-    def _answered(self, materials: Mapping[str, Material], textures: Worn) -> Lit | None:
+    def _answered(self, materials: Mapping[str, Material], textures: Textures) -> Lit | None:
         """The answer to edits; None without edits, or where light stays as baked."""
         if not self.answers or not (materials or textures):
             return None

@@ -1,4 +1,4 @@
-"""A room as traced, in a state: which materials its objects wear, and how its light is mixed."""
+"""A traced room in a state: the materials of its objects, and the mix of its light groups."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class TracedRoom:
     """
 
     def __init__(self, traced: TracedScene, light: StoredLight | None, folder: Any = None) -> None:
-        self._traced, self._scene = traced, traced.scene  # the scene as given
+        self._traced, self._scene = traced, traced.scene  # as loaded
         self._light, self._folder = light, folder  # the folder has images that the scene reads
         self._looks: Mapping[str, Look] = {}
         self._materials: Mapping[str, Material] = {}
@@ -49,7 +49,7 @@ class TracedRoom:
         """Whether light between surfaces follows edited materials."""
         return self._light is None or self._light.answers
 
-    def wear(self, looks: Mapping[str, Look], materials: Mapping[str, Material]) -> None:
+    def set_materials(self, looks: Mapping[str, Look], materials: Mapping[str, Material]) -> None:
         """Show materials with other textures (`looks`) and other documents (`materials`), by name; others as baked.
 
         A `tracer` from before must not be used any more.
@@ -59,7 +59,7 @@ class TracedRoom:
         self._looks, self._materials, self._tracer = dict(looks), dict(materials), None
         scene, textures = self._scene, textures_in_looks(self._scene.textures, looks)
         textures |= prepared({name: textures[name] for name in looks if name in textures})
-        self._traced.dress(replace(scene, materials={**scene.materials, **materials}, textures=textures))
+        self._traced.set_materials(replace(scene, materials={**scene.materials, **materials}, textures=textures))
 
     def follow(self, on: bool) -> None:
         """Let light between surfaces follow edited materials, if the room `answers`, or stay as baked."""
@@ -95,8 +95,8 @@ class TracedRoom:
         from lambent.bake.pictures.tracer import Tracer  # imports Mitsuba, whose variant `engine` has set
 
         if self._tracer is None and self._light is not None:
-            worn = {name: textures_in_look(name, look, self._scene.textures) for name, look in self._looks.items()}
-            edits = (self._materials, worn) if self._follows else ({}, {})
+            textures = {name: textures_in_look(name, look, self._scene.textures) for name, look in self._looks.items()}
+            edits = (self._materials, textures) if self._follows else ({}, {})
             self._tracer = Tracer.of_baked(self._traced, self._light.of(*edits, self._factors))
         elif self._tracer is None:
             factors = factors_of(self._names, self._factors) if self._factors else None

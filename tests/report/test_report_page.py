@@ -67,7 +67,7 @@ def test_nothing_a_user_wrote_becomes_markup():
         page.heading(HOSTILE, 1),
         page.paragraph(HOSTILE, "soft"),
         page.note(HOSTILE, [HOSTILE]),
-        page.facts([(HOSTILE, HOSTILE)], HOSTILE),
+        page.facts([(HOSTILE, HOSTILE)]),
         page.table((HOSTILE, HOSTILE), [(HOSTILE, HOSTILE)], caption=HOSTILE, numbers=(1,), chosen=0),
         page.row([page.picture(png(), HOSTILE, HOSTILE)]),
         page.bullets([HOSTILE]),

@@ -23,14 +23,14 @@ from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import MaterialTextures
 
 PLUGIN = "lambent_edited"
-_GIVEN: list[Editable] = []  # a plugin receives only an index into this list
+_EDITABLES: list[Editable] = []  # a plugin receives only an index into this list
 
 
 def edited_dict(material: Material, edited: Editable, textures: MaterialTextures | None = None) -> dict[str, Any]:
     """The dictionary for `mi.load_dict`, for a material of this document after edits; registers the plugin."""
     _register()
-    _GIVEN.append(edited)
-    return material_dict(material, textures) | {"type": PLUGIN, "number": len(_GIVEN) - 1}
+    _EDITABLES.append(edited)
+    return material_dict(material, textures) | {"type": PLUGIN, "number": len(_EDITABLES) - 1}
 
 
 @once_per_variant
@@ -42,7 +42,7 @@ def _register() -> None:
 
         def __init__(self, props: Any) -> None:
             base.__init__(self, props)  # type: ignore[misc]
-            self.curves = Curves(_GIVEN[int(props["number"])], ops)
+            self.curves = Curves(_EDITABLES[int(props["number"])], ops)
             self.anisotropic = True
             through, back = map(float, shares_of(self.curves.material))
             self.sides = Sides(through, back)

@@ -71,9 +71,8 @@ class LightMapCache:
         """Irradiance (mi.Color3f) of the sun that the light map leaves out, and the direction it comes from."""
         if self._sun is None:
             return []
-        si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.position))
-        si.p, si.n, si.sh_frame = points.position, mi.Normal3f(points.flat), mi.Frame3f(mi.Normal3f(points.normal))
-        return [(dr.maximum(self._sun(si, active), 0.0), mi.Vector3f(*map(float, self._sun.direction)))]
+        light = self._sun.on(points.position, points.normal, points.flat, active)
+        return [(light, mi.Vector3f(*map(float, self._sun.direction)))]
 
     def irradiance(self, si: Any, active: Any, *, sun: bool = True) -> Any:
         """Irradiance on the side that a ray came from, with or without the `sun` that the light map leaves out.

@@ -89,7 +89,7 @@ class _Grown:
         self.values[target] = mean
 
     def ring(self, chart: Indices | None) -> bool:
-        """Fill unknown texels next to known ones (of their own chart, if charts are given) with the mean of those."""
+        """Fill unknown texels next to known ones (of their own chart, with `chart`) with the mean of those."""
         reached = np.zeros(len(self.known), bool)
         reached[self._front[:, None] + self.steps] = True
         target = np.flatnonzero(reached & self.inner & ~self.known & (True if chart is None else chart >= 0))
@@ -139,12 +139,12 @@ def _filtered(kind: str, images: Mapping[str, Floats], quality: int | None = Non
     """The output (H, W, 3) of an Open Image Denoise filter, clamped at 0."""
     import pyoidn
 
-    given = {name: np.ascontiguousarray(image, np.float32) for name, image in images.items()}
-    clean = given[pyoidn.OIDN_IMAGE_OUTPUT] = np.zeros_like(given[pyoidn.OIDN_IMAGE_COLOR])
+    inputs = {name: np.ascontiguousarray(image, np.float32) for name, image in images.items()}
+    clean = inputs[pyoidn.OIDN_IMAGE_OUTPUT] = np.zeros_like(inputs[pyoidn.OIDN_IMAGE_COLOR])
     with pyoidn.Device() as device:
         device.commit()
         with pyoidn.Filter(device, kind) as one:
-            for name, image in given.items():
+            for name, image in inputs.items():
                 one.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
             for name, value in options.items():
                 one.set_bool(name, value)

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
@@ -147,9 +146,6 @@ def group_notes(traced: TracedScene, light: Floats) -> list[dict[str, Any]]:
 
 def _sun_on(traced: TracedScene, texels: Texels) -> Floats:
     """Direct irradiance (K, 3) of the sun at the first point of each texel, on the normal's side."""
-    kind = {"diffuse": False}
-    p, n, flat = (vectors(mi.Vector3f, v[:, 0]) for v in (texels.positions, texels.normals, texels.flat))
-    si = dr.zeros(mi.SurfaceInteraction3f, len(texels.index))
-    si.p, si.n, si.sh_frame = mi.Point3f(p), mi.Normal3f(flat), mi.Frame3f(mi.Normal3f(n))
     assert traced.sun is not None
-    return np.maximum(array_of(SunRays(traced.sun, traced.whole(**kind))(si, mi.Bool(True))), 0)
+    p, n, flat = (vectors(mi.Vector3f, v[:, 0]) for v in (texels.positions, texels.normals, texels.flat))
+    return array_of(SunRays(traced.sun, traced.whole(diffuse=False)).on(p, n, flat, mi.Bool(True)))

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.bake.surfaces.atlas import Atlas, merged
+from lambent.bake.surfaces.atlas import Atlas, merged, mesh_of_faces
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
 from lambent.scenes.replacement import Replacement, with_replacements
-from lambent.scenes.scene import Mesh, Scene, SceneObject
+from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.consistency import read_geometry
 from lambent.store.contract import SceneRecord, scene_record, sun_beside
 from lambent.store.store import Store
@@ -46,12 +46,6 @@ def _objects(record: SceneRecord, arrays: dict[str, Floats]) -> tuple[tuple[Scen
     """The objects of a store, and the light map coordinates (V, 2) of each, by name."""
     objects, uv2 = [], {}
     for o in record.objects:
-        faces = arrays["faces"][o.first_face : o.first_face + o.face_count]
-        low, high = int(faces.min()), int(faces.max()) + 1
-        positions, normals, tangents, uv = (
-            arrays[name][low:high] for name in ("positions", "normals", "tangents", "uv")
-        )
-        mesh = Mesh(positions, normals, tangents, uv, (faces - low).astype(np.uint32))
+        mesh, uv2[o.name] = mesh_of_faces(arrays, o.first_face, o.face_count)
         objects.append(SceneObject(o.name, mesh, o.material, o.emission))
-        uv2[o.name] = arrays["uv2"][low:high]
     return tuple(objects), uv2

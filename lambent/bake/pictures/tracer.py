@@ -74,7 +74,7 @@ class Tracer:
         gather: Callable[[], Gathering] | None = None, max_depth: int = MAX_DEPTH,
     ) -> None:  # fmt: skip
         self._scene, self._tally, self._cache, self._max_depth = scene, tally, cache, max_depth
-        self._gather, self._worn = gather, _Worn(builder)
+        self._gather, self._surfaces = gather, _SurfaceGuides(builder)
 
     @classmethod
     def of_baked(cls, traced: TracedScene, light: LightMap) -> Tracer:
@@ -126,10 +126,10 @@ class Tracer:
     def guides(self, camera: Camera, size: tuple[int, int], samples: int, seed: int) -> tuple[Image, Image]:
         """Albedo and normals (height, width, 3) for a denoiser; 0 without a surface."""
 
-        def worn(ray: Any, sampler: Any) -> list[Any]:
-            return list(self._worn.at(intersect(self._scene, ray, mi.Bool(True), has_holes(self._scene))))
+        def guides(ray: Any, sampler: Any) -> list[Any]:
+            return list(self._surfaces.at(intersect(self._scene, ray, mi.Bool(True), has_holes(self._scene))))
 
-        albedo, normal = (sums / np.float32(samples) for sums in in_bands(worn, camera, size, 0, samples, seed))
+        albedo, normal = (sums / np.float32(samples) for sums in in_bands(guides, camera, size, 0, samples, seed))
         return albedo, normal
 
 
@@ -181,14 +181,14 @@ class Shown:
         return self._tally.cached(sums, throughput, cache, si, active, first)
 
 
-class _Worn:
+class _SurfaceGuides:
     """What a denoiser is told of surfaces: their approximate reflectance and their normals."""
 
     def __init__(self, builder: SceneBuilder) -> None:
         self._numbers = builder.numbers
         looks = {name: _look(one, builder.edited.get(name)) for name, one in builder.scene.materials.items()}
-        worn = np.array([looks[o.material] for o in builder.scene.objects], np.float32)
-        self._diffuse, self._specular = (mi.Color3f(np.ascontiguousarray(column.T)) for column in worn.swapaxes(0, 1))
+        table = np.array([looks[o.material] for o in builder.scene.objects], np.float32)
+        self._diffuse, self._specular = (mi.Color3f(np.ascontiguousarray(column.T)) for column in table.swapaxes(0, 1))
         self._textured = any(t.diffuse or t.specular for t in builder.scene.textures.values())
 
     def at(self, si: Any) -> tuple[Any, Any]:

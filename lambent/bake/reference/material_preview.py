@@ -77,18 +77,9 @@ def preview(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Preview:
-    """Render both balls with the same seed and compare them.
+    """Render a ball with a measurement and one with the material fitted to it, with the same seed, and compare them.
 
-    Parameters
-    ----------
-    table, material
-        A measurement, and the material fitted to it.
-    environment : Environment
-        Lighting of both balls.
-    size_px : int
-        Pixels along each side of the images.
-    spp : int
-        Samples per pixel.
+    Images have `size_px` pixels along each side, and `spp` samples per pixel.
 
     Raises
     ------

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.tracing.rays import distances, rays_from
+from lambent.bake.tracing.scene_builder import bare_scene
 from lambent.core.arrays import Floats
 from lambent.store.contract import FAR
 
@@ -16,13 +16,7 @@ class Surfaces:
 
     def __init__(self, positions: Floats, faces: NDArray[np.uint32]) -> None:
         """`positions` (V, 3), `faces` (T, 3)."""
-        mesh = mi.Mesh("all", len(positions), len(faces))
-        parameters = mi.traverse(mesh)
-        parameters["vertex_positions"] = mi.Float(np.asarray(positions, np.float32).ravel())
-        parameters["faces"] = mi.UInt32(np.asarray(faces, np.uint32).ravel())
-        parameters.update()
-        dark = {"type": "point", "position": [0.0, 0.0, 0.0], "intensity": 0.0}  # Mitsuba warns without a light
-        self._scene = mi.load_dict({"type": "scene", "all": mesh, "dark": dark})
+        self._scene = bare_scene(np.asarray(positions)[faces])
 
     def distance(self, origin: Floats, directions: Floats) -> Floats:
         """Metres (n,) from a point (3,) along unit directions (n, 3), FAR without a hit."""

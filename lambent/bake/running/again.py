@@ -68,11 +68,11 @@ def bake_again(
         raise UserError("store has no light map", file=folder, field=LIGHT)
     made_with = store.artefact(LIGHT).meta
     scene = scene_of(store)
-    worn = {name: Look(scene.materials[name], of) for name, of in (textures or {}).items()}
+    exchanged = {name: Look(scene.materials[name], of) for name, of in (textures or {}).items()}
     scene = replace(
         scene,
         materials={**scene.materials, **materials},
-        textures=textures_in_looks(scene.textures, worn),
+        textures=textures_in_looks(scene.textures, exchanged),
         measured={name: file for name, file in scene.measured.items() if name not in materials},
     )
     _check_parts(store, scene, materials)
@@ -92,15 +92,15 @@ def _check_parts(store: Store, scene: Scene, materials: Mapping[str, Material]) 
     """
     record, shared = scene_record(store), shared_probes(store)
     for name in sorted(materials):
-        given, wanted = record.materials.get(name), materials[name]
+        baked, wanted = record.materials.get(name), materials[name]
         textures_in_look = [o.name for o in record.objects if o.material == name]
-        if given is None or not textures_in_look:
+        if baked is None or not textures_in_look:
             continue
         lacks = ""
         owners = [shared.get(one, one) for one in textures_in_look]
-        if needs_probe(wanted) and not needs_probe(given):
+        if needs_probe(wanted) and not needs_probe(baked):
             lacks = "" if all(probe_name(one, "radiance") in store for one in owners) else "a probe"
-        if wanted.transmits and not given.transmits and BACK not in store:
+        if wanted.transmits and not baked.transmits and BACK not in store:
             lacks = "a light map of its far side"
         if lacks:
             hint = f"add a [[variants]] with this {name} to the scene, and bake it"

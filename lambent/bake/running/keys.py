@@ -61,7 +61,7 @@ class _Meshes:
     objects: tuple[SceneObject, ...]
 
     def parts(self) -> Iterator[bytes]:
-        """What `key_of` hashes of each object, as if each input were given to it by itself."""
+        """What `key_of` hashes of each object, as if each input were hashed by itself."""
         for o in self.objects:
             found: list[Any] = [json.dumps(o.name).encode(), _number(o.light_map_scale)]
             for array in (o.mesh.positions, o.mesh.normals, o.mesh.tangents, o.mesh.uv, o.mesh.faces):

@@ -16,7 +16,7 @@ class Watch:
     Attributes
     ----------
     region_pause : float or None
-        Pause between early regions of the light map, as a multiple of the time that finishing one took. None: no
+        Pause between regions of the light map, as a multiple of the time that finishing one took. None: no
         regions.
     """
 

@@ -134,10 +134,10 @@ def sky_image(sky: SunSky) -> NDArray[np.float32]:
     image = coarse.reshape(len(rows), len(columns), 3).repeat(COARSE, axis=0).repeat(COARSE, axis=1)
     sun = sun_disc(sky)
     reach_rad = sun.radius_rad + 2 * np.pi / HEIGHT
-    beside = (
+    rows_near = (
         np.abs(np.arange(HEIGHT) * (np.pi / (HEIGHT - 1)) - np.arccos(np.clip(sun.direction[1], -1, 1))) < reach_rad
     )
-    pixels = np.stack(np.meshgrid(np.flatnonzero(beside), np.arange(WIDTH), indexing="ij"), axis=-1).reshape(-1, 2)
+    pixels = np.stack(np.meshgrid(np.flatnonzero(rows_near), np.arange(WIDTH), indexing="ij"), axis=-1).reshape(-1, 2)
     near = pixels[(_directions(*pixels.T) @ sun.direction) > np.cos(reach_rad)]
     offset = (np.arange(SUPERSAMPLES) + 0.5) / SUPERSAMPLES - 0.5
     for mine in slices(len(near), PIXELS_AT_ONCE):

@@ -223,8 +223,8 @@ def _points_and_normals(scene: Scene, count: int) -> tuple[Floats, Floats, Flags
 
 def _both_sides(whole: Any, position: Floats, normal: Floats, crossed: Flags) -> tuple[Floats, Floats, Flags]:
     """The points, followed by all points flipped whose other side is not within a solid."""
-    behind = whole.ray_intersect(leaving(whole, position, normal, -normal))
-    inside = behind.is_valid() & (dr.dot(behind.n, vectors(mi.Vector3f, normal)) < 0)
+    back = whole.ray_intersect(leaving(whole, position, normal, -normal))
+    inside = back.is_valid() & (dr.dot(back.n, vectors(mi.Vector3f, normal)) < 0)
     sheet = np.flatnonzero(~np.array(inside))
     both = np.concatenate([np.arange(len(position)), sheet])
     turned = np.concatenate([normal, -normal[sheet]])

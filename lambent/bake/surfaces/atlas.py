@@ -129,24 +129,26 @@ def separated(scene: Scene, arrays: dict[str, Floats], width: int, height: int) 
     """The atlas from which `merged` arrays were made."""
     objects, uv2, first_face = [], {}, 0
     for o in scene.objects:
-        faces = arrays["faces"][first_face : first_face + len(o.mesh.faces)]
-        low, high = int(faces.min()), int(faces.max()) + 1
-        positions, normals, tangents, uv = (
-            arrays[name][low:high] for name in ("positions", "normals", "tangents", "uv")
-        )
-        mesh = Mesh(positions, normals, tangents, uv, (faces - low).astype(np.uint32))
+        mesh, uv2[o.name] = mesh_of_faces(arrays, first_face, len(o.mesh.faces))
         objects.append(replace(o, mesh=mesh))
-        uv2[o.name] = arrays["uv2"][low:high]
         first_face += len(o.mesh.faces)
     return Atlas(replace(scene, objects=tuple(objects)), uv2, width, height)
+
+
+def mesh_of_faces(arrays: dict[str, Floats], first: int, count: int) -> tuple[Mesh, Floats]:
+    """The mesh of consecutive faces of `merged` arrays, and its light map coordinates (V, 2)."""
+    faces = arrays["faces"][first : first + count]
+    own = slice(int(faces.min()), int(faces.max()) + 1)
+    positions, normals, tangents, uv = (arrays[name][own] for name in ("positions", "normals", "tangents", "uv"))
+    return Mesh(positions, normals, tangents, uv, (faces - own.start).astype(np.uint32)), arrays["uv2"][own]
 
 
 def object_records(scene: Scene) -> tuple[ObjectRecord, ...]:
     """The store's record of each object, in the order of `merged`."""
     records, first = [], 0
     boxes = boxes_of([o.mesh for o in scene.objects]).tolist()
-    worn = {o.material for o in scene.objects}
-    wants_probe = {material: any(map(needs_probe, documents_of(scene, material))) for material in worn}
+    used = {o.material for o in scene.objects}
+    wants_probe = {material: any(map(needs_probe, documents_of(scene, material))) for material in used}
     for o, (low, high) in zip(scene.objects, boxes, strict=True):
         records.append(ObjectRecord(
             name=o.name, material=o.material, first_face=first, face_count=len(o.mesh.faces), emission=o.emission,

@@ -95,8 +95,8 @@ class SceneBuilder:
         self._tables = {name: mi.load_dict(table_dict(grid)) for name, grid in self.measured.items()}
         for name, made in self.edited.items():
             self._tables[name] = mi.load_dict(edited_dict(scene.materials[name], made, scene.textures.get(name)))
-        self._given = dict[Look, tuple[Any, MaterialTextures | None]]()
-        self._first = self._bsdfs(scene, self._given)
+        self._known = dict[Look, tuple[Any, MaterialTextures | None]]()
+        self._first = self._bsdfs(scene, self._known)
         self._shapes = Shapes(scene.objects, self._first, uv2 or {})
         self.meshes = self._shapes.meshes
         self.lights = [emitter_of(light) for light in scene.lights]
@@ -106,17 +106,17 @@ class SceneBuilder:
             self.environment = sampling.environment
             self.weigh_emitters(sampling.weights)
 
-    def dress(self, scene: Scene) -> bool:
-        """Let the objects wear the materials and textures of a scene, in all scenes built, or return False.
+    def set_materials(self, scene: Scene) -> bool:
+        """Set the materials and textures of a scene in all scenes built, or return False.
 
-        False where objects of one shape would wear different materials: then only another builder can. BSDFs of the
-        first scene are kept. Those of another are dropped before new ones are made, which get their places: kernels
-        depend on the number of BSDFs.
+        False if objects of one shape would get different materials: then only another builder can. BSDFs of the first
+        scene are kept. Those of another are dropped before new ones are made, which get their places: kernels depend
+        on the number of BSDFs.
         """
-        self._shapes.wear(self._first)
-        dressed = self._shapes.wear(self._bsdfs(scene, dict(self._given)))
-        self.scene = scene if dressed else self.scene
-        return dressed
+        self._shapes.set_bsdfs(self._first)
+        is_set = self._shapes.set_bsdfs(self._bsdfs(scene, dict(self._known)))
+        self.scene = scene if is_set else self.scene
+        return is_set
 
     def _bsdfs(self, scene: Scene, known: dict[Look, tuple[Any, MaterialTextures | None]]) -> list[Any]:
         """mi.BSDF of each object. Equal materials share one, because each takes time in every kernel: `known` ones."""

@@ -50,7 +50,7 @@ class Shapes:
         self.numbers = ObjectNumbers(counts, self._groups)
         self.numbers.add(self._shapes, self._values)
 
-    def wear(self, bsdfs: Sequence[Any]) -> bool:
+    def set_bsdfs(self, bsdfs: Sequence[Any]) -> bool:
         """Give objects these BSDFs (mi.BSDF by object); False, and no change, if objects of one shape would differ."""
         if any(len({id(bsdfs[i]) for i in group}) > 1 for group in self._groups):
             return False

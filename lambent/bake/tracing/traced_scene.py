@@ -87,9 +87,9 @@ class TracedScene:
         The renderer shows a fit of the table, the material's document.
         """
         files = self.scene.measured
-        worn = {o.material for o in self.scene.objects} & set(files)
+        used = {o.material for o in self.scene.objects} & set(files)
         tell: Any = self.progress  # hashable, which its protocol does not state
-        return {name: _lookup(files[name], sha256_of(files[name]), photons, tell) for name in sorted(worn)}
+        return {name: _lookup(files[name], sha256_of(files[name]), photons, tell) for name in sorted(used)}
 
     def whole(self, *, diffuse: bool, photons: bool = False) -> Any:
         """mi.Scene of that builder, with all objects."""
@@ -140,14 +140,14 @@ class TracedScene:
     def _sorting(self, *, diffuse: bool) -> Sorting:
         return Sorting(self.sorted_lights, self.builder(diffuse=diffuse), self.sun)
 
-    def dress(self, scene: Scene) -> None:
-        """Put on the materials and textures of another scene: the same objects, under the same lights.
+    def set_materials(self, scene: Scene) -> None:
+        """Take the materials and textures of another scene with the same objects and lights.
 
-        Every mi.Scene made before wears them too, so caches and tallies must be made anew.
+        Every mi.Scene made before has them too, so caches and tallies must be made anew.
         """
         self.scene = replace(self.scene, materials=scene.materials, textures=scene.textures)
         self.atlas = replace(self.atlas, scene=self.scene)
-        if self._builder is not None and not self._builder[1].dress(self.scene):
+        if self._builder is not None and not self._builder[1].set_materials(self.scene):
             self._builder = self._whole = None
         found, panes = self._found_sun, panes_of(self.scene)
         if found is not None and found.record.panes != panes:

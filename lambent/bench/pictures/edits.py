@@ -114,7 +114,7 @@ def _in_states(
             rooms = {edit.sky_turn_deg: room_of(edit.sky_turn_deg)}
         room = rooms[edit.sky_turn_deg]
         worn = edits_of(scene.materials, scene.textures, bare, edit.looks, edit.colours, edit.textures)
-        room.wear(worn.looks, worn.materials)
+        room.set_materials(worn.looks, worn.materials)
         room.mix(edit.light)
         yield name, found(room.tracer)
 

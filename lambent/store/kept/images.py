@@ -20,7 +20,7 @@ from lambent.scenes.looks.image_textures import mean_and_detail
 from lambent.scenes.scene import ImageTexture, Variant
 
 IMAGES = "images"
-Worn = Mapping[str, str | ImageTexture]  # by material, as of `session.RoomState.textures`
+Textures = Mapping[str, str | ImageTexture]  # by material, as of `session.RoomState.textures`
 
 
 def kept_image(folder: Path, file: Path) -> str:
@@ -71,15 +71,15 @@ def located(image: ImageTexture, folder: Path | None) -> ImageTexture:
     return replace(image, file=str(inside(folder / IMAGES, image.file)))
 
 
-def with_paths(worn: Worn, folder: Path | None) -> dict[str, str | ImageTexture]:
+def with_paths(textures: Textures, folder: Path | None) -> dict[str, str | ImageTexture]:
     """Textures of a state with absolute paths of images; raises as `located`."""
-    return {name: located(of, folder) if isinstance(of, ImageTexture) else of for name, of in worn.items()}
+    return {name: located(of, folder) if isinstance(of, ImageTexture) else of for name, of in textures.items()}
 
 
-def readable(worn: Worn, folder: Path | None) -> tuple[dict[str, str | ImageTexture], tuple[str, ...]]:
+def readable(textures: Textures, folder: Path | None) -> tuple[dict[str, str | ImageTexture], tuple[str, ...]]:
     """Textures of a state with absolute paths, without images that cannot be read; and a line on each of these."""
     found, faults = dict[str, str | ImageTexture](), list[str]()
-    for name, of in worn.items():
+    for name, of in textures.items():
         try:
             shown = located(of, folder) if isinstance(of, ImageTexture) else of
             if isinstance(shown, ImageTexture):
@@ -91,9 +91,9 @@ def readable(worn: Worn, folder: Path | None) -> tuple[dict[str, str | ImageText
     return found, tuple(faults)
 
 
-def names_of_images(worn: Worn) -> Iterator[str]:
+def names_of_images(textures: Textures) -> Iterator[str]:
     """The files of images among the textures of a state, as it names them."""
-    return (of.file for of in worn.values() if isinstance(of, ImageTexture))
+    return (of.file for of in textures.values() if isinstance(of, ImageTexture))
 
 
 def remove_unused(folder: Path, used: Collection[str]) -> None:

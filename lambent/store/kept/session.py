@@ -70,17 +70,17 @@ class RoomState(Strict):
     def unknown(self, materials: Collection[str], groups: Collection[str]) -> list[str]:
         """Names of materials and light groups that are missing from a store."""
         others = [of for of in self.textures.values() if isinstance(of, str) and of]
-        worn = [*self.materials, *self.textures, *others]
-        return [n for n in worn if n not in materials] + [n for n in self.light.groups if n not in groups]
+        used = [*self.materials, *self.textures, *others]
+        return [n for n in used if n not in materials] + [n for n in self.light.groups if n not in groups]
 
     def only(self, materials: Collection[str]) -> RoomState:
         """A copy limited to the materials that a store has."""
         known = {name: one for name, one in self.materials.items() if name in materials}
-        worn = {
+        textures = {
             name: of for name, of in self.textures.items()
             if name in materials and (isinstance(of, ImageTexture) or of in (*materials, ""))
         }  # fmt: skip
-        return RoomState(materials=known, textures=worn, light=self.light)
+        return RoomState(materials=known, textures=textures, light=self.light)
 
 
 class WalkSession(Strict):

@@ -36,7 +36,7 @@ def images_of_variants(folder: Path) -> set[str]:
     """The images of a store's scene variants, as the store names them."""
     variants = scene_record(Store.open(folder)).variants
     textures = ({name: look.textures for name, look in variant.looks.items()} for variant in variants)
-    return {name for worn in textures for name in names_of_images(worn)}
+    return {name for one in textures for name in names_of_images(one)}
 
 
 def says_light(store: Store, name: str) -> bool:
@@ -49,6 +49,6 @@ def says_light(store: Store, name: str) -> bool:
 def _variant(name: str, room: RoomState, record: SceneRecord, folder: Path) -> Variant:
     known = room.only(record.materials)
     own = {one: one if one in record.textures else "" for one in record.materials}
-    changed, worn = dict.fromkeys([*known.materials, *known.textures]), with_paths(known.textures, folder)
-    looks = {one: Look(known.materials.get(one, record.materials[one]), worn.get(one, own[one])) for one in changed}
+    changed, textures = dict.fromkeys([*known.materials, *known.textures]), with_paths(known.textures, folder)
+    looks = {one: Look(known.materials.get(one, record.materials[one]), textures.get(one, own[one])) for one in changed}
     return Variant(name, looks, known.light)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -153,10 +152,8 @@ def test_light_map_and_sun_add_up_to_all_light_on_the_floor(tmp_path: Path, numb
         return array_of(value).astype(float)
 
     sun = Sun(found)
-    si = dr.zeros(mi.SurfaceInteraction3f, count)
-    si.p, si.n = points.position, mi.Normal3f(points.flat)
-    si.sh_frame = mi.Frame3f(mi.Normal3f(points.normal))
-    direct = array_of(SunRays(sun, whole)(si, mi.Bool(True))).astype(float)
+    on_floor = SunRays(sun, whole).on(points.position, points.normal, points.flat, mi.Bool(True))
+    direct = array_of(on_floor).astype(float)
     rest, former = irradiance(sun, 1), irradiance(None, 2)
     error = np.sqrt(((rest + direct).var(axis=0) + former.var(axis=0)) / count)
     assert np.all(direct.mean(axis=0) > 8 * error), "the sun is not too small to be missed"
@@ -189,8 +186,6 @@ def photon_flux_of_the_sun(scene: Scene, found: FoundSun) -> Floats:
     rng = np.random.default_rng(0)
     face = rng.choice(len(area), size=count, p=area / area.sum())
     p, n = points_on_triangles(corners, face, rng), triangle_normals(corners[face])
-    si = dr.zeros(mi.SurfaceInteraction3f, count)
-    si.p, si.n = vectors(mi.Point3f, p), mi.Normal3f(vectors(mi.Vector3f, n))
-    si.sh_frame = mi.Frame3f(si.n)
-    direct = array_of(SunRays(Sun(found), whole)(si, mi.Bool(True)))
-    return np.asarray(np.maximum(direct, 0).mean(axis=0) * area.sum())
+    points, normals = vectors(mi.Point3f, p), vectors(mi.Vector3f, n)
+    direct = array_of(SunRays(Sun(found), whole).on(points, normals, normals, mi.Bool(True)))
+    return np.asarray(direct.mean(axis=0) * area.sum())

@@ -81,10 +81,8 @@ def sunlit(scene: Scene, points: Floats) -> tuple[Sun, Floats]:
     found = sun_of(scene)
     assert found is not None
     sun, whole = Sun(found), SceneBuilder(scene).build()
-    si = dr.zeros(mi.SurfaceInteraction3f, len(points))
-    si.p, si.n = vectors(mi.Point3f, points), mi.Normal3f(0.0, 1.0, 0.0) + dr.zeros(mi.Normal3f, len(points))
-    si.sh_frame = mi.Frame3f(si.n)
-    return sun, array_of(SunRays(sun, whole)(si, mi.Bool(True))).astype(float)
+    up = mi.Vector3f(0.0, 1.0, 0.0) + dr.zeros(mi.Vector3f, len(points))
+    return sun, array_of(SunRays(sun, whole).on(vectors(mi.Point3f, points), up, up, mi.Bool(True))).astype(float)
 
 
 def under(at: tuple[float, float], height: float = 1.0) -> Floats:

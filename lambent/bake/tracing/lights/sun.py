@@ -119,6 +119,12 @@ class SunRays:
             return dr.select(lit & ~self._scene.ray_test(ray, lit), self._irradiance * cosine, 0.0)
         return self._irradiance * cosine * rays.passed(self._scene, ray, lit)
 
+    def on(self, points: Any, normals: Any, flat: Any, active: Any) -> Any:
+        """Irradiance (mi.Color3f) on the front of points of surfaces, by shading and triangle normals."""
+        si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points))
+        si.p, si.n, si.sh_frame = mi.Point3f(points), mi.Normal3f(flat), mi.Frame3f(mi.Normal3f(normals))
+        return dr.maximum(self(si, active), 0.0)
+
     def arrive(self, points: Floats, normals: Floats, seed: int) -> Flags:
         """Whether one ray each from points (n, 3) of flat surfaces (normals (n, 3)) reaches the sun, (n,)."""
         w = self._direction(rays.independent(seed, len(points)).next_2d())

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.tracing.rays import rays_from
-from lambent.bake.tracing.seen.visibility import viewing_places
+from lambent.bake.tracing.seen.visibility import camera_eyes, viewing_places
 from lambent.core.arrays import Floats, Indices
 from lambent.scenes.scene import Scene
 
@@ -29,10 +29,9 @@ def viewers_of(scene: Scene, traced: Any) -> Viewers | None:
     Places beyond the cameras' reach are left out, because rays through a window end far outside. `traced` is the
     mi.Scene of the opaque triangles, None without any.
     """
-    cameras = [*scene.cameras, *(key for path in scene.paths for key in path.keys)]
-    if not cameras or traced is None:
+    eyes = camera_eyes(scene)
+    if not len(eyes) or traced is None:
         return None
-    eyes = np.array([camera.position for camera in cameras], float)
     _, _, distance = met(traced, eyes, RAYS // 16)
     if not len(distance):
         return None

@@ -25,16 +25,21 @@ FEW = (8, 32, 96)  # positions tried before all the others; most points are seen
 RAYS_AT_ONCE = 1 << 21
 
 
+def camera_eyes(scene: Scene) -> Floats:
+    """Positions (n, 3) of the scene's cameras and of the keys of its paths."""
+    cameras = [*scene.cameras, *(key for path in scene.paths for key in path.keys)]
+    return np.array([camera.position for camera in cameras], float).reshape(-1, 3)
+
+
 def viewing_places(scene: Scene, traced: Any) -> Floats:
     """Free positions (PLACES, 3) in view of the scene's cameras: along their rays, and along one diffuse bounce.
 
     Rays without a hit give no positions. (0, 3) without cameras, or if they see nothing.
     """
-    cameras = [*scene.cameras, *(camera for path in scene.paths for camera in path.keys)]
-    if not cameras:
-        return np.zeros((0, 3))
-    u = r2(8 * PLACES)
-    eyes = np.array([c.position for c in cameras], float)[np.arange(len(u)) % len(cameras)]
+    eyes, u = camera_eyes(scene), r2(8 * PLACES)
+    if not len(eyes):
+        return eyes
+    eyes = eyes[np.arange(len(u)) % len(eyes)]
     z = 1 - 2 * u[:, 0]
     phi = 2 * np.pi * u[:, 1]
     around = np.stack([np.sqrt(1 - z**2) * np.cos(phi), z, np.sqrt(1 - z**2) * np.sin(phi)], axis=-1)
@@ -105,16 +110,16 @@ def without_hidden(texels: Texels, valid: Flags, in_view: Flags, labels: Indices
     shown = valid & in_view
     has_shown = np.asarray(shown.any(axis=1))
     chart = labels.reshape(-1)[texels.index]
-    beside = np.asarray(_beside(labels, texels.index[has_shown]).reshape(-1)[texels.index] & ~has_shown)
-    hidden = ~has_shown & ~beside & valid.any(axis=1)
+    adjacent = np.asarray(_adjacent(labels, texels.index[has_shown]).reshape(-1)[texels.index] & ~has_shown)
+    hidden = ~has_shown & ~adjacent & valid.any(axis=1)
     parted = labels.reshape(-1).copy()
     parted[texels.index[hidden]] = chart[hidden] + BEYOND
-    kept = np.where(has_shown[:, None], shown, valid & ~beside[:, None])
+    kept = np.where(has_shown[:, None], shown, valid & ~adjacent[:, None])
     return kept, parted.reshape(labels.shape)
 
 
-def _beside(labels: Indices, index: Indices) -> Flags:
-    """(H, W) bool: texels adjacent to one of the given, corners included, in the same chart."""
+def _adjacent(labels: Indices, index: Indices) -> Flags:
+    """(H, W) bool: texels adjacent to one of `index`, corners included, in the same chart."""
     height, width = labels.shape
     padded = np.pad(labels, 1, constant_values=-1)
     marked = np.zeros(labels.size, bool)

@@ -94,7 +94,7 @@ class Rooms:
             room = self._baked_again((wish.materials, wish.textures))
         else:
             room, given = self.as_baked(kind), self.materials
-            room.wear({name: Look(given[name], of) for name, of in wish.textures.items()}, wish.materials)
+            room.set_materials({name: Look(given[name], of) for name, of in wish.textures.items()}, wish.materials)
             room.follow(wish.answers)
         room.mix(wish.light)
         return room
@@ -202,7 +202,7 @@ def warm_up(rooms: Rooms) -> None:
 
     room = rooms.as_baked("traced")
     for materials in (dict(list(rooms.materials.items())[:1]), {}):
-        room.wear({}, materials)
+        room.set_materials({}, materials)
         picture = TracedPicture(room.tracer, Wish(0).camera, (8, 8))
         while picture.samples <= ENDED:
             picture.sample()
