@@ -94,6 +94,12 @@ def test_cancelled_fit_gives_the_best_so_far(paint, stop):
     assert result.errors["cuberoot"] < 0.3 * result.lambertian_errors["cuberoot"]
 
 
+def test_progress_rises_to_its_end(paint):
+    seen = []
+    fit(paint, distribution="best", progress=lambda done, total, what: seen.append(done / total))
+    assert seen == sorted(seen) and seen[0] == 0 and seen[-1] == 1
+
+
 def test_the_number_of_lobes_is_found(paint):
     assert len(fit(paint, lobes="auto").material.lobes) == 1
     assert len(fit(grey(TWO_LOBES, FEW), lobes="auto").material.lobes) == 2

@@ -80,8 +80,9 @@ def test_its_parameters_have_names(beads):
     check({"r_mx": 0.002, "r_alpha": -3.0, "kr": 0.2}, {}, lobes=1)
     with pytest.raises(UserError, match="out of bounds"):
         check({"r_alpha": -5.0}, {}, lobes=1)
-    retro = fit(beads, fix={"r_alpha": -1.0, "kr": 0.25}, ranges={"r_mx": (0.02, 0.025)}).material.lobes[-1]
-    assert (retro.alpha, retro.k[0]) == (-1.0, 0.25) and 0.02 <= retro.mx <= 0.025
+    fix = {"r_alpha": -1.0, "kr": 0.25, "r_r0": 0.35}  # exp(log(0.35)) is another number
+    retro = fit(beads, fix=fix, ranges={"r_mx": (0.02, 0.025)}).material.lobes[-1]
+    assert (retro.alpha, retro.k[0], retro.r0[0]) == (-1.0, 0.25, 0.35) and 0.02 <= retro.mx <= 0.025
 
 
 def test_derivatives_are_those_of_the_model(beads):
