@@ -11,7 +11,10 @@ import numpy as np
 import pytest
 
 from lambent.bake.artefacts import light_field
+from lambent.bake.artefacts.light_map import finished_maps
 from lambent.bake.bake import bake
+from lambent.bake.bake import found as kinds
+from lambent.bake.context import BakeContext
 from lambent.bake.light_fields.acquisition import (
     Around,
     TracedMaps,
@@ -20,6 +23,8 @@ from lambent.bake.light_fields.acquisition import (
     inverse_distances,
     radiance_maps,
 )
+from lambent.bake.light_fields.surroundings import around
+from lambent.bake.methods import chosen
 from lambent.bake.quality import Quality
 from lambent.bake.sky.sun import sun_of
 from lambent.bake.tracing.lights.sun import Sun
@@ -29,12 +34,12 @@ from lambent.baked.light_fields.stored import read_light_field
 from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.octahedral import from_square, texel_directions, texel_solid_angles
 from lambent.core.progress import Cancelled
-from lambent.materials.document import Material
+from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import patch
-from lambent.scenes.scene import ConstantEnvironment, LightFieldWish, Scene, SceneObject, SunSky
+from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, LightFieldWish, Scene, SceneObject, SunSky
 from lambent.store.contract import light_field_name
 from lambent.store.store import Store
-from tests.bake.small_scenes import BLACK, COLOURS, TINY, coloured_room, room_with_step
+from tests.bake.small_scenes import BLACK, COLOURS, TINY, coloured_room, plane, room_with_step
 
 SMALL = TINY.changed("small", light_field={"points": 24, "texels": 14, "strata": 1})
 PARTS = ("points", "normals", "blocks", "distances", "sample_map")
@@ -262,3 +267,16 @@ def test_maps_that_are_traced_where_they_are_read_are_those_of_a_bake(mi: Any) -
         np.testing.assert_array_equal(read[some], whole[some])
     assert read.shape == whole.shape and read.nbytes == whole.nbytes
     np.testing.assert_array_equal(np.array(read), whole)
+
+
+def test_an_object_without_its_lobes_shows_the_sun_on_it(tmp_path: Path) -> None:
+    """A mirror on top of kd = .5, under a sun straight above of irradiance pi and no sky: radiance kd E/pi."""
+    glossy = Material(kd=0.5, lobes=(Lobe(mx=0.01, my=0.01, r0=0.9),))
+    scene = replace(plane(), materials={"black": glossy}, lights=(DirectionalLight((0.0, -1.0, 0.0), (np.pi,) * 3),))
+    store = bake(scene, tmp_path / "s", quality=TINY, only=("light_map",))
+    context = BakeContext(scene, store, kinds(), TINY, chosen({}))
+    surroundings = around(context.traced, finished_maps(context), 2, ("floor",))
+    light = radiance_maps(surroundings, np.array([[0.0, 0.2, 0.0]]), 16, 1, 0)[0][0]
+    up = texel_directions(16)[..., 1]
+    np.testing.assert_allclose(light[up < -0.9], 0.5, rtol=0.02)
+    assert not light[up > 0.1].any()
