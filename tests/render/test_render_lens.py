@@ -23,7 +23,7 @@ FIELD = {"points": 100, "texels": 126, "strata": 2}
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     quality = TINY.changed("lens", light_field=FIELD, geometry={"texels": 96})
-    return bake(LENS.scene(), tmp_path_factory.mktemp("lens") / "s", quality=quality)
+    return bake(LENS.scene(), tmp_path_factory.mktemp("lens") / "s", quality=quality, only=("light_field",))
 
 
 @pytest.mark.parametrize(
