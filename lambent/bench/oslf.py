@@ -162,7 +162,8 @@ def surface_rows(
 
 def raw_mb(field: LightField) -> float:
     """MB of radiance and inverse distance in half floats, and of the sample map, uncompressed."""
-    return round((field.radiance.nbytes + field.inverse_distance.nbytes + field.sample_map.nbytes) / 1e6, 1)
+    arrays = np.asarray(field.radiance), np.asarray(field.inverse_distance), field.sample_map
+    return round(sum(array.nbytes for array in arrays) / 1e6, 1)
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:

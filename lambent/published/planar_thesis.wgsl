@@ -41,11 +41,12 @@ fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
         let q = gain(lobe, at.wi, wo, at.h) / at.wi.z;
         let hit = find_hit(place, to_world(s, at.wi));
         let inside = hit.inside;
-        let weight = select(q * q, q, FORMULA == 24u) * (at.wi.z * at.wi.z * p);
+        let norm = select(q, vec3f(1.0), FORMULA == 24u) * (at.wi.z * p);
+        let weight = norm * q * at.wi.z;
         sum += buffer_sample(hit.texel, level) * inside * weight;
         let share = 1.0 - inside;
         beyond = Beyond(beyond.gain + share * weight, beyond.w + share * at.wi, beyond.omega + share * omega);
-        weights += select(q, vec3f(1.0), FORMULA == 24u) * (at.wi.z * p);
+        weights += norm;
     }
     sum += from_probe(s, beyond);
     return vec4f(select(vec3f(0.0), sum / max(weights, vec3f(1e-30)), weights > vec3f(1e-30)), 0.0);

@@ -15,5 +15,5 @@ def is_clear(material: Material, textures: MaterialTextures | None) -> bool:
 
 def panes_of(scene: Scene) -> tuple[str, ...]:
     """Names of the clear materials that objects use; measured tables are excluded."""
-    worn = {o.material for o in scene.objects} - set(scene.measured)
-    return tuple(sorted(name for name in worn if is_clear(scene.materials[name], scene.textures.get(name))))
+    used = {o.material for o in scene.objects} - set(scene.measured)
+    return tuple(sorted(name for name in used if is_clear(scene.materials[name], scene.textures.get(name))))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
@@ -12,17 +11,12 @@ from lambent.bake.light import sampling
 from lambent.bake.quality import quality_named
 from lambent.bench.measuring.switches import BAKE, SWITCHES, TRACE, Switch, is_frozen, switched
 from lambent.bench.pictures import ablation
-from lambent.bench.registry import run_bench
 from lambent.core.errors import UserError
-from lambent.core.pictures.images import write_image
 from lambent.realtime.gpu import cube_mips, shader_source
 from lambent.realtime.incident import planes
 from lambent.realtime.integrators.integrators import INTEGRATORS
 from lambent.realtime.light import lamps, probe_light
-from lambent.render import Settings, images
 from lambent.scenes import load_scene
-from lambent.store.contract import scene_record
-from lambent.store.store import Store
 
 COARSE = quality_named("preview").changed("coarse", geometry={"texels": 64}, environment={"texels": 32})
 WHITE = Switch("colour.wgsl:srgb_encode", "    return vec3f(1.0);")
@@ -68,11 +62,6 @@ def test_shaders_change_where_they_include_the_file() -> None:
 def test_a_place_that_is_not_there_is_named(place: str) -> None:
     with pytest.raises(UserError, match="no such constant or function"), switched(Switch(place, 0)):
         pass
-
-
-def test_a_constant_that_no_function_reads_is_frozen() -> None:
-    assert is_frozen(FROZEN)
-    assert not is_frozen(Switch("lambent.realtime.light.lamps.FAINT", 0.0)) and not is_frozen(WHITE)
 
 
 def test_switches_are_of_what_there_is() -> None:
@@ -131,15 +120,3 @@ def test_what_gains_nothing_goes():
     }  # fmt: skip
     assert (found["flip"]["flip"], found["flip"]["flip_most"], found["flip"]["flip_least"]) == (-0.0045, 0.001, -0.01)
     assert found["time"]["frame_s"] == 1.05
-
-
-def test_references_belong_to_stores_by_name(store, tmp_path):
-    other = tmp_path / "other.store"
-    other.symlink_to(store)
-    camera = scene_record(Store.open(store)).cameras[0]
-    picture = images(Store.open(store), Settings(48, 32, "path", samples=4)).radiance(camera)
-    for name in ("box-1.exr", "box-2.exr"):
-        write_image(tmp_path / name, np.asarray(picture, np.float32))
-    mine = [tmp_path / "box-1.exr", tmp_path / "box-2.exr"]
-    with pytest.raises(UserError, match=r"other.store: --reference: a store has no reference; expected other-\*.exr"):
-        run_bench("ablation", "quick", inputs=[store, other], reference=mine)

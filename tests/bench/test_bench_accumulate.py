@@ -12,10 +12,8 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.quality import quality_named
+from lambent.bench.measuring.reference import Reference
 from lambent.bench.pictures import accumulate, edits
-from lambent.bench.registry import run_bench
-from lambent.core.errors import UserError
-from lambent.core.pictures.images import write_image
 from lambent.scenes import load_scene
 from lambent.store.store import Store
 from lambent.traced.room import TracedRoom
@@ -44,12 +42,6 @@ def test_pictures_at_rest_come_below_path_tracing(folder: Path, monkeypatch: pyt
     assert report["summary"]["box.store"] == {key: last[key] for key in ("flip", "bar", "flip_worst_tile")}
 
 
-def test_a_single_reference_is_refused(folder: Path, tmp_path: Path) -> None:
-    write_image(tmp_path / "one.exr", np.ones((4, 6, 3), np.float32))
-    with pytest.raises(UserError, match=r"--reference: a single reference has no noise; expected at least two"):
-        run_bench("accumulate", "quick", inputs=[folder], reference=[tmp_path / "one.exr"])
-
-
 def test_edits_of_all_kinds_show(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     effort = replace(edits.QUICK, width=96, height=64, samples=32, truth_spp=256)
     report = edits.run(effort, inputs=[folder])
@@ -67,3 +59,13 @@ def test_edits_of_all_kinds_show(folder: Path, monkeypatch: pytest.MonkeyPatch) 
     )
     stays = list(edits.rows_of(Store.open(folder), replace(effort, edits=1)))[1]
     assert stays["flip"] > colour["flip"] and stays["left_unedited"] > 0.05
+
+
+def test_errors_count_where_few_pixels_are_compared() -> None:
+    radiance = np.random.default_rng(1).uniform(0.5, 2, (48, 64, 3))
+    shown = np.zeros((48, 64), bool)
+    shown[20:26, 30:40] = True
+    reference = Reference.of(radiance, shown)
+    errors = reference.errors(radiance * [0.7, 1.0, 1.3])
+    assert errors["flip_shown"] > 0.05 and errors["psnr"] < 30
+    assert reference.errors(radiance)["flip"] == 0

@@ -37,18 +37,6 @@ def test_maps_hold_what_the_traced_rays_meet(view: LightFieldView) -> None:
     assert len(black) and not field.radiance[black].any() and field.radiance[used].any(axis=(1, 2, 3)).all()
 
 
-def test_methods_come_in_order(view: LightFieldView) -> None:
-    field, single = view.field(144, TEXELS, 1), view.single(TEXELS, 1)
-    mirror = Compared.of(view.shown.pixel, view.size, view.truth)
-    methods = {m.name: m for m in oslf.methods(field, single, view.place(field), view)}
-    flip = {name: mirror.errors(m.radiance())["flip"] for name, m in methods.items()}
-    for name in ("nearest", "angle", "average", "B_r 4", "B_n 4"):
-        assert flip[name] < flip["single map"], name
-        assert flip["march 4"] < flip[name], name
-    assert flip["march 4"] < 1.3 * flip["true hit"]
-    assert methods["march 4"].look_ups == 4 * methods["march 1"].look_ups
-
-
 def test_a_diffuse_object_is_seen_by_its_own_light_field(view: LightFieldView, tmp_path: Path) -> None:
     folder = tmp_path / "store"
     block = LightFieldView(load_scene("builtin:box"), "block", 0, (96, 96), 1, folder, oslf.SMALL)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from lambent.bench.pictures import planar_quality, walk_planar
+from lambent.bench.pictures import planar_quality
 from lambent.bench.scenes import planar_scene
 from lambent.bench.scenes.planar_scene import floor_state
 from lambent.core.pictures import metrics
@@ -36,29 +35,3 @@ def test_interleaving_beats_the_thesis_and_the_probe() -> None:
     psnr = {method: by_n["7"] for method, by_n in report["summary"]["psnr_path"].items()}
     assert psnr["marched"] > psnr["thesis"] + 2
     assert all(0 < row["flip_path"] < row["flip_worst_tile_path"] < 1 for row in report["rows"])
-
-
-def test_a_run_tells_its_size_and_progress() -> None:
-    effort = planar_quality.Effort(64, 48, 128, ns=(7,), roughnesses=((0.05, 0.05),))
-    steps: list[float] = []
-    report = planar_quality.run(effort, lambda done, total, what: steps.append(done / total))
-    summary = report["summary"]
-    assert (summary["width"], summary["height"], summary["spp"]) == (64, 48, 128)
-    assert summary["psnr_path"]["marched"]["7"] > summary["psnr_path"]["thesis"]["7"]
-    assert len(steps) >= 2 and steps == sorted(steps) and steps[-1] == 1
-
-
-def test_times_of_planes_come_in_rows() -> None:
-    report = walk_planar.run(walk_planar.Effort(40, 25, ns=(3, 5), rounds=2))
-    assert len(report["rows"]) == 2 * (2 + 2 * 3)
-    assert {row["integrator"] for row in report["rows"]} == {"diffuse", "split-sum", "rings", "lobe-4.25", "fis"}
-
-
-def test_the_floor_covers_what_the_bench_says() -> None:
-    lobe = planar_quality.lobe_of(0.1, 0.1)
-    renderer = Renderer(open_device(), planar_scene.planar_scene(lobe))
-    for coverage, share in (("full", 1.0), ("half", 0.5)):
-        state = replace(floor_state(lobe, 84, 52), camera=walk_planar.CAMERAS[coverage])
-        image = renderer.image(state)
-        assert renderer.statistics["mirrors"] == 1
-        assert (image[..., 1] > 0).mean() == pytest.approx(share, abs=0.02)

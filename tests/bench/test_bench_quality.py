@@ -9,20 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.bench.measuring import frame_times
 from lambent.bench.pictures import quality, walk_cube
 from lambent.bench.registry import run_bench
 from lambent.bench.scenes.quality_inputs import MATERIALS, read_inputs
 from lambent.core.errors import UserError
-from lambent.core.geometry.cubemap import face_directions
-from lambent.core.geometry.directions import normalize
 from lambent.core.pictures.images import write_image
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.objects.unbaked import CAMERA, unbaked_scene
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.geometry import sphere
-from lambent.scenes.sky.environments import dusk, from_lat_long, night, studio
+from lambent.scenes.sky.environments import dusk, studio
 
 pytestmark = pytest.mark.usefixtures("adapter")
 
@@ -70,13 +67,6 @@ def test_the_callers_materials_stand_beside_ours(tmp_path: Path) -> None:
     assert {row["material"] for row in report["rows"]} == {"matte .15", "mine"}
 
 
-def test_a_measured_table_is_fitted_first(shared_data: Path) -> None:
-    environments, materials = read_inputs([shared_data / "measured" / "rgl" / "satin_rosaline_rgb.bsdf"])
-    assert not environments
-    assert materials[0].name == "satin_rosaline_rgb"
-    assert 0.05 < materials[0].lobes[0].mx < 0.5
-
-
 def test_the_path_tracer_sees_the_same_image() -> None:
     """A lone sphere has nothing to reflect but the environment: qmc and path tracing agree, the right way round."""
     from lambent.bench.scenes.specular_scene import path_traced
@@ -97,36 +87,3 @@ def test_frame_times_come_with_their_spread() -> None:
     assert len(report["rows"]) == 2 * (2 + 3 * 2)
     for row in report["rows"]:
         assert row["wall_ms_spread"][0] <= row["wall_ms"] <= row["wall_ms_spread"][1]
-
-
-def test_a_line_is_found_in_frame_times() -> None:
-    def row(n: int | None, factor: float) -> frame_times.Row:
-        return frame_times.Row("full", None, FrameState(CAMERA, n=n), [], [factor * ms for ms in (10.0, 30.0, 20.0)])
-
-    floor, rows = row(None, 1.0), [row(n, 0.7 + 0.4 * n) for n in (3, 5, 9)]
-    assert frame_times.linear_fit(rows, floor) == {"per_sample": 0.4, "offset": 0.7, "deviation": 0.0}
-
-
-def test_the_bulge_covers_what_it_says() -> None:
-    scenes = walk_cube.scenes(42, 26)
-    for coverage, share in (("full", 1.0), ("half", 0.5)):
-        renderer, state = scenes[coverage]
-        lit = renderer.image(replace(state, n=3, show="specular")).max(axis=-1) > 0
-        assert lit.mean() == pytest.approx(share, abs=0.01)
-
-
-@pytest.mark.parametrize("make", [studio, night, dusk])
-def test_environments_are_finite_and_not_dark(make) -> None:
-    light = make(32)
-    assert light.shape == (6, 32, 32, 3)
-    assert np.isfinite(light).all()
-    assert light.min() >= 0
-    assert light.max() > 0.3
-
-
-def test_lat_long_has_its_top_up_and_its_middle_at_minus_z() -> None:
-    v, u = np.mgrid[0:64, 0:128]
-    theta, phi = (v + 0.5) / 64 * np.pi, (u + 0.5) / 128 * 2 * np.pi - np.pi
-    w = np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)], axis=-1)
-    cube = from_lat_long(w + 1, 16)
-    np.testing.assert_allclose(cube, normalize(face_directions(16)) + 1, atol=0.04)

@@ -34,11 +34,6 @@ def ruler(monkeypatch, tmp_path):
     sys.modules.pop("lambent.bench.ruler", None)
 
 
-def test_discovery_finds_load(ruler):
-    assert benches()["load"] is load
-    assert {"bake", "fit", "quality", "ruler"} <= set(benches())
-
-
 def test_every_bench_has_the_agreed_face():
     for name, module in benches().items():
         assert type(module.FULL) is type(module.QUICK) and module.FULL != module.QUICK, name

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -75,20 +74,6 @@ def test_noise_of_the_light_map(lambent, refused, store, tmp_path):
     Store.open(store).put("light_map/noise", "light_map", np.full((4, 4), 0.2, np.float16), key="by hand")
     assert lambent(*common, "--range", "1:100").code == 0
     np.testing.assert_allclose(read_encoded(file)[-8, 20], false_colour(np.array(20.0), Range(1, 100)), atol=0.01)
-
-
-def test_saved_views_can_be_rendered(lambent, refused, store, tmp_path):
-    from lambent.store.kept.views import change_views
-    from tests.viewer.small_store import SIDE
-
-    saved = replace(SIDE, name="my/view")
-    change_views(store, lambda views: views.model_copy(update={"cameras": (saved,)}))
-    for name in ("my/view", "side"):
-        lambent("render", store, "-o", tmp_path / f"{name[-4:]}.png", "--camera", name, "--size", "32x24")
-    assert (tmp_path / "view.png").read_bytes() == (tmp_path / "side.png").read_bytes()
-    (store / "views.json").write_text('{"format": "lambent-views", "version": 7}')
-    assert "views.json: version" in refused("render", store, "-o", tmp_path / "a.png")
-    (store / "views.json").unlink()
 
 
 @pytest.mark.parametrize(

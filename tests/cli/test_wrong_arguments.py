@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from pathlib import Path
 
 import pytest
 
@@ -74,3 +75,10 @@ def test_one_line_says_what_is_wrong(refused, tmp_path, monkeypatch, line):
     said = refused(*shlex.split(line))
     assert WRONG[line] in said and len(said) < 400
     assert {one.name for one in tmp_path.iterdir()} == {"folder", "bad.edits.json", "half.edits.json", "half.json"}
+
+
+def test_a_name_that_fits_nothing_is_one_line(lambent, tmp_path: Path):
+    outcome = lambent("bake", "builtin:box", "-o", tmp_path / "s", "--light-fields", "sphre")
+    assert outcome.code == 2
+    assert "--light-fields: matches no object; found sphre" in outcome.err and "did you mean 'sphere'?" in outcome.err
+    assert not (tmp_path / "s").exists(), "nothing is begun"

@@ -37,16 +37,6 @@ def square(material: Material = PAPER) -> BakedScene:
     return baked_scene({"square": mesh}, material, np.zeros((6, 2, 2, 3)))
 
 
-def test_plus_x_is_right_and_plus_y_is_up(device) -> None:
-    meshes = {"right": patch((0.2, 0.1, 0), (0.3, 0, 0), (0, 0.3, 0))}
-    scene = baked_scene(meshes, PAPER, np.zeros((6, 2, 2, 3)), irradiance=(np.pi, np.pi, np.pi))
-    image = Renderer(device, scene).image(FrameState(FORWARD, 64, 64))[..., 0]
-    rows, columns = np.nonzero(image > 0.25)
-    assert len(rows) > 10
-    assert columns.min() > 32
-    assert rows.max() < 32
-
-
 def test_field_of_view_is_vertical_and_whole(device) -> None:
     """A square of half size tan(fov/2) times the distance fills the height, and half of an image twice as wide."""
     half = 2 * np.tan(np.radians(30))
@@ -111,16 +101,6 @@ def test_emission_goes_one_way(device) -> None:
     assert renderer.image(FrameState(behind, 9, 9))[4, 4].max() == 0
 
 
-def test_back_of_a_reflector_reflects_its_own_side(device) -> None:
-    mirror = Material(name="m", lobes=(Lobe(mx=0.001, my=0.001, r0=1.0, alpha=0.5),))
-    renderer = Renderer(device, wall_scene(mirror, cube_of(smooth_light)))
-    for z in (2.0, -2.0):
-        camera = Camera(name="c", position=(0.3, 0.2, z), target=(0.1, 0.0, 0.0), fov_y_deg=40)
-        image = renderer.image(FrameState(camera, 16, 12, n=1, lookup="plain", antialias=False))
-        expected = smooth_light(pixel_rays(camera, 16, 12) * [1, 1, -1])
-        np.testing.assert_allclose(image, expected, rtol=0.02)
-
-
 def test_a_niche_is_shown_the_share_of_the_probe_that_its_light_map_has(device) -> None:
     glossy = Material(name="m", lobes=(Lobe(mx=0.2, my=0.2, r0=1.0, alpha=0.5),))
     scene = wall_scene(glossy, np.ones((6, 8, 8, 3), np.float32), irradiance=(np.pi / 4,) * 3)
@@ -135,7 +115,7 @@ def test_a_niche_is_shown_the_share_of_the_probe_that_its_light_map_has(device) 
     np.testing.assert_allclose(shown(np.pi / 3, 0, 0, np.pi / 3, 0, 0, np.pi / 6, 0, 0), whole / 4, rtol=2e-3)
 
 
-@pytest.mark.parametrize("integrator", ["rings", "lamps", "qmc", "split-sum"])
+@pytest.mark.parametrize("integrator", ["lamps", "qmc"])
 def test_the_light_map_says_from_where_a_probes_light_arrives(device, integrator: str) -> None:
     """Shares a + b.w of the mirrored direction w, on fronts of the objects that they count for; at most 2."""
     mirror = Material(name="m", lobes=(Lobe(mx=0.003, my=0.003, r0=1.0, alpha=0.5),))
@@ -182,28 +162,13 @@ def test_coupled_diffuse_darkens_towards_grazing(device) -> None:
     np.testing.assert_allclose(image[seen], expected[seen], rtol=2e-3)
 
 
-@pytest.mark.parametrize("view_transform", ["linear", "filmic"])
-def test_display_image_is_exposed_and_encoded(device, view_transform: str) -> None:
+def test_display_image_is_exposed_and_encoded(device) -> None:
     scene = replace(square(), environment=cube_of(smooth_light))
     renderer = Renderer(device, scene)
     away = Camera(name="away", position=(0, 0, 2), target=(1, 1, 3), fov_y_deg=70)
-    state = FrameState(away, 24, 16, exposure_ev=-0.7, view_transform=view_transform)
+    state = FrameState(away, 24, 16, exposure_ev=-0.7, view_transform="filmic")
     linear = renderer.image(state)
-    exposed = filmic(linear, -0.7) if view_transform == "filmic" else linear * 2**-0.7
-    np.testing.assert_allclose(renderer.display_image(state), srgb_encode(exposed) * 255, atol=0.55)
-
-
-def test_neutral_keeps_colours_and_tames_highlights(device) -> None:
-    """Khronos PBR Neutral: below .8 - .04 a colour loses only its .04 offset; above, it stays below 1."""
-    scene = replace(square(), environment=np.broadcast_to(np.array([0.5, 0.3, 0.2]), (6, 2, 2, 3)))
-    renderer = Renderer(device, scene)
-    away = Camera(name="away", position=(0, 0, 2), target=(0, 0, 3))
-    state = FrameState(away, 4, 4, view_transform="neutral")
-    expected = srgb_encode(np.array([0.46, 0.26, 0.16])) * 255
-    np.testing.assert_allclose(renderer.display_image(state)[0, 0], expected, atol=0.6)
-    bright = renderer.display_image(replace(state, exposure_ev=6))[0, 0]
-    assert 240 < bright.max() <= 255
-    assert bright[2] > 200
+    np.testing.assert_allclose(renderer.display_image(state), srgb_encode(filmic(linear, -0.7)) * 255, atol=0.55)
 
 
 def test_progressive_frames_average(device) -> None:
@@ -224,18 +189,6 @@ def test_jitter_looks_right_of_and_below_the_middle_of_a_pixel() -> None:
         right_px * per_px, -below_px * per_px, 0.0, 1.0
     )  # fmt: skip
     np.testing.assert_allclose(there[:2], 0, atol=1e-9)
-
-
-def test_jitter_antialiases(device) -> None:
-    mesh = patch((-0.4, -0.3, 0), (0.8, 0.2, 0), (-0.2, 0.6, 0))
-    scene = baked_scene({"m": mesh}, PAPER, np.zeros((6, 2, 2, 3)), irradiance=(np.pi, np.pi, np.pi))
-    renderer = Renderer(device, scene)
-    state = FrameState(FORWARD, 48, 36)
-    smooth = renderer.converged(replace(state, n=1), 256)[..., 0]
-    hard = renderer.image(state)[..., 0]
-    assert set(np.unique(hard.round(2))) == {0.0, 0.5}
-    assert np.abs(hard - smooth).max() > 0.1
-    assert np.mean((smooth > 0.01) & (smooth < 0.49)) > 0.02
 
 
 def lamp() -> BakedScene:
@@ -271,27 +224,6 @@ def test_a_still_is_the_mean_of_what_a_display_emits(device) -> None:
         renderer.still(state, 0)
 
 
-def test_a_material_edit_shows_and_is_undone(device) -> None:
-    renderer = Renderer(device, with_light_map(square(), np.full((1, 1, 3), np.pi, np.float32)))
-    state = FrameState(FORWARD, 8, 8)
-    before = renderer.image(state)
-    edited = renderer.image(replace(state, materials={"m": PAPER.model_copy(update={"kd": (0.9, 0.1, 0.1)})}))
-    np.testing.assert_allclose(edited[4, 4], (0.9, 0.1, 0.1), rtol=1e-3)
-    np.testing.assert_array_equal(renderer.image(state), before)
-
-
-def test_silhouettes_are_neither_lost_nor_brighter_than_the_light(device) -> None:
-    """Interpolated normals turn away from the viewer at edges, where a lobe with alpha > 0 has no bound."""
-    gloss = Material(name="m", lobes=(Lobe(mx=0.15, my=0.15, r0=0.8, alpha=0.5),))
-    renderer = Renderer(device, baked_scene(sphere_and_torus(), gloss, np.ones((6, 4, 4, 3), np.float32)))
-    for name in ("rings", "lobe-4.24", "lobe-4.25", "fis", "split-sum"):
-        image = renderer.image(FrameState(CAMERA, 160, 120, integrator=name, n=7, antialias=False))
-        assert np.isfinite(image).all()
-        assert image.min() > 0.05, name
-        # the estimates as published overstate the albedo of rough lobes anywhere
-        assert image.max() < (1.3 if name.startswith("lobe") else 1.05), name
-
-
 def test_broken_normals_and_tangents_make_no_nan(device) -> None:
     gloss = Material(name="m", kd=0.2, lobes=(Lobe(mx=0.15, my=0.15, r0=0.5),))
     scene = baked_scene(sphere_and_torus(24), gloss, np.full((6, 4, 4, 3), np.nan), irradiance=(1, 1, 1))
@@ -299,17 +231,6 @@ def test_broken_normals_and_tangents_make_no_nan(device) -> None:
     renderer = Renderer(device, scene)
     for name in ("rings", "lobe-4.25", "split-sum", "qmc"):
         assert np.isfinite(renderer.image(FrameState(CAMERA, 40, 30, integrator=name, accumulate=0))).all()
-
-
-def test_statistics(device) -> None:
-    renderer = Renderer(device, square())
-    renderer.display_image(FrameState(FORWARD, 16, 16))
-    statistics = renderer.statistics
-    assert statistics["draw_calls"] == 3
-    assert statistics["triangles"] == 2
-    if "timestamp-query" in device.features:
-        assert set(statistics["gpu_ms"]) == {"depth", "shade", "tonemap", "smooth"}
-        assert all(0 <= ms < 1e4 for ms in statistics["gpu_ms"].values())
 
 
 @pytest.mark.parametrize(

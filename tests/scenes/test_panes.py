@@ -14,8 +14,7 @@ from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch
 from lambent.scenes.panes import panes_of
 from lambent.scenes.scene import MaterialTextures, Scene, SceneObject, Texture
-from tests.scenes.loaders.gltf.test_gltf import _worn as worn
-from tests.scenes.loaders.gltf.test_gltf import loaded
+from tests.scenes.loaders.gltf.test_gltf import loaded, textured
 from tests.scenes.loaders.mitsuba.test_scene_mitsuba_bsdfs import bsdf, rgb
 from tests.scenes.loaders.test_scene_obj import QUAD
 
@@ -76,7 +75,7 @@ def test_glass_of_mitsuba(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize("name", IN_GLTF)
 def test_glass_of_gltf(tmp_path: Path, name: str) -> None:
     said, expected = IN_GLTF[name]
-    check(passed_by(loaded(tmp_path, worn({"name": "m", "pbrMetallicRoughness": PLAIN} | said, []))), expected)
+    check(passed_by(loaded(tmp_path, textured({"name": "m", "pbrMetallicRoughness": PLAIN} | said, []))), expected)
 
 
 def test_glass_of_obj(tmp_path: Path) -> None:

@@ -49,10 +49,10 @@ def film_writer(path: Path, width: int, height: int, fps: float = 30) -> Iterato
     import imageio_ffmpeg
 
     assert width % 2 == 0 and height % 2 == 0, f"odd size {width}x{height}"
-    with atomic_path(path) as beside:
+    with atomic_path(path) as temporary:
         try:
             writer = imageio_ffmpeg.write_frames(
-                str(beside),
+                str(temporary),
                 (width, height),
                 fps=fps,
                 codec="libx264",
@@ -71,10 +71,10 @@ def film_writer(path: Path, width: int, height: int, fps: float = 30) -> Iterato
                 yield write
             finally:
                 writer.close()
-            if not _is_whole(beside):  # ffmpeg does not report late errors such as a full disk
+            if not _is_whole(temporary):  # ffmpeg does not report late errors such as a full disk
                 raise OSError(errno.ENOSPC, "the end of the film could not be written: is the disk full?")
         except (OSError, RuntimeError) as error:
-            said = str(error).replace(str(beside), str(path))
+            said = str(error).replace(str(temporary), str(path))
             raise UserError(f"film could not be written ({said})", file=path) from error
 
 

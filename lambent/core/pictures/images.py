@@ -99,20 +99,20 @@ def write_image(path: Path, image: NDArray[Any], view: str | None = None) -> Non
     rgb = np.asarray(image, np.float32)
     assert rgb.ndim == 3 and rgb.shape[2] == 3, f"not (H, W, 3): {rgb.shape}"
     check_writable(path)
-    with atomic_path(path) as beside:
+    with atomic_path(path) as temporary:
         if path.suffix.lower() == ".exr":
-            exr.encode(rgb, beside)
+            exr.encode(rgb, temporary)
         elif path.suffix.lower() == ".hdr":
-            beside.write_bytes(rgbe.encode(rgb, view))
+            temporary.write_bytes(rgbe.encode(rgb, view))
         else:
-            _save_png(beside, to_bytes(srgb_encode(rgb)))
+            _save_png(temporary, to_bytes(srgb_encode(rgb)))
 
 
 def write_shown(path: Path, picture: NDArray[np.uint8]) -> None:
     """Write display values, (H, W, 3) uint8 encoded, as PNG, atomically."""
     check_writable(path, (".png",))
-    with atomic_path(path) as beside:
-        _save_png(beside, picture)
+    with atomic_path(path) as temporary:
+        _save_png(temporary, picture)
 
 
 def _save_png(path: Path, picture: NDArray[np.uint8]) -> None:

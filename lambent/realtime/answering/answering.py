@@ -293,23 +293,3 @@ def _shown(materials: list[Material]) -> tuple[Floats, Floats]:
     """Diffuse colours that probes see, float32, without the diffuse equivalent of lobes."""
     albedos: Albedos = albedos_of(materials)
     return albedos.reflected.astype(np.float32), albedos.transmitted.astype(np.float32)
-
-
-def answered_scene(
-    baked: BakedScene, stored: StoredAnswer, edited: Mapping[str, Material], textures: Textures = NO_TEXTURES
-) -> BakedScene:
-    """A baked scene with edited materials and textures, by name, and with light maps and probes that answer them."""
-    answer = AnsweredLight(baked, stored)
-    light = answer.lit(edited, textures)
-    front, back = answer.maps(light)
-    probes = {**baked.probes, **{name: answer.probe(name, light) for name in answer.probes}}
-    record = baked.record.model_copy(update={"materials": {**baked.record.materials, **edited}})
-    return replace(
-        baked,
-        record=record,
-        irradiance=front,
-        irradiance_back=back,
-        probes=probes,
-        groups=answer.groups(light),
-        textures={name: one for name, one in {**baked.textures, **textures}.items() if one is not None},
-    )

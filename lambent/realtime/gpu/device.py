@@ -110,22 +110,20 @@ def _have_runtime_folder() -> None:
         atexit.register(shutil.rmtree, folder, ignore_errors=True)
 
 
-def open_device(needs: Mapping[str, int] | None = None, adapter: Any = None) -> Any:
+def open_device(needs: Mapping[str, int] | None = None) -> Any:
     """A wgpu device with WebGPU's default limits, raised only as `needs` says.
 
     Parameters
     ----------
     needs : mapping, optional
         Limit name -> least value, for example ``{"max-buffer-size": 1 << 30}`` for a large scene.
-    adapter : wgpu.GPUAdapter, optional
-        The adapter of a window; by default `choose_adapter`.
 
     Raises
     ------
     UserError
         If there is no adapter, or it cannot grant a limit.
     """
-    adapter = adapter or choose_adapter()
+    adapter = choose_adapter()
     limits = dict(WEBGPU_LIMITS)
     for name, value in (needs or {}).items():
         if value > adapter.limits[name]:

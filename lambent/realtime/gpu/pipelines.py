@@ -43,12 +43,10 @@ def pipeline(
     )
 
 
-def screen_pipeline(
-    device: Any, shader: str, layouts: Sequence[Any], formats: Iterable[str], entry: str = "", **depth: Any
-) -> Any:
-    """Pipeline of a file that includes screen.wgsl; by default its entry point is named after the file."""
+def screen_pipeline(device: Any, shader: str, layouts: Sequence[Any], formats: Iterable[str], **depth: Any) -> Any:
+    """Pipeline of a file that includes screen.wgsl, whose entry point is named after it."""
     module = device.create_shader_module(code=assemble(f"{shader}.wgsl"))
-    return pipeline(device, module, entry or f"{shader}_main", layouts, formats, vertex="screen_main", **depth)
+    return pipeline(device, module, f"{shader}_main", layouts, formats, vertex="screen_main", **depth)
 
 
 def cover(encoder: Any, views: Iterable[Any], pipeline: Any, groups: Iterable[Any], stamps: dict[str, Any]) -> None:

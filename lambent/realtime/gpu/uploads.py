@@ -31,13 +31,10 @@ def with_alpha(rgb: Floats) -> NDArray[np.float16]:
     return rgba
 
 
-def upload(device: Any, levels: Sequence[NDArray[Any]], format: str, usage: int = 0) -> Any:
-    """Texture of MIP levels (layers, rows, columns, channels) with texels of `format`.
-
-    It can be sampled and written to; `usage` adds further usages.
-    """
+def upload(device: Any, levels: Sequence[NDArray[Any]], format: str) -> Any:
+    """Texture of MIP levels (layers, rows, columns, channels) with texels of `format`, to be sampled and written to."""
     layers, height, width = levels[0].shape[:3]
-    usage |= wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
+    usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
     size = (width, height, layers)
     texture = device.create_texture(size=size, format=format, mip_level_count=len(levels), usage=usage)
     for level, values in enumerate(levels):

@@ -31,14 +31,9 @@ fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
         if (!at.seen) { continue; }
         let p = sample.w / (at.h.z * at.h.z * at.h.z * at.cos_d);
         let q = gain(lobe, at.wi, wo, at.h) / at.wi.z;
-        let light = incident(s, on_side(lobe, at.wi), half_log2_omega);
-        if (FORMULA == 24u) {
-            sum += light * at.wi.z * at.wi.z * p * q;
-            weights += vec3f(p * at.wi.z);
-        } else {
-            sum += light * at.wi.z * at.wi.z * p * q * q;
-            weights += p * q * at.wi.z;
-        }
+        let weight = select(q, vec3f(1.0), FORMULA == 24u) * (at.wi.z * p);
+        sum += incident(s, on_side(lobe, at.wi), half_log2_omega) * weight * q * at.wi.z;
+        weights += weight;
     }
     return select(vec3f(0.0), sum / max(weights, vec3f(1e-30)), weights > vec3f(1e-30));
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -100,8 +101,8 @@ class BakedScene:
             return probe
         most = None
         if self.light_field_mb is not None:
-            whole = sum(one.inverse_distance.size for one in self.light_fields.values())
-            most = 1e6 * self.light_field_mb * light_field.inverse_distance.size / whole
+            whole = sum(math.prod(one.inverse_distance.shape) for one in self.light_fields.values())
+            most = 1e6 * self.light_field_mb * math.prod(light_field.inverse_distance.shape) / whole
         return replace(
             probe or DARK, light_field=light_field, sky=self.environment, most_bytes=most, policy=self.policy
         )

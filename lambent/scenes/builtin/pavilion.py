@@ -52,9 +52,9 @@ def textured() -> dict[str, tuple[Material, MaterialTextures]]:
     }
 
 
-def _checks(n: int = 256) -> Floats:
-    """Reflectance (n, n, 3) of a cloth: woven checks in two blues, a red flower on every light square."""
-    at_texel = (np.arange(n) + 0.5) / n
+def _checks() -> Floats:
+    """Reflectance (256, 256, 3) of a cloth: woven checks in two blues, a red flower on every light square."""
+    at_texel = (np.arange(256) + 0.5) / 256
     u, v = np.meshgrid(at_texel, at_texel)
     dark = (np.floor(2 * u) % 2 + np.floor(2 * v) % 2)[..., None] / 2  # 0 on light squares, 1 where bands cross
     colour = (1 - dark) * [0.78, 0.74, 0.64] + dark * [0.05, 0.13, 0.36]

@@ -75,7 +75,7 @@ class _Moment:
     whole_light: bool
 
 
-def read_keyframes(path: Path, given: Known) -> Keyframes:
+def read_keyframes(path: Path, names: Known) -> Keyframes:
     """Read the keyframes of a file.
 
     Each material and each light group has its own keys: a key that does not name one lets it change from the previous
@@ -95,32 +95,32 @@ def read_keyframes(path: Path, given: Known) -> Keyframes:
         if second.at <= first.at:
             raise UserError("times do not increase", file=path, field="keys.at", got=f"{first.at:g}, {second.at:g}")
     files = LookFiles(path, SceneFiles(path))
-    moments = [_moment(key, number, given, files) for number, key in enumerate(document.keys)]
-    return Keyframes(MixTrack(_light_keys(moments)), LookTrack(_look_keys(moments, given.looks)))
+    moments = [_moment(key, number, names, files) for number, key in enumerate(document.keys)]
+    return Keyframes(MixTrack(_light_keys(moments)), LookTrack(_look_keys(moments, names.looks)))
 
 
-def _moment(key: _Key, number: int, given: Known, files: LookFiles) -> _Moment:
+def _moment(key: _Key, number: int, names: Known, files: LookFiles) -> _Moment:
     path, where = files.path, f"keys.{number}"
     if sum((key.as_baked, key.variant is not None)) > 1:
         raise UserError("sets both as_baked and a variant", file=path, field=where, got=key.variant)
     looks, light = dict[str, Look](), dict[str, GroupMix]()
     if key.variant is not None:
-        variant = variant_named(given.variants, key.variant, f"{path.name}: {where}.variant")
+        variant = variant_named(names.variants, key.variant, f"{path.name}: {where}.variant")
         looks, light = dict(variant.looks), dict(variant.light.groups)
     if key.view is not None:
-        light = dict((given.mixes or {})[_known_view(key.view, given, path, where)].groups)
-    present = {**given.looks, **looks}
-    looks |= parse_looks(key.materials, present, given.coloured, files, f"{where}.materials")
+        light = dict((names.mixes or {})[_known_view(key.view, names, path, where)].groups)
+    present = {**names.looks, **looks}
+    looks |= parse_looks(key.materials, present, names.coloured, files, f"{where}.materials")
     light |= parse_mixes(key.light, path, f"{where}.light")
     whole = key.as_baked or key.variant is not None
     return _Moment(key.at, looks, light, whole, whole or key.view is not None)
 
 
-def _known_view(name: str, given: Known, path: Path, where: str) -> str:
-    if not given.mixes:
+def _known_view(name: str, names: Known, path: Path, where: str) -> str:
+    if not names.mixes:
         hint = "save a view in the window with its light mix"
         raise UserError("no saved view has a light mix", file=path, field=f"{where}.view", hint=hint)
-    return known("saved view", name, given.mixes, file=path, field=f"{where}.view")
+    return known("saved view", name, names.mixes, file=path, field=f"{where}.view")
 
 
 def _light_keys(moments: list[_Moment]) -> dict[str, tuple[tuple[float, GroupMix], ...]]:

@@ -27,7 +27,7 @@ NO_UV, NO_UV_HINT = "has no texture coordinates", "bake the scene again, or add 
 
 
 def parse_textures(texts: Sequence[str]) -> dict[str, str]:
-    """What each material shall wear, from texts MATERIAL=FILE[,REPEAT], MATERIAL=MATERIAL or MATERIAL=none."""
+    """The texture that each material gets, from texts MATERIAL=FILE[,REPEAT], MATERIAL=MATERIAL or MATERIAL=none."""
     found: dict[str, str] = {}
     for text in texts:
         name, _, value = (part.strip() for part in text.partition("="))
@@ -120,7 +120,7 @@ def texture_named(
     return ImageTexture(str(image.resolve()), repeat)
 
 
-def materials_without_uv(worn: Sequence[tuple[str, Floats]]) -> frozenset[str]:
-    """Materials of which no object has texture coordinates; `worn` has a material and its uv (n, 2) for each object."""
-    placed = {name for name, uv in worn if len(uv) and bool(np.ptp(uv, axis=0).any())}
-    return frozenset(name for name, _ in worn) - placed
+def materials_without_uv(objects: Sequence[tuple[str, Floats]]) -> frozenset[str]:
+    """Materials of which no object has texture coordinates; `objects` are the material and uv (n, 2) of each."""
+    placed = {name for name, uv in objects if len(uv) and bool(np.ptp(uv, axis=0).any())}
+    return frozenset(name for name, _ in objects) - placed

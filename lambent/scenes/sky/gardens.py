@@ -91,9 +91,9 @@ def _lawn(w: Floats) -> Floats:
     return np.asarray(np.where(bed[..., None], tint * [3.2, 0.9, 2.2] + [0.1, 0.25, 0.05], light))
 
 
-def _noise(p: Floats, seed: int, frequency: float, waves: int = 12) -> Floats:
+def _noise(p: Floats, seed: int, frequency: float) -> Floats:
     """(..., 1) smooth noise of standard deviation 1 at points (..., 3); `frequency` in radians per unit."""
-    rng = np.random.default_rng(seed)
+    waves, rng = 12, np.random.default_rng(seed)
     towards = normalize(rng.normal(size=(waves, 3))) * frequency * rng.uniform(0.55, 1.3, (waves, 1))
     phase = rng.uniform(0, 2 * np.pi, waves)
     single = p.astype(np.float32)  # a third of the time, and as smooth

@@ -92,7 +92,7 @@ def test_maps_in_blocks_read_as_arrays_and_decode_what_is_read() -> None:
     blocks = distance_blocks_of(inverse, None)
     exact = distances_of(blocks, 22)[0]
     maps, cover = distances_in_blocks(blocks, 22)
-    assert maps.shape == exact.shape and maps.dtype == exact.dtype and maps.nbytes == exact.nbytes
+    assert maps.shape == exact.shape and maps.dtype == exact.dtype
     picked = np.array([[3, 1], [1, 0]])
     for key in (2, -1, slice(1, 3), [0, 3], picked, (picked, picked + 1, 5), np.s_[1:3, ::2]):
         np.testing.assert_array_equal(maps[key], exact[key])

@@ -16,8 +16,7 @@ from lambent.scenes.loaders.contents import Contents
 from lambent.scenes.loaders.scene_toml.placing import placed
 from lambent.scenes.scene import DirectionalLight, IesLight, PointLight
 from lambent.scenes.sky.environment_images import read_lat_long
-from tests.scenes.loaders.gltf.test_gltf import _worn as worn
-from tests.scenes.loaders.gltf.test_gltf import document, loaded
+from tests.scenes.loaders.gltf.test_gltf import document, loaded, textured
 from tests.scenes.loaders.gltf.test_gltf_luminaires import UNEVEN, candela
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 1 1 0\n"
@@ -59,7 +58,7 @@ def test_vertex_colours_are_said_to_be_ignored(tmp_path: Path) -> None:
 
 def test_base_colours_above_1_are_clipped(tmp_path: Path) -> None:
     look = {"name": "m", "pbrMetallicRoughness": {"metallicFactor": 1, "baseColorFactor": [1.5, 0.5, 0.2, 1]}}
-    scene = loaded(tmp_path, worn(look, []))
+    scene = loaded(tmp_path, textured(look, []))
     assert scene.materials["m"].lobes[0].r0 == pytest.approx((1, 0.5, 0.2), abs=1e-3)
     assert any("clipped to 1" in warning for warning in scene.warnings)
 

@@ -10,8 +10,7 @@ import pytest
 
 from lambent.scenes import load_scene
 from tests.scenes.loaders.gltf.test_gltf import _png as png
-from tests.scenes.loaders.gltf.test_gltf import _worn as worn
-from tests.scenes.loaders.gltf.test_gltf import loaded
+from tests.scenes.loaders.gltf.test_gltf import loaded, textured
 from tests.scenes.loaders.mitsuba.test_scene_mitsuba import written
 from tests.scenes.loaders.test_scene_obj import QUAD, parts_of
 
@@ -29,14 +28,14 @@ def grey(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(("metallic", "expected"), [(0.0, 0.96 * LIGHT), (1.0, LIGHT)])
 def test_base_colours_of_gltf_are_encoded(grey: Path, metallic: float, expected: float) -> None:
     pbr = {"baseColorTexture": {"index": 0}, "metallicFactor": metallic}
-    material = loaded(grey, worn({"name": "m", "pbrMetallicRoughness": pbr}, ["grey.png"])).materials["m"]
+    material = loaded(grey, textured({"name": "m", "pbrMetallicRoughness": pbr}, ["grey.png"])).materials["m"]
     found = material.lobes[0].r0 if metallic else material.kd
     assert found == pytest.approx((expected,) * 3, rel=2e-3)
 
 
 def test_emission_of_gltf_is_encoded(grey: Path) -> None:
     look = {"name": "m", "emissiveFactor": [4, 2, 1], "emissiveTexture": {"index": 0}}
-    scene = loaded(grey, worn(look, ["grey.png"]))
+    scene = loaded(grey, textured(look, ["grey.png"]))
     assert scene.object("thing").emission == pytest.approx((4 * LIGHT, 2 * LIGHT, LIGHT), rel=2e-3)
 
 
@@ -44,22 +43,22 @@ def test_roughness_metal_and_alpha_of_gltf_are_numbers(grey: Path) -> None:
     """Roughness is green, metal blue; alpha is never encoded."""
     png(grey / "packed.png", np.full((1, 1, 3), (0, BYTE, 255)))
     look: dict[str, Any] = {"name": "m", "pbrMetallicRoughness": {"metallicRoughnessTexture": {"index": 0}}}
-    (lobe,) = loaded(grey, worn(look, ["packed.png"])).materials["m"].lobes
+    (lobe,) = loaded(grey, textured(look, ["packed.png"])).materials["m"].lobes
     assert lobe.mx == pytest.approx(NUMBER**2, rel=2e-3)
     png(grey / "packed.png", np.full((1, 1, 3), (0, 255, BYTE)))
     look["pbrMetallicRoughness"]["baseColorFactor"] = [1, 0, 0, 1]
-    material = loaded(grey, worn(look, ["packed.png"])).materials["m"]
+    material = loaded(grey, textured(look, ["packed.png"])).materials["m"]
     assert material.kd[0] == pytest.approx(0.96 * (1 - NUMBER), rel=5e-3)
     pbr = {"baseColorTexture": {"index": 0}, "metallicFactor": 0}
     pane = {"name": "m", "alphaMode": "BLEND", "pbrMetallicRoughness": pbr}
-    (through,) = loaded(grey, worn(pane, ["grey.png"])).materials["m"].transmission_lobes
+    (through,) = loaded(grey, textured(pane, ["grey.png"])).materials["m"].transmission_lobes
     assert through.k == pytest.approx((1 - NUMBER,) * 3, rel=2e-3)
 
 
 def test_specular_glossiness_is_encoded_but_for_its_alpha(grey: Path) -> None:
     older = {"diffuseTexture": {"index": 0}, "specularGlossinessTexture": {"index": 0}}
     look = {"name": "m", "extensions": {"KHR_materials_pbrSpecularGlossiness": older}}
-    material = loaded(grey, worn(look, ["grey.png"])).materials["m"]
+    material = loaded(grey, textured(look, ["grey.png"])).materials["m"]
     assert material.lobes[0].r0 == pytest.approx((LIGHT,) * 3, rel=2e-3)
     assert material.kd == pytest.approx((LIGHT * (1 - LIGHT),) * 3, rel=2e-3)
     assert material.lobes[0].mx == pytest.approx((1 - NUMBER) ** 2, rel=5e-3)
@@ -102,5 +101,5 @@ def test_grey_of_sixteen_bits_keeps_its_range(tmp_path: Path) -> None:
 
     Image.fromarray(np.full((2, 2), 257 * BYTE, np.uint16)).save(tmp_path / "deep.png")
     pbr = {"baseColorTexture": {"index": 0}, "metallicFactor": 0}
-    material = loaded(tmp_path, worn({"name": "m", "pbrMetallicRoughness": pbr}, ["deep.png"])).materials["m"]
+    material = loaded(tmp_path, textured({"name": "m", "pbrMetallicRoughness": pbr}, ["deep.png"])).materials["m"]
     assert material.kd == pytest.approx((0.96 * LIGHT,) * 3, rel=2e-3)

@@ -12,16 +12,26 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.scenes import load_scene
+from lambent.scenes.loaders import ply
 from lambent.scenes.loaders.mitsuba import load as read_mitsuba
 from lambent.scenes.loaders.mitsuba import serialized
+from lambent.scenes.loaders.ply import UV_NAMES
 from lambent.scenes.loaders.ply import read as read_ply
 
 BALL = '<shape type="sphere"/>'
+
+
 DEEP = "<scene version='3.0.0'>" + "<bsdf type='twosided'>" * 5000 + "</bsdf>" * 5000 + "</scene>"
+
+
 DOUBLING = "".join(
     f'<bsdf type="blendbsdf" id="b{i}"><ref id="b{i + 1}"/><ref id="b{i + 1}"/></bsdf>' for i in range(25)
 )
+
+
 LAUGHS = '<!DOCTYPE scene [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>'
+
+
 HOSTILE = {
     "not XML": ("<scene", r"not XML"),
     "another root": ("<bsdf/>", r"not a Mitsuba scene; found <bsdf>"),
@@ -71,6 +81,7 @@ HOSTILE = {
     "flat": ('<shape type="sphere"><transform name="to_world"><scale x="1" y="0" z="1"/></transform></shape>',
              r"holds no triangles; sphere: left out, its transform is singular"),
 }  # fmt: skip
+
 
 WHOLE = {"not XML", "another root", "entities", "a file of the system", "too deep"}  # files without a scene around them
 
@@ -177,6 +188,8 @@ def test_a_deflated_desert_is_not_unpacked(tmp_path: Path) -> None:
 PLY_HEAD = (
     "ply\nformat {form} 1.0\ncomment made up\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
 )
+
+
 PLY_HEAD += "element face {faces}\nproperty uchar flag\nproperty list uchar int vertex_indices\nend_header\n"
 
 
@@ -227,3 +240,33 @@ def test_ply_that_is_broken(tmp_path: Path) -> None:
             path.write_bytes(data[:length])
             with pytest.raises(UserError):
                 read_ply(path)
+
+
+ROWS = np.array([(0, 0, 0, 0.6, 0, 0.8, 0.1, 0.2), (1, 0, 0, 0, 0.6, 0.8, 0.3, 0.4), (0, 1, 0, 0, 0, 1, 0.5, 0.9)])
+
+
+def written(path: Path, order: str, names: tuple[str, str]) -> Path:
+    """A triangle whose properties stand in an order of their own."""
+    columns = ("nz", names[1], "x", "ny", "y", names[0], "z", "nx")
+    of = dict(zip(("x", "y", "z", "nx", "ny", "nz", *names), ROWS.T, strict=True))
+    head = f"ply\nformat {order} 1.0\nelement vertex 3\n" + "".join(f"property float {c}\n" for c in columns)
+    head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    table = np.stack([of[c] for c in columns], axis=-1)
+    if order == "ascii":
+        body = "\n".join(" ".join(map(str, row)) for row in table) + "\n3 0 1 2\n"
+        path.write_bytes(head.encode() + body.encode())
+    else:
+        end = "<" if order == "binary_little_endian" else ">"
+        face = np.array([0, 1, 2], f"{end}i4").tobytes()
+        path.write_bytes(head.encode() + table.astype(f"{end}f4").tobytes() + b"\x03" + face)
+    return path
+
+
+@pytest.mark.parametrize("names", UV_NAMES)
+@pytest.mark.parametrize("order", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_columns_are_known_by_their_names(tmp_path: Path, order: str, names: tuple[str, str]) -> None:
+    arrays = ply.read(written(tmp_path / "a.ply", order, names))
+    assert arrays.normals is not None and arrays.uv is not None
+    found = np.column_stack([arrays.positions, arrays.normals, arrays.uv])
+    np.testing.assert_allclose(found, ROWS, atol=1e-6)
+    assert np.asarray(arrays.triangles).tolist() == [[0, 1, 2]]

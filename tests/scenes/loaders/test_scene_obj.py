@@ -77,8 +77,8 @@ def test_objects_groups_and_materials(tmp_path: Path) -> None:
         + ("o table\nusemtl wood\nf 1 2 3\nusemtl metal\nf 1 3 4\no lamp\nf 1 2 4\nusemtl wood\no table\nf 2 3 4\n")
     )
     parts = parts_of(tmp_path, text, "newmtl wood\nKd .5 .25 .125\nnewmtl metal\nKd 0 0 0\nKs .9 .8 .7\n")
-    worn = {o.name: (o.material, len(o.mesh.faces)) for o in parts.objects}
-    assert worn == {"table_wood": ("wood", 2), "table_metal": ("metal", 1), "lamp": ("metal", 1)}
+    found = {o.name: (o.material, len(o.mesh.faces)) for o in parts.objects}
+    assert found == {"table_wood": ("wood", 2), "table_metal": ("metal", 1), "lamp": ("metal", 1)}
     assert parts.materials["wood"].kd == (0.5, 0.25, 0.125) and parts.materials["wood"].lobes == ()
     assert parts.materials["metal"].lobes[0].r0 == (0.9, 0.8, 0.7)
     grouped = parts_of(tmp_path, QUAD + "g a\nf 1 2 3\ng b c\nf 1 3 4\n")

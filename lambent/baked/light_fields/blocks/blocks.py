@@ -6,7 +6,6 @@ Maps of 310 texels a side fill 78 x 78 blocks without padding.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -81,15 +80,6 @@ class MapsInBlocks:
     shape: tuple[int, ...]
     dtype: np.dtype[Any]
     decode: Callable[[NDArray[np.uint32]], NDArray[Any]]
-
-    @property
-    def size(self) -> int:
-        return math.prod(self.shape)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the decoded maps."""
-        return self.size * self.dtype.itemsize
 
     def __len__(self) -> int:
         return self.shape[0]

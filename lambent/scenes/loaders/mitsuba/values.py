@@ -166,10 +166,10 @@ class Plugin:
     def texture(self, name: str) -> Plugin | None:
         return next(iter(self.objects("texture", name)), None)
 
-    def file(self, name: str = "filename") -> Path:
-        """The file of a parameter; it need not exist."""
-        field = f"line {self.element.line} <{self.element.tag}> {name}"
-        return self.reading.files.path(self.text(name), self.element.file, field)
+    def file(self) -> Path:
+        """The file that it names, which need not exist."""
+        field = f"line {self.element.line} <{self.element.tag}> filename"
+        return self.reading.files.path(self.text("filename"), self.element.file, field)
 
 
 def _part(part: Element) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -16,18 +16,8 @@ from lambent.scenes.scene import MaterialTextures, SceneObject
 NAMES_HINT = "see the names with `lambent inspect`"
 
 
-@dataclass(frozen=True)
-class Assembly:
-    """Objects of all files, their materials and textures by name."""
-
-    objects: tuple[SceneObject, ...]
-    materials: dict[str, Material]
-    textures: dict[str, MaterialTextures]
-    warnings: tuple[str, ...]
-
-
-def assembled(contents: Sequence[Contents], variant: str | None, path: Path) -> Assembly:
-    """The combined contents of all files, with the material set `variant` of the files that have it.
+def assembled(contents: Sequence[Contents], variant: str | None, path: Path) -> Contents:
+    """Objects, materials, textures and warnings of all files; `variant` is a material set of those that have it.
 
     Names of objects that are taken get a number. So do those of materials, unless both are the same.
 
@@ -55,7 +45,7 @@ def assembled(contents: Sequence[Contents], variant: str | None, path: Path) -> 
         materials |= {called[n]: m.model_copy(update={"name": called[n]}) for n, m in c.materials.items()}
         textures |= {called[n]: t for n, t in c.textures.items() if n in called}
         warnings += c.warnings
-    return Assembly(tuple(objects), materials, textures, tuple(warnings))
+    return Contents(tuple(objects), materials, textures=textures, warnings=tuple(warnings))
 
 
 def _own_names(

@@ -25,7 +25,7 @@ def parse_looks(
     tables: Mapping[str, Mapping[str, Any]],
     looks: Mapping[str, Look],
     coloured: Mapping[str, bool],
-    given: LookFiles,
+    files: LookFiles,
     where: str,
 ) -> dict[str, Look]:
     """Looks given by tables, by the names of the materials they replace.
@@ -36,7 +36,7 @@ def parse_looks(
         Of all existing materials.
     coloured : mapping
         Whether textures have a diffuse part, by the material they belong to.
-    given : LookFiles
+    files : LookFiles
         The file of the tables, and those that it refers to.
     where : str
         The field that contains the tables, for errors.
@@ -44,8 +44,8 @@ def parse_looks(
     found = {}
     for name, table in tables.items():
         field = f"{where}.{name}"
-        check_material(name, {name: look.material for name, look in looks.items()}, given.path, field)
-        found[name] = _look(table, looks, name, coloured, given, field)
+        check_material(name, {name: look.material for name, look in looks.items()}, files.path, field)
+        found[name] = _look(table, looks, name, coloured, files, field)
     return found
 
 
@@ -66,11 +66,11 @@ def _look(
     looks: Mapping[str, Look],
     name: str,
     coloured: Mapping[str, bool],
-    given: LookFiles,
+    files: LookFiles,
     field: str,
 ) -> Look:
     """Another material of the scene, another document, or the same material with another texture or other numbers."""
-    path = given.path
+    path = files.path
     for key in (USE, FILE, TEXTURE):
         if key in table and len(table) > 1 and key in ALONE:
             raise UserError(f"has other keys beside {key}", file=path, field=field, got=sorted({*table} - {key})[0])
@@ -80,16 +80,16 @@ def _look(
         check_material(table[USE], {name: look.material for name, look in looks.items()}, path, f"{field}.{USE}")
         return looks[table[USE]]
     if FILE in table:
-        return Look(given.material(table[FILE], f"{field}.{FILE}"))
+        return Look(files.material(table[FILE], f"{field}.{FILE}"))
     if not table:
         expected = "use, file, texture, colour, or keys of a material document"
         raise UserError("is empty", file=path, field=field, expected=expected)
     now, numbers = looks[name], dict(table)
     if TEXTURE in numbers:
         place = f"{field}.{TEXTURE}"
-        of = texture_named(numbers.pop(TEXTURE), coloured, partial(given.image, field=place), place, path)
+        of = texture_named(numbers.pop(TEXTURE), coloured, partial(files.image, field=place), place, path)
         if isinstance(of, ImageTexture):
-            given.files.use(Path(of.file))
+            files.files.use(Path(of.file))
         now = with_texture(now, of, looks, {one for one, has_colour in coloured.items() if has_colour})
         if not numbers:
             return now

@@ -59,11 +59,11 @@ def scaled(v: Textured, factor: float | Floats) -> Textured:
     return Textured(v.values * np.asarray(factor, v.values.dtype), v.uv_transform)
 
 
-def combined(function: Callable[..., Any], *inputs: Textured, notes: list[str], what: str = "textures") -> Textured:
+def combined(function: Callable[..., Any], *inputs: Textured, notes: list[str]) -> Textured:
     """`function` of the inputs' values, texel by texel.
 
     Textures with the same uv transform are resized to the largest. A texture with another uv transform than the first's
-    becomes its mean; `notes` gets a line about it that names `what`.
+    becomes its mean; `notes` gets a line about it.
     """
     textures = [v for v in inputs if v.is_texture]
     if not textures:
@@ -73,7 +73,7 @@ def combined(function: Callable[..., Any], *inputs: Textured, notes: list[str], 
     values = []
     for v in inputs:
         if v.is_texture and v.uv_transform != lead.uv_transform:
-            notes.append(f"{what} have different uv transforms: one is averaged")
+            notes.append("textures have different uv transforms: one is averaged")
             values.append(v.mean)
         else:
             values.append(_resized(v.values, height, width) if v.is_texture else v.values)

@@ -175,8 +175,8 @@ def _png(path: Path, texels: Any) -> None:
     Image.fromarray(np.uint8(texels)).save(path)
 
 
-def _worn(material: dict[str, Any], images: list[str], **more: Any) -> dict[str, Any]:
-    """A document whose triangle wears `material`; texture i is picture i."""
+def textured(material: dict[str, Any], images: list[str], **more: Any) -> dict[str, Any]:
+    """A document whose triangle has `material`; texture i is picture i."""
     content = document(
         materials=[material], textures=[{"source": i} for i in range(len(images))],
         images=[{"uri": name} for name in images], **more,
@@ -188,7 +188,7 @@ def _worn(material: dict[str, Any], images: list[str], **more: Any) -> dict[str,
 def test_a_texture_multiplies_the_mean_that_the_document_holds(tmp_path: Path) -> None:
     _png(tmp_path / "half.png", [[[255, 0, 0]], [[0, 0, 0]]])
     look = {"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 1, 1, 1], "metallicFactor": 0}
-    content = _worn({"name": "cloth", "pbrMetallicRoughness": look}, ["half.png"])
+    content = textured({"name": "cloth", "pbrMetallicRoughness": look}, ["half.png"])
     scene = loaded(tmp_path, content)
     assert scene.materials["cloth"].kd == pytest.approx((0.24, 0, 0)) and not scene.materials["cloth"].kd_coupled
     texture = scene.textures["cloth"].diffuse
@@ -204,7 +204,7 @@ def test_a_metals_picture_is_its_reflectance_and_never_more_than_arrives(tmp_pat
     _png(tmp_path / "base.png", [[[255, 255, 255], [255, 0, 0]]])
     _png(tmp_path / "packed.png", [[[0, 255, 255], [0, 128, 0]]])  # metal and rough; dielectric and smoother
     look = {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 1}}
-    scene = loaded(tmp_path, _worn({"name": "m", "pbrMetallicRoughness": look}, ["base.png", "packed.png"]))
+    scene = loaded(tmp_path, textured({"name": "m", "pbrMetallicRoughness": look}, ["base.png", "packed.png"]))
     material, textures = scene.materials["m"], scene.textures["m"]
     assert textures.diffuse is not None and textures.specular is not None and textures.roughness is not None
     (lobe,) = material.lobes
@@ -236,7 +236,7 @@ def test_texture_transforms(tmp_path: Path) -> None:
     moved = {"offset": [0, 1], "rotation": np.pi / 2, "scale": [0.5, 0.5]}
     reference = {"index": 0, "extensions": {"KHR_texture_transform": moved}}
     look = {"name": "m", "normalTexture": {"index": 0}, "pbrMetallicRoughness": {"baseColorTexture": reference}}
-    textures = loaded(tmp_path, _worn(look, ["four.png"])).textures["m"]
+    textures = loaded(tmp_path, textured(look, ["four.png"])).textures["m"]
     plain, turned = textures.normal, textures.specular
     corners = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)]
     assert plain is not None and turned is not None
@@ -249,13 +249,13 @@ def test_holes_and_what_shines_through(tmp_path: Path) -> None:
     _png(tmp_path / "leaf.png", [[[0, 255, 0, 255], [0, 255, 0, 0]]])
     pbr = {"baseColorTexture": {"index": 0}, "metallicFactor": 0}
     look = {"name": "m", "pbrMetallicRoughness": pbr, "alphaMode": "MASK", "alphaCutoff": 0.3}
-    textures = loaded(tmp_path, _worn(look, ["leaf.png"])).textures["m"]
+    textures = loaded(tmp_path, textured(look, ["leaf.png"])).textures["m"]
     assert textures.opacity is not None and textures.cutoff == 0.3
     assert textures.opacity.texels.ravel().tolist() == [1, 0]
-    scene = loaded(tmp_path, _worn(look | {"alphaMode": "BLEND"}, ["leaf.png"]))
+    scene = loaded(tmp_path, textured(look | {"alphaMode": "BLEND"}, ["leaf.png"]))
     assert scene.textures["m"].opacity is not None and "becomes a cut-out" in scene.warnings[0]
     pane = {"name": "m", "alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}}
-    scene = loaded(tmp_path, _worn(pane, []))
+    scene = loaded(tmp_path, textured(pane, []))
     (through,) = scene.materials["m"].transmission_lobes
     assert through.k == (0.75,) * 3 and through.r0 == (0,) * 3 and "lets 75% of the light through" in scene.warnings[0]
     assert scene.materials["m"].reflection_lobes[0].k == pytest.approx((0.25 * masking(1, 1, "ggx")[1],) * 3)
@@ -269,7 +269,7 @@ def test_normal_maps_and_the_direction_of_anisotropy(tmp_path: Path) -> None:
         "name": "m", "normalTexture": {"index": 0, "scale": 0.5}, "pbrMetallicRoughness": {"roughnessFactor": 0.3},
         "extensions": {"KHR_materials_anisotropy": brushed},
     }  # fmt: skip
-    scene = loaded(tmp_path, _worn(look, ["normal.png", "way.png"]))
+    scene = loaded(tmp_path, textured(look, ["normal.png", "way.png"]))
     textures = scene.textures["m"]
     assert textures.normal is not None and textures.direction is not None
     assert np.allclose(textures.normal.texels, [[(0, 0, 1), (1, 0, 0)]], atol=0.02)
@@ -413,7 +413,7 @@ def test_every_truncation_of_a_glb_is_one_line(tmp_path: Path) -> None:
 def test_variants_of_primitives_are_variants_of_the_scene(tmp_path: Path) -> None:
     names = [{"name": "oak"}, {"name": "night"}, {"name": "bare"}]
     lamp = {"name": "lamp", "emissiveFactor": [1, 1, 1]}
-    content = _worn({"name": "plain"}, [], extensions={"KHR_materials_variants": {"variants": names}})
+    content = textured({"name": "plain"}, [], extensions={"KHR_materials_variants": {"variants": names}})
     content["materials"] += [{"name": "wood", "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.3, 0.1, 1]}}, lamp]
     mappings = [{"material": 1, "variants": [0]}, {"material": 2, "variants": [1]}]
     content["meshes"][0]["primitives"][0]["extensions"] = {"KHR_materials_variants": {"mappings": mappings}}
@@ -428,3 +428,36 @@ def test_variants_of_primitives_are_variants_of_the_scene(tmp_path: Path) -> Non
     oak, night, bare, red = chosen.variants
     assert chosen.object("thing").material == "wood" and not oak.looks and not oak.light.of("sun").on
     assert bare.materials["wood"] == chosen.materials["plain"] and red.materials["wood"].kd[1] == 0
+
+
+def test_extensions_that_are_not_read_are_said(tmp_path: Path) -> None:
+    used = ["EXT_mesh_unheard_of", "KHR_materials_sheen", "KHR_mesh_quantization"]
+    primitive = {**document()["meshes"][0]["primitives"][0], "material": 0}
+    sheen = {"name": "cloth", "extensions": {"KHR_materials_sheen": {}}}
+    scene = loaded(tmp_path, document(extensionsUsed=used, materials=[sheen], meshes=[{"primitives": [primitive]}]))
+    assert [w for w in scene.warnings if "ignored" in w] == [
+        "extension EXT_mesh_unheard_of is ignored", "material cloth: ignored: KHR_materials_sheen",
+    ]  # fmt: skip
+
+
+def test_a_compressed_primitive_without_its_numbers_is_said(tmp_path: Path) -> None:
+    content = document(
+        extensionsUsed=["KHR_draco_mesh_compression"], nodes=[{"mesh": 0}, {"mesh": 1, "name": "packed"}]
+    )
+    packed = {"attributes": {"POSITION": 4}, "extensions": {"KHR_draco_mesh_compression": {"bufferView": 0}}}
+    content["accessors"].append({"componentType": 5126, "count": 3, "type": "VEC3"})
+    content["meshes"].append({"primitives": [packed]})
+    content["scenes"] = [{"nodes": [0, 1]}]
+    scene = loaded(tmp_path, content)
+    assert len(scene.objects) == 1
+    said = "packed: left out, it is compressed (KHR_draco_mesh_compression): export without compression"
+    assert said in scene.warnings
+
+
+def test_a_picture_on_the_network_is_missing(tmp_path: Path) -> None:
+    address = "https://pictures.example/wood.png"
+    wood = {"name": "wood", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
+    content = document(materials=[wood], images=[{"uri": address}], textures=[{"source": 0}])
+    content["meshes"][0]["primitives"][0]["material"] = 0
+    scene = loaded(tmp_path, content)
+    assert any(address in w and "only its factor is used" in w for w in scene.warnings)

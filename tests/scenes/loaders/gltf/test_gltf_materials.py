@@ -13,8 +13,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.scenes.loaders.surfaces.material_builder import masking
 from tests.scenes.loaders.gltf.test_gltf import _png as png
-from tests.scenes.loaders.gltf.test_gltf import _worn as worn
-from tests.scenes.loaders.gltf.test_gltf import loaded
+from tests.scenes.loaders.gltf.test_gltf import loaded, textured
 
 
 def test_specular_has_a_weight_and_a_colour(tmp_path: Path) -> None:
@@ -23,7 +22,7 @@ def test_specular_has_a_weight_and_a_colour(tmp_path: Path) -> None:
 
     def seen(**said: Any) -> Material:
         look = {"name": "m", "pbrMetallicRoughness": plain, "extensions": {"KHR_materials_specular": said}}
-        return loaded(tmp_path, worn(look, [])).materials["m"]
+        return loaded(tmp_path, textured(look, [])).materials["m"]
 
     grazing = np.array([np.sin(np.radians(85)), 0, np.cos(np.radians(85))])
     dull, half = seen(specularFactor=0), seen(specularFactor=0.5)
@@ -40,7 +39,7 @@ def test_rough_surfaces_keep_their_colour_towards_grazing(tmp_path: Path, roughn
 
     def bsdf(colour: float) -> MaterialBSDF:
         look = {"metallicFactor": 0, "roughnessFactor": roughness, "baseColorFactor": [colour] * 3 + [1]}
-        return MaterialBSDF(loaded(tmp_path, worn({"name": "m", "pbrMetallicRoughness": look}, [])).materials["m"])
+        return MaterialBSDF(loaded(tmp_path, textured({"name": "m", "pbrMetallicRoughness": look}, [])).materials["m"])
 
     wi = cosine_hemisphere(hammersley(4096))
     for theta_deg in (0, 60, 80, 88):
@@ -57,7 +56,7 @@ def test_coats_take_from_what_is_below(tmp_path: Path) -> None:
     """A smooth mirror below a clear coat returns no more than arrives, up to 75 degrees; a tenth more up to 82."""
     coat = {"KHR_materials_clearcoat": {"clearcoatFactor": 1}}
     look = {"name": "m", "pbrMetallicRoughness": {"roughnessFactor": 0.1}, "extensions": coat}
-    bsdf = MaterialBSDF(loaded(tmp_path, worn(look, [])).materials["m"])
+    bsdf = MaterialBSDF(loaded(tmp_path, textured(look, [])).materials["m"])
     for theta_deg, most in ((0, 1.001), (45, 1.001), (75, 1.001), (82, 1.1)):
         wo = np.array([np.sin(np.radians(theta_deg)), 0, np.cos(np.radians(theta_deg))])
         assert 0.8 < bsdf.albedo(wo).max() <= most
@@ -67,14 +66,14 @@ def test_leaves_volumes_and_what_is_not_read(tmp_path: Path) -> None:
     leaf = {"diffuseTransmissionFactor": 0.25, "diffuseTransmissionColorFactor": [0.1, 0.8, 0.2]}
     more = {"KHR_materials_diffuse_transmission": leaf, "KHR_materials_sheen": {"sheenColorFactor": [1, 1, 1]}}
     look = {"name": "m", "pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": more}
-    scene = loaded(tmp_path, worn(look, []))
+    scene = loaded(tmp_path, textured(look, []))
     material = scene.materials["m"]
     assert material.kd == pytest.approx((0.72,) * 3) and material.kt_d == pytest.approx((0.024, 0.192, 0.048))
     assert "material m: ignored: KHR_materials_sheen" in scene.warnings
     volume = {"thicknessFactor": 2, "attenuationDistance": 1, "attenuationColor": [0.5, 0.9, 1]}
     glass = {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": volume}
     look = {"name": "m", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0}, "extensions": glass}
-    (through,) = loaded(tmp_path, worn(look, [])).materials["m"].transmission_lobes
+    (through,) = loaded(tmp_path, textured(look, [])).materials["m"].transmission_lobes
     assert through.k == pytest.approx((0.25, 0.81, 1), rel=1e-3)
 
 
@@ -83,13 +82,13 @@ def test_specular_glossiness(tmp_path: Path) -> None:
     png(tmp_path / "gloss.png", [[[255, 255, 255, 255], [188, 188, 188, 128]]])
     older = {"diffuseFactor": [0.8, 0.4, 0.2, 1], "specularFactor": [0.5, 0.5, 0.5], "glossinessFactor": 0.8}
     look: dict[str, Any] = {"name": "m", "extensions": {"KHR_materials_pbrSpecularGlossiness": older}}
-    material = loaded(tmp_path, worn(look, [])).materials["m"]
+    material = loaded(tmp_path, textured(look, [])).materials["m"]
     assert material.kd == pytest.approx((0.4, 0.2, 0.1)) and material.lobes[0].mx == pytest.approx(0.04)
     assert material.lobes[0].r0 == pytest.approx((0.5,) * 3)
     both = look | {"pbrMetallicRoughness": {"metallicFactor": 0}}
-    assert loaded(tmp_path, worn(both, [])).materials["m"].kd == pytest.approx((0.96,) * 3)
+    assert loaded(tmp_path, textured(both, [])).materials["m"].kd == pytest.approx((0.96,) * 3)
     older["specularGlossinessTexture"] = {"index": 0}
-    scene = loaded(tmp_path, worn(look, ["gloss.png"]))
+    scene = loaded(tmp_path, textured(look, ["gloss.png"]))
     roughness = scene.textures["m"].roughness
     assert roughness is not None and scene.textures["m"].specular is not None
     slopes = scene.materials["m"].lobes[0].mx * roughness.texels[0, :, 0]

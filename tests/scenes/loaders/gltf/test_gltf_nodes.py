@@ -12,9 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from lambent.core.geometry.directions import normalize
 from lambent.scenes.scene import PointLight
-from tests.scenes.loaders.gltf.test_gltf import TRIANGLE, document, loaded
+from tests.scenes.loaders.gltf.test_gltf import TRIANGLE, document, loaded, textured
 from tests.scenes.loaders.gltf.test_gltf import _png as png
-from tests.scenes.loaders.gltf.test_gltf import _worn as worn
 
 OUTER = {"translation": [1, 2, 3], "rotation": [0.5, -0.1, 0.7, 0.5], "scale": [2, 3, 4]}
 INNER = {"translation": [-4, 1, 0.5], "rotation": [0.2, 0.6, -0.3, 0.8], "scale": [0.5, 0.25, 1.5]}
@@ -104,7 +103,7 @@ def test_strips_and_fans(tmp_path: Path, mode: int, expected: list[tuple[int, in
 def test_the_uv_set_that_a_texture_names(tmp_path: Path) -> None:
     png(tmp_path / "two.png", [[[255, 0, 0], [0, 0, 0]]])
     pbr = {"baseColorTexture": {"index": 0, "texCoord": 1}, "metallicFactor": 0}
-    content = worn({"name": "m", "pbrMetallicRoughness": pbr}, ["two.png"])
+    content = textured({"name": "m", "pbrMetallicRoughness": pbr}, ["two.png"])
     data = base64.b64decode(content["buffers"][0]["uri"].partition(",")[2])
     second = np.float32([(0.2, 0.3), (0.4, 0.5), (0.6, 0.8)])
     whole = data + b"\0\0" + second.tobytes()
@@ -120,7 +119,7 @@ def test_the_uv_set_that_a_texture_names(tmp_path: Path) -> None:
 def test_normal_maps_are_scaled_across_alone(tmp_path: Path) -> None:
     png(tmp_path / "lean.png", np.full((1, 1, 3), (178, 102, 230)))
     look = {"name": "m", "normalTexture": {"index": 0, "scale": 0.5}}
-    texture = loaded(tmp_path, worn(look, ["lean.png"])).textures["m"].normal
+    texture = loaded(tmp_path, textured(look, ["lean.png"])).textures["m"].normal
     n = (np.array([178, 102, 230]) / 255 * 2 - 1) * (0.5, 0.5, 1)
     assert texture is not None
     np.testing.assert_allclose(texture.texels[0, 0], n / np.linalg.norm(n), atol=1e-3)
@@ -129,8 +128,8 @@ def test_normal_maps_are_scaled_across_alone(tmp_path: Path) -> None:
 def test_a_coats_roughness_is_squared_as_the_bases(tmp_path: Path) -> None:
     coat = {"clearcoatFactor": 1, "clearcoatRoughnessFactor": 0.4}
     look = {"name": "m", "pbrMetallicRoughness": {"roughnessFactor": 0.8, "metallicFactor": 1}}
-    material = loaded(tmp_path, worn(look | {"extensions": {"KHR_materials_clearcoat": coat}}, [])).materials["m"]
+    material = loaded(tmp_path, textured(look | {"extensions": {"KHR_materials_clearcoat": coat}}, [])).materials["m"]
     assert [lobe.mx for lobe in material.lobes] == pytest.approx([0.64, 0.16])
     assert material.lobes[1].r0 == pytest.approx((0.04,) * 3)
-    bare = loaded(tmp_path, worn(look, [])).materials["m"]
+    bare = loaded(tmp_path, textured(look, [])).materials["m"]
     assert material.lobes[0].k == pytest.approx(0.96 * np.array(bare.lobes[0].k)), "the coat takes what it reflects"
