@@ -125,7 +125,7 @@ def _direct_name(context: BakeContext, side: int) -> str:
 
 
 def _sampled_direct(context: BakeContext, side: int, lit: Floats) -> Floats:
-    """Likewise for a light map `lit` (G, H, W, 3) that keeps none."""
+    """Direct light (G, H, W, 3) of a side, sampled for a light map `lit` (G, H, W, 3) that keeps none."""
     from lambent.bake.answering.direct import cleaned_direct
     from lambent.bake.light.sampling import closed, sampled_halves
 
@@ -148,7 +148,7 @@ def _lit(context: BakeContext) -> list[Floats]:
 
 
 def _direct_by_group(context: BakeContext, side: int, lit: Floats, known: Flags, labels: Indices) -> Floats:
-    """Likewise for separated light: the light map's own direct light, denoised, plus light through lobes alone."""
+    """Direct light (G, H, W, 3) of separated light: the light map's own, denoised, plus light through lobes alone."""
     from lambent.bake.answering.direct import cleaned_direct
 
     parts = context.store.read(_by_group(TRACED[side]))[0].reshape(*known.shape, -1, 3)

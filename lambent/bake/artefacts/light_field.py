@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from lambent.bake.light_fields.acquisition import Around
     from lambent.bake.light_fields.choosing import Chooser
     from lambent.bake.light_fields.placing import Placed, Placing
-    from lambent.bake.light_fields.sample_map import Behind
+    from lambent.bake.light_fields.sample_map import FindExits
 
 KIND = "light_field"
 NEEDS = ("geometry", "light_map", "probe")
@@ -310,10 +310,10 @@ def _sample_map(context: BakeContext, name: str, wish: LightFieldWish, traced: T
     if wish.volume:
         spacing = spacing_m(mesh, len(points))
     size = context.atlas.width, context.atlas.height
-    behind = _exits(context, name) if wish.refracts else None
+    find_exits = _exits(context, name) if wish.refracts else None
     sees = views_in(traced.seen(name, wish).scene)
     side = side_seen(mesh, context.traced.places, traced.around.scene, seed_of(context.seed, KIND, name))
-    found = sample_map(context.geometry, _faces_of(context, name), size, points, float(spacing), behind, sees, side)
+    found = sample_map(context.geometry, _faces_of(context, name), size, points, float(spacing), find_exits, sees, side)
     if found.exits is not None:
         context.put(KIND, light_field_name(name, EXITS), found.exits, context.provenance(glass=_glass(context, name)))
     offset_m = context.store.artefact(light_field_name(name, "points")).meta["offset_m"]
@@ -324,13 +324,13 @@ def _sample_map(context: BakeContext, name: str, wish: LightFieldWish, traced: T
     context.put(KIND, name_of_map, found.entries, context.provenance(**note, seconds=seconds))
 
 
-def _exits(context: BakeContext, name: str) -> Behind:
+def _exits(context: BakeContext, name: str) -> FindExits:
     """Finds the faces behind the surface of an object of glass."""
     from lambent.bake.light_fields.glass import Exits
 
     o = context.scene.object(name)
     builder = context.traced.builder(diffuse=not cached(context))
-    return Exits(builder, name, context.scene.materials[o.material]).behind
+    return Exits(builder, name, context.scene.materials[o.material]).find
 
 
 def _glass(context: BakeContext, name: str) -> list[float]:

@@ -136,7 +136,7 @@ def finished_maps(context: BakeContext) -> tuple[Floats, Floats | None]:
 
 
 def finished_groups(context: BakeContext) -> tuple[Floats, Floats | None]:
-    """Likewise by light group, (n, H, W, 3)."""
+    """The stored light map (n, H, W, 3) of both sides by light group; None for the back if no surface is two-sided."""
     front, *back = (context.store.read(group_name(side)) for side in SIDES[: side_count(context)])
     return front, back[0] if back else None
 
@@ -214,7 +214,7 @@ def _sampled_maps(context: BakeContext) -> Maps:
 
 
 def _sorted_maps(context: BakeContext) -> Maps:
-    """Likewise as sums of the maps of light groups, which are stored as well."""
+    """The light map of each side as the sum of the maps of light groups, which are stored as well."""
     from lambent.bake.light.groups import finished_groups, group_notes
     from lambent.bake.light.sampling import gathered, path_traced
     from lambent.bake.tracing.group_tally import Direct

@@ -47,15 +47,15 @@ class Exits:
         self._alone: Any = builder.build(leave_out={n for n in builder.meshes if n != name})
         self._passed = float(np.mean(normal_transmittance(clearest(material))))
 
-    def behind(self, places: Floats, normals: Floats) -> Floats:
+    def find(self, places: Floats, normals: Floats) -> Floats:
         """(n, 4) of places and unit normals (n, 3): `exits` of `baked.light_fields.light_field.Glass`."""
         found = np.zeros((len(places), 4))
         found[:, 3] = NO_EXIT
         for mine in slices(len(places), AT_ONCE):
-            found[mine] = self._behind(places[mine], normals[mine])
+            found[mine] = self._found(places[mine], normals[mine])
         return found
 
-    def _behind(self, places: Floats, normals: Floats) -> Floats:
+    def _found(self, places: Floats, normals: Floats) -> Floats:
         down = -normals
         si = self._alone.ray_intersect(leaving(self._alone, places, normals, down))
         out = np.array(si.is_valid() & (dr.dot(si.n, si.sh_frame.n) > 0))

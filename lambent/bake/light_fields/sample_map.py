@@ -31,12 +31,12 @@ class SampleMap:
     exits: NDArray[np.float16] | None = None
 
 
-Behind = Callable[[Floats, Floats], Floats]  # of places and normals (n, 3): their exits (n, 4), as in `Glass`
+FindExits = Callable[[Floats, Floats], Floats]  # of places and normals (n, 3): their exits (n, 4), as in `Glass`
 
 
 def sample_map(
     geometry: dict[str, Floats], faces: Indices, size: tuple[int, int], points: Floats, spacing_m: float,
-    behind: Behind | None = None, sees: Sees | None = None, side: float = 1.0,
+    find_exits: FindExits | None = None, sees: Sees | None = None, side: float = 1.0,
 ) -> SampleMap:  # fmt: skip
     """The sample map of an object.
 
@@ -47,7 +47,7 @@ def sample_map(
     size : width and height of the light map.
     points : (P, 3), P at most 65535.
     spacing_m : of the points; texels are finer, as far as the map has room.
-    behind : finds the exits, where the object is of glass.
+    find_exits : finds the faces behind places, where the object is of glass.
     sees : whether places see points (`baked.light_fields.nearest_points`).
     side : -1 where viewers see the object from the other side of its normals.
     """
@@ -66,10 +66,10 @@ def sample_map(
     shape = height, width, CANDIDATES
     filled = with_gutters(entries.reshape(shape), covered.reshape(height, width), NO_POINT)
     (left, top), (columns, rows) = map(int, low), map(int, grid)
-    if behind is None:
+    if find_exits is None:
         return SampleMap(filled, (top, left), (rows, columns))
     exits = np.zeros((height * width, 4), np.float16)
-    exits[texels.index] = behind(middle, normal)
+    exits[texels.index] = find_exits(middle, normal)
     whole = with_gutters(exits.reshape(height, width, 4), covered.reshape(height, width), NO_EXIT)
     return SampleMap(filled, (top, left), (rows, columns), whole)
 

@@ -58,7 +58,7 @@ class Watched:
         return float(self.errors(along, level).mean())
 
     def errors(self, along: Floats, level: float) -> Floats:
-        """Likewise at each point, (n,)."""
+        """The differences whose mean is `error`, (n,), one a point."""
         shown = self.own + (self.share * along).sum(axis=1)
         return np.asarray(np.abs(np.log1p(shown / level) - np.log1p(self.light / level)).mean(axis=1))
 

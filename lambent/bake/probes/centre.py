@@ -47,7 +47,7 @@ def centre_of(mesh: Mesh, middle: Floats, solids: SolidTest, without: Any) -> Fl
 
 
 def centre_among(points: Floats, normals: Floats, middle: Floats, solids: SolidTest | None, without: Any) -> Floats:
-    """Likewise for points (n, 3), uniform over a surface of unit normals (n, 3); without `solids`, never moved out."""
+    """The centre for points (n, 3) all over a surface of unit normals (n, 3); without `solids`, never moved out."""
     return _centre(points, _axis_of(normals, np.full(len(points), 1 / len(points))), middle, solids, without)
 
 
