@@ -1,4 +1,4 @@
-"""A recorded scene, and the state of the walk mode on it, for tests that need no store."""
+"""A recorded scene, the state of the walk mode on it, and a virtual screen for windows."""
 
 import numpy as np
 import pytest
@@ -9,6 +9,7 @@ from lambent.store.contract import ObjectRecord, SceneRecord
 from lambent.viewer.cameras.picking import Geometry
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.screen import Rect, Screen
+from tests.viewer.window_session import VirtualScreen, WindowSession, missing_tools
 
 
 @pytest.fixture
@@ -62,3 +63,26 @@ def geometry(scene):
     positions = np.array(square(4, 0.0) + square(1, 1.0), np.float32)
     faces = np.array([(0, 1, 2), (0, 2, 3), (4, 5, 6), (4, 6, 7)], np.uint32)
     return Geometry(positions, faces, scene.objects)
+
+
+@pytest.fixture(scope="session")
+def virtual_screen(adapter):
+    if missing_tools():
+        pytest.skip(f"not installed: {', '.join(missing_tools())}")
+    screen = VirtualScreen()
+    yield screen
+    screen.close()
+
+
+@pytest.fixture
+def open_window(virtual_screen):
+    """Opens windows that end with the test."""
+    sessions = []
+
+    def start(*args):
+        sessions.append(WindowSession(virtual_screen, *args))
+        return sessions[-1]
+
+    yield start
+    for session in sessions:
+        session.kill()

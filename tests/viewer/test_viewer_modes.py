@@ -5,7 +5,7 @@ from PIL import ImageGrab
 
 from lambent.core.errors import UserError
 from lambent.viewer import app, edit, modes
-from tests.viewer.window_session import INTERRUPT, VirtualScreen, WindowSession, missing_tools
+from tests.viewer.window_session import INTERRUPT
 
 TOY = '''
 from lambent.viewer.mode import Drawing, Mode, Panel
@@ -80,23 +80,16 @@ def test_modes_are_found(toys, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_toy_mode_opens_rings_and_closes_at_an_interrupt(adapter, toys, tmp_path):
+def test_a_toy_mode_opens_rings_and_closes_at_an_interrupt(virtual_screen, open_window, toys, tmp_path):
     """Dear ImGui finds the size of new text one frame later: without further frames, a message is cut off."""
-    if missing_tools():
-        pytest.skip(f"not installed: {', '.join(missing_tools())}")
-    screen = VirtualScreen()
-    session = WindowSession(screen, tmp_path / "train.toy", tmp_path, (480, 320), f"found:{toys}")
-    try:
-        title = session.tool("getwindowname", session.id)
-        assert ImageGrab.grab(xdisplay=screen.name).getpixel((40, 40)) == (30, 160, 90)
-        session.click(*session.point("wind up"))
-        session.wait_for(lambda state: state["messages"] == ["train rings"])
-        session.wait_for(lambda state: "seen 3" in state["rects"])
-        session.tool("key", "h")
-        session.wait_for(lambda state: state["picture"] == [480, 320])
-        session.tool("key", INTERRUPT)  # within a frame, after which the window closes
-        assert title.strip() == "Lambent: train" and session.process.wait(60) == 0, session.log()
-        assert "Received signal Interrupt" in session.log()
-    finally:
-        session.kill()
-        screen.close()
+    session = open_window(tmp_path / "train.toy", tmp_path, (480, 320), f"found:{toys}")
+    title = session.tool("getwindowname", session.id)
+    assert ImageGrab.grab(xdisplay=virtual_screen.name).getpixel((40, 40)) == (30, 160, 90)
+    session.click(*session.point("wind up"))
+    session.wait_for(lambda state: state["messages"] == ["train rings"])
+    session.wait_for(lambda state: "seen 3" in state["rects"])
+    session.tool("key", "h")
+    session.wait_for(lambda state: state["picture"] == [480, 320])
+    session.tool("key", INTERRUPT)  # within a frame, after which the window closes
+    assert title.strip() == "Lambent: train" and session.process.wait(60) == 0, session.log()
+    assert "Received signal Interrupt" in session.log()

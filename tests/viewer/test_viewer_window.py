@@ -11,19 +11,10 @@ from lambent.core.errors import UserError
 from lambent.core.pictures.images import read_image
 from lambent.store.kept.views import read_views
 from tests.viewer.small_store import FRONT, write_small_store
-from tests.viewer.window_session import ROOT, VirtualScreen, WindowSession, missing_tools
+from tests.viewer.window_session import ROOT, WindowSession
 
 pytestmark = pytest.mark.slow
 BALL = (213, 220)  # where the window of the tests shows it
-
-
-@pytest.fixture(scope="module")
-def screen(adapter):
-    if missing_tools():
-        pytest.skip(f"not installed: {', '.join(missing_tools())}")
-    screen = VirtualScreen()
-    yield screen
-    screen.close()
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +23,8 @@ def store(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def window(screen, store, tmp_path_factory):
-    opened = WindowSession(screen, store, tmp_path_factory.mktemp("window"))
+def window(virtual_screen, store, tmp_path_factory):
+    opened = WindowSession(virtual_screen, store, tmp_path_factory.mktemp("window"))
     yield opened
     opened.kill()
 

@@ -18,7 +18,7 @@ from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.state import WalkState
 from tests.viewer.small_store import write_small_store
-from tests.viewer.window_session import ROOT, VirtualScreen, WindowSession, missing_tools
+from tests.viewer.window_session import ROOT, VirtualScreen, WindowSession
 
 
 class Ended(Drawing):
@@ -83,9 +83,7 @@ def test_a_store_that_is_gone_is_not_made_anew(state, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_window_that_loses_its_display_keeps_its_material(adapter, tmp_path):
-    if missing_tools():
-        pytest.skip(f"not installed: {', '.join(missing_tools())}")
+def test_a_window_that_loses_its_display_keeps_its_material(virtual_screen, tmp_path):
     screen = VirtualScreen()
     session = WindowSession(screen, write_small_store(tmp_path / "store"), tmp_path)
     try:

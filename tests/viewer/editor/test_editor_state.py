@@ -193,14 +193,6 @@ def test_what_is_saved_says_that_it_was_edited(editor, brass_file, tmp_path):
     assert load_material(tmp_path / "mine.json").provenance is None, "as it was before the fit"
 
 
-def test_another_file_is_replaced_at_the_second_try(editor, tmp_path, said):
-    FROSTED.save(tmp_path / "brass.json")
-    editor.save()
-    assert load_material(tmp_path / "brass.json").name == "frosted" and "save again" in said[-1]
-    editor.save()
-    assert load_material(tmp_path / "brass.json").name == "brass"
-
-
 @pytest.mark.parametrize("name", ["", ".json", "brass.txt", "nowhere/brass.json"])
 def test_a_bad_file_name_is_said_and_nothing_lost(editor, said, name):
     editor.subject.step(moved(BRASS, mx=0.3))

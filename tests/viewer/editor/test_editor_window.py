@@ -4,24 +4,20 @@ import pytest
 
 from lambent.materials.document import load_material
 from tests.viewer.editor.measured_specimens import BRASS, write_measurement
-from tests.viewer.window_session import VirtualScreen, WindowSession, missing_tools
+from tests.viewer.window_session import WindowSession
 
 pytestmark = pytest.mark.slow
 SIZE = (900, 700)
 
 
 @pytest.fixture(scope="module")
-def session(adapter, tmp_path_factory):
-    if missing_tools():
-        pytest.skip(f"not installed: {', '.join(missing_tools())}")
+def session(virtual_screen, tmp_path_factory):
     folder = tmp_path_factory.mktemp("editor")
     BRASS.save(folder / "brass.json")
     write_measurement(folder / "brass.txt", BRASS)
-    screen = VirtualScreen()
-    session = WindowSession(screen, folder / "brass.txt", folder, SIZE, f"edit:{folder / 'brass.json'}")
+    session = WindowSession(virtual_screen, folder / "brass.txt", folder, SIZE, f"edit:{folder / 'brass.json'}")
     yield session
     session.kill()
-    screen.close()
 
 
 def lobe_of(state):

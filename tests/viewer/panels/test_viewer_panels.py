@@ -1,7 +1,5 @@
 """Every control of the panels does what it says to the state."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from imgui_bundle import imgui
@@ -261,29 +259,6 @@ def test_views_in_the_panel(whole, tmp_path):
     assert state.navigation.camera.name == "by/the door!" == state.recordings.cameras[-1].name
     whole.click("delete##camera")
     assert len(state.recordings.cameras) == 2 and read_views(tmp_path).cameras == ()
-
-
-def test_a_walk_is_recorded_in_the_panel(whole, tmp_path):
-    state = whole.state
-    whole.click("record a walk###record")
-    assert state.recordings.recorder.on
-    for k in range(10):
-        state.screen.clock.now_s = 0.2 * k
-        x = 0.1 * k
-        state.recordings.recorder.take(
-            replace(state.navigation.camera, position=(x, 1.6, 3.0)), state.screen.clock.now_s
-        )
-    whole.frame()
-    whole.click(next(label for label in whole.rects if label.endswith("###record")))
-    whole.frame()
-    assert state.navigation.path.path.name == "recorded"
-    whole.drag("smooth", 0.2, 0.9)
-    assert state.recordings.recorder.smooth_s > 1
-    whole.click("save path##path name")
-    whole.frame(2)
-    assert [p.name for p in read_views(tmp_path).paths] == ["walk 1"]
-    whole.click("delete##path")
-    assert read_views(tmp_path).paths == ()
 
 
 def test_false_colour_has_a_range(whole):

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui, implot
 
-from lambent.core.views.camera import Camera
-from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.curve import KNOTS, Curve
 from lambent.materials.models import model_named
@@ -116,15 +114,6 @@ def test_keys_work_over_the_plot_alone(panel):
     assert panel.view.x.high < 30 and panel.editor.state.tool == "translate"
 
 
-def test_freehand(panel):
-    panel.click("draw")
-    panel.pull((2.0, 5.0), (4.0, 10.0), (6.0, 5.0))
-    assert panel.edit.curves["highlight"].drawn is not None and panel.layers() == ()
-    assert panel.session.editable("gold").curves["highlight"].at(np.radians(5.0))[1] == pytest.approx(7.5, abs=0.2)
-    panel.undo()
-    assert not panel.edit.curves and not panel.session.history.can_undo
-
-
 def test_handles_and_numbers_of_the_region(panel):
     axes, view = panel.editor.axes, panel.view
     c_deg = np.degrees(view.region.c)
@@ -230,20 +219,6 @@ def test_layers(panel):
     assert not panel.edit.curves
 
 
-def test_the_size_of_a_layer(panel):
-    panel.pull((2.0, 20.0), (3.0, 25.0))
-    up, across = panel.layers()
-    panel.slide("##size 0", 0.2, 0.6)
-    bigger, same = panel.layers()
-    assert bigger.size > up.size and bigger.region == up.region and same == across
-    panel.slide("##size 1", 0.2, 0.6)
-    assert panel.layers()[0] == bigger and panel.layers()[1].size > across.size
-    panel.undo()
-    assert panel.layers() == (bigger, across)
-    panel.undo()
-    assert panel.layers() == (up, across)
-
-
 def test_curves_are_chosen_in_the_list(panel):
     assert panel.curve == "highlight", "the one that changes most"
     panel.click("fresnel##curve", 0.1)
@@ -273,36 +248,6 @@ def test_numbers_of_a_document(panel):
     panel.slide("mx", 0.5, 0.7)
     assert not panel.editor.state.shown(panel.session, "gold").serves, "two curves in place of one"
     panel.frame(2)
-
-
-def test_parameters_of_a_model(open_panel):
-    panel = open_panel({"lacquer": ASHIKHMIN}, "lacquer", WIDE)
-    panel.pull((2.0, 0.5), (2.0, 0.7))
-    name = panel.curve
-    layers = panel.layers(name)
-    panel.slide("ex", 0.4, 0.6)
-    assert panel.edit.source.parameters["ex"] > 100 and panel.layers(name) == layers, "layers stay"
-    panel.undo()
-    assert panel.edit.source.parameters["ex"] == 100 and panel.layers(name) == layers
-
-
-def test_factors_of_a_table(open_panel, tmp_path, monkeypatch):
-    file = tmp_path / "factors.txt"
-    file.write_text("stands for a table")
-    camera = Camera(name="front", position=(0, 1, 3), target=(0, 1, 0))
-    made = Session.new("room", camera, {"gold": GOLD}).original("gold")
-    panel = open_panel({"table": file, "gold": GOLD}, "gold")
-    panel.session._factorise = lambda path: made
-    panel.material = "table"
-    panel.frame(2)
-    assert not any(label in panel.rects for label in ("mx", "kd", "ex")), "a table has no numbers"
-    panel.pull((2.0, 20.0), (3.0, 25.0))
-    assert len(panel.layers()) == 2
-    panel.slide("##values", 0.15, 0.05)
-    red, green, blue = panel.edit.tints["specular"]
-    assert red < 0.5 and green == blue == 1, "the first of the last term's three sliders"
-    panel.undo()
-    assert not panel.edit.tints and len(panel.layers()) == 2, "one step"
 
 
 @pytest.mark.parametrize("size", [NARROW, WIDE, (200, 300), (60, 40)])

@@ -6,34 +6,19 @@ from lambent.core.pictures.images import read_image
 from lambent.editing.session.session import Session
 from lambent.store.store import Store
 from tests.viewer.watched_window import FEW_LIGHTS
-from tests.viewer.window_session import VirtualScreen, WindowSession, missing_tools
 
 pytestmark = pytest.mark.slow
 SIZE, PIXELS = (900, 900), 24
 FIRST, LAST = FEW_LIGHTS
 
 
-@pytest.fixture(scope="module")
-def screen():
-    if missing_tools():
-        pytest.skip(f"not installed: {', '.join(missing_tools())}")
-    screen = VirtualScreen()
-    yield screen
-    screen.close()
-
-
 @pytest.fixture
-def opened(adapter, screen):
-    sessions = []
-
+def opened(open_window):
     def start(what, folder):
         (folder / "state.json").unlink(missing_ok=True)  # of a window before
-        sessions.append(WindowSession(screen, what, folder, SIZE, f"place:{PIXELS}"))
-        return sessions[-1]
+        return open_window(what, folder, SIZE, f"place:{PIXELS}")
 
-    yield start
-    for session in sessions:
-        session.kill()
+    return start
 
 
 def test_a_scene_is_baked_edited_and_opened_again(opened, tmp_path):
@@ -100,12 +85,3 @@ def pull(session, begin, end):
     top, bottom = rects["log"][3] + 20, rects["all##preset"][1] - 120
     x = (left + right) / 2
     session.drag((x, top + begin * (bottom - top)), (x, top + end * (bottom - top)))
-
-
-TWINS = """mtllib twins.mtl
-v -1 0 1\nv 1 0 1\nv 1 0 -1\nv -1 0 -1\nv -1 1.5 -1\nv 1 1.5 -1\nv 1 1.5 1
-vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1
-o floor\nusemtl oak\nf 1/1 2/2 3/3 4/4
-o back\nusemtl plaster\nf 4/1 3/2 6/3 5/4
-o side\nusemtl stucco\nf 3/1 2/2 7/3 6/4
-"""

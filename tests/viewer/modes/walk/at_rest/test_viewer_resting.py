@@ -5,23 +5,15 @@ import signal
 
 import pytest
 
-from tests.viewer.window_session import SKIP, VirtualScreen, WindowSession, missing_tools
+from tests.viewer.window_session import SKIP
 
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture
-def session(baked_box, adapter, tmp_path):
-    if missing_tools():
-        pytest.skip(f"not installed: {', '.join(missing_tools())}")
-    screen = VirtualScreen()
-    session = WindowSession(screen, baked_box, tmp_path)
-    yield session
-    session.kill()
-    screen.close()
-
-
-def test_the_window_sleeps_until_a_picture_is_traced_and_learns_that_tracing_has_ended(session):
+def test_the_window_sleeps_until_a_picture_is_traced_and_learns_that_tracing_has_ended(
+    baked_box, open_window, tmp_path
+):
+    session = open_window(baked_box, tmp_path)
     first = session.wait_for(lambda state: state["at_rest"].startswith("traced"))
     session.wait_for(lambda state: state["at_rest"] != first["at_rest"] and "noise" in state["at_rest"])
     session.tool("key", SKIP)

@@ -30,10 +30,8 @@ from lambent.viewer.modes.walk.rebake.arrivals import Arrived, Region
 from lambent.viewer.modes.walk.rebake.rebaked_light import (
     FADE_STEPS,
     Rebaked,
-    batches_of,
     in_view_order,
     steps,
-    texel_objects,
     texel_steps,
 )
 from lambent.viewer.modes.walk.rebake.rebaking import clock_time
@@ -206,27 +204,16 @@ def test_texels_go_over_by_their_batches_and_end_exactly():
     np.testing.assert_array_equal(frames[FADE_STEPS - 1][:, :2], last[:, :2])
 
 
-def test_objects_in_view_come_first_and_near_ones_before_far_ones(store):
-    scene = Renderer(open_device(), Store.open(store)).scene
-    record = scene.record
+def test_objects_in_view_come_first_and_near_ones_before_far_ones(scene):
     camera = Camera(name="in", position=(0.0, 1.0, 0.0), target=(0.0, 1.0, -1.0), fov_y_deg=40)
     places = {"behind": 1.0, "far": -3.0, "near": -1.0}
-    first = record.objects[0]
+    first = scene.objects[0]
     objects = tuple(
         first.model_copy(update={"name": name, "bounds": ((-0.1, 0.9, z), (0.1, 1.1, z + 0.1))})
         for name, z in places.items()
     )
-    order = in_view_order(record.model_copy(update={"objects": objects}), camera, (64, 48))
+    order = in_view_order(scene.model_copy(update={"objects": objects}), camera, (64, 48))
     assert [objects[number].name for number in order] == ["near", "far", "behind"]
-
-
-def test_every_lit_texel_belongs_to_an_object(store):
-    scene = Renderer(open_device(), Store.open(store)).scene
-    owner = texel_objects(scene)
-    count = len(scene.record.objects)
-    assert owner.shape == scene.irradiance.shape[:2] and set(np.unique(owner)) >= set(range(count))
-    batch = batches_of(owner, list(range(count)), count)
-    assert batch.max() == min(count, 16) - 1 and (batch[owner == 0] == 0).all()
 
 
 class Room:

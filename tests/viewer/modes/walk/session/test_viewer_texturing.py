@@ -17,7 +17,6 @@ from lambent.store.kept.session import FILE, RoomState, read_session
 from lambent.store.kept.states import variants_of
 from lambent.store.store import Store
 from lambent.viewer.edits.edits import MaterialEdits
-from lambent.viewer.modes.walk.at_rest.tracing import Wish
 from lambent.viewer.modes.walk.session.keeping import SessionKeeper
 from lambent.viewer.modes.walk.session.texturing import NONE, OWN, Texturing
 from lambent.viewer.modes.walk.session.thumbnails import SIDE, thumbnail
@@ -173,12 +172,6 @@ def test_a_store_that_is_not_writable_names_the_image_where_it_is(window, folder
     assert window.edits.room.textures == {"plaster": ImageTexture(str(picture))}
     with pytest.raises(UserError):
         kept_image(folder, picture)
-
-
-def test_a_wish_for_path_tracing_carries_the_image(picture):
-    textures = {"plaster": ImageTexture(str(picture), 2.0), "oak": ""}
-    wish = Wish(1, materials={"plaster": SCENE["plaster"]}, textures=textures)
-    assert Wish.of(wish.said()) == wish
 
 
 def test_images_of_the_scenes_variants_stay(window, folder, picture):
