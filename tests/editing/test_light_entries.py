@@ -36,8 +36,11 @@ def test_entries_come_back(numbers: int, share: float, width: int) -> None:
     assert np.array_equal(light.met, np.unique(light.codes[given] // 8))
 
 
-def test_the_first_number_may_be_far_too() -> None:
-    far: Entries = np.array([1, 0, 2]), np.array([255, 256, 1023], np.uint32), packed_rgb(np.ones((3, 3), np.float32))
+@pytest.mark.parametrize("channel", range(3))
+def test_the_first_number_may_be_far_too(channel: int) -> None:
+    """The largest sum of a point's entries is that of its brightest channel."""
+    values = packed_rgb(np.eye(3, dtype=np.float32)[[channel] * 3])
+    far: Entries = np.array([1, 0, 2]), np.array([255, 256, 1023], np.uint32), values
     light = TermLight.of_tiles([far], np.array([1, 1, 4], np.float32), ())
     assert light.codes[light.values != 0].tolist() == [255, 256, 1023]
     assert light.largest == 8
