@@ -281,15 +281,15 @@ def _samples(
             progress=context.progress,
             what=f"light map, {stage.removeprefix('light_map/')}" + (", far sides" if side else ""),
             cost=lambda region: 1 + float(of_map[region[1], region[2]].sum()),
-            wrote=_early(context, stage, side, labels),
+            wrote=_regions(context, stage, side, labels),
         )
     writer.finish()
     return context.store.read(name), labels
 
 
-def _early(context: BakeContext, stage: str, side: int, labels: Indices) -> Callable[[], None]:
+def _regions(context: BakeContext, stage: str, side: int, labels: Indices) -> Callable[[], None]:
     """Callback that shows a watch finished regions of light: samples of the last stage, on the front."""
-    from lambent.bake.light.early import EarlyLight
+    from lambent.bake.light.regions import FinishedRegions
 
     if context.watch.region_pause is None or side or stage != _stages(context.settings(KIND))[-1]:
         return lambda: None
@@ -297,7 +297,7 @@ def _early(context: BakeContext, stage: str, side: int, labels: Indices) -> Call
     if sorts_light(context.methods):
         groups = len(traced.sorted_lights.groups)
     surface = traced.texels, labels, traced.cuts
-    return EarlyLight(context.watch, context.store, stage, _parts(stage), groups, surface).wrote
+    return FinishedRegions(context.watch, context.store, stage, _parts(stage), groups, surface).wrote
 
 
 def _photon_maps(context: BakeContext) -> Maps:

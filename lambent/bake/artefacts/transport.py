@@ -14,7 +14,7 @@ from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
 from lambent.bake.interreflection.series import SMOOTH_ANGLES
 from lambent.bake.quality import QualityName
-from lambent.bake.running.in_background import behind
+from lambent.bake.running.in_background import background
 from lambent.bake.running.keys import key_of, texture_inputs
 from lambent.bake.transport.view import View
 from lambent.core.progress import Progress
@@ -148,7 +148,7 @@ class _Baking:
 
         bands, many = self._bands(), len(self.points)
         writer = self._begin(store, "rows", (bands[0].count, 3, many), (bands[0].count, 3, POINTS), "float16")
-        with behind() as after:
+        with background() as after:
             for chunk in self._missing(writer):
                 some = writer.artefact.region(chunk)[2]
                 found = transport(self.points.where(some), self.lights, self.seen[:, some], self.part.term, bands[0])
@@ -166,7 +166,7 @@ class _Baking:
         steps = self._begin(store, "steps", (0,), (ENTRIES,), "uint8", growing=True)
         values = self._begin(store, "values", (0,), (ENTRIES,), "uint32", growing=True)
         begin = None
-        with behind() as after:
+        with background() as after:
             for chunk in self._missing(spans):
                 if begin is None:
                     begin = int(spans.read_chunk((chunk[0] - 1, 0)).max(initial=0)) if chunk[0] else 0

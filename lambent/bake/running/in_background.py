@@ -10,8 +10,8 @@ from typing import Any
 AHEAD = 32  # pieces of work that may queue
 
 
-class Behind:
-    """Does one piece of work after another on its own thread; see `behind`."""
+class Background:
+    """Does one piece of work after another on its own thread; see `background`."""
 
     def __init__(self, thread: ThreadPoolExecutor) -> None:
         self._thread, self._waiting = thread, list[Future[Any]]()
@@ -29,9 +29,9 @@ class Behind:
 
 
 @contextmanager
-def behind() -> Iterator[Behind]:
+def background() -> Iterator[Background]:
     """Completes all work on exit, even if the block raises an error."""
     with ThreadPoolExecutor(1) as thread:
-        work = Behind(thread)
+        work = Background(thread)
         yield work
         work.finish()

@@ -1,4 +1,4 @@
-"""Early light: finished regions of an unfinished light map, denoised for observers of the bake."""
+"""Finished regions of an unfinished light map, denoised for observers of the bake."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.store.store import Store
 
 
-class EarlyLight:
+class FinishedRegions:
     """Sends the light of written tiles to a watch, no more often than it requests.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Work behind the main thread: in order, all of it, and its errors are raised."""
+"""Work beside the main thread: in order, all of it, and its errors are raised."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from lambent.bake.running.in_background import AHEAD, behind
+from lambent.bake.running.in_background import AHEAD, background
 
 
 def test_work_is_done_in_order() -> None:
@@ -16,7 +16,7 @@ def test_work_is_done_in_order() -> None:
         time.sleep(0.002 if i % 3 == 0 else 0)
         done.append(i)
 
-    with behind() as after:
+    with background() as after:
         for i in range(3 * AHEAD):
             after.do(work, i)
     assert done == list(range(3 * AHEAD))
@@ -26,13 +26,13 @@ def test_the_error_of_work_is_raised() -> None:
     def fail() -> None:
         raise ValueError("no space")
 
-    with pytest.raises(ValueError, match="no space"), behind() as after:
+    with pytest.raises(ValueError, match="no space"), background() as after:
         after.do(fail)
 
 
 def test_what_was_given_is_done_though_the_block_fails() -> None:
     done: list[int] = []
-    with pytest.raises(KeyError), behind() as after:
+    with pytest.raises(KeyError), background() as after:
         after.do(time.sleep, 0.05)
         after.do(done.append, 1)
         raise KeyError
