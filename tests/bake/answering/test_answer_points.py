@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from lambent.bake.answering.patches import clustered
 from lambent.bake.answering.points import (
     MORE,
     MORE_RECEIVERS,
@@ -184,3 +186,13 @@ def test_transfer_between_patches_is_that_of_their_points() -> None:
     weight = np.array([[1.0, 1, 1, 0], [1, 1, 2, 2], [1, 1, 1, 1]])
     found = transfer_of(Rays.of(packed_rays(point, weight)), np.array([0, 0, 1]), np.array([1.0, 3.0, 9.0]), 3)
     assert np.allclose(found, [[(1 + 3 * 2) / 16, (2 + 3 * 4) / 16, 0], [1, 0, 0], [0, 0, 0]])
+
+
+@pytest.mark.parametrize("crossed", [False, True])
+def test_patches_are_as_many_as_asked_on_both_sides_together(crossed: bool) -> None:
+    spots = plane()
+    there = np.stack([spots.there[0], np.full(SIZE * SIZE, crossed)])
+    found = clustered(replace(spots, lit=there, there=there), np.ones(there.shape), 20)
+    front, back = found.of
+    assert found.count == 20 and len(np.unique(front)) == (10 if crossed else 20)
+    assert (found.paired[front] == (back if crossed else front)).all() and ((back >= 0) == crossed).all()
