@@ -53,9 +53,11 @@ def test_edits_of_all_kinds_show(folder: Path, monkeypatch: pytest.MonkeyPatch) 
     for row in edited:
         assert row["flip"] < row["unedited_flip"] and row["left_unedited"] == 0, row
         assert row["flip"] < 2 * baked["flip"] and row["relative_error"] < 0.1, row
-    wear = TracedRoom.wear
+    set_materials = TracedRoom.set_materials
     monkeypatch.setattr(
-        TracedRoom, "wear", lambda room, *worn: wear(room, *(worn if room._light is None else ({}, {})))
+        TracedRoom,
+        "set_materials",
+        lambda room, *states: set_materials(room, *(states if room._light is None else ({}, {}))),
     )
     stays = list(edits.rows_of(Store.open(folder), replace(effort, edits=1)))[1]
     assert stays["flip"] > colour["flip"] and stays["left_unedited"] > 0.05
