@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
@@ -39,14 +40,19 @@ def test_a_published_metal_passes_and_the_report_is_json():
     assert data["passed"] and np.shape(data["furnace"]["albedo"]) == (24, 4, 3) and len(data["sampler"]) == 3
 
 
-def test_more_light_than_arrives_is_a_warning_with_its_angle(quick):
+def test_more_light_than_arrives_is_a_warning_with_its_angle(few_samples):
     report = check(FOIL)
     assert report.passed and "theta 89" in report.warnings[0] and report.furnace.highest[0] > 1.5
 
 
-def test_a_material_that_would_light_up_a_room_fails(quick):
+def test_a_material_that_would_light_up_a_room_fails(few_samples):
     report = check(Material(lobes=(Lobe(mx=0.5, my=0.5, r0=1, alpha=1),)))
     assert not report.passed and "without bound" in report.failures[0]
+
+
+@pytest.fixture
+def few_samples(quick, monkeypatch):
+    monkeypatch.setattr(module, "check_sampler", partial(check_sampler, samples=1 << 16))
 
 
 class NotReciprocal(MaterialBSDF):
@@ -101,7 +107,7 @@ def test_furnace_of_a_tight_mirror():
     np.testing.assert_allclose(result.albedo[below_85], 1, atol=2e-3)
 
 
-def test_the_check_is_deterministic_and_shows_progress(quick):
+def test_the_check_is_deterministic_and_shows_progress(few_samples):
     seen = []
     first = check(FOIL, seed=3, progress=lambda done, total, what: seen.append((done, total, what)))
     assert first.to_json() == check(FOIL, seed=3).to_json()

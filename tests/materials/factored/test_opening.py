@@ -10,6 +10,8 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.opening import editable_of
+from lambent.materials.factored.tabulated import Grid
+from lambent.materials.fitting import factors
 from lambent.materials.measured.merl import SCALES, MerlTable, bin_centres, directions_of
 from lambent.materials.models import model_named
 from lambent.materials.models.model import Model
@@ -32,8 +34,9 @@ def test_a_document_s_path_opens_as_its_curves(tmp_path: Path) -> None:
     assert set(opened.editable.curves) == {"diffuse", "highlight along", "highlight across"}
 
 
-def test_a_merl_file_s_own_bins_are_exact(tmp_path: Path) -> None:
+def test_a_merl_file_s_own_bins_are_exact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A small table of MERL's layout that no product is."""
+    monkeypatch.setattr(factors, "FITTED", Grid(45, 24, 12, turns_d=2))
     shape = (20, 12, 16)
     theta_h, theta_d, phi_d = np.broadcast_arrays(*bin_centres(shape))
     wi, wo = directions_of(theta_h, theta_d, phi_d)
