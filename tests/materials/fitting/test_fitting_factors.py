@@ -30,6 +30,7 @@ def angles_of(wi: Floats, wo: Floats) -> dict[str, Floats]:
 @pytest.fixture
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """Grids of an eighth and less of the nodes, for speed."""
+    monkeypatch.setattr(factors, "KNOTS", {"theta_h": 60, "theta_d": 20, "theta_i": 16, "theta_o": 16})
     monkeypatch.setattr(factors, "FITTED", Grid(45, 24, 12, turns_d=2))
     monkeypatch.setattr(factors, "RATIOS", Grid(45, 24, 18))
     monkeypatch.setattr(factors, "FITTED_ANISOTROPIC", Grid(24, 12, 8, 8, turns_d=2))
