@@ -167,14 +167,6 @@ def test_an_interruption_is_one_line_and_130(lambent, monkeypatch, material, cau
     assert outcome.err.splitlines()[-1] == "lambent: interrupted; finished work is kept"
 
 
-def test_an_interrupted_fit_ends_its_bench(lambent, monkeypatch):
-    def interrupt(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("lambent.materials.fitting.gradient._descend", interrupt)
-    assert lambent("bench", "fit", "--quick").code == 130
-
-
 def test_an_interrupted_fit_gives_the_best_so_far_and_130(lambent, monkeypatch, tmp_path):
     def interrupt(*_, **__):
         raise KeyboardInterrupt

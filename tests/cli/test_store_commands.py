@@ -64,18 +64,6 @@ def test_exposure_as_ev100(lambent, refused, store, tmp_path):
     assert "--ev100" in line and "-57 to 71" in line and "--exposure" not in line
 
 
-def test_noise_of_the_light_map(lambent, refused, store, tmp_path):
-    from lambent.store.store import Store
-
-    file = tmp_path / "a.png"
-    common = ("render", store, "-o", file, "--size", "192x128", "--show", "noise")
-    assert "lambent bake" in refused(*common), "the store does not say"
-    assert not file.exists()
-    Store.open(store).put("light_map/noise", "light_map", np.full((4, 4), 0.2, np.float16), key="by hand")
-    assert lambent(*common, "--range", "1:100").code == 0
-    np.testing.assert_allclose(read_encoded(file)[-8, 20], false_colour(np.array(20.0), Range(1, 100)), atol=0.01)
-
-
 @pytest.mark.parametrize(
     ("options", "word"),
     [
@@ -95,15 +83,6 @@ def test_render_options(refused, store, tmp_path, monkeypatch, options, word):
     monkeypatch.chdir(tmp_path)
     assert word in refused("render", store, *options)
     assert not list(tmp_path.iterdir())
-
-
-def test_inspect_tells_a_damaged_chunk(lambent, tmp_path):
-    store = write_small_store(tmp_path / "s")
-    chunk = next(p for p in (store / "light_map/irradiance/c").rglob("*") if p.is_file())
-    chunk.write_bytes(b"damaged")
-    arrays = lambent("inspect", store, "--json").json["arrays"]
-    assert arrays["light_map/irradiance"].endswith("chunk is damaged")
-    assert arrays["geometry/faces"].endswith("complete")
 
 
 def test_bake_of_the_geometry(lambent, tmp_path):

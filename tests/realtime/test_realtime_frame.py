@@ -171,17 +171,6 @@ def test_display_image_is_exposed_and_encoded(device) -> None:
     np.testing.assert_allclose(renderer.display_image(state), srgb_encode(filmic(linear, -0.7)) * 255, atol=0.55)
 
 
-def test_progressive_frames_average(device) -> None:
-    """The mean of a series is the mean of its frames, whatever was drawn before."""
-    gloss = Material(name="m", lobes=(Lobe(mx=0.3, my=0.3, r0=1.0),))
-    renderer = Renderer(device, baked_scene({"sphere": sphere(0.62)}, gloss, studio(32)))
-    state = FrameState(CAMERA, 48, 36, integrator="qmc", n=4)
-    renderer.image(replace(state, accumulate=0, camera=FORWARD))
-    converged = renderer.converged(replace(state, antialias=False), 4 * 64)
-    frames = renderer.converged(replace(state, antialias=False, n=64), 4 * 64)
-    np.testing.assert_allclose(converged, frames, rtol=2e-4, atol=1e-5)  # the same samples in other frames
-
-
 def test_jitter_looks_right_of_and_below_the_middle_of_a_pixel() -> None:
     width, height, right_px, below_px = 48, 36, 0.25, 0.375
     per_px = 2 * 2.0 * np.tan(np.radians(FORWARD.fov_y_deg) / 2) / height  # metres in the target's plane

@@ -65,17 +65,6 @@ def test_position_index_grows_off_the_line_of_sight():
     assert position_index(0, 0.5, 0.866) == pytest.approx(3.35, abs=0.02)  # Levin's curve: 30 degrees above
 
 
-def test_sources_are_sorted_and_numbered():
-    found = glare(picture([(40, 0, 2, 3000), (0, 10, 4, 9000), (-30, 20, 3, 6000)], 100), VIEW)
-    assert [round(source.luminance, -2) for source in found.sources] == [9000, 6000, 3000]
-    assert (found.numbers.max(), found.numbers.min()) == (3, 0)
-    assert found.sources[1].azimuth_deg == pytest.approx(-30, abs=0.5) and found.sources[
-        1
-    ].elevation_deg == pytest.approx(20, abs=0.5)
-    rays, _ = VIEW.directions(SIDE, SIDE)
-    assert rays[found.numbers == 3][:, 0].min() > 0.5  # the dimmest is on the right
-
-
 def evalglare() -> Path | None:
     spec = importlib.util.find_spec("pyradiance")
     program = Path(spec.origin).parent / "bin" / "evalglare" if spec and spec.origin else None

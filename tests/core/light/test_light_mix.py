@@ -29,13 +29,6 @@ def test_factors_dim_and_tint_and_keep_luminance():
     assert dark_red == pytest.approx(red) and red[1:] == (0, 0)
 
 
-def test_a_mix_lists_what_is_not_as_baked():
-    mix = LightMix().changed("lamp", GroupMix(intensity=0.5)).changed("sky", GroupMix(intensity=1))
-    assert mix.groups == {"lamp": GroupMix(intensity=0.5)} and list(mix.factors) == ["lamp"]
-    assert mix.changed("lamp", AS_BAKED) == LightMix()
-    assert mix.of("nobody") == AS_BAKED
-
-
 def test_light_is_parsed_as_written():
     track = parse_light(["lamp=off", "desk lamp=0.3,2700K", "a=b=#ff0000", "sky=on,2"])
     mixes = {name: keys[0][1] for name, keys in track.groups.items()}
@@ -66,8 +59,3 @@ def test_tracks_change_evenly_between_the_times_of_each_group():
 def test_what_is_no_light_is_refused_in_one_line(texts, message):
     with pytest.raises(UserError, match=message):
         parse_light(texts)
-
-
-def test_tracks_go_forwards():
-    with pytest.raises(UserError, match="times do not increase"):
-        MixTrack({"lamp": ((1.0, AS_BAKED), (1.0, AS_BAKED))})

@@ -17,7 +17,6 @@ from lambent.realtime.gpu.device import WEBGPU_LIMITS, choose_adapter
 from lambent.realtime.gpu.shader_source import PACKAGE, shader_files
 from lambent.realtime.objects.unbaked import CAMERA
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.resources import device_needs
 from tests.realtime.lit_wall import wall_scene
 
 GLOSS = Material(name="m", kd=0.5, lobes=(Lobe(mx=0.1, my=0.1), Lobe(mx=0.2, my=0.2, side="transmission")))
@@ -54,13 +53,6 @@ def test_opengl_is_not_started() -> None:
     code = "from lambent.realtime.gpu.device import open_device; open_device(); print(open('/proc/self/maps').read())"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "vulkan" in done.stdout and "libEGL" not in done.stdout
-
-
-def test_a_large_scene_asks_for_what_it_needs(device) -> None:
-    scene = wall_scene(GLOSS, np.ones((6, 2, 2, 3)))
-    assert device_needs(scene) == {}
-    large = type(scene)(**{**vars(scene), "positions": np.broadcast_to(np.float32(0), (7_000_000, 3))})
-    assert device_needs(large) == {"max-buffer-size": 7_000_000 * 52}
 
 
 def test_no_two_shaders_have_one_name() -> None:

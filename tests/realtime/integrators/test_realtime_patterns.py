@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import erfinv
 
-from lambent.materials.document import Lobe, Material
+from lambent.materials.document import Lobe
 from lambent.realtime.integrators import patterns
 
 NS = (3, 5, 7, 9, 11, 13, 15, 17, 19, 40)
@@ -104,10 +104,3 @@ def test_fis_filters_share_out_the_sphere_of_slopes() -> None:
     rows = patterns.fis_table(lobe, 16)
     density = patterns.relative_density(rows[:, :2] / [lobe.mx, lobe.my])
     np.testing.assert_allclose(4.0 ** rows[:, 2] * density, 4 * np.pi * 0.03 / 16, rtol=1e-5)
-
-
-def test_more_samples_for_wider_lobes() -> None:
-    counts = [patterns.automatic_n(Material(lobes=(Lobe(mx=m, my=m),))) for m in (0.002, 0.01, 0.05, 0.15, 0.3, 0.6)]
-    assert counts == sorted(counts)
-    assert counts[0] == 1
-    assert counts[-1] == 19

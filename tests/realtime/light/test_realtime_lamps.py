@@ -134,14 +134,6 @@ def test_numpy_and_the_shader_take_out_as_many_groups() -> None:
     np.testing.assert_allclose(got, expected, atol=1e-4)
 
 
-def test_mirrors_keep_the_cube_map_and_its_samples(device) -> None:
-    renderer = Renderer(device, wall_scene(material((LOBES["rough"],)), lit(*lamps_of(LOBES["rough"]))))
-    narrow = material((Lobe(mx=0.004, my=0.004),))
-    for shown, shader in ((narrow, "rings.wgsl"), (material((LOBES["rough"],)), "lamps.wgsl")):
-        (draw,) = draws_of(replace(STATE, materials={"m": shown}), renderer.resources)
-        assert draw.shader == shader
-
-
 def test_faint_highlights_need_neither_lamps_nor_many_samples(device) -> None:
     """A window on rough varnish adds little to what is lit; a lamp on it, or the window on metal, is seen."""
     rough = Lobe(mx=0.2, my=0.2, r0=0.04)

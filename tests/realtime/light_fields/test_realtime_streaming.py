@@ -106,16 +106,6 @@ def test_points_needed_are_those_named_where_the_object_faces_the_eye(scene: Bak
     assert set(NeededPoints(triangles, wild, field).of_view(eye, AROUND)) <= set(range(64))
 
 
-def test_the_back_of_a_sheet_is_seen_and_that_of_a_closed_body_is_not(scene: BakedScene, field: LightField) -> None:
-    """Half of the ball alone, seen into: its inner side names its points."""
-    triangles, uv2 = scene.positions[scene.faces].astype(float), scene.uv2[scene.faces].astype(float)
-    eye = np.array(CAMERA.position)
-    far = (triangles @ eye).max(axis=1) < 0
-    needed = NeededPoints(triangles[far], uv2[far], field).of_view(eye, AROUND)
-    behind = field.normals @ eye < -0.6 * np.linalg.norm(eye)
-    assert behind.sum() > 10 and set(np.flatnonzero(behind)) <= set(needed.tolist())
-
-
 def test_a_budget_below_one_map_is_refused(tmp_path: Path, field: LightField) -> None:
     store = put_ball(tmp_path / "ball.store", field)
     with pytest.raises(UserError, match="--light-field-mb"):

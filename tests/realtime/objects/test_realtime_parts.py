@@ -12,7 +12,6 @@ from lambent.core.views.camera import Camera, pixel_rays
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.light.baked import BakedScene, Probe
-from lambent.realtime.objects.clusters import Seen
 from lambent.realtime.objects.parts import neighbouring_faces, reaches
 from lambent.realtime.objects.unbaked import unbaked_scene
 from lambent.realtime.renderer import Renderer
@@ -170,11 +169,3 @@ def test_faces_out_of_reach_are_left_out() -> None:
     far = [o.model_copy(update={"borders": ((0.0, 0.0, 1.0, -5.0),)}) for o in scene.record.objects]
     none = replace(scene, record=scene.record.model_copy(update={"objects": tuple(far)}))
     assert not any(neighbouring_faces(none).values())
-
-
-def test_runs_are_cut_to_a_range_of_faces() -> None:
-    seen = Seen(np.array([0, 1000, 3000]), np.array([500, 2000, 4000]))
-    assert seen.of(0, 500) == [(0, 500)]
-    assert seen.of(400, 800) == [(400, 100), (1000, 200)]
-    assert seen.of(1500, 100) == [(1500, 100)]
-    assert seen.of(500, 500) == [] and seen.of(4000, 10) == []

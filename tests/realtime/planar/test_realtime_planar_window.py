@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,6 @@ import numpy as np
 import lambent.realtime.planar.planar_view
 from lambent.core.views.camera import Camera
 from lambent.realtime.frame_state import FrameState
-from lambent.realtime.integrators.integrators import INTEGRATORS
-from lambent.realtime.objects.draws import draws_of
-from lambent.realtime.planar.planar_buffer import mirrored_by
 from lambent.realtime.planar.planar_view import MARGIN_PX, STEP_PX, covered_share, on_screen, planar_views
 from lambent.realtime.planar.reflector_faces import ReflectorFaces, shares_on_screen
 from lambent.realtime.renderer import Renderer
@@ -83,22 +79,6 @@ def test_a_tile_that_shares_a_lobe_needs_fewer_samples() -> None:
     assert shared.planar_samples(rough) < shared.samples(rough)
     assert shared.planar_samples(smooth) == shared.samples(smooth)
     assert FrameState(CAMERA, n=19).planar_samples(rough) == 19, "what is asked for"
-
-
-def test_one_sample_serves_what_a_reflector_blurs(device: Any) -> None:
-    """A glossy ball over a floor: highlights of its lamps matter in a sharp mirror alone."""
-    how = {}
-    for m in (0.003, 0.15):
-        renderer = Renderer(device, scene_of(mirror(m)))
-        state = FrameState(CAMERA, WIDTH, HEIGHT)
-        (view,) = planar_views(frame_of(CAMERA), [FLOOR], WIDTH, HEIGHT, 4, {"floor": m})
-        draws = draws_of(state, renderer.resources, {"floor"})
-        for integrator in ("lamps", "rings"):
-            frame = SimpleNamespace(state=replace(state, integrator=integrator), draws=draws)
-            how[m, integrator] = mirrored_by(frame, view)
-        assert how[m, "rings"] == (INTEGRATORS["rings"], 3)
-    assert how[0.003, "lamps"] == (INTEGRATORS["lamps"], 3)
-    assert how[0.15, "lamps"] == (INTEGRATORS["rings"], 1)
 
 
 AHEAD = Camera(name="c", position=(0, 0, 3), target=(0, 0, 0), fov_y_deg=60)

@@ -52,15 +52,6 @@ def test_glass_lets_its_share_pass(device: Any, camera: Camera, integrator: str)
         np.testing.assert_allclose(middle(seen), middle(bare) * passed(material, cosine), rtol=0.01, atol=1e-4)
 
 
-def test_panes_follow_each_other_in_any_order(device: Any) -> None:
-    low, high = (pane_at(1.0), "clear"), (pane_at(1.5), "red")
-    one = shown(device, glowing({"a": low, "b": high}))
-    other = shown(device, glowing({"a": high, "b": low}))
-    np.testing.assert_array_equal(one, other)
-    expected = middle(shown(device, glowing({}))) * passed(CLEAR, 1.0) * passed(RED, 1.0)
-    np.testing.assert_allclose(middle(one), expected, rtol=0.01, atol=1e-4)
-
-
 def test_a_solid_has_two_faces(device: Any) -> None:
     solid = placed(box((2.0, 0.1, 2.0)), (0.0, 1.0, 0.0))
     seen = middle(shown(device, glowing({"solid": (solid, "clear")})))

@@ -15,9 +15,9 @@ from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.light.baked import BakedScene
 from lambent.realtime.renderer import Renderer
-from lambent.scenes.geometry import box, patch, placed, sphere
+from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import MaterialTextures, Mesh, Texture
-from tests.realtime.sun.test_realtime_sun import DOWN, HEIGHT, IRRADIANCE, SIZE, TOWARDS, floor, places, plate, scene
+from tests.realtime.sun.test_realtime_sun import DOWN, IRRADIANCE, SIZE, TOWARDS, floor, places, scene
 
 Floats = NDArray[np.floating]
 GREY = Material(name="grey", kd=0.5)
@@ -94,17 +94,6 @@ def test_edges_of_panes_are_sharp_and_lie_where_the_sun_draws_them(device: Any) 
     beyond = np.abs(x) > 0.03
     assert np.allclose(share[beyond], (x > 0)[beyond], atol=0.01)
     assert share.mean() == pytest.approx((x > 0).mean(), abs=0.01)
-
-
-def test_penumbra_of_a_frame_is_tinted_as_its_pane_is(device: Any) -> None:
-    """A pane that just fills the opening of a plate: no plain light comes in beside it."""
-    parts = {"plate": (plate(), "grey"), "pane": (placed(box((1.0, 0.02, 1.0)), (0, HEIGHT, 0)), "red")}
-    found = lit(device, glazed(parts), frames=16)
-    expected = passed(RED) ** 2
-    some = found[..., 0] > 0.02
-    assert some.sum() > 300 and (found[..., 0][some] < 0.9 * expected[0]).sum() > 30
-    ratio = found[..., 1][some] / found[..., 0][some]
-    assert np.quantile(ratio, 0.98) < 1.3 * expected[1] / expected[0] and found[..., 2].max() < 0.05
 
 
 def test_bowl_dims_by_the_slant_of_each_place(device: Any) -> None:
