@@ -143,6 +143,21 @@ def test_a_screen_casts_the_shadow_of_its_checks(tmp_path) -> None:
     np.testing.assert_allclose(np.array(e.x).reshape(8, 8), 3 * (1 - SCREEN[..., 0]), rtol=1e-5)
 
 
+def test_cached_light_is_tinted_by_the_diffuse_texture() -> None:
+    """kd/pi of the front's irradiance, pi, and kt_d/pi of the back's, 2 pi, times the texture."""
+    import mitsuba as mi
+
+    from lambent.bake.light.cache import LightMapCache
+    from lambent.bake.tracing.scene_builder import SceneBuilder
+
+    scene = wall(Material(kd=0.4, kt_d=0.2), MaterialTextures(diffuse=constant(0.5, 1.0, 0.25)))
+    builder = SceneBuilder(scene, {"wall": np.full((4, 2), 0.5)}, diffuse=False)
+    front, back = (np.full((2, 2, 3), irradiance) for irradiance in (np.pi, 2 * np.pi))
+    si = builder.build().ray_intersect(mi.Ray3f(mi.Point3f(0.1, 0.1, 1), mi.Vector3f(0, 0, -1)))
+    shown = np.array(LightMapCache(builder, front, back)(si, mi.Bool(True))).ravel()
+    np.testing.assert_allclose(shown, [0.4, 0.8, 0.2], rtol=1e-4)
+
+
 def test_diffuse_light_on_bumps_is_that_of_path_tracing(adapter, tmp_path) -> None:
     """A wall whose halves' normals lean to the left and to the right, between a lamp and a lit wall."""
     from lambent.bake.bake import bake
