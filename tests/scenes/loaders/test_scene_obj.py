@@ -113,7 +113,7 @@ newmtl plastic
 Kd 0.8 0.8 0.8
 Ks 0.5 0.5 0.5
 Ns 198
-map_Kd -s 2 3 1 -o 0.5 0 0 maps\wood grain.png
+map_Kd -blendu on -blendv on -boost 1 -cc on -clamp off -type sphere -mm 0 1 -s 2 3 1 -o 0.5 0 0 maps\wood grain.png
 map_d holes.png
 map_Bump flat.png
 newmtl mirror

@@ -128,6 +128,10 @@ kind = "directional"
 direction = [0.0, -1.0, 0.0]
 lux = 1790.0
 [[lights]]
+kind = "directional"
+direction = [0.0, -1.0, 0.0]
+lux = 0.0
+[[lights]]
 kind = "ies"
 file = "lamp.ies"
 position = [0.0, 2.0, 0.0]
@@ -144,7 +148,7 @@ def test_lamps_in_photometric_units(tmp_path: Path) -> None:
     even = "TILT=NONE\n1 -1 1 3 1 1 2 0 0 0 1 1 1\n0 90 180\n0\n7 7 7\n"
     (tmp_path / "lamp.ies").write_text(even)
     scene = load_scene(written(tmp_path, MATERIALS + LAMPS))
-    point, spot, far, luminaire = scene.lights
+    point, spot, far, unlit, luminaire = scene.lights
     assert isinstance(point, PointLight) and isinstance(spot, PointLight) and isinstance(luminaire, IesLight)
     assert photometric(np.array(point.intensity)) == pytest.approx(100, rel=1e-5)
     assert point.intensity[0] == pytest.approx(4 * point.intensity[2])
@@ -153,6 +157,7 @@ def test_lamps_in_photometric_units(tmp_path: Path) -> None:
     lumens = 2 * np.pi * photometric(np.array(spot.intensity)) * (falloff[1:] + falloff[:-1]).sum() / 2 * x[1]
     assert lumens == pytest.approx(1000, rel=1e-4)
     assert isinstance(far, DirectionalLight) and far.irradiance == pytest.approx((10, 10, 10))
+    assert isinstance(unlit, DirectionalLight) and unlit.irradiance == (0, 0, 0)
     assert 7 * photometric(np.array(luminaire.scale)) == pytest.approx(50, rel=1e-5)
     assert luminaire.aim == (1, 0, 0) and tmp_path / "lamp.ies" in scene.sources
     lamp, ball = scene.object("lamp"), scene.object("sphere")
