@@ -127,12 +127,12 @@ def test_a_lobe_becomes_retro_and_turns_back(editor):
 
 def test_restrictions_of_a_fit():
     restrictions = Restrictions()
-    material = Material(kd=(0.1, 0.2, 0.3), lobes=(Lobe(mx=0.1, my=0.2, r0=(0.2, 0.3, 0.4), k=0.5),))
+    material = Material(kd=(0.1, 0.2, 0.2), lobes=(Lobe(mx=0.1, my=0.2, r0=(0.2, 0.3, 0.4), k=0.5),))
     for name in ("kd", "ks", "r0", "my_2"):
         restrictions.fix(name, True)
     restrictions.narrow("mx", (0.05, 0.3))
     fix, ranges, unknown = restrictions.for_fit(material, 1)
-    assert fix == {"kd": (0.1, 0.2, 0.3), "ks": 0.5, "r0": pytest.approx(0.3)}
+    assert fix == {"kd": (0.1, 0.2, 0.2), "ks": 0.5, "r0": pytest.approx(0.3)}
     assert ranges == {"mx": (0.05, 0.3)} and unknown == ["my_2"]
     restrictions.fix("mx", True)
     assert restrictions.ranges == {}, "what is fixed has no interval"
