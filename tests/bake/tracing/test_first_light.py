@@ -23,7 +23,7 @@ from lambent.core.geometry.directions import normalize
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import DirectionalLight, PointLight, Scene, SceneObject
 from tests.bake.sky.test_sun import SKY, TOWARDS, disc, environment_file, suns, wall_with_an_opening
-from tests.bake.small_scenes import GREY
+from tests.bake.small_scenes import BLACK, GREY
 
 Floats = NDArray[np.floating]
 
@@ -91,9 +91,9 @@ def test_sky_has_no_sun_and_lamps_stay(tmp_path: Path) -> None:
 
 def test_a_scene_of_the_sun_alone_is_dark() -> None:
     light = DirectionalLight(tuple(-TOWARDS), (3.0, 2.0, 1.0))
-    whole, _, beside = traced_scene(Scene("sun", wall_with_an_opening()[:1], {"grey": GREY}, lights=(light,)))
-    up = np.array([[0.0, 1.0, 0.0]])
+    whole, _, beside = traced_scene(Scene("sun", wall_with_an_opening()[:1], {"grey": BLACK}, lights=(light,)))
+    up = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
     points = path_tracer.Points(*(vectors(mi.Vector3f, v) for v in (0 * up + 0.3, up, up)))
-    sampler = independent(0, 1)
+    sampler = independent(0, 2)
     value = path_tracer.irradiance(whole, sampler, points, sampler.next_2d(), sampler.next_2d(), 3, None, beside)
     assert not array_of(value).any()
