@@ -13,6 +13,7 @@ from lambent.scenes.geometry import (
     extrusion,
     lathe,
     signed_volume,
+    smooth_curve,
     sphere,
     tube,
     turn,
@@ -92,6 +93,7 @@ def test_catmull_rom_passes_its_points_and_its_derivative_is_its_slope() -> None
     points = np.random.default_rng(1).normal(size=(6, 3))
     for closed in (False, True):
         assert np.allclose(catmull_rom(points, np.arange(6.0), closed)[0], points)
+        assert np.allclose(smooth_curve(points, 3, closed)[0][: 3 * 5 + 1 : 3], points)
         t, h = np.linspace(0.1, 4.8, 30), 1e-5
         slope = (catmull_rom(points, t + h, closed)[0] - catmull_rom(points, t - h, closed)[0]) / (2 * h)
         assert np.allclose(catmull_rom(points, t, closed)[1], slope, atol=1e-6)
