@@ -71,10 +71,14 @@ def test_leaves_volumes_and_what_is_not_read(tmp_path: Path) -> None:
     assert material.kd == pytest.approx((0.72,) * 3) and material.kt_d == pytest.approx((0.024, 0.192, 0.048))
     assert "material m: ignored: KHR_materials_sheen" in scene.warnings
     volume = {"thicknessFactor": 2, "attenuationDistance": 1, "attenuationColor": [0.5, 0.9, 1]}
-    glass = {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": volume}
+    glass: dict[str, Any] = {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": volume}
     look = {"name": "m", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0}, "extensions": glass}
     (through,) = loaded(tmp_path, textured(look, [])).materials["m"].transmission_lobes
     assert through.k == pytest.approx((0.25, 0.81, 1), rel=1e-3)
+    png(tmp_path / "through.png", [[[255, 0, 255], [0, 0, 255]]])
+    glass["KHR_materials_transmission"]["transmissionTexture"] = {"index": 0}
+    (through,) = loaded(tmp_path, textured(look, ["through.png"])).materials["m"].transmission_lobes
+    assert through.k == pytest.approx((0.125, 0.405, 0.5), rel=1e-3)
 
 
 def test_specular_glossiness(tmp_path: Path) -> None:
