@@ -34,7 +34,7 @@ def corners(kind: type[Model]) -> list[Model]:
 
 def assert_sampled(model: Model) -> None:
     for theta_deg in (50.0, 85.0):
-        one = check.check_sampler(model, theta_deg, 30.0, samples=1 << 18)
+        one = check.check_sampler(model, theta_deg, 30.0, samples=1_000_000)
         assert one.p_value > 1e-4, one
         assert abs(one.pdf_integral + one.rejected_share - 1) < check.INTEGRAL_LIMIT, one
         tolerance = 5 * one.albedo_error + check.INTEGRAL_LIMIT * one.albedo_quadrature
