@@ -29,7 +29,7 @@ from lambent.bake.running.watch import Watch
 from lambent.bake.running.workers import InProcess, Workers
 from lambent.bake.surfaces.backs import find_backs
 from lambent.bake.surfaces.cuts import cut_for_viewers
-from lambent.bake.surfaces.visible_triangles import Sight
+from lambent.bake.surfaces.visible_triangles import TriangleVisibility
 from lambent.bake.transport.view import View
 from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
@@ -143,7 +143,7 @@ def bake(
     with Store.create(store_path, inputs_of(scene)) as store:
         store.set_document(METHODS, methods)
         timed = Stopwatch(store)
-        undivided, sight = scene, Sight(scene)
+        undivided, sight = scene, TriangleVisibility(scene)
         if "geometry" in order:
             sight = cut_for_viewers(divided(sight, store, progress, timed), store, timed)
             find_backs(sight, store, timed, progress, anew=not resume)

@@ -27,7 +27,7 @@ from lambent.bake.running.watch import Watch
 from lambent.bake.running.workers import InProcess, Workers
 from lambent.bake.surfaces.atlas import Atlas, separated
 from lambent.bake.surfaces.backs import backs_of, crossed_by_light
-from lambent.bake.surfaces.visible_triangles import Sight
+from lambent.bake.surfaces.visible_triangles import TriangleVisibility
 from lambent.bake.transport.view import View
 from lambent.core.progress import Progress, silent
 from lambent.materials.factored.of_lobes import of_material
@@ -78,7 +78,7 @@ class BakeContext:
     workers: Workers = field(default_factory=InProcess)
     timed: Timed = untimed
     watch: Watch = field(default_factory=Watch)
-    sight: Sight | None = None
+    sight: TriangleVisibility | None = None
     _keys: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def settings(self, kind: str) -> Any:

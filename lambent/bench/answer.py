@@ -31,7 +31,7 @@ from lambent.baked.answering.answer import answered, upsampled
 from lambent.baked.answering.stored import StoredAnswer, answer_name, read_answer
 from lambent.bench.measuring.answer_times import Edit, changed, darkened, dragged, timed
 from lambent.bench.measuring.bake_context import context_of
-from lambent.bench.scenes.views import given_or_baked
+from lambent.bench.scenes.views import inputs_or_baked
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.plain import Triple
@@ -73,7 +73,7 @@ FULL, QUICK = Effort(), Effort(300, 256, 2, 5, "builtin:box", 1024, 2.0)
 
 def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
     """Rows of the inputs, which are baked stores; without inputs, of a scene baked here in `preview`."""
-    with given_or_baked(inputs, effort.scene, progress) as stores:
+    with inputs_or_baked(inputs, effort.scene, progress) as stores:
         rows = [row for store in stores for row in rows_of(store, effort, progress)]
     return {"rows": rows, "summary": {f"{row['scene']} {row['edit']}": row["rms"] for row in rows}}
 

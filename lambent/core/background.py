@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def beside_frames(is_software: bool) -> Iterator[None]:
+def yielding_to_frames(is_software: bool) -> Iterator[None]:
     """Run numba's loops that this thread calls in one thread, if an adapter in software (`is_software`) draws frames.
 
     Between loops, numba's other threads spin on cores that the frames need.

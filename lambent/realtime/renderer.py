@@ -33,7 +33,7 @@ from lambent.realtime.light.light_mixer import LightMixer
 from lambent.realtime.light_fields.streaming import Streaming
 from lambent.realtime.objects.clusters import Clusters
 from lambent.realtime.objects.draws import draws_of, panes_of
-from lambent.realtime.overlays.computed_picture import Given
+from lambent.realtime.overlays.computed_picture import UploadedPicture
 from lambent.realtime.overlays.discs import Discs
 from lambent.realtime.overlays.outline import Outline
 from lambent.realtime.passes.accumulate import AccumulatePass
@@ -133,9 +133,9 @@ class Renderer:
         """What draws discs at places in the scene."""
         return Discs(self._layouts, self.resources, self._clusters)
 
-    def given(self) -> Given:
+    def uploaded_picture(self) -> UploadedPicture:
         """What shows radiance that was made elsewhere as frames show theirs."""
-        return Given(self._layouts, self.resources)
+        return UploadedPicture(self._layouts, self.resources)
 
     def base(self, radiance: Any, state: FrameState) -> None:
         """Draw the next frame with `FrameState.over` over a texture (rgba16float) of radiance that shows a state."""
@@ -148,9 +148,11 @@ class Renderer:
             return None
         if panes_of(before, self.resources) or panes_of(state, self.resources):
             return None  # laid over what may be drawn anew
-        given = self.scene.record.materials
+        materials = self.scene.record.materials
         return frozenset(
-            name for name in given if state.materials.get(name, given[name]) != before.materials.get(name, given[name])
+            name
+            for name in materials
+            if state.materials.get(name, materials[name]) != before.materials.get(name, materials[name])
         )
 
     def finish(self) -> None:

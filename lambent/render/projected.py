@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from lambent.core.arrays import Floats
 from lambent.core.progress import Progress, part_of, silent
-from lambent.core.views.around import Around, face_px
 from lambent.core.views.camera import Camera
+from lambent.core.views.panorama import Panorama, face_px
 from lambent.core.views.projections import Projection
 from lambent.render.images import ANYWHERE, Images, Settings
 from lambent.scenes.scene import Variant
@@ -32,7 +32,7 @@ class Projected(Images):
         self._faces.apply_variant(variant)
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
-        around = Around(self.settings.view_of(camera), self.settings.width, self.settings.height)
+        around = Panorama(self.settings.view_of(camera), self.settings.width, self.settings.height)
         count, self._faces.time_s = len(around.cameras), self.time_s
         for index, face in enumerate(around.cameras):
             part = part_of(progress, index / count, (index + 1) / count, "faces around the eye")

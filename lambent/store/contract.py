@@ -326,7 +326,7 @@ def radiance_unit(store: Store, name: str) -> float:
     return float(unit)
 
 
-def sun_beside(store: Store) -> SunRecord | None:
+def sun_left_out(store: Store) -> SunRecord | None:
     """The sun whose direct light the light map leaves out; None if it has all light. `UserError` if it is invalid."""
     name = f"light_map/{SIDES[0]}"
     said = store.artefact(name).meta.get("sun") if name in store else None

@@ -16,7 +16,7 @@ from lambent.core.pictures.images import write_image
 from lambent.core.surroundings import Axis, Layout
 from lambent.scenes.scene import ImageEnvironment, SunSky
 from lambent.scenes.sky.environment_images import orientation
-from lambent.store.contract import sun_beside
+from lambent.store.contract import sun_left_out
 from tests.bake.small_scenes import TINY, plane
 
 SUN = normalize(np.array([0.5, 0.6, 0.3]))
@@ -35,7 +35,7 @@ def test_sky_and_sun_carry_the_path_tracers_energy(tmp_path: Path, radius_deg: f
         replace(plane(), environment=sky), tmp_path / "s", quality=TINY.changed(light_map={"samples": (128, 128)})
     )
     raw = store.read("light_map/traced")
-    sun = sun_beside(store)
+    sun = sun_left_out(store)
     assert sun is not None
     direct = np.multiply(sun.irradiance, sun.direction[1])  # which the light map leaves out
     traced = raw[..., :3].sum(axis=(0, 1, 2)) / raw[..., 3].sum() + direct

@@ -7,7 +7,7 @@ import threading
 import numba
 import pytest
 
-from lambent.core.background import beside_frames
+from lambent.core.background import yielding_to_frames
 
 
 @pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="one core")
@@ -16,9 +16,9 @@ def test_loops_beside_frames_take_one_thread_and_those_of_other_threads_all() ->
 
     def work() -> None:
         for is_software in (True, False):
-            with beside_frames(is_software):
+            with yielding_to_frames(is_software):
                 seen.append(numba.get_num_threads())
-        with pytest.raises(ValueError, match="fault"), beside_frames(is_software=True):
+        with pytest.raises(ValueError, match="fault"), yielding_to_frames(is_software=True):
             raise ValueError("fault")
         seen.append(numba.get_num_threads())
 

@@ -128,7 +128,7 @@ def sender_means(spots: Spots, senders: Indices, values: Floats, count: int) -> 
     return np.asarray(total / np.maximum(area, 1e-30)[:, None])
 
 
-def texels_around(spots: Spots, senders: Indices, points: GatherPoints, most: int = AROUND) -> Indices:
+def neighbouring_texels(spots: Spots, senders: Indices, points: GatherPoints, most: int = AROUND) -> Indices:
     """(n, most) texels for which each point sends, among `senders` (2, K): some, or all in turn; itself without any."""
     found = np.broadcast_to(points.texel[:, None], (len(points.texel), most)).copy()
     for side in range(2):

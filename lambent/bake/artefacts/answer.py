@@ -236,7 +236,7 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
         refined_points,
         seeing,
     )
-    from lambent.bake.answering.transfer import Between, light_seen, sender_means, texels_around, transfer_of
+    from lambent.bake.answering.transfer import Between, light_seen, neighbouring_texels, sender_means, transfer_of
 
     how: Settings = context.settings(KIND)
     width = context.traced.texels.width
@@ -272,7 +272,7 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
         run_tiles(writer, tile, seed=context.seed, progress=context.progress, what=what)
         writer.finish()
 
-    gather(RAYS[0], points, texels_around(spots, closest, points), how.gather_rays, how.gather_rays, "gathering")
+    gather(RAYS[0], points, neighbouring_texels(spots, closest, points), how.gather_rays, how.gather_rays, "gathering")
     of_contacts, kept = max(how.gather_rays // 2, how.receiver_rays), how.receiver_rays
     gather(RAYS[1], receivers, receivers.texel[:, None], of_contacts, kept, "gathering beside contacts")
     sending = Rays.of(np.moveaxis(context.store.read(answer_name("rays")), 0, -1))

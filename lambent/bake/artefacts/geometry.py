@@ -11,7 +11,7 @@ from lambent.bake.quality import QualityName
 from lambent.bake.running.keys import geometry_inputs, key_of
 from lambent.bake.surfaces.atlas import merged, object_records, unwrap
 from lambent.bake.surfaces.cuts import longest_piece
-from lambent.bake.surfaces.visible_triangles import Sight
+from lambent.bake.surfaces.visible_triangles import TriangleVisibility
 from lambent.core.plain import triple
 from lambent.scenes.reflectors import Reflector, find_reflectors
 from lambent.scenes.scene import Scene
@@ -46,7 +46,7 @@ def bake(context: BakeContext) -> None:
     from lambent.bake.tracing.seen.viewed import texel_sizes
 
     texels, longest_m = context.settings(KIND).texels, longest_piece(context.store)
-    sight = context.sight or Sight(context.scene)
+    sight = context.sight or TriangleVisibility(context.scene)
     atlas = unwrap(context.scene, texels, context.progress, partial(texel_sizes, sight), longest_m)
     sight.forget()
     meta = {"light_map_size": [atlas.width, atlas.height]}

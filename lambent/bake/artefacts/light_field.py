@@ -30,7 +30,7 @@ from lambent.store.contract import LIGHT_FIELD_CHOICE, light_field_name, needs_p
 from lambent.store.store import Array
 
 if TYPE_CHECKING:
-    from lambent.bake.light_fields.acquisition import Around
+    from lambent.bake.light_fields.acquisition import Surroundings
     from lambent.bake.light_fields.choosing import Chooser
     from lambent.bake.light_fields.placing import Placed, Placing
     from lambent.bake.light_fields.sample_map import FindExits
@@ -73,11 +73,11 @@ class Traced:
     """
 
     placing: Placing
-    around: Around
+    around: Surroundings
     unit: float
-    without: Callable[[str], Around]
+    without: Callable[[str], Surroundings]
 
-    def seen(self, name: str, wish: LightFieldWish) -> Around:
+    def seen(self, name: str, wish: LightFieldWish) -> Surroundings:
         """What points of an object see."""
         return self.without(name) if wish.without_object else self.around
 
@@ -200,7 +200,7 @@ def _traced(context: BakeContext) -> Traced:
     depth = MIRROR_DEPTH if by_map else context.settings("light_map").max_depth
     seen, kind = around(traced, maps if by_map else None, depth), {"diffuse": not by_map}
 
-    def without(name: str) -> Around:
+    def without(name: str) -> Surroundings:
         return replace(seen, scene=traced.builder(**kind).build(leave_out={name}))
 
     placing = Placing(traced.builder(**kind), traced.whole(**kind))

@@ -30,7 +30,7 @@ BENEATH = 0.25  # sine of the angle under a point's horizon from where on only s
 
 
 @dataclass(frozen=True)
-class Around:
+class Surroundings:
     """The Mitsuba scene that points see; with a `cache` it is without diffuse terms. Paths meet `depth` surfaces.
 
     The disc of a `sun` is left out where nothing hides it: pixels add it by themselves, as far as they see it.
@@ -58,8 +58,8 @@ class _First:
 
 
 def radiance_maps(
-    around: Around, points: Floats, texels: int, strata: int, seed: int, onward: int = 1, normals: Floats | None = None,
-    covers: bool = False,
+    around: Surroundings, points: Floats, texels: int, strata: int, seed: int, onward: int = 1,
+    normals: Floats | None = None, covers: bool = False,
 ) -> tuple[NDArray[np.float32], Flags]:  # fmt: skip
     """Maps (P, texels, texels, 3) of the radiance that arrives at points (P, 3), and which texels show a surface.
 
@@ -109,7 +109,7 @@ class TracedMaps:
 
     dtype: np.dtype[Any] = np.dtype(np.float32)
 
-    def __init__(self, around: Around, points: Floats, texels: int, seed: int) -> None:
+    def __init__(self, around: Surroundings, points: Floats, texels: int, seed: int) -> None:
         self._around, self._points, self._seed = around, points, seed
         self.shape = len(points), texels, texels, 3
         self._light = np.zeros((self.size // 3, 3), np.float32)  # of all texels, flat
@@ -158,7 +158,7 @@ def _beneath(normals: Floats, texels: int) -> Flags:
 
 
 def _parted(
-    around: Around, points: Floats, texels: int, index: Indices, solid: Flags, strata: int, onward: int, seed: int
+    around: Surroundings, points: Floats, texels: int, index: Indices, solid: Flags, strata: int, onward: int, seed: int
 ) -> NDArray[np.float32]:
     """Light (k, 3) of texels `index` (k,), numbered through the maps of points, in strata x strata parts.
 
@@ -182,7 +182,7 @@ def _parted(
     return found
 
 
-def _first(around: Around, ray: Any) -> _First:
+def _first(around: Surroundings, ray: Any) -> _First:
     si = rays.intersect(around.scene, ray, mi.Bool(True), rays.has_holes(around.scene))
     light = around.without_sun(si.emitter(around.scene).eval(si), ray, si)
     mirrors = si.is_valid()
@@ -192,7 +192,7 @@ def _first(around: Around, ray: Any) -> _First:
     return _First(light, mirrors, si.is_valid())
 
 
-def _radiance(around: Around, ray: Any, onward: int, seed: int) -> tuple[Any, Any]:
+def _radiance(around: Surroundings, ray: Any, onward: int, seed: int) -> tuple[Any, Any]:
     """Radiance (mi.Color3f) along rays, from glossy surfaces by the mean of `onward` paths; which met a surface."""
     first = _first(around, ray)
     light, met = first.light, first.met

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.bake.light_fields.acquisition import Around
+from lambent.bake.light_fields.acquisition import Surroundings
 from lambent.bake.light_fields.choice import MOST_TRIED, worth_trying
 from lambent.bake.light_fields.facing import turned_to_viewers
 from lambent.bake.light_fields.placing import Placing
@@ -40,7 +40,7 @@ class Chooser:
     """Tries light fields on objects of a scene, whose probes a store holds; viewers stand at `places` (m, 3)."""
 
     def __init__(
-        self, scene: Scene, store: Store, placing: Placing, around: Around, places: Floats, texels: int, seed: int
+        self, scene: Scene, store: Store, placing: Placing, around: Surroundings, places: Floats, texels: int, seed: int
     ) -> None:
         """`texels` are those along a side of the maps that will be baked."""
         self._scene, self._store, self._texels, self._seed = scene, store, texels, seed

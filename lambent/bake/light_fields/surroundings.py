@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from lambent.bake.light.cache import LightMapCache
-from lambent.bake.light_fields.acquisition import Around
+from lambent.bake.light_fields.acquisition import Surroundings
 from lambent.bake.tracing.lights.sun import Sun, SunRays
 from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
 from lambent.bake.tracing.traced_scene import TracedScene
@@ -19,7 +19,7 @@ from lambent.scenes.scene import Scene
 Maps = tuple[Floats, Floats | None]  # the light map's irradiance (H, W, 3), and that of the other sides
 
 
-def around(traced: TracedScene, maps: Maps | None, depth: int, bare: Collection[str] = ()) -> Around:
+def around(traced: TracedScene, maps: Maps | None, depth: int, bare: Collection[str] = ()) -> Surroundings:
     """The whole scene, lit by the light map, or without `maps` by paths that meet `depth` surfaces.
 
     Objects in `bare` have lost their lobes, so that they show their diffuse light alone.
@@ -27,12 +27,12 @@ def around(traced: TracedScene, maps: Maps | None, depth: int, bare: Collection[
     diffuse = maps is None
     if not bare:
         cache = None if maps is None else traced.cache(*maps)
-        return Around(traced.whole(diffuse=diffuse), cache, depth, traced.sun)
+        return Surroundings(traced.whole(diffuse=diffuse), cache, depth, traced.sun)
     usual, scene = traced.builder(diffuse=diffuse), without_lobes(traced.scene, bare)
     builder = SceneBuilder(scene, traced.atlas.uv2, diffuse=diffuse, measured=usual.measured, sampling=usual.sampling())
     whole = builder.build()
     sun = None if traced.sun is None else SunRays(traced.sun, whole)
-    return Around(whole, None if maps is None else LightMapCache(builder, *maps, sun), depth, traced.sun)
+    return Surroundings(whole, None if maps is None else LightMapCache(builder, *maps, sun), depth, traced.sun)
 
 
 def without_lobes(scene: Scene, names: Collection[str]) -> Scene:

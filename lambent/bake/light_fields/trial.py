@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lambent.bake.light_fields.acquisition import Around, TracedMaps, inverse_distances
+from lambent.bake.light_fields.acquisition import Surroundings, TracedMaps, inverse_distances
 from lambent.bake.light_fields.facing import views_in
 from lambent.bake.light_fields.placing import Placed, Placing
 from lambent.bake.light_fields.watched import Watched
@@ -123,7 +123,7 @@ def options_of(texels: int) -> list[Option]:
 
 
 def tried(
-    placing: Placing, mesh: Mesh, seen: Watched, probe: ProbeLight, around: Around, seed: int,
+    placing: Placing, mesh: Mesh, seen: Watched, probe: ProbeLight, around: Surroundings, seed: int,
     options: Sequence[Option], level: float,
 ) -> Trial:  # fmt: skip
     """The errors of an object's probe, and of the light fields of `options`, rising, as far as more points help."""
@@ -162,7 +162,7 @@ def helps(errors: Mapping[Option, float], option: Option) -> bool:
     return errors[option] < FALLS * min(fewer + coarser, default=np.inf)
 
 
-def trial_field(points: Placed, texels: int, around: Around, seed: int) -> LightField:
+def trial_field(points: Placed, texels: int, around: Surroundings, seed: int) -> LightField:
     """A light field whose light is traced where it is read, without a sample map."""
     p, n = points.positions.astype(np.float32), points.normals.astype(np.float32)
     inverse = inverse_distances(around.scene, p, texels)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import drjit as dr
 import numpy as np
 
-from lambent.bake.light_fields.acquisition import Around
+from lambent.bake.light_fields.acquisition import Surroundings
 from lambent.bake.light_fields.sampling import spread_evenly
 from lambent.bake.probes.selection import light_along, spread_mirrored, viewers_of
 from lambent.bake.tracing.rays import array_of, leaving, rays_from, towards
@@ -73,7 +73,7 @@ class Watched:
         return replace(self, **{name: getattr(self, name)[which] for name in names})
 
 
-def watched(mesh: Mesh, material: Material, places: Floats, around: Around, seed: int) -> Watched | None:
+def watched(mesh: Mesh, material: Material, places: Floats, around: Surroundings, seed: int) -> Watched | None:
     """What viewers at `places` (m, 3) see of a mesh; None where they see too little of it."""
     rng = np.random.default_rng(seed)
     spots = spread_evenly(mesh, POINTS, rng)
@@ -123,7 +123,7 @@ def _shown(lobe: Lobe, cosine: Floats, through: bool) -> Floats:
     return np.asarray(np.asarray(lobe.k, float) * (1 - reflected if through else reflected))
 
 
-def _diffuse(around: Around, x: Floats, n: Floats) -> tuple[Floats, Floats]:
+def _diffuse(around: Surroundings, x: Floats, n: Floats) -> tuple[Floats, Floats]:
     """Diffuse radiance (n, 3) of surface points, and the luminance (n,) of their irradiance, by the light map."""
     if around.cache is None:
         return np.zeros(x.shape), np.zeros(len(x))
@@ -136,7 +136,7 @@ def _diffuse(around: Around, x: Floats, n: Floats) -> tuple[Floats, Floats]:
 
 
 def _size_sr(
-    points: Floats, normals: Floats, places: Floats, around: Around, rng: np.random.Generator
+    points: Floats, normals: Floats, places: Floats, around: Surroundings, rng: np.random.Generator
 ) -> float:  # of a square metre of the surface
     p, n = np.repeat(points, TRIES, axis=0), np.repeat(normals, TRIES, axis=0)
     eyes = places[rng.integers(len(places), size=len(p))]

@@ -37,9 +37,9 @@ class Gathering:
 
     def radiance(self, si: Any, sampler: Any, active: Any) -> Any:
         """One sample of the diffuse radiance (mi.Color3f) of surfaces towards `si.wi`."""
-        return self._gathered(si, sampler, active, self._beside_contacts)
+        return self._gathered(si, sampler, active, self._near_contacts)
 
-    def _beside_contacts(self, si: Any, active: Any) -> Any:
+    def _near_contacts(self, si: Any, active: Any) -> Any:
         near = active & (si.t < dr.gather(mi.Float, self._near_m, self._numbers.faces(si, active), active))
         again = self._gathered(si, Random.at(si.p), near, self.cache)
         return dr.select(near, again, self.cache(si, active & ~near))

@@ -13,7 +13,7 @@ from lambent.core.arrays import Floats
 from lambent.scenes.replacement import Replacement, with_replacements
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.consistency import read_geometry
-from lambent.store.contract import SceneRecord, scene_record, sun_beside
+from lambent.store.contract import SceneRecord, scene_record, sun_left_out
 from lambent.store.store import Store
 
 GUIDING = 0.25  # effort of the sky's guide: 1 has .8 % less noise, and takes 1.3 s longer on one core
@@ -33,8 +33,8 @@ def stored_scene(store: Store, scene: Scene, replacements: Sequence[Replacement]
     width, height = store.artefact("geometry/uv2").meta["light_map_size"]
     atlas = Atlas(scene, uv2, width, height)
     own = merged(atlas) if unmapped else arrays
-    has_sun = sun_beside(store) is not None
-    return TracedScene(atlas, own, [False] * len(objects), sun_beside=has_sun, unmapped=unmapped, effort=GUIDING)
+    has_sun = sun_left_out(store) is not None
+    return TracedScene(atlas, own, [False] * len(objects), sun_left_out=has_sun, unmapped=unmapped, effort=GUIDING)
 
 
 def scene_alone(scene: Scene) -> TracedScene:

@@ -21,7 +21,7 @@ from lambent.bake.engine import engine
 from lambent.bake.running.keys import geometry_inputs, key_of
 from lambent.bake.running.timing import Timed, untimed
 from lambent.bake.surfaces.cutting import cut_across
-from lambent.bake.surfaces.visible_triangles import Sight
+from lambent.bake.surfaces.visible_triangles import TriangleVisibility
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.plain import quad
@@ -49,7 +49,7 @@ SCREENED = 4096  # the largest objects, which are screened more closely
 MOST = 24  # the largest of them, for which cuts are tried
 
 
-def divided(sight: Sight, store: Store, progress: Progress, timed: Timed = untimed) -> Sight:
+def divided(sight: TriangleVisibility, store: Store, progress: Progress, timed: Timed = untimed) -> TriangleVisibility:
     """The scene with its objects divided; the cuts are recomputed only if geometry has changed."""
     scene = sight.scene
     centres = sorted(scene.probe_centres.items())
@@ -65,10 +65,10 @@ def divided(sight: Sight, store: Store, progress: Progress, timed: Timed = untim
             found = {"key": key, "cuts": cuts_of(sight, progress)}
         store.set_document(PARTS, found)
     cuts = {name: [tuple(map(quad, borders)) for borders in cut] for name, cut in found["cuts"].items()}
-    return Sight(split(scene, cuts)) if cuts else sight
+    return TriangleVisibility(split(scene, cuts)) if cuts else sight
 
 
-def cuts_of(sight: Sight, progress: Progress = silent) -> dict[str, Cut]:
+def cuts_of(sight: TriangleVisibility, progress: Progress = silent) -> dict[str, Cut]:
     """By name of divided object, the borders of each part. Deterministic."""
     scene = sight.scene
     mirrors = {name for name, material in scene.materials.items() if needs_probe(material)}
@@ -96,7 +96,7 @@ def cuts_of(sight: Sight, progress: Progress = silent) -> dict[str, Cut]:
     return cuts
 
 
-def _worth_trying(sight: Sight, objects: list[SceneObject], places: Floats) -> list[SceneObject]:
+def _worth_trying(sight: TriangleVisibility, objects: list[SceneObject], places: Floats) -> list[SceneObject]:
     """The MOST largest objects, in order, that are not flat, look large and seem to need more than one probe."""
     from lambent.bake.probes.centre import flat_axis
     from lambent.bake.probes.screening import hidden_shares, median_distances, widths

@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.light_fields.acquisition import Around, covered_distances, inverse_distances, radiance_maps
+from lambent.bake.light_fields.acquisition import Surroundings, covered_distances, inverse_distances, radiance_maps
 from lambent.bake.light_fields.surroundings import Maps, around
 from lambent.bake.running.tiles import slices
 from lambent.bake.tracing import path_tracer, rays
@@ -91,7 +91,7 @@ class MirrorTracer:
         """The object's centre (1, 3), and one map from there without the object, for reflection mapping."""
         middle = np.mean(self._mesh.bounds, axis=0, keepdims=True).astype(float)
         scene = self._builder.build(leave_out=(self._name,))
-        without = Around(scene, self._cache, DEPTH, self._around.sun)
+        without = Surroundings(scene, self._cache, DEPTH, self._around.sun)
         light, _ = radiance_maps(without, middle, texels, strata, seed)
         return middle, halves(light, 1.0), inverse_distances(without.scene, middle, texels)
 
@@ -120,7 +120,7 @@ class MirrorTracer:
 
 
 def _maps(
-    seen: Around, points: Floats, texels: int, strata: int, seed: int
+    seen: Surroundings, points: Floats, texels: int, strata: int, seed: int
 ) -> tuple[Halves, Halves, NDArray[np.uint8]]:
     radiance = np.empty((len(points), texels, texels, 3), np.float16)
     for mine in slices(len(points), max(1, PATHS_AT_ONCE // (texels * strata) ** 2)):

@@ -39,7 +39,7 @@ class ReflectionTracer:
         self._cache = LightMapCache(builder, irradiance, None)
         self._numbers = builder.numbers
         self._emission = mi.Color3f(np.array([o.emission for o in scene.objects], np.float32).T.copy())
-        self._lamps = [_ball_around(o.mesh.positions.astype(float)) for o in scene.objects if max(o.emission) > 0]
+        self._lamps = [_enclosing_ball(o.mesh.positions.astype(float)) for o in scene.objects if max(o.emission) > 0]
         self._sky = mi.Color3f(*sky)
 
     def distance(self, origin: Floats, directions: Floats) -> Floats:
@@ -100,7 +100,7 @@ class ReflectionTracer:
         return dr.select(valid, gain * dr.select(hit, seen, self._sky), 0.0), dr.select(valid, density, 0.0)
 
 
-def _ball_around(vertices: Floats) -> tuple[Floats, float]:
+def _enclosing_ball(vertices: Floats) -> tuple[Floats, float]:
     centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     return centre, float(np.linalg.norm(vertices - centre, axis=1).max())
 

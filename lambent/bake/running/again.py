@@ -26,7 +26,7 @@ KINDS = ("light_map", "probe")
 LIGHT, BACK = (f"light_map/{side}" for side in SIDES)
 
 
-def copy_beside(folder: Path) -> Path:
+def rebaked_copy(folder: Path) -> Path:
     """Path of a store's copy: ROOM.rebake.store beside ROOM.store."""
     folder = folder.resolve()
     return folder.with_name(f"{folder.name.removesuffix('.store')}.rebake.store")

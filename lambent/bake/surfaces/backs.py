@@ -9,7 +9,7 @@ from __future__ import annotations
 from lambent.bake.engine import engine
 from lambent.bake.running.keys import geometry_inputs, key_of
 from lambent.bake.running.timing import Timed, untimed
-from lambent.bake.surfaces.visible_triangles import Sight
+from lambent.bake.surfaces.visible_triangles import TriangleVisibility
 from lambent.core.progress import Progress, silent
 from lambent.scenes.scene import Scene
 from lambent.store.contract import is_two_sided
@@ -20,7 +20,7 @@ LEAST = 4e-5  # share of viewers' rays, ten in number, below which a back stays 
 
 
 def find_backs(
-    sight: Sight, store: Store, timed: Timed = untimed, progress: Progress = silent, *, anew: bool = False
+    sight: TriangleVisibility, store: Store, timed: Timed = untimed, progress: Progress = silent, *, anew: bool = False
 ) -> None:
     """Store which backs are seen; kept while geometry is unchanged, even if cameras change, unless `anew`."""
     scene = sight.scene

@@ -10,14 +10,14 @@ from lambent.bake.engine import engine
 from lambent.bake.running.keys import geometry_inputs, key_of
 from lambent.bake.running.timing import Timed, untimed
 from lambent.bake.surfaces.cutting import cut, too_long
-from lambent.bake.surfaces.visible_triangles import Sight
+from lambent.bake.surfaces.visible_triangles import TriangleVisibility
 from lambent.store.contract import CUTS
 from lambent.store.store import Store
 
 MOST_EYES = 128
 
 
-def cut_for_viewers(sight: Sight, store: Store, timed: Timed = untimed) -> Sight:
+def cut_for_viewers(sight: TriangleVisibility, store: Store, timed: Timed = untimed) -> TriangleVisibility:
     """The scene with very large triangles cut (`surfaces.cutting`); unchanged geometry keeps its previous cuts.
 
     The document "cuts" stores the eyes used: adding cameras later changes nothing.
@@ -44,7 +44,7 @@ def cut_for_viewers(sight: Sight, store: Store, timed: Timed = untimed) -> Sight
     eyes, reach = np.array(found["eyes"]).reshape(-1, 3), found["reach_m"]
     large = set(found["objects"])
     objects = (replace(o, mesh=cut(o.mesh, eyes, reach)) if o.name in large else o for o in scene.objects)
-    return Sight(replace(scene, objects=tuple(objects)))
+    return TriangleVisibility(replace(scene, objects=tuple(objects)))
 
 
 def longest_piece(store: Store) -> float:

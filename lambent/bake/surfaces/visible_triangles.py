@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Sight:
+class TriangleVisibility:
     """A scene with properties computed on first use; choose the engine before."""
 
     scene: Scene

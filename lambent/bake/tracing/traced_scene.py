@@ -42,16 +42,16 @@ class TracedScene:
     """Shared by the artefacts of a bake. `merged` is the concatenated geometry of the atlas, as from `atlas.merged`.
 
     `two_sided` flags each object whose back has a light map too: because light crosses it, or viewers see it. The
-    light map leaves out the scene's sun unless `sun_beside` is false. Objects in `unmapped` have no texels in it. The
+    light map leaves out the scene's sun unless `sun_left_out` is false. Objects in `unmapped` have no texels in it. The
     sky is guided with `effort` (`sky.guide.learn`).
     """
 
     def __init__(
         self, atlas: Atlas, merged: dict[str, Floats], two_sided: list[bool], progress: Progress = silent, *,
-        sun_beside: bool = True, unmapped: Collection[str] = (), effort: float = 1.0,
+        sun_left_out: bool = True, unmapped: Collection[str] = (), effort: float = 1.0,
     ) -> None:  # fmt: skip
         self.atlas, self.scene, self.merged, self.progress = atlas, atlas.scene, merged, progress
-        self.two_sided, self._sun_beside, self._unmapped, self._effort = two_sided, sun_beside, unmapped, effort
+        self.two_sided, self._sun_beside, self._unmapped, self._effort = two_sided, sun_left_out, unmapped, effort
         counts = [len(o.mesh.faces) for o in self.scene.objects]
         self._two_sided, self._crossed = np.repeat(two_sided, counts), np.repeat(crossed_by_light(self.scene), counts)
         self._builder: tuple[tuple[bool, bool], SceneBuilder] | None = None

@@ -45,7 +45,7 @@ from lambent.baked.answering.smoothing import alike
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.scenes.light_groups import SUN
-from lambent.store.contract import SIDES, SceneRecord, scene_record, sun_beside
+from lambent.store.contract import SIDES, SceneRecord, scene_record, sun_left_out
 from lambent.store.light_groups import group_name, light_groups
 from lambent.store.store import Store
 
@@ -196,7 +196,7 @@ def read_answer(store: Store) -> StoredAnswer:
     flat = patch.reshape(2, -1)
     of_patch = np.where(flat == NO_PATCH, 0, flat)[texels % 2, texels // 2].astype(np.int64)
     other = number[(texels ^ 1).astype(np.int64)]
-    sun = sun_beside(store)
+    sun = sun_left_out(store)
     of_sun = next((n for n, group in enumerate(light_groups(store)) if SUN in group.members), 0)
     directs, at = np.minimum(directs, baked), number[points[:senders]]
     nearest = Neighbours(near, shares)

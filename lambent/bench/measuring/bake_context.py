@@ -22,8 +22,8 @@ def context_of(store: Store, scene: Scene, quality: Quality, progress: Progress 
     from lambent.bake.methods import METHODS
     from lambent.bake.probes.division import divided
     from lambent.bake.surfaces.cuts import cut_for_viewers
-    from lambent.bake.surfaces.visible_triangles import Sight
+    from lambent.bake.surfaces.visible_triangles import TriangleVisibility
 
     ready = replace(scene, textures=prepared(scene.textures))
-    as_baked = cut_for_viewers(divided(Sight(ready), store, progress), store).scene
+    as_baked = cut_for_viewers(divided(TriangleVisibility(ready), store, progress), store).scene
     return BakeContext(as_baked, store, found(), quality, store.documents.get(METHODS, {}))

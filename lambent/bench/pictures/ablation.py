@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from lambent.bake.quality import Quality
 from lambent.bench.measuring.reference import Truth, compile_kernels, finished, path_traced_parts, with_samples
 from lambent.bench.measuring.switches import BAKE, DRAW, SWITCHES, TRACE, Switch, is_frozen, switched
-from lambent.bench.scenes.views import first_camera, given_or_baked
+from lambent.bench.scenes.views import first_camera, inputs_or_baked
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.core.views.camera import Camera
@@ -75,7 +75,7 @@ def run(
     of NAME.store are named NAME-*.exr.
     """
     rows: list[dict[str, Any]] = []
-    with given_or_baked(inputs, effort.scene, progress) as stores:
+    with inputs_or_baked(inputs, effort.scene, progress) as stores:
         for number, store in enumerate(stores):
             view = View.of(store, effort, _references(store, inputs, reference), progress)
             for row in rows_of(view):

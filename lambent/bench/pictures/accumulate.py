@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from lambent.bench.measuring.reference import Truth, compile_kernels, finished, path_traced_parts
-from lambent.bench.scenes.views import first_camera, given_or_baked
+from lambent.bench.scenes.views import first_camera, inputs_or_baked
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
@@ -57,7 +57,7 @@ def run(
     pictures = finished(reference, inputs)
     if len(pictures) == 1:
         raise UserError("a single reference has no noise", field="--reference", expected="at least two, of other seeds")
-    with given_or_baked(inputs, effort.scene, progress) as stores:
+    with inputs_or_baked(inputs, effort.scene, progress) as stores:
         rows = [row for store in stores for row in rows_of(store, effort, progress, pictures)]
     last = {row["scene"]: row for row in rows}
     summary = {name: {key: row[key] for key in ("flip", "bar", "flip_worst_tile")} for name, row in last.items()}

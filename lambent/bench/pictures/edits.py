@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from lambent.bench.measuring.reference import Truth, path_traced_parts, with_samples
-from lambent.bench.scenes.views import first_camera, given_or_baked
+from lambent.bench.scenes.views import first_camera, inputs_or_baked
 from lambent.core.arrays import Floats
 from lambent.core.light.colour import luminance
 from lambent.core.light.light_mix import Factors
@@ -80,7 +80,7 @@ class Edit:
 
 def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
     """Rows of the inputs, which are baked stores; without inputs, of a scene baked here in `preview`."""
-    with given_or_baked(inputs, effort.scene, progress) as stores:
+    with inputs_or_baked(inputs, effort.scene, progress) as stores:
         rows = [row for store in stores for row in rows_of(store, effort, progress)]
     return {"rows": rows, "summary": {f"{row['scene']} {row['edit']}": row["flip"] for row in rows}}
 

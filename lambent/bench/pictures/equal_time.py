@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lambent.bench.measuring.reference import Truth, compile_kernels, finished, path_traced_parts, with_samples
-from lambent.bench.scenes.views import first_camera, given_or_baked
+from lambent.bench.scenes.views import first_camera, inputs_or_baked
 from lambent.core.arrays import Floats
 from lambent.core.progress import Progress, part_of, silent
 from lambent.core.views.camera import Camera
@@ -71,7 +71,7 @@ def run(
     `reference`: finished pictures of the only input's first camera, with equal samples and different seeds.
     """
     pictures = finished(reference, inputs)
-    with given_or_baked(inputs, effort.scene, progress) as stores:
+    with inputs_or_baked(inputs, effort.scene, progress) as stores:
         parts = [part_of(progress, k, k + 1, s.folder.name) for k, s in enumerate(stores)]
         rows = [
             row for store, part in zip(stores, parts, strict=True) for row in rows_of(store, effort, part, pictures)

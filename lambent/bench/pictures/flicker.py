@@ -20,7 +20,7 @@ import numpy as np
 
 from lambent.bench.measuring.reference import with_samples
 from lambent.bench.measuring.reprojection import reprojected
-from lambent.bench.scenes.views import first_camera, given_or_baked
+from lambent.bench.scenes.views import first_camera, inputs_or_baked
 from lambent.core.arrays import Floats
 from lambent.core.light.colour import shown
 from lambent.core.pictures import metrics
@@ -65,7 +65,7 @@ FULL, QUICK = Effort(), Effort(240, 135, 2, (1, 4, 24), 4, "builtin:box")
 
 def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
     """Rows of the inputs, which are baked stores; without inputs, of a scene baked here in `preview`."""
-    with given_or_baked(inputs, effort.scene, progress) as stores:
+    with inputs_or_baked(inputs, effort.scene, progress) as stores:
         rows = [row for store in stores for row in rows_of(store, effort, progress)]
     return {"rows": rows, "summary": {f"{row['scene']} {row['case']}": row["flip"] for row in rows}}
 

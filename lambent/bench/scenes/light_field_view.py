@@ -26,7 +26,7 @@ from lambent.core.progress import Progress, silent
 from lambent.core.views.camera import Camera
 from lambent.realtime.sun.sun_disc import sky_without
 from lambent.scenes.scene import Scene
-from lambent.store.contract import sun_beside
+from lambent.store.contract import sun_left_out
 
 if TYPE_CHECKING:
     from lambent.bake.context import BakeContext
@@ -120,7 +120,7 @@ class LightFieldView:
 
     @cached_property
     def _sky(self) -> Floats:
-        store, sun = self._context.store, sun_beside(self._context.store)
+        store, sun = self._context.store, sun_left_out(self._context.store)
         array = store.artefact("environment/radiance")
         cube = store.read(array.name).astype(np.float32) * float(array.meta.get("unit", 1.0))
         return cube if sun is None else sky_without(cube, sun)

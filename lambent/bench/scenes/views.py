@@ -15,7 +15,7 @@ from lambent.store.store import Store
 
 
 @contextmanager
-def given_or_baked(inputs: Sequence[Path], scene: str, progress: Progress) -> Iterator[list[Store]]:
+def inputs_or_baked(inputs: Sequence[Path], scene: str, progress: Progress) -> Iterator[list[Store]]:
     """The inputs, which are baked stores; without inputs, a scene baked here in `preview`."""
     from lambent.bake.bake import bake
     from lambent.scenes import load_scene

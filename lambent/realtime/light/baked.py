@@ -183,7 +183,7 @@ def read_baked(
     if without:
         missing.append(f"no probe of {first_of(without)}: the nearest probe or the environment is used")
     shares, share_objects = probe_shares(store)
-    sun = contract.sun_beside(store)
+    sun = contract.sun_left_out(store)
     back = "light through two-sided sheets is black" if two_sided else None
     return BakedScene(
         record,

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.background import beside_frames
+from lambent.core.background import yielding_to_frames
 from lambent.core.light.light_mix import Factors
 from lambent.realtime.gpu.cube_mips import finite
 from lambent.realtime.gpu.device import adapter_info
@@ -152,7 +152,7 @@ class LightMixer:
 
         `beside`: frames are drawn meanwhile, by the processor.
         """
-        with beside_frames(beside):
+        with yielding_to_frames(beside):
             self._make_stale()
 
     def _make_stale(self) -> None:

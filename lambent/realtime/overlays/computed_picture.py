@@ -16,7 +16,7 @@ from lambent.realtime.gpu.targets import DISPLAY_FORMAT, target_texture
 from lambent.realtime.resources import SceneResources
 
 
-class Given:
+class UploadedPicture:
     """One picture: `radiance` is its texture, `view` a view of its display texture; both None before the first."""
 
     def __init__(self, layouts: Layouts, resources: SceneResources) -> None:

@@ -19,7 +19,7 @@ from lambent.bake.answering.points import (
     seeing,
 )
 from lambent.bake.answering.spots import LEAST, Spots
-from lambent.bake.answering.transfer import AROUND, chosen_rays, sender_means, texels_around, transfer_of
+from lambent.bake.answering.transfer import AROUND, chosen_rays, neighbouring_texels, sender_means, transfer_of
 from lambent.baked.answering.rays import BYTE, Rays, packed_rays
 from lambent.materials.document import Material
 from lambent.scenes.scene import Scene
@@ -138,14 +138,14 @@ def test_rays_of_a_point_start_from_all_texels_that_it_stands_for() -> None:
     row, column = np.divmod(np.arange(len(spots.area)), SIZE)
     block = (row // 4) * (SIZE // 4) + column // 4
     senders[0] = np.argsort(block[points.texel])[block]
-    found = texels_around(spots, senders, points)
+    found = neighbouring_texels(spots, senders, points)
     assert found.shape == (len(points.texel), AROUND)
     for k in range(len(points.texel)):
         assert np.array_equal(np.sort(found[k]), np.flatnonzero(senders[0] == k)), "all 16 of a block, each once"
-    few = texels_around(spots, senders, points, 4)
+    few = neighbouring_texels(spots, senders, points, 4)
     assert all(len(set(one)) == 4 and (senders[0, one] == k).all() for k, one in enumerate(few))
     senders[0, senders[0] == 3] = -1
-    assert (texels_around(spots, senders, points)[3] == points.texel[3]).all(), "itself if it stands for none"
+    assert (neighbouring_texels(spots, senders, points)[3] == points.texel[3]).all(), "itself if it stands for none"
 
 
 def test_chosen_rays_stand_for_all() -> None:

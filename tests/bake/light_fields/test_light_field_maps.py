@@ -16,7 +16,7 @@ from lambent.bake.bake import bake
 from lambent.bake.bake import found as kinds
 from lambent.bake.context import BakeContext
 from lambent.bake.light_fields.acquisition import (
-    Around,
+    Surroundings,
     TracedMaps,
     covered_distances,
     direction,
@@ -80,7 +80,7 @@ def test_every_texel_sees_the_wall_behind_it(mi: Any) -> None:
     room = coloured_room()
     scene = SceneBuilder(replace(room, objects=room.objects[:-1])).build()
     points, n = np.array([[0.0, 0, 0], [1.5, -0.7, 0.3], [-1.9, 1.9, -1.9]]), 32
-    radiance, _ = radiance_maps(Around(scene, None, 1), points, n, 2, 0)
+    radiance, _ = radiance_maps(Surroundings(scene, None, 1), points, n, 2, 0)
     inverse = inverse_distances(scene, points, n)
     for p, light, nearness in zip(points, radiance, inverse, strict=True):
         w = texel_directions(n)
@@ -106,7 +106,10 @@ def test_what_is_open_is_at_no_distance_and_shows_the_sky(mi: Any) -> None:
     point, n = np.array([[0.0, 1e-4, 0.0]]), 16
     up = texel_directions(n)[..., 1] > 0.15
     down = texel_directions(n)[..., 1] < -0.15
-    inverse, light = inverse_distances(scene, point, n)[0], radiance_maps(Around(scene, None, 2), point, n, 1, 0)[0][0]
+    inverse, light = (
+        inverse_distances(scene, point, n)[0],
+        radiance_maps(Surroundings(scene, None, 2), point, n, 1, 0)[0][0],
+    )
     assert (inverse[up] == 0).all() and (inverse[down] > 1000).all()
     np.testing.assert_allclose(light[up], np.broadcast_to(sky.radiance, light[up].shape), rtol=1e-5)
     assert (light[down] == 0).all()
@@ -198,7 +201,7 @@ def test_quarters_of_texels_tell_where_a_square_ends(mi: Any) -> None:
     square = SceneObject("square", patch((-1.03, -1, 1.07), (2, 0, 0), (0, 0, -2)), "black")
     scene = Scene("s", (square,), {"black": BLACK}, environment=ConstantEnvironment((1.0, 1.0, 1.0)))
     built, point, n = SceneBuilder(scene).build(), np.zeros((1, 3)), 31
-    around = Around(built, None, 2)
+    around = Surroundings(built, None, 2)
     met = inverse_distances(built, point, n)[0] > 0
     assert 0.05 < met.mean() < 0.3
     by_middles = radiance_maps(around, point, n, 4, 0)[0][0]
@@ -228,7 +231,7 @@ def test_lamps_smaller_than_texels_keep_their_light(mi: Any) -> None:
     ceiling = SceneObject("ceiling", patch((-50, 1.01, -50), (100, 0, 0), (0, 0, 100)), "black")
     scene = Scene("s", (lamp, ceiling), {"black": BLACK})
     points = np.random.default_rng(0).uniform(-0.3, 0.3, (400, 3)) * [1, 0, 1]
-    around = Around(SceneBuilder(scene, diffuse=False).build(), lambda si, active: mi.Color3f(0.0), 2)
+    around = Surroundings(SceneBuilder(scene, diffuse=False).build(), lambda si, active: mi.Color3f(0.0), 2)
     distance = np.linalg.norm(points - [0, 1, 0], axis=1)
     expected = (100 * side_m**2 / distance**3).sum()
     omega, w = texel_solid_angles(n), texel_directions(n)
@@ -249,7 +252,9 @@ def test_the_disc_of_the_sun_is_left_out(mi: Any) -> None:
     found, n, strata = sun_of(scene), 16, 128
     assert found is not None
     built, point = SceneBuilder(scene).build(), np.zeros((1, 3))
-    whole, rest = (radiance_maps(Around(built, None, 2, sun), point, n, strata, 0)[0][0] for sun in (None, Sun(found)))
+    whole, rest = (
+        radiance_maps(Surroundings(built, None, 2, sun), point, n, strata, 0)[0][0] for sun in (None, Sun(found))
+    )
     difference = (whole - rest) * texel_solid_angles(n)[..., None]
     near = texel_directions(n) @ np.array(found.record.direction) > 0.97
     assert not difference[~near].any()
@@ -259,7 +264,7 @@ def test_the_disc_of_the_sun_is_left_out(mi: Any) -> None:
 
 def test_maps_that_are_traced_where_they_are_read_are_those_of_a_bake(mi: Any) -> None:
     room = coloured_room()
-    around = Around(SceneBuilder(replace(room, objects=room.objects[:-1])).build(), None, 1)
+    around = Surroundings(SceneBuilder(replace(room, objects=room.objects[:-1])).build(), None, 1)
     points = np.array([[0.0, 0, 0], [1.5, -0.7, 0.3]])
     whole, read = radiance_maps(around, points, 16, 1, 0)[0], TracedMaps(around, points, 16, 0)
     some = np.array([[1, 0], [1, 1]]), np.array([[3, 3], [15, 0]]), np.array([[4, 4], [0, 7]])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.light_fields.acquisition import Around
+from lambent.bake.light_fields.acquisition import Surroundings
 from lambent.bake.light_fields.trial import ProbeLight
 from lambent.bake.light_fields.watched import Watched, watched
 from lambent.bake.tracing.scene_builder import SceneBuilder
@@ -25,7 +25,7 @@ GLASS = Material(
 def seen_of(material: Material) -> Watched:
     room = coloured_room()
     scene = replace(room, materials={**room.materials, "mirror": material})
-    around = Around(SceneBuilder(scene).build(), None, 6)
+    around = Surroundings(SceneBuilder(scene).build(), None, 6)
     found = watched(scene.object("ball").mesh, material, EYES, around, 1)
     assert found is not None
     return found

@@ -20,7 +20,7 @@ from lambent.core.progress import Cancelled
 from lambent.materials.document import Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import DirectionalLight, ImageEnvironment, PointLight, Scene, SceneObject
-from lambent.store.contract import sun_beside
+from lambent.store.contract import sun_left_out
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, constant_picture, furnace, plane
 
@@ -88,7 +88,7 @@ def test_plane_under_a_constant_sky_receives_pi(tmp_path: Path) -> None:
 def test_plane_under_the_sun_receives_the_cosine(tmp_path: Path, cosine: float) -> None:
     sun = DirectionalLight((np.sqrt(1 - cosine**2), -cosine, 0.0), (3.0, 2.0, 1.0))
     store = photon_baked(replace(plane(), lights=(sun,)), tmp_path / "s")
-    found = sun_beside(store)
+    found = sun_left_out(store)
     assert found is not None and not flux(store).any(), "direct light of the sun is not in the map"
     assert np.array(found.irradiance) * found.direction[1] == pytest.approx(np.array([3, 2, 1]) * cosine)
 

@@ -13,7 +13,7 @@ from lambent.bake.bake import bake
 from lambent.bake.engine import engine
 from lambent.bake.probes.division import cuts_of, split
 from lambent.bake.surfaces.atlas import object_records
-from lambent.bake.surfaces.visible_triangles import Sight
+from lambent.bake.surfaces.visible_triangles import TriangleVisibility
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.bake.tracing.solids import SolidTest, closed
 from lambent.core.geometry.cubemap import texel_solid_angles
@@ -67,11 +67,11 @@ def test_object_in_two_rooms_has_a_probe_in_each(tmp_path: Path) -> None:
 
 def test_a_cut_that_viewers_do_not_see_is_not_made() -> None:
     """From a camera in the red room nobody sees the half of the bar that mirrors the blue one."""
-    assert set(cuts_of(Sight(two_rooms()))) == {"bar"}
+    assert set(cuts_of(TriangleVisibility(two_rooms()))) == {"bar"}
     red = Camera("red", (-1.5, 0.5, 1.5), (-1.5, 0, 0))
     blue = replace(red, name="blue", position=(2.0, 0.5, 1.5), target=(2.0, 0.0, 0.0))
-    assert not cuts_of(Sight(replace(two_rooms(), cameras=(red,))))
-    assert set(cuts_of(Sight(replace(two_rooms(), cameras=(red, blue))))) == {"bar"}
+    assert not cuts_of(TriangleVisibility(replace(two_rooms(), cameras=(red,))))
+    assert set(cuts_of(TriangleVisibility(replace(two_rooms(), cameras=(red, blue))))) == {"bar"}
 
 
 def test_too_few_probes_are_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -12,7 +12,7 @@ from lambent.bake.bake import bake
 from lambent.bake.engine import engine
 from lambent.bake.surfaces.backs import backs_of
 from lambent.bake.surfaces.texels import texels_of
-from lambent.bake.surfaces.visible_triangles import Sight
+from lambent.bake.surfaces.visible_triangles import TriangleVisibility
 from lambent.core.views.camera import Camera
 from lambent.scenes.geometry import box, patch, placed
 from lambent.scenes.scene import ConstantEnvironment, Scene, SceneObject
@@ -76,7 +76,7 @@ def test_the_back_of_a_strip_that_fills_little_of_the_view_is_lit(tmp_path: Path
     engine()
     from lambent.bake.tracing.seen.viewed import seen_from_behind
 
-    assert seen_from_behind(Sight(few), 2e-4) == ["crate", "shelf"]
+    assert seen_from_behind(TriangleVisibility(few), 2e-4) == ["crate", "shelf"]
     assert backs_of(bake(few, tmp_path / "s", quality=LIGHT, only=("geometry",))) == {"crate", "shelf", "strip"}
 
 

@@ -17,7 +17,7 @@ from lambent.bake.surfaces.coverage import texel_areas
 from lambent.bake.surfaces.cuts import cut_for_viewers, longest_piece
 from lambent.bake.surfaces.cutting import cut, lengths_of
 from lambent.bake.surfaces.texels import texels_of
-from lambent.bake.surfaces.visible_triangles import Sight
+from lambent.bake.surfaces.visible_triangles import TriangleVisibility
 from lambent.core.geometry.triangles import cross_2d, triangle_areas
 from lambent.core.views.camera import Camera
 from lambent.scenes.geometry import box, merge, patch, placed, sphere
@@ -57,7 +57,7 @@ def seen_atlas(scene: Scene, folder: Path) -> Atlas:
     from lambent.bake.tracing.seen.viewed import texel_sizes
 
     with Store.create(folder / "s", {}) as store:
-        sight = cut_for_viewers(Sight(scene), store)
+        sight = cut_for_viewers(TriangleVisibility(scene), store)
         return unwrap(sight.scene, 128, sizes=partial(texel_sizes, sight), longest_m=longest_piece(store))
 
 
@@ -79,7 +79,7 @@ def test_an_object_whose_texels_are_too_coarse_is_named(caplog: pytest.LogCaptur
 
     with caplog.at_level(logging.WARNING):
         uncut = room_on_a_plain(100.0)
-        unwrap(uncut, 128, sizes=partial(texel_sizes, Sight(uncut)))
+        unwrap(uncut, 128, sizes=partial(texel_sizes, TriangleVisibility(uncut)))
     assert len(caplog.messages) == 1
     assert caplog.messages[0].startswith("plain: its texels in the light map are ") and "cut it" in caplog.messages[0]
     assert "light_map_scale = " in caplog.messages[0]
@@ -109,10 +109,10 @@ def test_cuts_leave_no_gaps_and_stay_with_the_store(tmp_path: Path) -> None:
     assert np.allclose(mesh.normals, (0, 1, 0)) and np.allclose(np.linalg.norm(mesh.tangents, axis=1), 1, atol=1e-6)
     scene = room_on_a_plain(1000.0)
     with Store.create(tmp_path / "s", {}) as store:
-        first = cut_for_viewers(Sight(scene), store).scene
+        first = cut_for_viewers(TriangleVisibility(scene), store).scene
         moved = replace(scene, cameras=(replace(EYE, position=(400.0, 1.6, 400.0)),))
         assert np.array_equal(
-            cut_for_viewers(Sight(moved), store).scene.objects[0].mesh.faces, first.objects[0].mesh.faces
+            cut_for_viewers(TriangleVisibility(moved), store).scene.objects[0].mesh.faces, first.objects[0].mesh.faces
         )
         assert len(first.objects[0].mesh.faces) > 100 and first.objects[2] is scene.objects[2]
 

@@ -14,7 +14,7 @@ import numpy as np
 from lambent.bake.surfaces.atlas import areas_of, even, scales_of
 from lambent.bake.surfaces.charts import Piece
 from lambent.bake.surfaces.density import Views, coarse_objects, sizes_seen
-from lambent.bake.surfaces.visible_triangles import Sight
+from lambent.bake.surfaces.visible_triangles import TriangleVisibility
 from lambent.bake.tracing.rays import towards
 from lambent.bake.tracing.seen.viewers import RAYS
 from lambent.core.arrays import Floats, Indices
@@ -28,7 +28,7 @@ MOST_LOOKS = 1 << 22  # ...when the total would exceed this
 NEAREST = 0.1  # share of the viewing distance: anything closer is behind viewers, like the wall a camera stands against
 
 
-def texel_sizes(sight: Sight, pieces: list[Piece], texels: int) -> Floats:
+def texel_sizes(sight: TriangleVisibility, pieces: list[Piece], texels: int) -> Floats:
     """Texel size of each piece in metres (N,); equal if the scene has no cameras, or they see nothing.
 
     Objects whose texels are far larger than viewers need are logged as warnings.
@@ -60,7 +60,7 @@ def texel_sizes(sight: Sight, pieces: list[Piece], texels: int) -> Floats:
     return sizes
 
 
-def seen_from_behind(sight: Sight, least: float) -> list[str]:
+def seen_from_behind(sight: TriangleVisibility, least: float) -> list[str]:
     """Sorted names of opaque objects whose backs take more than the share `least` of all that viewers see."""
     if sight.viewers is None:
         return []

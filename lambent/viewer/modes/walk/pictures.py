@@ -17,7 +17,7 @@ from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 from lambent.viewer.background.work import POLL_S
 from lambent.viewer.mode import Divider
-from lambent.viewer.modes.walk.at_rest.traced import AtRest, TracedFrames, TracedPicture, Worn, is_traceable
+from lambent.viewer.modes.walk.at_rest.traced import Appearance, AtRest, TracedFrames, TracedPicture, is_traceable
 from lambent.viewer.modes.walk.at_rest.tracing import ALL_LIGHT, Kind
 from lambent.viewer.modes.walk.comparison import AS_A
 from lambent.viewer.modes.walk.lanes import Lane
@@ -49,7 +49,7 @@ class Pictures(Pair):
         )
         self._b: Picture | None = None
         self._at_rest = AtRest(
-            lambda: self._renderer.given(), state.screen, state.store, state.sky_turn_deg, state.replaced
+            lambda: self._renderer.uploaded_picture(), state.screen, state.store, state.sky_turn_deg, state.replaced
         )
         self._said = ""  # the last reason for which nothing is traced
         self._stands_for: Any = None
@@ -114,7 +114,7 @@ class Pictures(Pair):
         filming, before = state.films.under_way is not None, self.shown[0].view
         kinds = self._traced_kinds(wanted)
         self._glare.step(wanted, self._renderer_of_glare, self._traced_glare)
-        self._at_rest.update(wanted, self._worn, kinds, before, paused=self._glare.waits)
+        self._at_rest.update(wanted, self._appearance, kinds, before, paused=self._glare.waits)
         if state.states.split and not filming:
             self._compare_states(wanted)
         elif state.comparison.on and not filming:
@@ -139,10 +139,10 @@ class Pictures(Pair):
     # at rest
 
     @property
-    def _worn(self) -> Worn:
+    def _appearance(self) -> Appearance:
         """What the room wears."""
         lane, answers = self._lane, self._lane.shown.on and self._lane.shown.possible
-        return Worn(lane.textures, answers, self._rebaked is not None and self._rebaked.is_copied(lane.room))
+        return Appearance(lane.textures, answers, self._rebaked is not None and self._rebaked.is_copied(lane.room))
 
     def _traced_kinds(self, wanted: FrameState) -> tuple[Kind, ...]:
         """Kinds of traced pictures that the window shows at rest."""
@@ -312,7 +312,7 @@ class Pictures(Pair):
         """Makes the faces that glare is rated in; None if they are drawn."""
         if not (self._state.screen.pace.traces and self._at_rest.ready and is_traceable(frame)):
             return None
-        return self._at_rest.frames(frame, self._worn, SAMPLES)
+        return self._at_rest.frames(frame, self._appearance, SAMPLES)
 
     def _meter(self) -> None:
         meter, look, now_s, a = self._state.meter, self._state.look, self._state.screen.clock(), self.shown[0]
@@ -380,5 +380,5 @@ class Pictures(Pair):
         light = None if track is None else lambda time_s: self._state.lights.known(track.factors_at(time_s))
         samples, traced = QUALITIES[films.quality], None
         if samples:
-            traced = self._at_rest.frames(frame, self._worn, samples)
+            traced = self._at_rest.frames(frame, self._appearance, samples)
         return Filming(self._film_renderer, file, path, frame, films.fps, traced, light)

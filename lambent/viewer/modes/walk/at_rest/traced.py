@@ -18,7 +18,7 @@ from lambent.core.errors import UserError
 from lambent.core.light.false_colour import Range
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.targets import pixels
-from lambent.realtime.overlays.computed_picture import Given
+from lambent.realtime.overlays.computed_picture import UploadedPicture
 from lambent.scenes.scene import ImageTexture
 from lambent.viewer.modes.walk.at_rest.tracing import ALL_LIGHT, MOST_SAMPLES, Kind, Traced, Tracing, Wish
 from lambent.viewer.modes.walk.light.light_fields import shows_choice
@@ -34,7 +34,7 @@ Textures = Mapping[str, str | ImageTexture]
 
 
 @dataclass(frozen=True)
-class Worn:
+class Appearance:
     """What a frame does not say of its room.
 
     Attributes
@@ -53,8 +53,8 @@ class Worn:
 class TracedPicture:
     """The present picture of a kind; `view` is None before the first."""
 
-    def __init__(self, given: Given, screen: Screen) -> None:
-        self._given, self._screen = given, screen
+    def __init__(self, uploaded: UploadedPicture, screen: Screen) -> None:
+        self._uploaded, self._screen = uploaded, screen
         self._taken: Traced | None = None
         self._frame: FrameState | None = None  # as it is shown
         self._wanted: tuple[int, int] | None = None  # size of what it shows
@@ -69,7 +69,7 @@ class TracedPicture:
 
     @property
     def view(self) -> Any:
-        return None if self._taken is None else self._given.view
+        return None if self._taken is None else self._uploaded.view
 
     @property
     def size(self) -> tuple[int, int]:
@@ -109,7 +109,7 @@ class TracedPicture:
     @property
     def texture(self) -> Any:
         """The radiance on the GPU, rgba16float."""
-        return self._given.radiance
+        return self._uploaded.radiance
 
     @property
     def noise(self) -> float | None:
@@ -125,14 +125,14 @@ class TracedPicture:
                 self._before = None
                 return
             self._before, self._began_s = before, self._screen.clock()
-            self._given.take(traced.radiance)
+            self._uploaded.take(traced.radiance)
             self.version += 1
         if self._taken is not None and (self._frame is None or _display(wanted) != _display(self._frame)):
             if self._frame is not None:
                 self._before = None  # shown with another exposure
             width, height = self.size
             self._frame = replace(wanted, width=width, height=height)
-            self._given.show(self._frame)
+            self._uploaded.show(self._frame)
 
     @property
     def fading(self) -> tuple[Any, float]:
@@ -157,20 +157,20 @@ class TracedPicture:
     def save(self, name: str) -> str | None:
         """Write the picture, as `Picture.save` does."""
         assert self._frame is not None, "saved before there is a picture"
-        display = pixels(self._given.device, self._given.view.texture)
+        display = pixels(self._uploaded.device, self._uploaded.view.texture)
         return write_picture(self._screen, name, self._frame, self.read(), display)
 
 
 class TracedFrames:
     """Single pictures of a number of samples, one after the other."""
 
-    def __init__(self, tracing: Tracing, given: Given, worn: Worn, samples: int) -> None:
-        self._tracing, self._given, self._worn, self._samples = tracing, given, worn, samples
+    def __init__(self, tracing: Tracing, uploaded: UploadedPicture, appearance: Appearance, samples: int) -> None:
+        self._tracing, self._uploaded, self._appearance, self._samples = tracing, uploaded, appearance, samples
 
     def ask(self, frame: FrameState) -> None:
         """Request the picture of a frame."""
-        wish = replace(_wish_of(frame, self._worn), kinds=("traced",), samples=self._samples)
-        self._tracing.ask(replace(wish, rebaked=self._worn.rebaked))
+        wish = replace(_wish_of(frame, self._appearance), kinds=("traced",), samples=self._samples)
+        self._tracing.ask(replace(wish, rebaked=self._appearance.rebaked))
 
     @property
     def radiance(self) -> Floats | None:
@@ -189,19 +189,19 @@ class TracedFrames:
 
     def display(self, radiance: Floats, frame: FrameState) -> NDArray[np.uint8]:
         """A picture as shown (height, width, 3)."""
-        self._given.take(radiance)
-        self._given.show(frame)
-        return pixels(self._given.device, self._given.view.texture)
+        self._uploaded.take(radiance)
+        self._uploaded.show(frame)
+        return pixels(self._uploaded.device, self._uploaded.view.texture)
 
 
 class AtRest:
     """Requests pictures of the view, in one process, and shows them."""
 
     def __init__(
-        self, given: Callable[[], Given], screen: Screen, store: Path | None, sky_turn_deg: float,
+        self, uploaded: Callable[[], UploadedPicture], screen: Screen, store: Path | None, sky_turn_deg: float,
         replaced: tuple[str, ...],
     ) -> None:  # fmt: skip
-        self._make, self._screen = given, screen
+        self._make, self._screen = uploaded, screen
         self._tracing = None if store is None else Tracing(store, sky_turn_deg, replaced, lambda: screen.wake())
         self._pictures: dict[Kind, TracedPicture] = {}
         self._frame: FrameState | None = None  # what is drawn, without its display
@@ -249,7 +249,7 @@ class AtRest:
         waits = tracing is not None and not tracing.ready and not self.fault and self._of is not None and self._of[1]
         return f"tracing at rest: {tracing.what}" if waits and tracing is not None else ""
 
-    def frames(self, frame: FrameState, worn: Worn, samples: int) -> TracedFrames:
+    def frames(self, frame: FrameState, appearance: Appearance, samples: int) -> TracedFrames:
         """Single pictures like a frame, of a number of samples.
 
         Raises
@@ -262,7 +262,7 @@ class AtRest:
         if not is_traceable(frame):
             raise UserError("this picture is drawn, not traced", hint="choose the quality as in motion")
         self._tracing.start()
-        return TracedFrames(self._tracing, self._make(), worn, samples)
+        return TracedFrames(self._tracing, self._make(), appearance, samples)
 
     def start(self) -> None:
         """Start the process."""
@@ -279,7 +279,7 @@ class AtRest:
         return f"{name}, {found.counted}"
 
     def update(
-        self, wanted: FrameState, worn: Worn, kinds: tuple[Kind, ...], before: Any, *, paused: bool = False
+        self, wanted: FrameState, appearance: Appearance, kinds: tuple[Kind, ...], before: Any, *, paused: bool = False
     ) -> None:
         """Request a view in these kinds once it stands still, and show its present pictures.
 
@@ -295,7 +295,7 @@ class AtRest:
         if frame != self._frame:
             self._frame, self._changed_s = frame, now_s
         self.still = now_s - self._changed_s >= STILL_S
-        of = _wish_of(wanted, worn), kinds
+        of = _wish_of(wanted, appearance), kinds
         if of != self._of:
             self._of = of
             if self._wish is not None:
@@ -304,7 +304,7 @@ class AtRest:
             for picture in self._pictures.values():
                 picture.show(None, wanted, None)
         redisplayed, self._display = self._display != _display(wanted), _display(wanted)
-        wish = replace(of[0], kinds=kinds, rebaked=worn.rebaked)
+        wish = replace(of[0], kinds=kinds, rebaked=appearance.rebaked)
         if paused:
             self._wish = None
         elif kinds and self.still and wish != self._wish and tracing.ready:
@@ -353,9 +353,9 @@ def _drawn(frame: FrameState) -> FrameState:
     return replace(frame, exposure_ev=0.0, view_transform="linear", scale=Range(), maps=0, mixed=0)
 
 
-def _wish_of(frame: FrameState, worn: Worn) -> Wish:
+def _wish_of(frame: FrameState, appearance: Appearance) -> Wish:
     """What pictures of a frame depend on, without their kinds and without where their light is."""
     return Wish(
-        0, (), frame.camera, frame.size, dict(frame.materials), dict(worn.textures), dict(frame.light),
-        frame.show if frame.show in TRACEABLE else ALL_LIGHT, worn.answers,
+        0, (), frame.camera, frame.size, dict(frame.materials), dict(appearance.textures), dict(frame.light),
+        frame.show if frame.show in TRACEABLE else ALL_LIGHT, appearance.answers,
     )  # fmt: skip

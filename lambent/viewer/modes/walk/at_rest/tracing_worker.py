@@ -114,11 +114,11 @@ class Rooms:
 
     def _baked_again(self, state: object) -> TracedRoom:
         """The room of the copy beside the store, baked with these materials and textures."""
-        from lambent.bake.running.again import copy_beside
+        from lambent.bake.running.again import rebaked_copy
         from lambent.traced.room import room_of_store
 
         if self._rebaked is None or self._rebaked[0] != state:
-            copy = Store.open(copy_beside(self._folder))
+            copy = Store.open(rebaked_copy(self._folder))
             self._rebaked = state, room_of_store(copy, scene_of(copy))
         return self._rebaked[1]
 

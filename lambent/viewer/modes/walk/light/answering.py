@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.baked.answering.stored import has_answer, read_answer
-from lambent.core.background import beside_frames
+from lambent.core.background import yielding_to_frames
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress
 from lambent.materials.document import Material
@@ -138,7 +138,7 @@ class AnsweringLight:
 
     def _maps(self, wanted: Wanted) -> _Maps:
         """Compute the light maps of edited materials and textures; runs in the thread."""
-        with beside_frames(self._is_software):
+        with yielding_to_frames(self._is_software):
             return self._computed_maps(wanted)
 
     def _computed_maps(self, wanted: Wanted) -> _Maps:
@@ -175,7 +175,7 @@ class AnsweringLight:
             found = {}
             for number, name in enumerate(answer.probes):
                 progress(number, len(answer.probes), "probes")
-                with beside_frames(self._is_software):
+                with yielding_to_frames(self._is_software):
                     found[name] = baked[name] if light.is_baked else answered(baked[name], answer, name, light)
             return found
 

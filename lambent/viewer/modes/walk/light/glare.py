@@ -9,7 +9,7 @@ from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.light.false_colour import Range
 from lambent.core.light.glare import Glare, glare
-from lambent.core.views.around import Around
+from lambent.core.views.panorama import Panorama
 from lambent.core.views.projections import Projection, View
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
@@ -41,7 +41,7 @@ class GlareDrawing:
         self._meter = meter
         self._frame: FrameState | None = None  # whose light is rated
         self._view: View | None = None
-        self._around: Around | None = None
+        self._around: Panorama | None = None
         self._traced: TracedFrames | None = None  # makes the faces; None: they are drawn
         self._is_asked = False  # whether the next face is being traced
         self._done = 0
@@ -86,10 +86,10 @@ class GlareDrawing:
     def _begin(self, traced: TracedFrames | None) -> None:
         assert self._frame is not None, "there is a request"
         self._view = View.of(self._frame.camera, Projection.fisheye, SIDE_PX, SIDE_PX)
-        self._around, self._done = Around(self._view, SIDE_PX, SIDE_PX), 0
+        self._around, self._done = Panorama(self._view, SIDE_PX, SIDE_PX), 0
         self._traced, self._is_asked = traced, False
 
-    def _face(self, around: Around, renderer: Callable[[], Renderer]) -> Floats | None:
+    def _face(self, around: Panorama, renderer: Callable[[], Renderer]) -> Floats | None:
         """Radiance of the next face; None while it is traced. Raises `UserError` if it will not come."""
         assert self._frame is not None, "there is a request"
         side = around.side_px

@@ -13,7 +13,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from lambent.bake.running.again import KINDS, copy_beside
+from lambent.bake.running.again import KINDS, rebaked_copy
 from lambent.core.errors import UserError
 from lambent.core.light.light_mix import Factors, LightMix
 from lambent.core.views.camera import Camera
@@ -40,7 +40,7 @@ class RebakedLight:
     """Rebakes the edited room and shows the light in its lane. Call it from the window's thread only."""
 
     def __init__(self, store: Path, scene: BakedScene, screen: Screen, shown: Rebaking) -> None:
-        self._store, self._copy, self._screen, self._shown = store, copy_beside(store), screen, shown
+        self._store, self._copy, self._screen, self._shown = store, rebaked_copy(store), screen, shown
         self._scene = scene
         self._mix: Factors = {}  # factors of the last update
         self._wanted = RoomState()  # present materials and textures, with light as baked

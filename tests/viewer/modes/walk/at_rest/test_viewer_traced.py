@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.running.again import bake_again, copy_beside
+from lambent.bake.running.again import bake_again, rebaked_copy
 from lambent.core.light.light_mix import GroupMix, LightMix
 from lambent.core.pictures.images import read_image
 from lambent.core.views.camera import CameraPath
@@ -280,10 +280,10 @@ def test_beside_a_traced_b_the_picture_a_is_drawn(pictures, state):
 def test_light_follows_edits_as_baked_estimated_or_rebaked(renderer, store, state):
     """In the diffuse light and the lamp's, which drawing shows as well, in other materials than the store's."""
     red = {name: one.model_copy(update={"kd": (0.7, 0.1, 0.1)}) for name, one in state.scene.materials.items()}
-    bake_again(store, copy_beside(store), red, quality=TINY).close()
+    bake_again(store, rebaked_copy(store), red, quality=TINY).close()
     state.look.show, camera = "diffuse", state.navigation.camera
     frame = state.look.frame(camera, SIZE, red)
-    truth = Renderer(renderer.device, Store.open(copy_beside(store))).still_radiance(frame, 16)
+    truth = Renderer(renderer.device, Store.open(rebaked_copy(store))).still_radiance(frame, 16)
     rooms, found = Rooms(store, 0.0, ()), []
     for how in ({"rebaked": True}, {}, {"answers": False}):
         wish = Wish(1, ("traced",), materials=red, **how)
@@ -313,7 +313,7 @@ def test_a_film_is_traced_frame_by_frame(pictures, state, tmp_path):
 
 def test_given_radiance_is_shown_as_frames_show_theirs(renderer, state):
     """The same picture to a step of 8 bits, under every view transform."""
-    given = renderer.given()
+    given = renderer.uploaded_picture()
     for view in ("filmic", "neutral", "linear", "false-colour"):
         frame = replace(
             state.look.frame(state.navigation.camera, SIZE, {}), view_transform=view, antialias=False, exposure_ev=-1.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.running.again import COPY_OF, bake_again, copy_beside
+from lambent.bake.running.again import COPY_OF, bake_again, rebaked_copy
 from lambent.core.errors import UserError
 from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe
@@ -72,7 +72,7 @@ def test_an_edit_that_needs_what_the_store_lacks_is_one_line(store, tmp_path):
 def test_settings_of_its_own_are_one_line(store, tmp_path):
     with pytest.raises(UserError, match="unknown quality"):
         bake_again(store, tmp_path / "copy", {})
-    assert copy_beside(tmp_path / "room.store").name == "room.rebake.store"
+    assert rebaked_copy(tmp_path / "room.store").name == "room.rebake.store"
 
 
 def test_texels_go_over_by_their_batches_and_end_exactly():

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bake.running.again import copy_beside
+from lambent.bake.running.again import rebaked_copy
 from lambent.core.light.light_mix import GroupMix, LightMix
 from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
@@ -122,7 +122,7 @@ def test_an_edit_is_estimated_then_baked_then_exact(boxes, opened, store, tmp_pa
     room.until(lambda: "25 %" in state.rebaking.line)
     flag.touch()
     room.until(lambda: state.rebaking.exact)
-    truth = Renderer(open_device(), Store.open(copy_beside(store)))
+    truth = Renderer(open_device(), Store.open(rebaked_copy(store)))
     np.testing.assert_allclose(image(room.renderer, state), image(truth, state), rtol=2e-3, atol=1e-4)
     assert any(
         re.fullmatch(r"baking again \d:\d\d \(first bake \d:\d\d\): light map 25 %", line) for line in room.lines
@@ -204,7 +204,7 @@ def test_objects_whose_light_is_finished_go_over_while_others_are_baked(boxes, o
     assert np.abs(shown - estimate)[theirs].mean() > 1e-3
     flag.touch()
     room.until(lambda: state.rebaking.exact)
-    truth = Renderer(open_device(), Store.open(copy_beside(boxes[groups].store)))
+    truth = Renderer(open_device(), Store.open(rebaked_copy(boxes[groups].store)))
     np.testing.assert_allclose(image(room.renderer, state), image(truth, state), rtol=4e-3, atol=1e-4)
     whole = room.renderer.resources.light_layers[0].astype(np.float32)
     off = np.abs(shown - whole)[theirs].mean() / np.abs(estimate - whole)[theirs].mean()
@@ -226,7 +226,7 @@ def test_light_of_an_edit_that_was_given_up_is_not_shown(boxes, opened, store, t
     assert rebaked._fade is None and rebaked._light is None and state.rebaking.share is None
     flag.touch()
     room.until(lambda: state.rebaking.exact)
-    truth = Renderer(open_device(), Store.open(copy_beside(store)))
+    truth = Renderer(open_device(), Store.open(rebaked_copy(store)))
     np.testing.assert_allclose(image(room.renderer, state), image(truth, state), rtol=2e-3, atol=1e-4)
 
 
@@ -261,7 +261,7 @@ def test_mixes_of_light_groups_are_exact_too(boxes, opened):
     room.frame()
     assert state.rebaking.exact
     room.until(lambda: not room.pictures._lane.busy)
-    truth = Renderer(open_device(), Store.open(copy_beside(boxes["scene"].store)))
+    truth = Renderer(open_device(), Store.open(rebaked_copy(boxes["scene"].store)))
     light = state.recordings.light
     np.testing.assert_allclose(
         image(room.renderer, state, light.items()), image(truth, state, light.items()), rtol=4e-3, atol=1e-4

@@ -27,7 +27,7 @@ def face_px(view: View, width: int) -> int:
     return int(np.clip(math.ceil(2 * width / across), 16, MOST_FACE_PX)) + 2 * RIM_PX
 
 
-class Around:
+class Panorama:
     """A panorama that is filled face by face.
 
     Attributes
