@@ -145,10 +145,10 @@ def test_another_edit_ends_it_and_undo_comes_back_without_a_bake(room):
     room.paint()
     room.until(lambda: state.rebaking.exact)
     exact = image(room.renderer, state)
-    assert room.pictures._worn.rebaked, "the process that traces may read it"
+    assert room.pictures._appearance.rebaked, "the process that traces may read it"
     edits.undo()
     room.frame()
-    assert not state.rebaking.exact and state.rebaking.line == "" and not room.pictures._worn.rebaked
+    assert not state.rebaking.exact and state.rebaking.line == "" and not room.pictures._appearance.rebaked
     room.until(lambda: not room.pictures._lane.busy)
     np.testing.assert_allclose(image(room.renderer, state), baked, rtol=1e-3, atol=1e-5)
     edits.redo()
