@@ -64,7 +64,9 @@ class LightMixer:
     @property
     def busy(self) -> bool:
         """Whether a part of the mix is not on the GPU yet."""
-        return self._work is not None or bool(self._ready)
+        # Not `_work is not None`: work may end after its last part was shown, and then no frame follows to notice.
+        computes = self._work is not None and not self._work.done()
+        return computes or bool(self._ready)
 
     @property
     def lags(self) -> bool:

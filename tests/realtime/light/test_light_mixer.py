@@ -107,6 +107,25 @@ def test_a_window_does_not_wait_and_shows_the_same_in_the_end(
     assert renderer.image(state) == pytest.approx(expected, rel=1e-3, abs=1e-3)
 
 
+def test_work_that_ends_after_its_last_part_was_shown_is_over(
+    device: Any, scene: BakedScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Although no frame is drawn any more."""
+    renderer, made, may_end = Renderer(device, scene), Event(), Event()
+    mixer, renderer.waits = renderer.mixer, False
+    make = mixer._make_stale
+    monkeypatch.setattr(mixer, "_make_stale", lambda: (make(), made.set(), may_end.wait()))
+    try:
+        renderer.image(replace(STATE, light={"lamp": RED}))
+        made.wait()
+        renderer.image(replace(STATE, light={"lamp": RED}))
+        assert mixer.busy and not mixer.lags
+    finally:
+        may_end.set()
+    wait([mixer._work])
+    assert not mixer.busy
+
+
 def test_the_sun_is_in_its_group_alone(scene: BakedScene) -> None:
     groups = scene.groups
     assert groups is not None and scene.sun is not None

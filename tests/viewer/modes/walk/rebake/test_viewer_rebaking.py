@@ -132,7 +132,8 @@ def test_an_edit_is_estimated_then_baked_then_exact(boxes, opened, store, tmp_pa
     whole = np.abs(room.seen[-1] - room.seen[estimated - 1])
     frames = np.array([np.abs(b - a) for a, b in zip(room.seen[estimated - 1 :], room.seen[estimated:], strict=False)])
     assert whole.max() > 0.01, "the estimate was one"
-    assert (frames.max(axis=0) <= 0.25 * whole + 2e-3 * room.seen[-1] + 1e-6).all(), "no texel jumps"
+    way = frames.sum(axis=0)  # longer than the difference where the first light to arrive was brighter or darker
+    assert (frames.max(axis=0) <= 0.25 * way + 2e-3 * room.seen[-1] + 1e-6).all(), "no texel jumps"
     version = room.renderer.light_version
     for _ in range(3):
         room.frame()
