@@ -21,9 +21,9 @@ from lambent.materials.export.resampling import tree_growth
 from lambent.materials.measured.lbnl_xml import read
 from lambent.materials.measured.parts.tensor_tree import Rank, disk_of
 from lambent.materials.measured.parts.tree_part import on_sphere
+from tests.materials.export.by_hand.tree import leaves_of, place_of, read_by_hand, value_at
 from tests.materials.export.export_materials import PLASTIC
 from tests.materials.export.formula_table import FormulaTable, lopsided
-from tests.materials.export.tree_by_hand import leaves_of, place_of, read_by_hand, value_at
 from tests.materials.measured.lbnl_files import angles_away_from_borders, ask_radiance, random_tree
 from tests.materials.measured.lbnl_files import lbnl_xml as file_of
 

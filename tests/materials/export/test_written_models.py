@@ -16,8 +16,8 @@ from lambent.core.geometry.directions import Floats
 from lambent.materials.document import Material
 from lambent.materials.export import gltf, materialx, mitsuba
 from lambent.materials.export.resampling.pairs import CHECK_LOG2, pairs_of
+from tests.materials.export.by_hand.facets import Geometry, assert_costs
 from tests.materials.export.export_materials import BRUSHED, FOIL, GOLD, PAPER, PLASTIC, VARNISH
-from tests.materials.export.facets_by_hand import Geometry, assert_costs
 
 MATERIALS = [PLASTIC, BRUSHED, GOLD, PAPER, VARNISH]
 
