@@ -134,19 +134,23 @@ class Files:
 
     def save(self, measurement: Measurement | None) -> None:
         """Write the document with its provenance; replace an unrelated file only at the second try."""
-        subject = self._subject
-        errors = measurement.exact_errors(subject.material) if measurement else {}
-        document = with_account(subject.material, subject.origin, measurement, errors)
+        subject, material = self._subject, self._subject.material
+
+        def document() -> Material:
+            errors = measurement.exact_errors(material) if measurement else {}
+            return with_account(material, subject.origin, measurement, errors)
+
         if write_document(document, self._screen, self.name, self._may_replace):
-            subject.edits.saved[subject.name] = subject.material
+            subject.edits.saved[subject.name] = material
 
 
 def write_document(
-    document: Material, screen: Screen, name: str, may_replace: set[Path], *, bare: bool = False
+    document: Callable[[], Material], screen: Screen, name: str, may_replace: set[Path], *, bare: bool = False
 ) -> bool:
     """Write a material to the file of a typed name, and report success or failure; return whether it was written.
 
     A file that is not in `may_replace` is replaced only at the second try; `name` and `bare` as in `document_file`.
+    `document`, which may measure errors for seconds, is called only when there is a file to write.
     """
     try:
         file = document_file(screen.folder, name, bare=bare)
@@ -154,7 +158,7 @@ def write_document(
             may_replace.add(file.resolve())
             screen.say(f"{file.name} exists: save again to replace it")
             return False
-        document.save(file)
+        document().save(file)
     except (UserError, OSError) as error:
         screen.say(f"not saved: {error}")
         return False

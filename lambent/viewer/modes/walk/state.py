@@ -85,8 +85,13 @@ class Materials:
         Its provenance stays, with a note if numbers were changed by hand.
         """
         material, origin = self.edits.current(name), self.edits.scene[name]
-        document = with_account(material, origin, None, {})
-        if write_document(document, self.screen, self.file_name(name), self.may_replace, bare=True):
+        if write_document(
+            lambda: with_account(material, origin, None, {}),
+            self.screen,
+            self.file_name(name),
+            self.may_replace,
+            bare=True,
+        ):
             self.edits.saved[name] = material
 
     def rescue(self, names: Iterable[str]) -> Iterator[Path]:
