@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
@@ -173,12 +173,16 @@ class _Baking:
                 begin = -(-begin // ENTRIES) * ENTRIES
                 some = spans.artefact.region(chunk)[0]
                 points, seen, texture = self.points.where(some), self.seen[:, some], self._texture(some)
-                blocks = pair_transport(points, self.lights, seen, term, bands, self.scale, texture, least)
-                counts, of_steps, light = (np.concatenate(one) for one in zip(*blocks, strict=True))
-                after.do(append, steps, begin, of_steps)
-                after.do(append, values, begin, light)
-                ends = begin + np.cumsum(counts)
-                after.do(spans.write, chunk, np.stack([ends - counts, ends], axis=1).astype(np.uint32))
+                streams, counts = [EntryStream(writer, begin, after.do) for writer in (steps, values)], []
+                for found in pair_transport(points, self.lights, seen, term, bands, self.scale, texture, least):
+                    counts.append(found.counts)
+                    streams[0].add(found.steps)
+                    streams[1].add(found.light)
+                for stream in streams:
+                    stream.end()
+                many_each = np.concatenate(counts)
+                ends = begin + np.cumsum(many_each)
+                after.do(spans.write, chunk, np.stack([ends - many_each, ends], axis=1).astype(np.uint32))
                 begin = int(ends[-1])
         for writer in (steps, values, spans):
             writer.finish()
@@ -209,15 +213,46 @@ class _Baking:
         self.progress(total, total, self.what)
 
 
+class EntryStream:
+    """Writes entries (n, ...) into whole chunks from `begin`, the last one padded with zeros.
+
+    Holds one chunk, however many entries come. `do` writes a full one, at once or in the background, which may queue.
+    """
+
+    def __init__(self, writer: Writer, begin: int, do: Callable[..., None]) -> None:
+        self._writer, self._next, self._do = writer, begin // ENTRIES, do
+        self._chunk, self._filled = self._empty(), 0
+
+    def add(self, entries: np.ndarray) -> None:
+        while len(entries):
+            here, entries = np.split(entries, [ENTRIES - self._filled])
+            self._chunk[self._filled : self._filled + len(here)] = here
+            self._filled += len(here)
+            if self._filled == ENTRIES:
+                self.end()
+
+    def end(self) -> None:
+        """Write what is held."""
+        if self._filled:
+            self._do(self._write, self._next, self._chunk)
+            self._chunk, self._filled = self._empty(), 0
+            self._next += 1
+
+    def _empty(self) -> np.ndarray:
+        return np.zeros((ENTRIES, *self._writer.artefact.shape[1:]), self._writer.artefact.dtype)
+
+    def _write(self, number: int, chunk: np.ndarray) -> None:
+        missing = (number + 1) * ENTRIES - self._writer.artefact.shape[0]
+        if missing > 0:
+            self._writer.extend(missing)
+        self._writer.write((number, *[0] * (chunk.ndim - 1)), chunk)
+
+
 def append(writer: Writer, begin: int, entries: np.ndarray) -> None:
-    """Write entries (n, ...) into whole chunks from `begin`, the last one padded with zeros."""
-    size = -(-len(entries) // ENTRIES) * ENTRIES
-    padded = np.concatenate([entries, np.zeros((size - len(entries), *entries.shape[1:]), entries.dtype)])
-    if begin + size > writer.artefact.shape[0]:
-        writer.extend(begin + size - writer.artefact.shape[0])
-    for first in range(0, size, ENTRIES):
-        chunk = ((begin + first) // ENTRIES, *[0] * (entries.ndim - 1))
-        writer.write(chunk, padded[first : first + ENTRIES])
+    """Write entries as `EntryStream`, at once."""
+    stream = EntryStream(writer, begin, lambda work, *arguments: work(*arguments))
+    stream.add(entries)
+    stream.end()
 
 
 def _parts(context: BakeContext, view: View, count: int) -> Iterator[_Part]:
