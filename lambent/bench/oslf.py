@@ -8,6 +8,7 @@ sampling.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -162,8 +163,8 @@ def surface_rows(
 
 def raw_mb(field: LightField) -> float:
     """MB of radiance and inverse distance in half floats, and of the sample map, uncompressed."""
-    arrays = np.asarray(field.radiance), np.asarray(field.inverse_distance), field.sample_map
-    return round(sum(array.nbytes for array in arrays) / 1e6, 1)
+    arrays = field.radiance, field.inverse_distance, field.sample_map  # maps in blocks are not decoded for this
+    return round(sum(math.prod(array.shape) * array.dtype.itemsize for array in arrays) / 1e6, 1)
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -72,7 +72,6 @@ class LightField:
     corner : row and column of the sample map's first texel in a grid of `grid` (rows, columns) over the light map's uv2
         in [0, 1]: texel (row, column) has its centre at uv2 = ((column + 1/2)/columns, (row + 1/2)/rows).
     offset_m : distance of the points from the surface.
-    own_diffuse : whether the maps show the object itself without its lobes.
     volume : whether points fill the bounding box of the object and maps leave it out, so that another object may stand
         there. `normals` then point away from the centre of the box.
     cover : (P, E, E) uint8, or None: bit 2 i + j is set where the quarter (row i, column j) of a texel shows a surface;
@@ -93,7 +92,6 @@ class LightField:
     grid: tuple[int, int]
     offset_m: float
     blocks: NDArray[np.uint32] | None = None
-    own_diffuse: bool = False
     volume: bool = False
     glass: Glass | None = None
     cover: Maps | None = None

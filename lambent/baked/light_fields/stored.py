@@ -53,7 +53,7 @@ def read_light_field(store: Store, object_name: str) -> LightField:
     return LightField(
         points, normals, radiance, inverse_distance, sample_map,
         (int(corner[0]), int(corner[1])), (int(grid[0]), int(grid[1])), offset_m, blocks,
-        store.artefact(name).meta.get("levels") == 1, store.artefact(name).meta.get("volume") is True,
+        store.artefact(name).meta.get("volume") is True,
         _glass(store, object_name, sample_map.shape), cover, distances,
     )  # fmt: skip
 
