@@ -51,7 +51,7 @@ class TracedScene:
         sun_left_out: bool = True, unmapped: Collection[str] = (), effort: float = 1.0,
     ) -> None:  # fmt: skip
         self.atlas, self.scene, self.merged, self.progress = atlas, atlas.scene, merged, progress
-        self.two_sided, self._sun_beside, self._unmapped, self._effort = two_sided, sun_left_out, unmapped, effort
+        self.two_sided, self._sun_left_out, self._unmapped, self._effort = two_sided, sun_left_out, unmapped, effort
         counts = [len(o.mesh.faces) for o in self.scene.objects]
         self._two_sided, self._crossed = np.repeat(two_sided, counts), np.repeat(crossed_by_light(self.scene), counts)
         self._builder: tuple[tuple[bool, bool], SceneBuilder] | None = None
@@ -105,7 +105,7 @@ class TracedScene:
 
     @cached_property
     def _found_sun(self) -> FoundSun | None:
-        return sun_of(self.scene) if self._sun_beside else None
+        return sun_of(self.scene) if self._sun_left_out else None
 
     def unseen(self, *, diffuse: bool) -> Sun | None:
         """That sun with the emitters of `whole(diffuse=diffuse)`, for sampling at points of the light map."""

@@ -113,8 +113,8 @@ def _in_states(
         if edit.sky_turn_deg not in rooms:
             rooms = {edit.sky_turn_deg: room_of(edit.sky_turn_deg)}
         room = rooms[edit.sky_turn_deg]
-        worn = edits_of(scene.materials, scene.textures, bare, edit.looks, edit.colours, edit.textures)
-        room.set_materials(worn.looks, worn.materials)
+        changed = edits_of(scene.materials, scene.textures, bare, edit.looks, edit.colours, edit.textures)
+        room.set_materials(changed.looks, changed.materials)
         room.mix(edit.light)
         yield name, found(room.tracer)
 

@@ -140,7 +140,7 @@ class Pictures(Pair):
 
     @property
     def _appearance(self) -> Appearance:
-        """What the room wears."""
+        """The materials' textures and the light of the room."""
         lane, answers = self._lane, self._lane.shown.on and self._lane.shown.possible
         return Appearance(lane.textures, answers, self._rebaked is not None and self._rebaked.is_copied(lane.room))
 
