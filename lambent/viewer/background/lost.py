@@ -1,7 +1,8 @@
-"""Save unsaved work when the window is lost: by an error, a signal, or a lost display.
+"""Save unsaved work when the window is lost: by an error, a signal, a lost display, or a driver that aborts.
 
-If the X server dies, Xlib ends the process without running Python's `finally` and `atexit`, but calls a handler first.
-Nothing can be saved if the process is killed by SIGKILL or crashes in the graphics driver.
+If the X server dies, either Xlib notices first, which calls a handler and then ends the process, or WebGPU does, which
+calls `abort`. Neither runs Python's `finally` and `atexit`. Nothing can be saved if the process is killed by SIGKILL or
+reads a bad address in the graphics driver.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ from lambent.core.errors import UserError
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 LIBX11 = "libX11.so.6"
+RESCUE_LIMIT_S = 10  # after an abort, for a rescue that waits for a lock which the aborting code holds
 _IoErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
+_SignalHandler = ctypes.CFUNCTYPE(None, ctypes.c_int)
 
 
 def rescued(what: str, write: Callable[[], Iterable[object]]) -> None:
@@ -36,7 +39,8 @@ def rescued(what: str, write: Callable[[], Iterable[object]]) -> None:
 def kept(rescue: Callable[[], None]) -> Iterator[None]:
     """Context that calls `rescue` once if the window is lost.
 
-    Within it, handlers of terminating signals and of Xlib's connection error are replaced; they are restored after.
+    Within it, handlers of terminating signals, of `abort`, and of Xlib's connection error are replaced; they are
+    restored after.
     """
     over = False
 
@@ -60,6 +64,15 @@ def kept(rescue: Callable[[], None]) -> Iterator[None]:
             os._exit(1)  # Xlib would exit, too, but run the graphics driver's exit handlers first
         return 0
 
+    def on_abort(_: int) -> None:
+        signal.alarm(RESCUE_LIMIT_S)
+        try:
+            lost()
+        finally:
+            sys.stderr.write("lambent: error: the display was lost, or its graphics driver gave up\n")
+            sys.stderr.flush()
+            os._exit(1)
+
     main = threading.current_thread() is threading.main_thread()
     mine = [number for number in SIGNALS if main and signal.getsignal(number) == signal.SIG_DFL]
     for number in mine:
@@ -68,7 +81,8 @@ def kept(rescue: Callable[[], None]) -> Iterator[None]:
     xlib = _xlib()
     before = xlib.XSetIOErrorHandler(ctypes.cast(handler, ctypes.c_void_p)) if xlib is not None else None
     try:
-        yield
+        with _aborting_to(on_abort):
+            yield
     except Exception:
         lost()
         raise
@@ -77,6 +91,25 @@ def kept(rescue: Callable[[], None]) -> Iterator[None]:
             xlib.XSetIOErrorHandler(before)
         for number in mine:
             signal.signal(number, signal.SIG_DFL)
+
+
+@contextmanager
+def _aborting_to(handler: Callable[[int], None]) -> Iterator[None]:
+    """Context in which `abort` calls `handler`.
+
+    The handler of C is set, not Python's `signal.signal`, whose handlers run after the present call: `abort` has none.
+    """
+    if os.name != "posix":
+        yield
+        return
+    libc = ctypes.CDLL(None)
+    libc.signal.argtypes, libc.signal.restype = (ctypes.c_int, ctypes.c_void_p), ctypes.c_void_p
+    called = _SignalHandler(handler)  # kept alive until the handler before is restored
+    before = libc.signal(signal.SIGABRT, ctypes.cast(called, ctypes.c_void_p))
+    try:
+        yield
+    finally:
+        libc.signal(signal.SIGABRT, before)
 
 
 def _xlib() -> Any:

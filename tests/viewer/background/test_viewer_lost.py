@@ -113,6 +113,24 @@ with kept(lambda: print("saved", flush=True)):
     assert done.returncode == -signal.SIGTERM and done.stdout == "saved\n", done.stderr
 
 
+@pytest.mark.parametrize("thread", ["main", "other"])
+def test_an_abort_of_the_driver_ends_the_process_after_the_rescue(thread):
+    code = f"""
+import ctypes, threading
+from lambent.viewer.background.lost import kept
+with kept(lambda: print("saved", flush=True)):
+    abort = ctypes.CDLL(None).abort
+    if {thread!r} == "main":
+        abort()
+    started = threading.Thread(target=abort)
+    started.start()
+    started.join()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False)
+    assert done.returncode == 1 and done.stdout == "saved\n", done.stderr
+    assert done.stderr.startswith("lambent: error: the display was lost"), done.stderr
+
+
 def test_a_walk_that_can_be_kept_nowhere_is_said(mode, state, capsys, monkeypatch):
     def refused(*_, **__):
         raise PermissionError(errno.EACCES, "Permission denied")
