@@ -22,6 +22,7 @@ from lambent.core.plain import Triple
 from lambent.core.surroundings import Axis, Layout
 from lambent.core.views.camera import Camera, CameraPath
 from lambent.materials.document import Material
+from lambent.scenes.grids import Grid
 from lambent.scenes.ies import Photometry
 from lambent.scenes.mesh import Mesh as Mesh  # most users of scenes want it too
 from lambent.scenes.mesh import boxes_of, corners_of
@@ -306,6 +307,7 @@ class Scene:
     reflector_rules: tuple[ReflectorRule, ...] = ()  # the last one that matches an object counts
     variants: tuple[Variant, ...] = ()  # other states of the materials and the light
     light_groups: tuple[LightGroup, ...] = ()  # named by the user; other emitters are in default groups
+    grids: tuple[Grid, ...] = ()  # calculation surfaces
     parts: Mapping[str, str] = field(default_factory=dict)  # object that is a part -> name of the whole
     borders: Mapping[str, tuple[Border, ...]] = field(default_factory=dict)  # of parts, as in store.contract
     measured: Mapping[str, Path] = field(default_factory=dict)  # material -> the table that replaces it in bakes

@@ -11,6 +11,7 @@ from lambent.core.light.exposure import exposure_of
 from lambent.core.surroundings import Axis, Layout
 from lambent.core.views.camera import Camera, CameraPath
 from lambent.scenes.light_groups import MOST_GROUPS
+from lambent.scenes.loaders.scene_toml.grids import GridSection
 from lambent.scenes.loaders.scene_toml.lamps import LightSection, one_of
 from lambent.scenes.loaders.scene_toml.sections import (
     Colour,
@@ -263,6 +264,7 @@ class SceneDocument(Section):
     cameras: tuple[CameraSection, ...] = ()
     reflectors: tuple[ReflectorSection, ...] = ()
     paths: tuple[PathSection, ...] = ()
+    grids: tuple[GridSection, ...] = ()
 
     @property
     def exposure(self) -> float | None:
