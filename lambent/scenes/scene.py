@@ -23,9 +23,9 @@ from lambent.core.surroundings import Axis, Layout
 from lambent.core.views.camera import Camera, CameraPath
 from lambent.materials.document import Material
 from lambent.scenes.grids import Grid
-from lambent.scenes.ies import Photometry
 from lambent.scenes.mesh import Mesh as Mesh  # most users of scenes want it too
 from lambent.scenes.mesh import boxes_of, corners_of
+from lambent.scenes.photometry.distribution import Photometry
 
 Array = NDArray[np.floating]
 Border = tuple[float, float, float, float]

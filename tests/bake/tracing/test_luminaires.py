@@ -12,7 +12,7 @@ from scipy.ndimage import map_coordinates
 
 from lambent.bake.bake import bake
 from lambent.core.light.photometry import LM_PER_W, photometric
-from lambent.scenes.ies import Photometry
+from lambent.scenes.photometry.distribution import Photometry
 from lambent.scenes.scene import DirectionalLight, IesLight, PointLight
 from lambent.scenes.sky.triangle_lights import joined, small_lights
 from tests.bake.small_scenes import TINY, plane

@@ -11,9 +11,10 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import normalize
 from lambent.scenes import load_scene
-from lambent.scenes.ies import parse_ies
 from lambent.scenes.loaders.contents import Contents
+from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.placing import placed
+from lambent.scenes.photometry.files import parse_luminaire
 from lambent.scenes.scene import DirectionalLight, IesLight, PointLight
 from lambent.scenes.sky.environment_images import read_lat_long
 from tests.scenes.loaders.gltf.test_gltf import document, loaded, textured
@@ -76,10 +77,11 @@ def test_geometry_with_z_up_stands_upright(tmp_path: Path) -> None:
 def test_lights_are_placed_with_their_geometry(tmp_path: Path, up: str) -> None:
     """Intensities towards directions of the file are those towards the same directions of the scene."""
     scene = loaded(tmp_path, document())
+    lamp = parse_luminaire(UNEVEN.encode(), tmp_path, SceneFiles(tmp_path))
     lights = (
         PointLight((1, 2, 3), (1, 1, 1), direction=(0, 0, -1)),
         DirectionalLight((0, 0, -1), (1, 1, 1)),
-        IesLight((1, 2, 3), parse_ies(UNEVEN.encode(), tmp_path), (1, 1, 1), (0, 0, -1), 30.0),
+        IesLight((1, 2, 3), lamp.photometry(), (1, 1, 1), (0, 0, -1), 30.0),
     )
     contents = Contents(scene.objects, scene.materials, lights=lights)
     spot, sun, luminaire = placed(contents, 0.5, up, tmp_path).lights  # type: ignore[arg-type]

@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.scenes.ies import Photometry
+from lambent.scenes.photometry.distribution import Photometry
 
 EDGE_RAD = 1e-6  # tolerance beyond the first and the last vertical angle
 

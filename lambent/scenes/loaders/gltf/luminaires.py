@@ -1,4 +1,4 @@
-"""Luminaires of a glTF file (EXT_lights_ies): points that emit by an IES file, embedded or beside it."""
+"""Luminaires of a glTF file (EXT_lights_ies): points that emit by an IES or EULUMDAT file, embedded or beside it."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from lambent.core.errors import UserError
 from lambent.core.geometry.directions import Floats, normalize
 from lambent.core.light.photometry import radiometric
 from lambent.core.plain import triple
-from lambent.scenes.ies import Photometry, parse_ies
 from lambent.scenes.loaders.gltf.container import Gltf
 from lambent.scenes.loaders.gltf.schema import Node, ProfileDocument
+from lambent.scenes.photometry.distribution import Photometry
+from lambent.scenes.photometry.files import parse_luminaire
 from lambent.scenes.scene import IesLight
 
 
@@ -45,7 +46,8 @@ class Luminaires:
             profile = self._gltf.pick(self._gltf.document.profiles, index, "EXT_lights_ies.lights")
             field = f"EXT_lights_ies.lights.{index}"
             try:
-                self._read[index] = parse_ies(self._content(profile, field), self._gltf.path)
+                content = self._content(profile, field)
+                self._read[index] = parse_luminaire(content, self._gltf.path, self._gltf.files).photometry()
             except UserError as error:
                 self._read[index] = None
                 why = f"{error.field}: {error.message}" if error.field and error.field != field else error.message

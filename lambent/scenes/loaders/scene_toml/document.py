@@ -17,7 +17,6 @@ from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.plain import Triple
 from lambent.materials.document import Material, material_from
 from lambent.scenes.first_view import first_views
-from lambent.scenes.ies import read_ies
 from lambent.scenes.light_groups import SKY, SUN, names_of_lights
 from lambent.scenes.loaders.contents import DAYLIGHT, Contents, emission_warnings
 from lambent.scenes.loaders.scene_files import SceneFiles
@@ -36,6 +35,7 @@ from lambent.scenes.loaders.scene_toml.text import toml_of
 from lambent.scenes.loaders.scene_toml.variants import parse_variants
 from lambent.scenes.loaders.surfaces.surface import UNDESCRIBED
 from lambent.scenes.looks.variants import with_variants
+from lambent.scenes.photometry.files import read_luminaire
 from lambent.scenes.scene import (
     Environment,
     ImageEnvironment,
@@ -243,8 +243,7 @@ def _lights(document: SceneDocument, path: Path, files: SceneFiles) -> list[Ligh
             file = files.path(section.file, path, "lights.file")
             if not file.is_file():
                 raise UserError("file not found", file=path, field="lights.file", got=section.file)
-            files.use(file)
-            found.append(section.luminaire(read_ies(file)))
+            found.append(section.light_of(read_luminaire(file, files)))
         else:
             found.append(section.light())
     return found

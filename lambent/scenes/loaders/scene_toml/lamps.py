@@ -1,4 +1,4 @@
-"""Lights of a scene.toml, in radiometric or photometric units: W/sr, cd, lm; W/m^2, lx; IES files.
+"""Lights of a scene.toml, in radiometric or photometric units: W/sr, cd, lm; W/m^2, lx; IES and EULUMDAT files.
 
 A photometric light is white, or has a `colour`, whose luminance has no effect.
 """
@@ -14,8 +14,8 @@ from pydantic import Field, field_validator, model_validator
 from lambent.core.light.colour import luminance
 from lambent.core.light.photometry import LM_PER_W
 from lambent.core.plain import Triple, triple
-from lambent.scenes.ies import Photometry
 from lambent.scenes.loaders.scene_toml.sections import Colour, Finite, NotNegative, Section, Vector, not_zero, unit
+from lambent.scenes.photometry.luminaire import Luminaire
 from lambent.scenes.scene import DirectionalLight, IesLight, PointLight
 
 WHITE: Triple = (1.0, 1.0, 1.0)
@@ -124,10 +124,11 @@ class DirectionalSection(_Coloured):
 
 
 class IesSection(_Coloured):
-    """A luminaire of an IES file, straight down unless aimed; `lumens` scales it to that flux."""
+    """A luminaire of an IES or EULUMDAT file, straight down unless aimed; `lumens` scales it to that flux."""
 
     kind: Literal["ies"]
     file: str
+    lamp_set: int = 0
     position: Vector
     direction: Vector = (0.0, -1.0, 0.0)
     rotation_deg: Finite = 0.0
@@ -135,7 +136,9 @@ class IesSection(_Coloured):
 
     _direction = field_validator("direction")(not_zero)
 
-    def luminaire(self, photometry: Photometry) -> IesLight:
+    def light_of(self, luminaire: Luminaire) -> IesLight:
+        luminaire.lamps(self.lamp_set)
+        photometry = luminaire.photometry(self.lamp_set) if self.lumens is None else luminaire.values
         aim = unit(self.direction)
         tilt_deg = math.degrees(math.acos(min(max(-aim[1], -1.0), 1.0)))
         scale = photometry.tilted(tilt_deg)

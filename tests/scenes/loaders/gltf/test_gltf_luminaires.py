@@ -12,7 +12,7 @@ import pytest
 from lambent.core.light.photometry import photometric
 from lambent.scenes.scene import IesLight, PointLight, Scene
 from tests.scenes.loaders.gltf.test_gltf import document, loaded
-from tests.scenes.test_ies import ies
+from tests.scenes.photometry.test_ies import ies
 
 UNEVEN = ies("0 45 90", "0 90 180 270 360", "100 80 0 100 60 0 100 40 0 100 20 0 100 80 0")
 DATA = "data:application/x-ies-lm-63;base64," + base64.b64encode(UNEVEN.encode()).decode()
@@ -86,14 +86,14 @@ def test_a_light_for_other_programs_beside_it_is_not_added(tmp_path: Path) -> No
     ("profile", "told"),
     [
         ({"uri": "gone.ies", "name": "spot"}, "spot: luminaire left out, gone.ies is missing"),
-        ({"uri": "data:;base64,AAAA"}, "EXT_lights_ies.lights.0: luminaire left out, is not an IES file"),
+        ({"uri": "data:;base64,AAAA"}, "EXT_lights_ies.lights.0: luminaire left out, is not an IES or EULUMDAT file"),
         ({"uri": "data:;base64,!"}, "base64 data is damaged"),
         ({"uri": "http://lamps.example/a.ies"}, "is on the network"),
         ({"uri": "../../a.ies"}, "path leaves its folder"),
         ({}, "neither a uri nor a buffer view"),
-        ({"bufferView": 0}, "is not an IES file"),
+        ({"bufferView": 0}, "is not an IES or EULUMDAT file"),
         ({"bufferView": 99}, "index out of range"),
-        ({"uri": "data:;base64," + base64.b64encode(ies(kind=2).encode()).decode()}, "not of type C"),
+        ({"uri": "data:;base64," + base64.b64encode(ies(kind=4).encode()).decode()}, "unknown photometric type"),
     ],
 )
 def test_a_profile_that_cannot_be_used_leaves_its_luminaire_out(

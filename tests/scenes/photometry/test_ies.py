@@ -10,8 +10,15 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.scenes.ies import FEET_M, read_ies
+from lambent.scenes.photometry.distribution import Photometry
+from lambent.scenes.photometry.files import read_luminaire
+from lambent.scenes.photometry.ies import FEET_M
 from lambent.scenes.scene import IesLight
+
+
+def read_ies(path: Path) -> Photometry:
+    return read_luminaire(path).photometry()
+
 
 HEADS = {1986: "", 1991: "IESNA91\n", 1995: "IESNA:LM-63-1995\n", 2002: "IESNA:LM-63-2002\n"}
 
@@ -43,7 +50,7 @@ def written(folder: Path, text: str) -> Path:
 
 def test_a_downlight(tmp_path: Path) -> None:
     made = read_ies(written(tmp_path, ies()))
-    assert made.opening_m == (0.5, 0.25, 0.0)
+    assert str(made.opening) == "rectangle, 0.25 x 0.5 x 0 m"
     assert made.at(np.array([0, 22.5, 45, 90, 91]), np.array([0, 10, 370, -20, 0])) == pytest.approx(
         [1000, 750, 500, 0, 0]
     )
@@ -64,7 +71,7 @@ def test_factors(tmp_path: Path, year: int) -> None:
     text = ies(head=HEADS[year], numbers="1 800 2", factors=".9 .5 50", units=1)
     made = read_ies(written(tmp_path, text))
     assert made.at(np.array(0.0), np.array(0.0)) == pytest.approx(1000 * 2 * 0.9 * (0.5 if year < 1995 else 1))
-    assert made.opening_m[0] == pytest.approx(0.5 * FEET_M)
+    assert made.opening.size_m[1] == pytest.approx(0.5 * FEET_M)
 
 
 @pytest.mark.parametrize(
@@ -95,10 +102,11 @@ def test_tilt(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "word"),
     [
-        ("", "is not an IES file"),
+        ("", "is not an IES or EULUMDAT file"),
         ("TILT=NONE\n", "truncated"),
-        (ies(kind=2), "found type B"),
-        (ies(tilt="TILT=lamp.tlt"), "tilt file is not supported"),
+        (ies(kind=4), "unknown photometric type; found 4"),
+        (ies(tilt="TILT=lamp.tlt"), "tilt file is missing; found lamp.tlt"),
+        (ies(tilt="TILT=../../lamp.tlt"), "TILT: path leaves its folder"),
         (ies(candela="1000 500"), "candela: file is truncated"),
         (ies(candela="1000 nan 0"), "not finite"),
         (ies("0 90 45"), "do not increase"),

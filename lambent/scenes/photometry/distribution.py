@@ -1,0 +1,127 @@
+"""The luminous intensity of a luminaire by direction, in type C angles, and what its readers share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from lambent.core.arrays import Flags, Floats
+from lambent.core.errors import UserError
+from lambent.scenes.photometry.opening import POINT, Opening
+
+MOST_CD = 1e12
+EDGE_DEG = 1e-6  # tolerance beyond the first and the last angle
+ANGLE_DIGITS = 6  # mirrored angles are equal up to rounding
+
+
+@dataclass(frozen=True)
+class Photometry:
+    """Luminous intensity of a luminaire, linear in both angles; beyond the given angles there is no light.
+
+    Attributes
+    ----------
+    vertical_deg : (V,)
+        Ascending, within 0 to 180; 0 is the luminaire's axis.
+    horizontal_deg : (H,)
+        Ascending from 0 to 360, both included.
+    candela : (H, V)
+        Not negative.
+    opening : Opening
+        Its luminous opening.
+    tilt_deg, tilt_factors : (N,)
+        Factors on all intensities by the angle between the luminaire's axis and straight down.
+    """
+
+    vertical_deg: tuple[float, ...]
+    horizontal_deg: tuple[float, ...]
+    candela: tuple[tuple[float, ...], ...]
+    opening: Opening = POINT
+    tilt_deg: tuple[float, ...] = (0.0,)
+    tilt_factors: tuple[float, ...] = (1.0,)
+
+    @classmethod
+    def of(cls, vertical_deg: Floats, horizontal_deg: Floats, candela: Floats) -> Photometry:
+        """Of arrays (V,), (H,) and (H, V)."""
+        return cls(tuple(vertical_deg.tolist()), tuple(horizontal_deg.tolist()), tuple(map(tuple, candela.tolist())))
+
+    @cached_property
+    def lumens(self) -> float:
+        """Luminous flux of all directions, the exact integral of `at`."""
+        return self.lumens_within(180.0)
+
+    def lumens_within(self, most_deg: float) -> float:
+        """Luminous flux of directions up to `most_deg` from the axis."""
+        cut = np.minimum(self.vertical_deg, most_deg)
+        theta, phi = np.radians(self.vertical_deg), np.radians(self.horizontal_deg)
+        around = ((np.array(self.candela)[1:] + np.array(self.candela)[:-1]) / 2 * np.diff(phi)[:, None]).sum(axis=0)
+        a, b = theta[:-1], np.radians(cut)[1:]
+        slope = np.diff(around) / np.diff(theta)
+        # of (start + slope (x - a)) sin x from a to b
+        whole = around[:-1] * (np.cos(a) - np.cos(b)) + slope * (np.sin(b) - np.sin(a) - (b - a) * np.cos(b))
+        return float(whole[a < b].sum())
+
+    def scaled(self, factor: float) -> Photometry:
+        """With all intensities multiplied by `factor`."""
+        return replace(self, candela=tuple(map(tuple, (factor * np.array(self.candela)).tolist())))
+
+    def tilted(self, tilt_deg: float) -> float:
+        """Factor on all intensities of a luminaire whose axis is tilted by `tilt_deg` from straight down."""
+        return float(np.interp(tilt_deg, self.tilt_deg, self.tilt_factors))
+
+    def at(self, vertical_deg: Floats, horizontal_deg: Floats) -> Floats:
+        """Candela (...) towards angles (...), without tilt."""
+        theta, phi = np.array(self.vertical_deg), np.array(self.horizontal_deg)
+        wanted, turn = np.asarray(vertical_deg, float), np.mod(horizontal_deg, 360.0)
+        i = np.clip(np.searchsorted(phi, turn, side="right") - 1, 0, len(phi) - 2)
+        j = np.clip(np.searchsorted(theta, wanted, side="right") - 1, 0, len(theta) - 2)
+        s = np.clip((turn - phi[i]) / (phi[i + 1] - phi[i]), 0, 1)
+        t = np.clip((wanted - theta[j]) / (theta[j + 1] - theta[j]), 0, 1)
+        cd = np.array(self.candela)
+        found = (1 - s) * ((1 - t) * cd[i, j] + t * cd[i, j + 1]) + s * ((1 - t) * cd[i + 1, j] + t * cd[i + 1, j + 1])
+        return np.where(_within(wanted, theta) & _within(turn, phi), found, 0.0)
+
+
+def _within(angle_deg: Floats, nodes_deg: Floats) -> Flags:
+    inside: Flags = (angle_deg >= nodes_deg[0] - EDGE_DEG) & (angle_deg <= nodes_deg[-1] + EDGE_DEG)
+    return inside
+
+
+def check_angles(angles_deg: Floats, least: float, most: float, file: Path, field: str) -> None:
+    """Raise `UserError` if angles do not increase, are outside `least` to `most` degrees, or are fewer than 2."""
+    first, last = angles_deg[0], angles_deg[-1]
+    if (np.diff(angles_deg) <= 0).any():
+        raise UserError("angles do not increase", file=file, field=field, expected="increasing angles in degrees")
+    if not least <= first <= last <= most:
+        fault = f"are outside {least:g} to {most:g} degrees"
+        raise UserError(fault, file=file, field=field, got=f"{first:g} to {last:g}")
+    if len(angles_deg) < 2:
+        raise UserError("too few for a distribution", file=file, field=field, got="1", expected="2 or more")
+
+
+def check_candela(candela: Floats, file: Path, field: str) -> None:
+    """Raise `UserError` if intensities are beyond all luminaires."""
+    most = float(np.abs(candela).max())
+    if not most <= MOST_CD:
+        fault = "intensities are out of range"
+        raise UserError(fault, file=file, field=field, got=f"{most:g}", expected=f"up to {MOST_CD:g}")
+
+
+def whole_turn(horizontal_deg: Floats, values: Floats, mirrors_deg: Iterable[float] = ()) -> tuple[Floats, Floats]:
+    """Angles from 0 to 360 degrees, both included, and values (H, V) there.
+
+    Values are mirrored at each of the planes through the axis at `mirrors_deg`, one after the other, and linear in the
+    gap that is left.
+    """
+    for at_deg in mirrors_deg:
+        horizontal_deg = np.concatenate([horizontal_deg, 2 * at_deg - horizontal_deg])
+        values = np.concatenate([values, values])
+    rounded = np.mod(np.round(np.mod(horizontal_deg, 360.0), ANGLE_DIGITS), 360.0)
+    turned, index = np.unique(rounded, return_index=True)
+    before, after, inner = turned[-1] - 360, turned[0], turned > 0
+    share = -before / (after - before)
+    at_zero = (1 - share) * values[index[-1:]] + share * values[index[:1]]
+    return np.array([0, *turned[inner], 360.0]), np.concatenate([at_zero, values[index[inner]], at_zero])
