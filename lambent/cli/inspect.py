@@ -21,8 +21,10 @@ Facts = dict[str, Any]
 
 
 def command(
-    file: Annotated[str, typer.Argument(help="Measured table, material, scene, store, image; or builtin:room.")],
-    plot: Annotated[Path | None, typer.Option(help="Plot a table or material (.png, .pdf, .svg).")] = None,
+    file: Annotated[
+        str, typer.Argument(help="Measured table, material, luminaire, scene, store, image; or builtin:room.")
+    ],
+    plot: Annotated[Path | None, typer.Option(help="Plot a table, material or luminaire (.png, .pdf, .svg).")] = None,
     reconstruction: Between = "auto",
     crease_angle: CreaseAngle = None,
     force: Force = False,
@@ -47,10 +49,10 @@ def command(
         facts = plain(inspect_table(file, plot, reconstruction))
     elif plot is None:
         facts = plain(inspect(file))
-    elif inspect is inspect_material:
+    elif inspect in (inspect_material, inspect_luminaire):
         facts = plain(inspect(file, plot))
     else:
-        raise UserError("applies to tables and materials only", file=file, field="--plot")
+        raise UserError("applies to tables, materials and luminaires only", file=file, field="--plot")
     prose = ["\n- ".join([f"\n\n{name}", *value]) for name, value in facts.items() if _is_prose(value)]
     show(facts, table(_rows(facts)) + "".join(prose), json)
 
@@ -58,6 +60,7 @@ def command(
 def inspector_of(file: str) -> Callable[..., Facts]:
     """The function that describes a file, chosen by its path and its first bytes."""
     from lambent.scenes.loaders.load import BUILTIN_PREFIX, is_scene
+    from lambent.scenes.photometry.files import is_luminaire
 
     path = Path(file)
     if file.startswith(BUILTIN_PREFIX):
@@ -69,7 +72,9 @@ def inspector_of(file: str) -> Callable[..., Facts]:
         return inspect_picture
     if is_scene(path, head):
         return inspect_scene
-    return inspect_material if is_document(head) else inspect_table
+    if is_document(head):
+        return inspect_material
+    return inspect_luminaire if is_luminaire(path, head) else inspect_table
 
 
 def inspect_table(file: str, plot: Path | None = None, reconstruction: Between = "auto") -> Facts:
@@ -113,6 +118,17 @@ def inspect_material(file: str, plot: Path | None = None) -> Facts:
         "errors": provenance.get("errors"),
         "notes": provenance.get("notes"),
     }
+
+
+def inspect_luminaire(file: str, plot: Path | None = None) -> Facts:
+    """A photometric file: the luminaire, its flux and angles, and faults."""
+    from lambent.scenes.photometry.files import read_luminaire
+    from lambent.scenes.photometry.inspection import facts_of, plot_polar
+
+    luminaire = read_luminaire(Path(file))
+    if plot is not None:
+        plot_polar(plot, luminaire)
+    return {"is": "luminaire", **facts_of(luminaire)}
 
 
 def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -55,10 +55,9 @@ class Photometry:
 
     def lumens_within(self, most_deg: float) -> float:
         """Luminous flux of directions up to `most_deg` from the axis."""
-        cut = np.minimum(self.vertical_deg, most_deg)
         theta, phi = np.radians(self.vertical_deg), np.radians(self.horizontal_deg)
         around = ((np.array(self.candela)[1:] + np.array(self.candela)[:-1]) / 2 * np.diff(phi)[:, None]).sum(axis=0)
-        a, b = theta[:-1], np.radians(cut)[1:]
+        a, b = theta[:-1], np.minimum(theta[1:], np.radians(most_deg))
         slope = np.diff(around) / np.diff(theta)
         # of (start + slope (x - a)) sin x from a to b
         whole = around[:-1] * (np.cos(a) - np.cos(b)) + slope * (np.sin(b) - np.sin(a) - (b - a) * np.cos(b))
@@ -90,24 +89,35 @@ def _within(angle_deg: Floats, nodes_deg: Floats) -> Flags:
     return inside
 
 
+def numbers_of(words: Iterable[str], file: Path) -> Iterator[float]:
+    """The numbers up to the first text; raise `UserError` if one is not finite."""
+    for word in words:
+        try:
+            number = float(word)
+        except ValueError:
+            return  # text after the data; if it comes too early, numbers are missing
+        if not np.isfinite(number):
+            raise UserError("numbers are not finite", file=file, got=word[:20])
+        yield number
+
+
 def check_angles(angles_deg: Floats, least: float, most: float, file: Path, field: str) -> None:
-    """Raise `UserError` if angles do not increase, are outside `least` to `most` degrees, or are fewer than 2."""
-    first, last = angles_deg[0], angles_deg[-1]
+    """Raise `UserError` if angles do not increase or are outside `least` to `most` degrees."""
     if (np.diff(angles_deg) <= 0).any():
         raise UserError("angles do not increase", file=file, field=field, expected="increasing angles in degrees")
-    if not least <= first <= last <= most:
-        fault = f"are outside {least:g} to {most:g} degrees"
-        raise UserError(fault, file=file, field=field, got=f"{first:g} to {last:g}")
-    if len(angles_deg) < 2:
-        raise UserError("too few for a distribution", file=file, field=field, got="1", expected="2 or more")
+    if not least <= angles_deg[0] <= angles_deg[-1] <= most:
+        fault, got = f"are outside {least:g} to {most:g} degrees", f"{angles_deg[0]:g} to {angles_deg[-1]:g}"
+        raise UserError(fault, file=file, field=field, got=got)
 
 
 def check_candela(candela: Floats, file: Path, field: str) -> None:
-    """Raise `UserError` if intensities are beyond all luminaires."""
+    """Raise `UserError` if there are too few intensities for a distribution, or they are beyond all luminaires."""
     most = float(np.abs(candela).max())
+    if candela.shape[1] < 2:
+        raise UserError("too few for a distribution", file=file, field="vertical angles", got="1", expected="2 or more")
     if not most <= MOST_CD:
-        fault = "intensities are out of range"
-        raise UserError(fault, file=file, field=field, got=f"{most:g}", expected=f"up to {MOST_CD:g}")
+        fault, expected = "intensities are out of range", f"up to {MOST_CD:g}"
+        raise UserError(fault, file=file, field=field, got=f"{most:g}", expected=expected)
 
 
 def whole_turn(horizontal_deg: Floats, values: Floats, mirrors_deg: Iterable[float] = ()) -> tuple[Floats, Floats]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from lambent.core.arrays import Floats
 from lambent.core.ceilings import IES_ANGLES
 from lambent.core.errors import UserError
 from lambent.core.inputs import decoded
-from lambent.scenes.photometry.distribution import Photometry, check_angles, check_candela, whole_turn
+from lambent.scenes.photometry.distribution import Photometry, check_angles, check_candela, numbers_of, whole_turn
 from lambent.scenes.photometry.luminaire import LampSet, Luminaire
 from lambent.scenes.photometry.opening import POINT, Opening
 
@@ -40,7 +41,7 @@ def is_eulumdat(content: bytes) -> bool:
 
 def parse_eulumdat(content: bytes, path: Path) -> Luminaire:
     """The luminaire of the EULUMDAT file at `path`."""
-    return _Reading(content, path).luminaire()
+    return _Reading(_lines(content), path).luminaire()
 
 
 def _lines(content: bytes) -> list[str]:
@@ -50,53 +51,49 @@ def _lines(content: bytes) -> list[str]:
 class _Reading:
     """One file: a header with a fixed meaning of each line, then numbers."""
 
-    def __init__(self, content: bytes, path: Path) -> None:
-        self._path, self._lines = path, _lines(content)
-        if len(self._lines) < HEADER_LINES:
-            raise self._error(None, "is not an EULUMDAT file", f"{len(self._lines)} lines", f"{HEADER_LINES} or more")
+    def __init__(self, lines: list[str], path: Path) -> None:
+        self._path, self._lines, self._error = path, lines, partial(UserError, file=path)
+        if len(lines) < HEADER_LINES:
+            raise self._error("is not an EULUMDAT file", got=f"{len(lines)} lines", expected=f"{HEADER_LINES} or more")
 
     def luminaire(self) -> Luminaire:
         symmetry = self._whole(3, "symmetry", NONE, BOTH)
         planes = self._whole(4, "number of C planes", 1, IES_ANGLES.most)
         angles = self._whole(6, "number of gamma angles", 2, IES_ANGLES.most)
-        sets = self._whole(26, "number of lamp sets", 1, MOST_SETS)
-        numbers = self._numbers(HEADER_LINES + SET_LINES * sets + RATIO_LINES, planes + angles)
-        c_deg, gamma_deg, values = np.split(numbers, [planes, planes + angles])
-        check_angles(gamma_deg, 0, 180, self._path, "gamma angles")
-        if planes > 1:
-            check_angles(c_deg, -360, 360, self._path, "C planes")
+        sets = [HEADER_LINES + SET_LINES * k for k in range(self._whole(26, "number of lamp sets", 1, MOST_SETS))]
+        c_deg, gamma_deg, values = self._angles_and_values(sets[-1] + SET_LINES + RATIO_LINES, planes, angles)
         if len(values) != planes * angles:  # some programs write every plane, whatever the symmetry
-            c_deg = self._given(symmetry, c_deg)
+            c_deg = _given(symmetry, c_deg)
         if len(values) < len(c_deg) * angles:
-            raise self._error("intensities", "file is truncated", f"{len(values)}", f"{len(c_deg) * angles} numbers")
+            raise self._error("file is truncated", field="intensities", got=len(values), expected=len(c_deg) * angles)
         factor = self._number(24, "conversion factor", 0, MOST_FACTOR) or 1.0  # some programs leave it at 0
         candela = factor * values[: len(c_deg) * angles].reshape(len(c_deg), angles)
         check_candela(candela, self._path, "intensities")
         whole = whole_turn(c_deg, np.maximum(candela, 0.0), MIRRORS.get(symmetry, ()))
-        lamps = [self._lamps(HEADER_LINES + SET_LINES * k) for k in range(sets)]
+        ratio, downward = (self._number(line, "percentage", 0, 1000) / 100 for line in (23, 22))
         return Luminaire(
             self._path, "EULUMDAT", SYMMETRIES[symmetry], self._lines[8], self._lines[0], self._lines[7],
-            tuple(replace(one, count=abs(one.count)) for one in lamps),
-            replace(Photometry.of(gamma_deg, *whole), opening=self._opening()), True, lamps[0].count < 0,
-            self._number(23, "light output ratio", 0, 1000) / 100,
-            self._number(22, "downward flux fraction", 0, 1000) / 100, self._number(25, "tilt", -360, 360),
+            tuple(map(self._lamps, sets)), replace(Photometry.of(gamma_deg, *whole), opening=self._opening()), True,
+            self._number(HEADER_LINES + 1, "number of lamps", -1e6, 1e6) < 0, ratio, downward,
+            self._number(25, "tilt", -360, 360),
         )  # fmt: skip
+
+    def _angles_and_values(self, start: int, planes: int, angles: int) -> tuple[Floats, Floats, Floats]:
+        """C, gamma and intensities from the line of that index on."""
+        words = " ".join(self._lines[start:]).replace(",", ".").split()
+        numbers = np.array(list(numbers_of(words, self._path)))
+        if len(numbers) < planes + angles:
+            raise self._error("file is truncated", field="angles", got=len(numbers), expected=planes + angles)
+        c_deg, gamma_deg, values = np.split(numbers, [planes, planes + angles])
+        check_angles(c_deg, -360, 360, self._path, "C planes")
+        check_angles(gamma_deg, 0, 180, self._path, "gamma angles")
+        return c_deg, gamma_deg, values
 
     def _lamps(self, start: int) -> LampSet:
         """The lamp set whose first line has that index."""
         count = int(self._number(start + 1, "number of lamps", -1e6, 1e6))
-        lumens = self._number(start + 3, "luminous flux", 0, MOST_LM)
-        watts = self._number(start + 6, "watts", 0, MOST_LM)
-        return LampSet(count, self._lines[start + 1], lumens, watts, self._lines[start + 3])
-
-    def _given(self, symmetry: int, c_deg: Floats) -> Floats:
-        """The C planes that the file has intensities of; by symmetry, the others follow."""
-        count = len(c_deg)
-        first, given = {
-            NONE: (0, count), AXIAL: (0, 1), C0_C180: (0, count // 2 + 1), C90_C270: (3 * count // 4, count // 2 + 1),
-            BOTH: (0, count // 4 + 1),
-        }[symmetry]  # fmt: skip
-        return c_deg[(first + np.arange(given)) % count]
+        lumens, watts = (self._number(start + k, name, 0, MOST_LM) for k, name in ((3, "luminous flux"), (6, "watts")))
+        return LampSet(abs(count), self._lines[start + 1], lumens, watts, self._lines[start + 3])
 
     def _opening(self) -> Opening:
         """The luminous area: round if its width is 0. Its sides may be of different heights; the mean counts."""
@@ -106,36 +103,27 @@ class _Reading:
             return POINT
         return Opening("box", (width, length, height)) if width else Opening("cylinder", (length, length, height))
 
-    def _numbers(self, start: int, least: int) -> Floats:
-        """All numbers from the line of that index on, up to a line of text, `least` or more."""
-        found: list[float] = []
-        for number, line in enumerate(self._lines[start:], start + 1):
-            try:
-                found += map(float, line.replace(",", ".").split())
-            except ValueError:
-                break  # text after the data; if it comes too early, numbers are missing
-            if not np.isfinite(found[-1:]).all():
-                raise self._error(f"line {number}", "is not a finite number", line[:20])
-        if len(found) < least:
-            raise self._error("angles", "file is truncated", f"{len(found)}", f"{least} numbers")
-        return np.array(found)
-
     def _number(self, line: int, field: str, least: float, most: float) -> float:
         """The number on a line, counted from 1; 0 where it is empty."""
-        text = self._lines[line - 1] if line <= len(self._lines) else "nothing"
+        words, place = self._lines[line - 1 : line] or ["nothing"], f"{field} (line {line})"
         try:
-            number = float(text.replace(",", ".").split()[0]) if text else 0.0
+            number = float(words[0].replace(",", ".").split()[0]) if words[0] else 0.0
         except ValueError:
-            raise self._error(f"{field} (line {line})", "is not a number", text[:20]) from None
+            raise self._error("is not a number", field=place, got=words[0][:20]) from None
         if not least <= number <= most:
-            raise self._error(f"{field} (line {line})", "is out of range", f"{number:g}", f"{least:g} to {most:g}")
+            raise self._error("is out of range", field=place, got=f"{number:g}", expected=f"{least:g} to {most:g}")
         return number
 
     def _whole(self, line: int, field: str, least: int, most: int) -> int:
         number = self._number(line, field, least, most)
         if number != int(number):
-            raise self._error(f"{field} (line {line})", "is not a whole number", f"{number:g}")
+            raise self._error("is not a whole number", field=f"{field} (line {line})", got=f"{number:g}")
         return int(number)
 
-    def _error(self, field: str | None, fault: str, got: str | None = None, expected: str | None = None) -> UserError:
-        return UserError(fault, file=self._path, field=field, got=got, expected=expected)
+
+def _given(symmetry: int, c_deg: Floats) -> Floats:
+    """The C planes that a file has intensities of; by symmetry, the others follow."""
+    count = len(c_deg)
+    first = 3 * count // 4 if symmetry == C90_C270 else 0
+    given = {NONE: count, AXIAL: 1, BOTH: count // 4 + 1}.get(symmetry, count // 2 + 1)
+    return c_deg[(first + np.arange(given)) % count]

@@ -13,16 +13,11 @@ from lambent.scenes.photometry.ies import is_ies, parse_ies
 from lambent.scenes.photometry.luminaire import Luminaire
 
 ENDINGS = (".ies", ".ldt", ".gldf")
-FOREIGN = {b"PK\x03\x04": "GLDF", b"<?xml": "IES TM-33", b"<IESTM33": "IES TM-33"}  # by first bytes
+FOREIGN = (b"PK\x03\x04", b"<?xml", b"<IESTM33")  # of GLDF; of IES TM-33
 
 
 def read_luminaire(path: Path, files: SceneFiles | None = None) -> Luminaire:
-    """Read an IES or EULUMDAT file.
-
-    Parameters
-    ----------
-    files : SceneFiles, optional
-        Those of the scene that refers to it; by default, the files in its folder or below.
+    """Read an IES or EULUMDAT file; it may refer to `files`, by default those in its folder or below.
 
     Raises
     ------
@@ -40,11 +35,8 @@ def parse_luminaire(content: bytes, path: Path, files: SceneFiles) -> Luminaire:
             return parse_ies(content, path, files)
         if is_eulumdat(content) or path.suffix.lower() == ".ldt":
             return parse_eulumdat(content, path)
-    foreign = next(
-        (name for head, name in FOREIGN.items() if content.lstrip(b"\xef\xbb\xbf \r\n").startswith(head)), None
-    )
-    if foreign:
-        raise UserError(f"{foreign} is not read", file=path, hint="ask its maker for an .ies or .ldt file")
+    if content.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(FOREIGN):
+        raise UserError("GLDF and IES TM-33 are not read", file=path, hint="ask its maker for an .ies or .ldt file")
     raise UserError("is not an IES or EULUMDAT file", file=path, expected="a line TILT=..., or the lines of EULUMDAT")
 
 

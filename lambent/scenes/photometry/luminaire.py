@@ -13,16 +13,7 @@ KLM = 1000.0
 
 @dataclass(frozen=True)
 class LampSet:
-    """Lamps that a luminaire can hold.
-
-    Attributes
-    ----------
-    count : int
-        Number of lamps.
-    lumens, watts : float
-        Of all lamps of the set together, 0 where the file leaves them open; of an absolute measurement in EULUMDAT, the
-        lumens are the luminaire's own.
-    """
+    """Lamps that a luminaire can hold: their number, and `lumens` and `watts` together, 0 where the file has none."""
 
     count: int
     kind: str
@@ -37,18 +28,16 @@ class Luminaire:
 
     Attributes
     ----------
-    format, symmetry : str
-        In words.
-    name, maker, report : str
-        Of the luminaire, its maker, and its measurement; empty where the file has none.
+    format, symmetry, name, maker, report : str
+        In words; the last three are empty where the file has none.
     sets : tuple of LampSet
         Alternatives, at least one.
     values : Photometry
         Intensities in candela; with `per_klm`, in candela per 1000 lm of the lamps.
     absolute : bool
-        Whether the luminaire's own flux was measured, without reference to its lamps'.
+        Whether the luminaire itself was measured. In EULUMDAT, the lumens of its lamps are then its own.
     ratio, downward : float or None
-        Light output ratio of the luminaire, and the share of its flux below the horizontal, as stated: 0 to 1.
+        Light output ratio, and share of the flux below the horizontal, as stated: 0 to 1.
     measured_tilt_deg : float
         Tilt of the luminaire while it was measured. Intensities are those of the tilted luminaire.
     """
@@ -70,18 +59,14 @@ class Luminaire:
     def lamps(self, lamp_set: int = 0) -> LampSet:
         """The lamp set of that index; raise `UserError` if there is none."""
         if not 0 <= lamp_set < len(self.sets):
-            fault, expected = "has no such lamp set", f"0 to {len(self.sets) - 1}"
-            raise UserError(fault, file=self.file, field="lamp_set", got=lamp_set, expected=expected)
+            expected = f"0 to {len(self.sets) - 1}"
+            raise UserError("has no such lamp set", file=self.file, field="lamp_set", got=lamp_set, expected=expected)
         return self.sets[lamp_set]
 
     def photometry(self, lamp_set: int = 0) -> Photometry:
-        """Intensities in candela with the lamp set of that index."""
+        """Intensities in candela with the lamp set of that index; `UserError` if its flux is needed and unknown."""
         lumens = self.lamps(lamp_set).lumens
         if self.per_klm and not lumens:
-            hint = "write the flux of the lamps into the file, or give the light's lumens"
-            raise UserError("lamp set has no luminous flux", file=self.file, field=f"lamp set {lamp_set}", hint=hint)
+            hint = "write it into the file, or give the light's lumens"
+            raise UserError("states no flux of the lamps", file=self.file, field=f"lamp set {lamp_set}", hint=hint)
         return self.values.scaled(lumens / KLM) if self.per_klm else self.values
-
-    def stated_lumens(self, lamp_set: int = 0) -> float | None:
-        """Flux of the luminaire by its lamps and their light output ratio; None if the file leaves it open."""
-        return self.ratio * self.lamps(lamp_set).lumens if self.ratio else None

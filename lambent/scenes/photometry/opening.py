@@ -1,21 +1,18 @@
 """The luminous opening of a luminaire: the shape that its light leaves.
 
-Luminaire axes are those of type C photometry: x towards horizontal angle 0, y towards 90, z along the luminaire's axis,
-away from it.
+Luminaire axes are those of type C photometry: x towards horizontal angle 0, y towards 90, z along the luminaire's axis.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from lambent.core.arrays import Floats
+from lambent.core.plain import Triple, triple
 
-Shape = Literal["point", "box", "cylinder", "ellipsoid"]
-Size = tuple[float, float, float]
 X, Y, Z = range(3)
 
 
@@ -25,7 +22,7 @@ class Opening:
 
     Attributes
     ----------
-    shape : Shape
+    shape : str
         A box without extent in one direction is a rectangle, such a cylinder a disc, an ellipsoid of equal extents a
         sphere. Cross-sections of cylinders are ellipses.
     size_m : (x, y, z)
@@ -34,32 +31,30 @@ class Opening:
         0, 1 or 2: of a cylinder, the luminaire's axis along which it lies.
     """
 
-    shape: Shape = "point"
-    size_m: Size = (0.0, 0.0, 0.0)
+    shape: Literal["point", "box", "cylinder", "ellipsoid"] = "point"
+    size_m: Triple = (0.0, 0.0, 0.0)
     axis: int = Z
 
     def projected_m2(self, towards: Floats) -> Floats:
-        """Area of the shape's silhouette (...) seen from unit directions (..., 3) in luminaire axes, in m^2.
+        """Area in m^2 of the shape's silhouette (...) seen from unit directions (..., 3) in luminaire axes.
 
         Exact: the shapes are convex, so projected areas of the faces that are seen add up; an ellipsoid of half axes
         a, b, c has pi |(bc x, ca y, ab z)|.
         """
-        w, size = np.abs(np.asarray(towards, float)), np.array(self.size_m)
-        faces = w * [size[Y] * size[Z], size[Z] * size[X], size[X] * size[Y]]
+        x, y, z = self.size_m
+        faces = np.abs(np.asarray(towards, float)) * (y * z, z * x, x * y)
         if self.shape == "ellipsoid":
             return np.asarray(np.pi / 4 * np.linalg.norm(faces, axis=-1))
         if self.shape != "cylinder":
             return np.asarray(faces.sum(axis=-1))
-        sides = np.delete(faces, self.axis, axis=-1)
-        return np.asarray(np.pi / 4 * faces[..., self.axis] + np.linalg.norm(sides, axis=-1))
+        sides = np.linalg.norm(np.delete(faces, self.axis, axis=-1), axis=-1)
+        return np.asarray(np.pi / 4 * faces[..., self.axis] + sides)
 
     def __str__(self) -> str:
-        if self.shape == "point":
-            return "point"
-        flat = self.size_m.count(0) == 1
-        name = {"box": "rectangle", "cylinder": "disc"}.get(self.shape, self.shape) if flat else self.shape
-        along = f" along {'xyz'[self.axis]}" * (self.shape == "cylinder" and not flat and self.axis != Z)
-        return f"{name}{along}, {' x '.join(f'{x:g}' for x in self.size_m)} m"
+        flat = {"box": "rectangle", "cylinder": "disc"} if self.size_m.count(0) == 1 else {}
+        along = f" along {'xyz'[self.axis]}" if self.shape == "cylinder" and self.axis != Z and not flat else ""
+        size = f", {' x '.join(f'{x:g}' for x in self.size_m)} m" if self.shape != "point" else ""
+        return flat.get(self.shape, self.shape) + along + size
 
 
 POINT = Opening()
@@ -74,22 +69,15 @@ def opening_of_signs(width_m: float, length_m: float, height_m: float, ellipsoid
     width or length makes `ellipsoids`.
     """
     given, size = (length_m, width_m, height_m), [abs(length_m), abs(width_m), abs(height_m)]
-    if not any(given):
-        return POINT
-    round_, straight = [k for k in range(3) if given[k] < 0], [k for k in range(3) if given[k] >= 0]
-    if not round_:
-        return Opening("box", _triple(size))
-    if len(round_) == 1:  # up to 1995
-        (known,) = round_
-        axis = Z if known != Z else X if size[X] else Y
-        other = 3 - axis - known
-        size[other] = size[other] or size[known]
-        return Opening("cylinder", _triple(size), axis)
-    if len(round_) == 3 or (ellipsoids and Z in round_):
-        return Opening("ellipsoid", _triple([extent or max(size) for extent in size]))
-    return Opening("cylinder", _triple(size), straight[0])
-
-
-def _triple(size: Sequence[float]) -> Size:
-    x, y, z = map(float, size)
-    return x, y, z
+    negative = [k for k in (X, Y, Z) if given[k] < 0]
+    if not negative:
+        return Opening("box", triple(size)) if any(size) else POINT
+    if len(negative) == 1:  # up to 1995
+        axis = Z if negative != [Z] else X if size[X] else Y
+        (other,) = {X, Y, Z} - {axis, *negative}
+        size[other] = size[other] or size[negative[0]]
+        return Opening("cylinder", triple(size), axis)
+    if len(negative) == 3 or (ellipsoids and Z in negative):
+        return Opening("ellipsoid", triple([extent or max(size) for extent in size]))
+    (axis,) = {X, Y, Z} - {*negative}
+    return Opening("cylinder", triple(size), axis)

@@ -15,70 +15,52 @@ ahead. So the axis of type A is the direction that LM-63 calls photometric horiz
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
 from lambent.core.arrays import Floats
+from lambent.core.geometry.directions import angles, direction
 from lambent.scenes.photometry.distribution import Photometry, check_angles
 
-FINENESS = (1, 2, 4, 8)
+# Rows, in luminaire axes: towards H = V = 0, towards a growing angle of planes, and the axis that planes share.
+FRAMES = {"A": [[0, 0, 1], [0, -1, 0], [1, 0, 0]], "B": [[0, 0, 1], [1, 0, 0], [0, -1, 0]]}
+FINENESS = (1, 2, 4, 8, 16)
 PLANES = 72  # of type C at fineness 1
 MOST_NODES = 1 << 20
 TOLERANCE = 0.005  # of the largest intensity, at the file's own angles, and of the flux
-HALF_TURN = 180.0
+HALF_TURN = 180.0  # so that angles of planes, from -90 to 90 degrees, are positive
 
 
-def type_c(
-    kind: Literal["A", "B"], vertical_deg: Floats, horizontal_deg: Floats, candela: Floats, file: Path
-) -> Photometry:
-    """Resample candela (H, V) of type A or B onto type C angles.
+def type_c(kind: str, vertical_deg: Floats, horizontal_deg: Floats, candela: Floats, file: Path) -> Photometry:
+    """Resample candela (H, V) of type "A" or "B" onto type C angles.
 
     Horizontal or vertical angles that start at 0 are mirrored there. The grid is refined until values at the file's
     angles and the flux agree to half a per cent.
     """
-    for name, angles in (("vertical angles", vertical_deg), ("horizontal angles", horizontal_deg)):
-        check_angles(angles, -90, 90, file, name)
-    horizontal_deg, candela = _both_sides(horizontal_deg, candela)
-    vertical_deg, turned = _both_sides(vertical_deg, candela.T)
-    latitude, longitude = (vertical_deg, horizontal_deg) if kind == "A" else (horizontal_deg, vertical_deg)
-    values = turned.T if kind == "A" else turned
-    own = Photometry.of(90 - latitude[::-1], longitude + HALF_TURN, values[:, ::-1])
-    nodes = _type_c_angles(kind, *np.meshgrid(latitude, longitude))
-    offsets = np.unique(np.abs(np.concatenate([latitude, longitude, [0.0, 90.0]])))
+    check_angles(vertical_deg, -90, 90, file, "vertical angles")
+    check_angles(horizontal_deg, -90, 90, file, "horizontal angles")
+    (h_deg, h), (v_deg, v) = _both_sides(horizontal_deg), _both_sides(vertical_deg)
+    values = candela[np.ix_(h, v)]
+    in_plane, of_plane, values = (v_deg, h_deg, values) if kind == "A" else (h_deg, v_deg, values.T)
+    own = Photometry.of(90 - in_plane[::-1], of_plane + HALF_TURN, values[:, ::-1])
+    frame, offsets = np.array(FRAMES[kind]), np.unique(np.abs([*h_deg, *v_deg, 0.0, 90.0]))
+    nodes = np.degrees(angles(direction(*np.radians(np.meshgrid(90 - in_plane, of_plane))) @ frame))
     for fineness in FINENESS:
-        shares = np.arange(len(offsets) * fineness - fineness + 1) / fineness
+        shares = np.arange((len(offsets) - 1) * fineness + 1) / fineness
         gamma, c = np.interp(shares, np.arange(len(offsets)), offsets), np.linspace(0, 360, PLANES * fineness + 1)
-        found = Photometry.of(gamma, c, _sampled(kind, own, *np.meshgrid(gamma, c)))
+        polar, turn = np.degrees(angles(direction(*np.radians(np.meshgrid(gamma, c))) @ frame.T))
+        found = Photometry.of(gamma, c, own.at(polar, turn + HALF_TURN))
         error = np.abs(found.at(*nodes) - values).max() / max(values.max(), 1e-300)
-        if (
-            max(error, abs(found.lumens / max(own.lumens, 1e-300) - 1)) < TOLERANCE
-            or 4 * gamma.size * c.size > MOST_NODES
-        ):
+        error = max(error, abs(found.lumens / max(own.lumens, 1e-300) - 1))
+        if error < TOLERANCE or 4 * gamma.size * c.size > MOST_NODES:
             break
     return found
 
 
-def _both_sides(angles_deg: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Angles, and values (N, ...) there, mirrored at 0 if they start there."""
+def _both_sides(angles_deg: Floats) -> tuple[Floats, Any]:
+    """Angles, mirrored at 0 if they start there, and the index of each in the file."""
+    index = np.arange(len(angles_deg))
     if angles_deg[0] != 0:
-        return angles_deg, values
-    return np.concatenate([-angles_deg[:0:-1], angles_deg]), np.concatenate([values[:0:-1], values])
-
-
-def _sampled(kind: str, own: Photometry, gamma_deg: Floats, c_deg: Floats) -> Floats:
-    """Candela of `own`, whose axis is that of the planes, towards type C angles."""
-    gamma, c = np.radians(gamma_deg), np.radians(c_deg)
-    up, left, ahead = np.sin(gamma) * np.cos(c), np.sin(gamma) * np.sin(c), np.cos(gamma)
-    sine, across = (up, -left) if kind == "A" else (-left, up)
-    latitude = np.arcsin(np.clip(sine, -1, 1))
-    return own.at(90 - np.degrees(latitude), np.degrees(np.arctan2(across, ahead)) + HALF_TURN)
-
-
-def _type_c_angles(kind: str, latitude_deg: Floats, longitude_deg: Floats) -> tuple[Floats, Floats]:
-    """gamma and C of angles about the axis of the planes and along them."""
-    latitude, longitude = np.radians(latitude_deg), np.radians(longitude_deg)
-    sine, across = np.sin(latitude), np.cos(latitude) * np.sin(longitude)
-    up, left = (sine, -across) if kind == "A" else (across, -sine)
-    ahead = np.cos(latitude) * np.cos(longitude)
-    return np.degrees(np.arctan2(np.hypot(up, left), ahead)), np.degrees(np.arctan2(left, up))
+        return angles_deg, index
+    return np.concatenate([-angles_deg[:0:-1], angles_deg]), np.concatenate([index[:0:-1], index])

@@ -104,15 +104,18 @@ def test_tilt(tmp_path: Path) -> None:
     [
         ("", "is not an IES or EULUMDAT file"),
         ("TILT=NONE\n", "truncated"),
-        (ies(kind=4), "unknown photometric type; found 4"),
+        (ies(kind=4), "photometric type: is unknown"),
         (ies(tilt="TILT=lamp.tlt"), "tilt file is missing; found lamp.tlt"),
         (ies(tilt="TILT=../../lamp.tlt"), "TILT: path leaves its folder"),
         (ies(candela="1000 500"), "candela: file is truncated"),
         (ies(candela="1000 nan 0"), "not finite"),
         (ies("0 90 45"), "do not increase"),
         (ies("-90 0 90"), "outside 0 to 180"),
-        (ies("0 90", "0 70", "1 1 1 1"), "expected 0, 90, 180 or 360"),
-        (ies("0 90", "10 80", "1 1 1 1"), "unsupported angle"),
+        (ies("0 90", "0 70", "1 1 1 1"), "found 0 to 70; expected 0 to 0, 90, 180 or 360, or 90 to 270"),
+        (ies("0 90", "10 80", "1 1 1 1"), "unsupported range"),
+        (ies("0", "0", "1"), "too few for a distribution"),
+        (ies("0 45 91", kind=2), "outside -90 to 90"),
+        (ies("0 90", "0 120", "1 1 1 1", kind=3), "outside -90 to 90"),
         (ies().replace("3 1 1 2", "3000000 1 1 2"), "at most 4096 angles"),
         (ies().replace("3 1 1 2", "3.5 1 1 2"), "whole number"),
     ],
@@ -128,29 +131,54 @@ ROUND = "\n".join(
 )
 
 
-@pytest.mark.skipif(importlib.util.find_spec("pyradiance") is None, reason="pyradiance is not installed")
-def test_radiance_sees_the_same_luminaire(tmp_path: Path) -> None:
-    """Illuminance by ies2rad and rtrace, whose up is z; all the way round, with multiplier and ballast factor."""
-    text = ies("0 20 40 60 90", "0 90 180 270 360", ROUND, head=HEADS[1995], numbers="1 -1 2", factors=".9 1 50")
-    path = written(tmp_path, text.replace(" .5 .25 0\n", " .01 .01 0\n"))
-    package = Path(str(importlib.util.find_spec("pyradiance").origin)).parent  # type: ignore[union-attr]
+def radiance_lx(path: Path, places: np.ndarray) -> np.ndarray:
+    """Illuminance by ies2rad and rtrace on upward places (n, 2) x, z that lie 2 m below; Radiance's up is z."""
+    found = importlib.util.find_spec("pyradiance")
+    if found is None:
+        pytest.skip("pyradiance is not installed")
+    package, folder = Path(str(found.origin)).parent, path.parent
     library = {"PATH": f"{package / 'bin'}:/usr/bin:/bin", "RAYPATH": f".:{package / 'lib'}"}
 
     def run(*command: str, given: str = "") -> str:
         told = {"input": given, "capture_output": True, "text": True, "check": True}
-        return str(subprocess.run(command, cwd=tmp_path, env=library, **told).stdout)  # type: ignore[call-overload]
+        return str(subprocess.run(command, cwd=folder, env=library, **told).stdout)  # type: ignore[call-overload]
 
     run("ies2rad", "-t", "default", "-dm", "-o", "lamp", path.name)
-    (tmp_path / "scene.rad").write_text(run("xform", "-t", "0", "0", "2", "lamp.rad"))
-    with open(tmp_path / "scene.oct", "wb") as octree:
-        subprocess.run(["oconv", "scene.rad"], cwd=tmp_path, env=library, stdout=octree, check=True)
-    x, z = np.random.default_rng(0).uniform(-2, 2, (2, 40))
-    places = "".join(f"{a} {-b} 0 0 0 1\n" for a, b in zip(x, z, strict=True))
-    answer = run("rtrace", "-I", "-h", "-ab", "0", "-dc", "1", "-dt", "0", "-ds", ".01", "scene.oct", given=places)
-    lx = 179 * np.array([line.split() for line in answer.splitlines()], float)[:, 1]
+    (folder / "scene.rad").write_text(run("xform", "-t", "0", "0", "2", "lamp.rad"))
+    with open(folder / "scene.oct", "wb") as octree:
+        subprocess.run(["oconv", "scene.rad"], cwd=folder, env=library, stdout=octree, check=True)
+    given = "".join(f"{x} {-z} 0 0 0 1\n" for x, z in places)
+    answer = run("rtrace", "-I", "-h", "-ab", "0", "-dc", "1", "-dt", "0", "-ds", ".01", "scene.oct", given=given)
+    return np.asarray(179 * np.array([line.split() for line in answer.splitlines()], float)[:, 1])
+
+
+def lx(path: Path, places: np.ndarray) -> np.ndarray:
+    """The same by the inverse square and the cosine."""
     lamp = IesLight((0.0, 2.0, 0.0), read_ies(path), (1.0, 1.0, 1.0))
-    to = np.stack([x, 0 * x - 2, z], axis=1)
+    to = np.stack([places[:, 0], 0 * places[:, 0] - 2, places[:, 1]], axis=1)
     metres = np.linalg.norm(to, axis=1)
     a, b, down = ((to / metres[:, None]) @ axis for axis in lamp.axes)
-    cd = lamp.photometry.at(np.degrees(np.arccos(down)), np.degrees(np.arctan2(b, a)))
-    np.testing.assert_allclose(lx, 2 * cd / metres**3, rtol=2e-3, atol=0.01)
+    return 2 * lamp.photometry.at(np.degrees(np.arccos(down)), np.degrees(np.arctan2(b, a))) / metres**3
+
+
+def test_radiance_sees_the_same_luminaire(tmp_path: Path) -> None:
+    """All the way round, with multiplier and ballast factor."""
+    text = ies("0 20 40 60 90", "0 90 180 270 360", ROUND, head=HEADS[1995], numbers="1 -1 2", factors=".9 1 50")
+    path = written(tmp_path, text.replace(" .5 .25 0\n", " .01 .01 0\n"))
+    places = np.random.default_rng(0).uniform(-2, 2, (40, 2))
+    np.testing.assert_allclose(radiance_lx(path, places), lx(path, places), rtol=2e-3, atol=0.01)
+
+
+def test_radiance_sees_the_same_floodlight_of_type_b(tmp_path: Path) -> None:
+    """Uneven up and down, left and right. In the two planes through its axis, where source.cal follows the standard."""
+    angles = np.arange(-90, 91, 10)
+    h, v = np.meshgrid(angles, angles, indexing="ij")
+    candela = np.round(1000 + 5 * h + 3 * v).astype(int)
+    words = " ".join(map(str, angles))
+    text = ies(words, words, "\n".join(" ".join(map(str, row)) for row in candela), head=HEADS[1995], kind=2)
+    path = written(tmp_path, text.replace(" .5 .25 0\n", " .01 .01 0\n"))
+    along = np.linspace(-2, 2, 17)
+    places = np.concatenate([np.stack([along, 0 * along], axis=1), np.stack([0 * along, along], axis=1)])
+    found = lx(path, places)
+    assert np.ptp(found[[0, 16, 17, 33]]) > 10, "the ends of both planes differ"
+    np.testing.assert_allclose(radiance_lx(path, places), found, rtol=5e-3)

@@ -93,7 +93,7 @@ def test_a_light_for_other_programs_beside_it_is_not_added(tmp_path: Path) -> No
         ({}, "neither a uri nor a buffer view"),
         ({"bufferView": 0}, "is not an IES or EULUMDAT file"),
         ({"bufferView": 99}, "index out of range"),
-        ({"uri": "data:;base64," + base64.b64encode(ies(kind=4).encode()).decode()}, "unknown photometric type"),
+        ({"uri": "data:;base64," + base64.b64encode(ies(kind=4).encode()).decode()}, "photometric type: is unknown"),
     ],
 )
 def test_a_profile_that_cannot_be_used_leaves_its_luminaire_out(
