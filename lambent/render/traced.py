@@ -23,7 +23,7 @@ from lambent.store.kept.states import variants_of
 from lambent.store.source import changed_inputs, scene_of
 from lambent.store.store import Store
 from lambent.traced.picture import TracedPicture
-from lambent.traced.room import room_of_paths, room_of_store
+from lambent.traced.room import TracedRoom, room_of_paths, room_of_store
 
 PATHS = 64  # samples of each pixel by whole paths
 # Samples in a film's frame; limits of a still, whichever is met first. More gain less than .005 FLIP a doubling.
@@ -48,12 +48,12 @@ class TracedImages(Images):
         self._limits = limits_of(settings, moving=moving)
         self._path = settings.integrator == PATH_TRACER
         self._note, self._noted = note, set[str]()
-        self._scene = scene_of(store, scene)
-        if changed := changed_inputs(store, self._scene):
+        self.scene = scene_of(store, scene)
+        if changed := changed_inputs(store, self.scene):
             traced = f"{scene} is traced as it is now" if scene else AS_THE_FILE_IS
             note(f"changed since the bake: {', '.join(changed)}; {traced}")
         how: dict[str, Any] = {"sky_turn_deg": settings.sky_turn_deg, "replacements": settings.replacements}
-        self._room = room_of_paths(self._scene, **how) if self._path else room_of_store(store, self._scene, **how)
+        self._room = room_of_paths(self.scene, **how) if self._path else room_of_store(store, self.scene, **how)
         self._light, self._looks = settings.light or MixTrack(), dict[str, Look]()
         if settings.variant:
             self._looks = dict(variant_named(variants_of(store), settings.variant).looks)
@@ -63,13 +63,9 @@ class TracedImages(Images):
         self._light, self._looks = self.settings.light or MixTrack.of(variant.light), dict(variant.looks)
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
-        settings, edits = self.settings, self._edits()
-        self._room.set_materials(edits.looks, edits.materials)
-        self._room.mix(self._light.factors_at(self.time_s))
-        if edits.materials and not self._room.answers:
-            self._once(f"light between surfaces stays as baked: {NO_ANSWER}")
+        settings = self.settings
         picture = TracedPicture(
-            self._room.tracer, camera, (settings.width, settings.height), seed=settings.seed, path=self._path,
+            self.room().tracer, camera, (settings.width, settings.height), seed=settings.seed, path=self._path,
             part=settings.show,
         )  # fmt: skip
         try:
@@ -82,11 +78,20 @@ class TracedImages(Images):
         self.samples = picture.samples
         return picture.denoised(fast=picture.samples < FINE) if settings.denoises else picture.mean()
 
+    def room(self) -> TracedRoom:
+        """The room in the state of the next image."""
+        edits = self._edits()
+        self._room.set_materials(edits.looks, edits.materials)
+        self._room.mix(self._light.factors_at(self.time_s))
+        if edits.materials and not self._room.answers:
+            self._once(f"light between surfaces stays as baked: {NO_ANSWER}")
+        return self._room
+
     def _edits(self) -> Edits:
         """The changed materials of the next image."""
         settings, track = self.settings, self.settings.looks
         looks = {**self._looks, **(track.looks_at(self.time_s) if track else {})}
-        scene, bare = self._scene, self._without_uv
+        scene, bare = self.scene, self._without_uv
         return edits_of(scene.materials, scene.textures, bare, looks, settings.recolour, settings.textures)
 
     def _once(self, text: str) -> None:
@@ -96,7 +101,7 @@ class TracedImages(Images):
 
     @cached_property
     def _without_uv(self) -> frozenset[str]:
-        return materials_without_uv([(o.material, o.mesh.uv) for o in self._scene.objects])
+        return materials_without_uv([(o.material, o.mesh.uv) for o in self.scene.objects])
 
 
 def limits_of(settings: Settings, *, moving: bool) -> tuple[int, float | None]:

@@ -8,9 +8,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from lambent.bake.engine import engine
+from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.light.light_mix import Factors, factors_of
+from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
 from lambent.scenes.looks.textures import prepared
 from lambent.scenes.looks.variants import textures_in_look, textures_in_looks
@@ -84,6 +88,23 @@ class TracedRoom:
             self._light.check(factors)
         else:
             factors_of(self._names, factors)
+
+    def illuminance(
+        self, points: Floats, normal: Floats, limit: float, progress: Progress = silent
+    ) -> tuple[Floats, Floats]:
+        """Illuminance (n,) at points (n, 3), m, facing a unit normal (3,), and its standard error, lx; NaN in solids.
+
+        The error is at most `limit` times the illuminance where 262,144 samples suffice for that.
+        """
+        from lambent.bake.pictures.irradiance import illuminance  # imports Mitsuba, whose variant `engine` has set
+        from lambent.bake.tracing.solids import SolidTest
+
+        traced, normals = self._traced, np.broadcast_to(normal, points.shape)
+        free = ~SolidTest(traced.builder(diffuse=False), traced.whole(diffuse=False)).embedded(points, normals)
+        free |= not free.any()  # otherwise the room itself counts as a solid
+        found = np.full((2, len(points)), np.nan)
+        found[:, free] = illuminance(self.tracer.gathering, points[free], normals[free], limit, progress)
+        return found[0], found[1]
 
     @property
     def _names(self) -> list[str]:

@@ -39,6 +39,11 @@ class Gathering:
         """One sample of the diffuse radiance (mi.Color3f) of surfaces towards `si.wi`."""
         return self._gathered(si, sampler, active, self._near_contacts)
 
+    def irradiance(self, points: path_tracer.Points, sampler: Any) -> Any:
+        """One sample of the irradiance (mi.Color3f) at points, which need not lie on surfaces, W/m^2."""
+        found = self._arriving(points, sampler, mi.Bool(True), self._near_contacts)
+        return sum((light for light, _ in found), mi.Color3f(0.0))
+
     def _near_contacts(self, si: Any, active: Any) -> Any:
         near = active & (si.t < dr.gather(mi.Float, self._near_m, self._numbers.faces(si, active), active))
         again = self._gathered(si, Random.at(si.p), near, self.cache)
@@ -57,18 +62,23 @@ class Gathering:
         points = path_tracer.Points(
             si.p, normal * dr.mulsign(turn, cos_o), mi.Vector3f(si.n) * dr.mulsign(turn, dr.dot(si.n, viewer))
         )
-        arriving = path_tracer.arriving(
-            self._scene, sampler, points, sampler.next_2d(active), sampler.next_2d(active), MAX_DEPTH, cache,
-            self._tally, self._unseen, active,
-        )  # fmt: skip
-        arriving += self.cache.sun_on(points, active)
         coupled &= ~across
         found = mi.Color3f(0.0)
-        for light, w in arriving:
+        for light, w in self._arriving(points, sampler, active, cache):
             cos_i = dr.dot(w, points.normal)
             found += light * dr.select(coupled, coupling(dr.clip(cos_i, 0, 1), dr.abs(cos_o), dr), 1.0)
         weight = dr.select(across, dr.rcp(dr.maximum(share, 1e-6)), dr.rcp(dr.maximum(1 - share, 1e-6)))
         return dr.select(active, dr.select(across, transmitted, reflected) * weight * found, 0.0)
+
+    def _arriving(
+        self, points: path_tracer.Points, sampler: Any, active: Any, cache: path_tracer.Cache
+    ) -> list[tuple[Any, Any]]:
+        """Irradiances (mi.Color3f) that add up to one sample of all light at points, and their directions."""
+        found = path_tracer.arriving(
+            self._scene, sampler, points, sampler.next_2d(active), sampler.next_2d(active), MAX_DEPTH, cache,
+            self._tally, self._unseen, active,
+        )  # fmt: skip
+        return found + self.cache.sun_on(points, active)
 
 
 @dataclass

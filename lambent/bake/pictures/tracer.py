@@ -94,7 +94,7 @@ class Tracer:
         return cls(traced.whole(diffuse=True), traced.builder(diffuse=True), tally)
 
     @cached_property
-    def _gathering(self) -> Gathering:
+    def gathering(self) -> Gathering:
         """Made for the first sample that gathers: it guides the sampling of the sky once more."""
         assert self._gather is not None, "there is no light map"
         return self._gather()
@@ -118,7 +118,7 @@ class Tracer:
         gathers, diffuse = kind is Kind.gathered and part is not Part.specular, mi.Color3f(0.0)
         if gathers:
             si = intersect(self._scene, ray, mi.Bool(True), has_holes(self._scene))
-            diffuse = self._gathering.radiance(si, sampler, si.is_valid())
+            diffuse = self.gathering.radiance(si, sampler, si.is_valid())
         tally = Shown(self._tally, part, cached_first=not gathers)
         depth = self._max_depth if part is not Part.diffuse else 0 if gathers else 1
         return diffuse + path_tracer.radiance_sums(self._scene, sampler, start, depth, self._cache, tally)[0]
