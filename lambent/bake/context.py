@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from lambent.bake.engine import engine
 from lambent.bake.interreflection.settings import Bounces
+from lambent.bake.methods import LightMapMethod
 from lambent.bake.quality import Quality
 from lambent.bake.running.timing import Timed, untimed
 from lambent.bake.running.watch import Watch
@@ -139,7 +140,8 @@ class BakeContext:
         """The scene for Mitsuba, with the points of its light map."""
         from lambent.bake.tracing.traced_scene import TracedScene
 
-        return TracedScene(self.atlas, self.geometry, self.two_sided, self.progress)
+        apart = self.methods["light_map"] != LightMapMethod.photons
+        return TracedScene(self.atlas, self.geometry, self.two_sided, self.progress, lamps_apart=apart)
 
     @cached_property
     def in_views(self) -> Scene:

@@ -19,6 +19,7 @@ from lambent.realtime.gpu.structs import OBJECT_DTYPE
 from lambent.realtime.gpu.uploads import half, upload, with_alpha
 from lambent.realtime.incident import LookUp, brings_light, look_ups
 from lambent.realtime.integrators.integrators import Cube
+from lambent.realtime.lamps.lamps import PointLamps
 from lambent.realtime.light.baked import DARK, BakedScene, Probe
 from lambent.realtime.light.probe_light import ProbeLight, kind_of
 from lambent.realtime.materials.material_buffers import MaterialBuffers
@@ -99,7 +100,10 @@ class SceneResources:
         vertices = np.concatenate([scene.positions, scene.normals, scene.tangents, scene.uv2, uv], axis=1)
         self.vertices = layouts.buffer("VERTEX", np.nan_to_num(vertices).astype(np.float32))
         self.indices = layouts.buffer("INDEX", scene.faces.astype(np.uint32))
-        layers = light_layers(scene.irradiance, scene.irradiance_back, scene.dominant_direction, scene.probe_share)
+        of_lamps = [] if scene.lamps is None else scene.lamps.in_map()
+        layers = light_layers(
+            scene.irradiance, scene.irradiance_back, scene.dominant_direction, scene.probe_share, *of_lamps
+        )
         self.light_layers = list(layers)  # (H, W, 4) each, as shown
         self._light_texture = upload(device, [layers], "rgba16float")
         self.light_view = self._light_texture.create_view(dimension="2d-array")
@@ -139,6 +143,7 @@ class SceneResources:
         self.show_textures({})
         self.mixes_parts = any(beyond.values())
         self.sun = sun_light(layouts, scene, self)
+        self.lamps = PointLamps(layouts, scene.lamps)
 
     def show_textures(self, looks: Mapping[str, Look]) -> None:
         """Show materials with images or other materials' textures; materials left out show their own.
@@ -170,7 +175,8 @@ class SceneResources:
     def show_light_map(self, sides: Sequence[NDArray[np.float16] | None]) -> None:
         """Show new light maps (H, W, 4) on the front and the back; None leaves a side as it is.
 
-        A third map is the dominant direction, a fourth holds the shares of probes' light.
+        A third map is the dominant direction, a fourth holds the shares of probes' light, and two more are the direct
+        light of lamps on both sides.
         """
         for layer, texels in enumerate(sides):
             if texels is not None:
@@ -194,22 +200,26 @@ class SceneResources:
     def noise_group(self) -> Any:
         """Group 3 with the noise of the light map in place of its light, without a sun."""
         both = (self.scene.noise, self.scene.noise_back)
-        grey = (None if noise is None else np.repeat(noise[..., None], 3, axis=-1) for noise in both)
+        front, back = (None if noise is None else np.repeat(noise[..., None], 3, axis=-1) for noise in both)
         dark = SunLight(self._layouts)
-        view = upload(self._layouts.device, [light_layers(*grey)], "rgba16float").create_view(dimension="2d-array")
-        return self._layouts.group(self._layouts.light, view, dark.uniform, dark.nowhere)
+        view = upload(self._layouts.device, [light_layers(front, back)], "rgba16float").create_view(dimension="2d-array")
+        lamps = PointLamps(self._layouts, None)
+        return self._layouts.group(self._layouts.light, view, dark.uniform, dark.nowhere, *lamps.bindings)
 
 
 def light_layers(
-    front: Floats | None, back: Floats | None, direction: Floats | None = None, share: Floats | None = None
-) -> NDArray[np.float16]:
+    front: Floats | None, back: Floats | None, direction: Floats | None = None, share: Floats | None = None,
+    *lamps: Floats,
+) -> NDArray[np.float16]:  # fmt: skip
     """Layers (n, H, W, 4): light on the front and on the back, dominant direction (H, W, 3 each), shares (H, W, 4).
+
+    Then the direct light of `lamps` on the front and on the back.
 
     Layers end with the last map that is not None. Missing maps before it are black; the shader reads later layers as
     black.
     """
     maps = [None if light is None else finite(light)[0] for light in (front, back)]
-    maps += [None if values is None else np.nan_to_num(values) for values in (direction, share)]
+    maps += [None if values is None else np.nan_to_num(values) for values in (direction, share, *lamps)]
     count = max((i + 1 for i, values in enumerate(maps) if values is not None), default=1)
     height, width = max((values.shape[:2] for values in maps if values is not None), default=(1, 1))
     layers = np.zeros((count, height, width, 4), np.float16)

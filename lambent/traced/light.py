@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ from lambent.core.light.light_mix import Factors
 from lambent.materials.document import Material
 from lambent.realtime.light.baked import read_baked
 from lambent.realtime.light.group_arrays import BAKE_GROUPS, NO_GROUPS, GroupArrays
-from lambent.scenes.scene import MaterialTextures
+from lambent.scenes.scene import Light, MaterialTextures
 from lambent.store.store import Store
 
 if TYPE_CHECKING:
@@ -26,25 +26,31 @@ Textures = Mapping[str, MaterialTextures | None]  # exchanged ones, by material
 
 
 class StoredLight:
-    """The light map of a store; `answers` tells whether it follows edited materials."""
+    """The light map of a store; `answers` tells whether it follows edited materials.
 
-    def __init__(self, store: Store) -> None:
+    Lamps that renderers draw by pixel are traced if they are among the `lights` of the scene, as they were baked.
+    """
+
+    def __init__(self, store: Store, lights: Sequence[Light]) -> None:
         self._store, self.answers = store, has_answer(store)
         self._baked = read_baked(store, probes=False)
+        self._lamps = self._baked.lamps
+        records = () if self._lamps is None else self._lamps.records
+        positions = {number: light.position for number, light in enumerate(lights) if hasattr(light, "position")}
+        if any(positions.get(lamp.number) != lamp.position for lamp in records):
+            self._lamps = None
         self._lit: tuple[object, Lit] | None = None
 
     def of(self, materials: Mapping[str, Material], textures: Textures, factors: Factors) -> LightMap:
         """The light map for edited materials, exchanged textures and factors of light groups, all by name."""
-        from lambent.bake.pictures.tracer import LightMap  # imports Mitsuba, whose variant `engine` has set
-
         lit, baked = self._answered(materials, textures), self._baked
         if not factors:
             maps = (baked.irradiance, baked.irradiance_back) if lit is None else self._answer.maps(lit)
-            return LightMap(*map(self._in_watts, maps))
+            return self._without_lamps(maps, None)
         groups, by_group = self._groups, self._groups.factors(factors)
         answered = None if lit is None else self._answer.groups(lit)
         mixed = [None if side is None else side[..., :3] for side in (answered or groups).light_map(by_group)]
-        return LightMap(self._in_watts(mixed[0]), self._in_watts(mixed[1]), by_group)
+        return self._without_lamps(mixed, by_group)
 
     def check(self, factors: Factors) -> None:
         """Raise `UserError` if the store has no light groups, or none of a name."""
@@ -71,6 +77,20 @@ class StoredLight:
         from lambent.realtime.answering.answering import AnsweredLight  # imports what draws
 
         return AnsweredLight(self._baked, read_answer(self._store))
+
+    def _without_lamps(self, maps: Sequence[Floats | None], factors: Floats | None) -> LightMap:
+        from lambent.bake.pictures.tracer import LightMap  # imports Mitsuba, whose variant `engine` has set
+
+        front, back = map(self._in_watts, maps)
+        if self._lamps is None:
+            return LightMap(front, back, factors)
+        drawn = [self._in_watts(light) for light in self._lamps.in_map(factors)]
+        sides = [
+            None if of is None else np.maximum(of - (light if light is not None else 0), 0)
+            for of, light in zip((front, back), (*drawn, None), strict=False)
+        ]
+        groups = tuple((lamp.number, lamp.group) for lamp in self._lamps.records)
+        return LightMap(sides[0], sides[1], factors, groups)
 
     def _in_watts(self, side: Floats | None) -> Floats | None:
         """A side (H, W, 3) as float32, W/m^2."""

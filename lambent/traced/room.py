@@ -137,7 +137,7 @@ def room_of_store(
 
     folder = TemporaryDirectory()
     lit = under_turned_sky(_as_drawn(scene), sky_turn_deg, Path(folder.name))
-    return TracedRoom(stored_scene(store, lit, replacements), StoredLight(store), folder)
+    return TracedRoom(stored_scene(store, lit, replacements), StoredLight(store, scene.lights), folder)
 
 
 def room_of_paths(scene: Scene, *, sky_turn_deg: float = 0.0, replacements: Sequence[Replacement] = ()) -> TracedRoom:

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, finished_groups, finished_maps, keeps_direct, side_count
+from lambent.bake.artefacts.light_map import (
+    IRRADIANCE,
+    SIGNS,
+    finished_groups,
+    finished_maps,
+    keeps_direct,
+    lamp_light,
+    side_count,
+)
 from lambent.bake.artefacts.probe import sharing
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
@@ -114,7 +122,10 @@ def _direct(context: BakeContext, side: int) -> Floats:
     """
     if not keeps_direct(context) and MAPS[side] in context.stale(KIND):
         lit = _lit(context)[side]
-        direct = np.minimum(_sampled_direct(context, side, lit), np.asarray(lit, np.float16))
+        direct = _sampled_direct(context, side, lit)
+        if not sorts_light(context.methods):  # else the light map's own has it
+            direct = direct + lamp_light(context, side).sum(axis=0)
+        direct = np.minimum(direct, np.asarray(lit, np.float16))
         context.put(KIND, MAPS[side], direct, context.provenance())
     return np.asarray(context.store.read(_direct_name(context, side)))
 

@@ -21,7 +21,7 @@ from lambent.bake.running.tiles import run_tiles
 from lambent.bake.surfaces.backs import backs_of
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.scenes.panes import panes_of
-from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, Scene
+from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, IesLight, PointLight, Scene
 from lambent.store.contract import DOMINANT_DIRECTION, SIDES, noise_name
 from lambent.store.light_groups import group_name
 from lambent.store.store import Writer
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 KIND = "light_map"
 NEEDS = ("geometry",)
 REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 5, 6, 3, 1, 1
-REVISION_OF_DIRECT, REVISION_OF_PARTS = 4, 3
+REVISION_OF_DIRECT, REVISION_OF_PARTS, REVISION_OF_LAMPS = 4, 3, 1
 IRRADIANCE = tuple(f"light_map/{side}" for side in SIDES)
 NOISE = tuple(noise_name(side) for side in SIDES)
 TRACED, GATHERED = (f"light_map/{stage}" for stage in ("traced", "gathered"))
@@ -83,6 +83,8 @@ def keys(context: BakeContext) -> dict[str, str]:
         effort.append(["without the sun", REVISION_OF_SUN])
         if panes_of(context.scene):
             effort.append(["nor the sun through panes", REVISION_OF_PANES])
+    if lamps_apart(context):
+        effort.append(["lamps by rays", REVISION_OF_LAMPS])
     if backs := sorted(backs_of(context.store)):
         effort.append(["seen from behind", backs])
     grouped = sorts_light(context.methods)
@@ -187,7 +189,7 @@ def _bumpy_faces(context: BakeContext) -> Flags:
 
 def _sampled_maps(context: BakeContext) -> Maps:
     from lambent.bake.light.direct import direct_part
-    from lambent.bake.light.sampling import SMOOTH, finished, gathered, path_traced, sampled_halves, variance_of
+    from lambent.bake.light.sampling import SMOOTH, finished, gathered, path_traced, plus, sampled_halves, variance_of
     from lambent.bake.tracing.path_tracer import AllLight
 
     def maps(stage: str, sampling: Sampling) -> Maps:
@@ -195,12 +197,15 @@ def _sampled_maps(context: BakeContext) -> Maps:
         for side in range(side_count(context)):
             raw, labels = _samples(context, stage, side, sampling)
             context.progress(0, 1, "denoising")
-            found.append(finished(raw, context.traced.texels, labels, context.traced.cuts))
+            light, notes = finished(raw, context.traced.texels, labels, context.traced.cuts)
+            lamps = lamp_light(context, side)
+            found.append((plus(light, lamps.sum(axis=0)), notes))
             if sampling.parts:
                 parts, (halves, known) = context.store.read(_parts(_of_side(stage, side)))[0], sampled_halves(raw)
                 of_samples = parts, halves.mean(axis=0), variance_of(halves)
-                direct = direct_part(*of_samples, found[-1][0], known, labels, SMOOTH)
-                context.put(KIND, group_name(SIDES[side], direct=True), direct[None], context.provenance())
+                direct = direct_part(*of_samples, light, known, labels, SMOOTH)
+                direct = plus(direct[None], lamps.sum(axis=0))
+                context.put(KIND, group_name(SIDES[side], direct=True), direct, context.provenance())
         return found
 
     how: Settings = context.settings(KIND)
@@ -229,7 +234,8 @@ def _sorted_maps(context: BakeContext) -> Maps:
         for side in range(side_count(context)):
             raw, labels = _samples(context, stage, side, sampling)
             by_group = context.store.read(_parts(_of_side(stage, side)))[0]
-            found.append(finished_groups(raw, by_group, count, traced.texels, labels, traced.cuts, context.progress))
+            one = finished_groups(raw, by_group, count, traced.texels, labels, traced.cuts, context.progress)
+            found.append(one.plus(lamp_light(context, side)))
         return found
 
     last = how.gather_samples == 0
@@ -287,6 +293,18 @@ def _samples(
     return context.store.read(name), labels
 
 
+def lamps_apart(context: BakeContext) -> bool:
+    """Whether light of lamps at points is computed apart from samples, as renderers draw it."""
+    return not _by_photons(context) and any(isinstance(x, PointLight | IesLight) for x in context.scene.lights)
+
+
+def lamp_light(context: BakeContext, side: int) -> Floats:
+    """Direct light (G, H, W, 3) of lamps at points on a side, by light group, which samples do not have; 0 if none."""
+    if not lamps_apart(context):
+        return np.zeros((1, 1, 1, 3), np.float16)
+    return context.traced.lamp_light(SIGNS[side]).light
+
+
 def _regions(context: BakeContext, stage: str, side: int, labels: Indices) -> Callable[[], None]:
     """Callback that shows a watch finished regions of light: samples of the last stage, on the front."""
     from lambent.bake.light.regions import FinishedRegions
@@ -296,8 +314,8 @@ def _regions(context: BakeContext, stage: str, side: int, labels: Indices) -> Ca
     traced, groups = context.traced, 0
     if sorts_light(context.methods):
         groups = len(traced.sorted_lights.groups)
-    surface = traced.texels, labels, traced.cuts
-    return FinishedRegions(context.watch, context.store, stage, _parts(stage), groups, surface).wrote
+    surface, lamps = (traced.texels, labels, traced.cuts), lamp_light(context, side)
+    return FinishedRegions(context.watch, context.store, stage, _parts(stage), groups, surface, lamps).wrote
 
 
 def _photon_maps(context: BakeContext) -> Maps:
@@ -342,6 +360,8 @@ def _noise(context: BakeContext) -> None:
         halves = _photon_map(context).halves(context.store.read(PHOTONS))
     else:
         raw = (_of_side(_stages(context.settings(KIND))[-1], side) for side in range(side_count(context)))
-        halves = (sampled_halves(context.store.read(name)) for name in raw)
+        of_samples = (sampled_halves(context.store.read(name)) for name in raw)
+        lamps = (lamp_light(context, side).sum(axis=0, dtype=np.float32) for side in range(side_count(context)))
+        halves = ((both + light, known) for (both, known), light in zip(of_samples, lamps, strict=True))
     for name, (both, known) in zip(NOISE, halves, strict=False):
         context.put(KIND, name, noise_map(both, known, context.traced.labels), context.provenance())

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lambent.bake.artefacts.light_map import finished_maps
+from lambent.bake.artefacts.light_map import finished_maps, lamps_apart
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
 from lambent.bake.running.keys import key_of
@@ -38,7 +38,10 @@ def bake(context: BakeContext) -> None:
     sides, labels = traced.in_view(1.0)
     counts = [len(o.mesh.faces) for o in traced.scene.objects]
     owner = np.repeat(np.arange(len(counts)), counts)[sides.texels.face[:, 0]]
-    luminous = luminance(maps[0].reshape(-1, 3)[sides.texels.index].astype(float))
+    of_probes = maps[0].astype(np.float32)
+    if lamps_apart(context):  # probes do not see them
+        of_probes = np.maximum(of_probes - traced.lamp_light(1.0).drawn.sum(axis=0, dtype=np.float32), 0)
+    luminous = luminance(of_probes.reshape(-1, 3)[sides.texels.index].astype(float))
     cache, unseen = traced.cache(*maps), traced.unseen(diffuse=False)
     tracer = ShareTracer(traced.whole(diffuse=False), cache, sides, owner, luminous, unseen)
     seed = seed_of(context.seed, KIND)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import drjit as dr
@@ -9,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 
 from lambent.bake.bsdfs.material_plugin import DIFFUSE_ATTRIBUTE
+from lambent.bake.tracing.lights.lamps import LampRays
 from lambent.bake.tracing.lights.sun import SunRays
 from lambent.bake.tracing.path_tracer import Points
 from lambent.bake.tracing.scene_builder import SceneBuilder, light_map_uv
@@ -21,13 +23,15 @@ class LightMapCache:
     """Diffuse radiance of surfaces from baked irradiance: kd/pi E of this side plus kt_d/pi E of the other.
 
     A coupled kd falls with the viewer's cosine, t(cos_o); its mean over the light's cosines is used, which is exact for
-    uniform light. Shadow rays add the `sun` that the light map leaves out.
+    uniform light. Shadow rays add the `sun` and the `lamps` that the light map leaves out. By side, `drawn` is the part
+    (H, W, 3) of its light that renderers draw by pixel.
     """
 
     def __init__(
-        self, builder: SceneBuilder, irradiance: Floats, irradiance_back: Floats | None, sun: SunRays | None = None
-    ) -> None:
-        self._sun = sun
+        self, builder: SceneBuilder, irradiance: Floats, irradiance_back: Floats | None, sun: SunRays | None = None,
+        drawn: Sequence[Floats] = (), lamps: LampRays | None = None,
+    ) -> None:  # fmt: skip
+        self._sun, self._lamps, self._drawn = sun, lamps, [_texture(side) for side in drawn]
         # A measured table is traced without the cache: its object has no diffuse term.
         looks = dict(builder.scene.materials) | dict.fromkeys(builder.measured, Material())
         materials = [Material() if o.name in builder.unmapped else looks[o.material] for o in builder.scene.objects]
@@ -46,6 +50,9 @@ class LightMapCache:
         if self._sun is not None:
             sun = self._sun(si, active)
             front, back = front + dr.maximum(sun, 0), back + dr.maximum(-sun, 0)
+        if self._lamps is not None:
+            on_front, on_back = self._lamps(si, active)
+            front, back = front + on_front, back + on_back
         return self._shown(si, active, [(front, back)])[0]
 
     def _shown(self, si: Any, active: Any, irradiance: list[tuple[Any, Any]]) -> list[Any]:
@@ -74,8 +81,8 @@ class LightMapCache:
         light = self._sun.on(points.position, points.normal, points.flat, active)
         return [(light, mi.Vector3f(*map(float, self._sun.direction)))]
 
-    def irradiance(self, si: Any, active: Any, *, sun: bool = True) -> Any:
-        """Irradiance on the side that a ray came from, with or without the `sun` that the light map leaves out.
+    def irradiance(self, si: Any, active: Any, *, direct: bool = True) -> Any:
+        """Irradiance on the side that a ray came from, with or without what renderers draw: sun and lamps.
 
         A back without a light map takes the front's.
         """
@@ -83,10 +90,14 @@ class LightMapCache:
         found = mi.Color3f(self._front.eval(uv2, active))
         if self._back is not None:
             found = dr.select(outside, found, mi.Color3f(self._back.eval(uv2, active)))
-        if self._sun is None or not sun:
+        if not direct:
+            for side, light in zip((outside, ~outside), self._drawn, strict=False):
+                found -= dr.select(side, mi.Color3f(light.eval(uv2, active)), 0.0)
+            return dr.maximum(found, 0.0)
+        if self._sun is None:
             return found
-        direct = self._sun(si, active)
-        return found + dr.maximum(dr.select(outside, direct, -direct), 0)
+        of_sun = self._sun(si, active)
+        return found + dr.maximum(dr.select(outside, of_sun, -of_sun), 0)
 
 
 class GroupedCache(LightMapCache):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lambent.bake.light.denoise import fill
 from lambent.bake.light.direct import direct_part
-from lambent.bake.light.sampling import SMOOTH, closed, denoised, relative_noise, sampled_halves, variance_of
+from lambent.bake.light.sampling import SMOOTH, closed, denoised, plus, relative_noise, sampled_halves, variance_of
 from lambent.bake.light.stitching import Cuts
 from lambent.bake.surfaces.texels import BEYOND, Texels
 from lambent.bake.tracing.lights.sun import SunRays
@@ -82,6 +82,11 @@ class GroupMaps:
     light: NDArray[np.float16]
     direct: NDArray[np.float16] | None
     notes: dict[str, float]
+
+    def plus(self, direct: Floats) -> GroupMaps:
+        """With more direct light (n, H, W, 3)."""
+        of_direct = None if self.direct is None else plus(self.direct, direct)
+        return GroupMaps(plus(self.whole, direct.sum(axis=0)), plus(self.light, direct), of_direct, self.notes)
 
 
 def finished_groups(

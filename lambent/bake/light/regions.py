@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from lambent.bake.light.sampling import cleaned, sampled_halves, variance_of
+from lambent.bake.light.sampling import cleaned, plus, sampled_halves, variance_of
 from lambent.bake.light.stitching import Cuts
 from lambent.bake.running.watch import Watch
 from lambent.bake.surfaces.texels import Texels
@@ -25,14 +25,16 @@ class FinishedRegions:
         Number of light groups; 0 if light is not separated.
     surface : tuple
         Texels, their charts (H, W) and their cuts, as for `sampling.cleaned`.
+    lamps : (G, H, W, 3)
+        Direct light that samples do not have, by light group.
     """
 
     def __init__(
         self, watch: Watch, store: Store, whole: str, parts: str, groups: int,
-        surface: tuple[Texels, Indices, Cuts],
+        surface: tuple[Texels, Indices, Cuts], lamps: Floats,
     ) -> None:  # fmt: skip
         self._watch, self._store, self._whole, self._parts, self._groups = watch, store, whole, parts, groups
-        self._surface = surface
+        self._surface, self._lamps = surface, lamps if groups else lamps.sum(axis=0, keepdims=True)
         self._next_s = -np.inf
 
     def wrote(self) -> None:
@@ -49,7 +51,8 @@ class FinishedRegions:
         if self._groups:
             by_group = self._store.read_partial(self._parts)[0][0]
             light = [by_group[..., 3 * number : 3 * number + 3] for number in range(self._groups)]
-        self._watch.region(np.stack([self._clean(one, known, variance) for one in light]), self._finished())
+        shown = plus(np.stack([self._clean(one, known, variance) for one in light]), self._lamps)
+        self._watch.region(shown, self._finished())
         now_s = time.monotonic()
         self._next_s = now_s + pause * (now_s - began_s)
 

@@ -21,7 +21,7 @@ from lambent.bake.light.level import with_level
 from lambent.bake.light.stitching import Cuts, stitched
 from lambent.bake.surfaces.texels import POINTS, Sides, Texels, area_of_texels, covered_share
 from lambent.bake.tracing import path_tracer
-from lambent.bake.tracing.lights.sun import Sun
+from lambent.bake.tracing.lights.sun import Unseen
 from lambent.bake.tracing.rays import block_sums, independent, vectors
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.geometry.sequences import hammersley, r2
@@ -49,7 +49,7 @@ class Sampling:
     per_pass: int
     cache: Any = None
     estimate: Estimate = path_tracer.irradiance
-    unseen: Sun | None = None
+    unseen: Unseen | None = None
     tally: path_tracer.Tally | None = None
     parts: int = 0
 
@@ -173,6 +173,11 @@ def finished(raw: Floats, texels: Texels, labels: Indices, cuts: Cuts) -> tuple[
     samples = float(raw[..., 3].sum(axis=0)[known].mean()) if known.any() else 0.0
     meta = {"noise": relative_noise(halves[:, known]), "samples": samples}
     return cleaned(halves.mean(axis=0), known, texels, labels, cuts, variance_of(halves)), meta
+
+
+def plus(light: Floats, direct: Floats) -> NDArray[np.float16]:
+    """Sum of a light map and direct light that its samples do not have."""
+    return np.minimum(np.add(light, direct, dtype=np.float32), HALF_MAX).astype(np.float16)
 
 
 def variance_of(halves: Floats) -> Floats:

@@ -129,7 +129,7 @@ def _diffuse(around: Surroundings, x: Floats, n: Floats) -> tuple[Floats, Floats
         return np.zeros(x.shape), np.zeros(len(x))
     start = array_of(leaving(around.scene, x, n, n).o)
     si = around.scene.ray_intersect(rays_from(start, -n))
-    light, irradiance = around.cache(si, si.is_valid()), around.cache.irradiance(si, si.is_valid(), sun=False)
+    light, irradiance = around.cache(si, si.is_valid()), around.cache.irradiance(si, si.is_valid(), direct=False)
     dr.eval(light, irradiance)
     own, lit = (np.nan_to_num(array_of(found).astype(float), posinf=0.0) for found in (light, irradiance))
     return own, np.asarray(luminance(lit))  # a texel without light, or a triangle without area, may be no number

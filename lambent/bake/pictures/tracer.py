@@ -58,12 +58,14 @@ class Part(Enum):
 class LightMap:
     """Irradiance (H, W, 3) of front and back, W/m^2, in a mix of light groups: `factors` (n, 3), None as baked.
 
-    A side without light is None.
+    A side without light is None. The direct light of `lamps` is left out: numbers of lights of the scene, and their
+    groups.
     """
 
     front: Floats | None
     back: Floats | None = None
     factors: Floats | None = None
+    lamps: tuple[tuple[int, int], ...] = ()
 
 
 class Tracer:
@@ -83,7 +85,8 @@ class Tracer:
         if light.factors is not None and (sun := traced.sorted_lights.sun) is not None:
             of_sun = triple(light.factors[sun])
         front = np.zeros((1, 1, 3), np.float32) if light.front is None else light.front
-        cache = traced.cache(front, light.back, of_sun)
+        lamps = traced.lamp_rays(light.lamps, light.factors) if light.lamps else None
+        cache = traced.cache(front, light.back, of_sun, lamps)
         scene, builder = traced.whole(diffuse=False), traced.builder(diffuse=False)
         return cls(scene, builder, tally, cache, lambda: Gathering(traced, cache, tally))
 

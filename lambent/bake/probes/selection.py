@@ -85,7 +85,7 @@ def mirrored(
     met = scene.ray_intersect_preliminary(ray)
     own = np.array(met.is_valid()) & np.isin(np.array(numbers.at(met, met.is_valid())), family)
     below = scene.ray_intersect(rays_from(array_of(leaving(scene, at, n, n).o), -n))
-    lit = array_of(cache.irradiance(below, below.is_valid(), sun=False)).astype(float)
+    lit = array_of(cache.irradiance(below, below.is_valid(), direct=False)).astype(float)
     irradiance = np.nan_to_num(lit, posinf=0.0)
     share = np.asarray(fresnel(np.abs((view * n).sum(axis=1)), r0[found]))
     return Mirrored(array_of(ray.o).astype(float), directions, n, radiance, luminance(irradiance), share, own)

@@ -36,7 +36,7 @@ from lambent.bake.probes.selection import Scaling, difference
 from lambent.bake.running.tiles import slices
 from lambent.bake.surfaces.texels import POINTS, Sides
 from lambent.bake.tracing import path_tracer, rays
-from lambent.bake.tracing.lights.sun import Sun
+from lambent.bake.tracing.lights.sun import Unseen
 from lambent.bake.tracing.rays import array_of, independent
 from lambent.core.arrays import Floats, Indices
 from lambent.core.progress import Progress, silent
@@ -89,7 +89,7 @@ class ShareTracer:
     """
 
     def __init__(
-        self, scene: Any, cache: LightMapCache, sides: Sides, owner: Indices, luminous: Floats, unseen: Sun | None
+        self, scene: Any, cache: LightMapCache, sides: Sides, owner: Indices, luminous: Floats, unseen: Unseen | None
     ) -> None:
         self._scene, self._cache, self._sides, self._owner, self._unseen = scene, cache, sides, owner, unseen
         self._luminous = luminous

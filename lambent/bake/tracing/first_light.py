@@ -1,4 +1,4 @@
-"""Emitters without the sun, for sampling at points of the light map; the renderer draws the sun's direct light.
+"""Emitters without the sun and lamps at points, for sampling at points of the light map: their light is added by rays.
 
 A sky is the same picture without the sun's part, with its own guide: samples aimed at the sun would be wasted. Later
 surfaces on a path see the sun, and sample all emitters.
@@ -6,6 +6,7 @@ surfaces on a path see the sun, and sample all emitters.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import drjit as dr
@@ -19,10 +20,17 @@ from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
 
 
 class FirstLight:
-    """All emitters of a builder but the sun; `environment` as from `sky_without`, for the scene `whole`."""
+    """All emitters of a builder but the sun, if `found`, and some of its lights, by number.
 
-    def __init__(self, builder: SceneBuilder, whole: Any, found: FoundSun, environment: Any) -> None:
-        lights = [e for e, light in zip(builder.lights, builder.scene.lights, strict=True) if not is_sun(light, found)]
+    `environment` is as from `sky_without`, for the scene `whole`.
+    """
+
+    def __init__(
+        self, builder: SceneBuilder, whole: Any, found: FoundSun | None, environment: Any,
+        without: Collection[int] = (),
+    ) -> None:  # fmt: skip
+        suns = [number for number, light in enumerate(builder.scene.lights) if found and is_sun(light, found)]
+        lights = [emitter for number, emitter in enumerate(builder.lights) if number not in {*suns, *without}]
         emitters = [*lights, *([] if environment is None else [environment])]
         meshes = [mesh for mesh in builder.meshes.values() if mesh.is_emitter()]
         parts = {f"part_{i}": part for i, part in enumerate([*meshes, *emitters])}

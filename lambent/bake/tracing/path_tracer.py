@@ -16,7 +16,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lambent.bake.tracing import rays
-from lambent.bake.tracing.lights.sun import Sun
+from lambent.bake.tracing.lights.sun import Sun, Unseen
 
 ROULETTE_DEPTH = 2
 Cache = Callable[[Any, Any], Any]  # (surface interaction, active) -> diffuse radiance towards the ray's origin
@@ -80,7 +80,7 @@ class Start:
     origin: Any
     pdf: Any
     direct: bool
-    unseen: Sun | None = None
+    unseen: Unseen | None = None
     active: Any = True
 
 
@@ -112,7 +112,7 @@ def radiance_sums(scene: Any, sampler: Any, start: Start, max_depth: int, cache:
 
 
 def sample_emitter(
-    scene: Any, lights: Any, si: Any, u: Any, active: Any, holes: bool, unseen: Sun | None = None
+    scene: Any, lights: Any, si: Any, u: Any, active: Any, holes: bool, unseen: Unseen | None = None
 ) -> tuple[Any, Any]:
     """DirectionSample3f of an emitter of the mi.Scene `lights`, and its light over its density, 0 in shadow.
 
@@ -120,7 +120,7 @@ def sample_emitter(
     """
     ds, value = lights.sample_emitter_direction(si, u, False, active)
     lit = active & (ds.pdf > 0)
-    if unseen is not None and unseen.first is None:
+    if isinstance(unseen, Sun) and unseen.first is None:
         value = dr.select(lit, unseen.left_out(ds, value), 0.0)
     if unseen is not None and unseen.passes_panes:
         return ds, dr.select(lit, value, 0.0) * rays.passed_from(scene, si.p, si.n, ds.p, lit)
@@ -206,7 +206,7 @@ class Points:
 
 def irradiance(
     scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None = None,
-    unseen: Sun | None = None,
+    unseen: Unseen | None = None,
 ) -> Any:  # fmt: skip
     """One sample of irradiance (mi.Color3f) at each point, W/m^2, all bounces.
 
@@ -216,7 +216,7 @@ def irradiance(
         In [0, 1)^2, for a cosine-distributed direction and a point on an emitter; to be stratified.
     max_depth, cache
         As in `radiance`.
-    unseen : Sun, optional
+    unseen : Unseen, optional
         Sun whose direct light is left out, including light straight through clear glass.
     """
     return irradiance_sums(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, AllLight(), unseen)[0]
@@ -224,7 +224,7 @@ def irradiance(
 
 def irradiance_sums(
     scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Any, tally: Tally,
-    unseen: Sun | None = None,
+    unseen: Unseen | None = None,
 ) -> list[Any]:  # fmt: skip
     """Likewise as the sums of a tally, with a cache that suits it."""
     parts = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, tally, unseen)
@@ -234,7 +234,7 @@ def irradiance_sums(
 
 def arriving(
     scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Any, tally: Tally,
-    unseen: Sun | None = None, active: Any = True,
+    unseen: Unseen | None = None, active: Any = True,
 ) -> list[tuple[Any, Any]]:  # fmt: skip
     """Likewise by direction: irradiances (mi.Color3f) that add up to the sample, and unit directions they come from.
 
@@ -246,7 +246,7 @@ def arriving(
 
 def moment(
     scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None = None,
-    unseen: Sun | None = None,
+    unseen: Unseen | None = None,
 ) -> Any:  # fmt: skip
     """One sample of the sum of directions (as mi.Color3f), each weighted by its luminance in `irradiance`."""
     found = arriving(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, AllLight(), unseen)
@@ -255,7 +255,7 @@ def moment(
 
 def _contributions(
     scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Any, tally: Tally,
-    unseen: Sun | None, active: Any = True,
+    unseen: Unseen | None, active: Any = True,
 ) -> list[tuple[list[Any], Any]]:  # fmt: skip
     """Sums of irradiance by sampling of directions, and by emitters, each with the directions it comes from."""
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.position))

@@ -5,7 +5,7 @@ Everything follows from the scene and the split meshes alone: a resumed bake fin
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.light.cache import GroupedCache, LightMapCache
+from lambent.bake.light.lamps import LampLight, LampPoints, drawn_of
 from lambent.bake.light.stitching import Cuts, cuts_of
 from lambent.bake.sky.sun import FoundSun, is_sun, sun_of
 from lambent.bake.surfaces.atlas import Atlas
@@ -22,7 +23,8 @@ from lambent.bake.surfaces.texels import POINTS, Sides, Texels, chart_labels, te
 from lambent.bake.tracing.first_light import FirstLight, sky_without
 from lambent.bake.tracing.group_tally import Direct, GroupTally, MixTally, Sorting
 from lambent.bake.tracing.lights.emitters import balance_emitters
-from lambent.bake.tracing.lights.sun import Sun, SunRays
+from lambent.bake.tracing.lights.lamps import LampRays, lamps_among
+from lambent.bake.tracing.lights.sun import NoSun, Sun, SunRays, Unseen
 from lambent.bake.tracing.scene_builder import EmitterSampling, SceneBuilder
 from lambent.bake.tracing.seen.visibility import seen, viewing_places, without_hidden
 from lambent.bake.tracing.solids import SolidTest
@@ -42,16 +44,18 @@ class TracedScene:
     """Shared by the artefacts of a bake. `merged` is the concatenated geometry of the atlas, as from `atlas.merged`.
 
     `two_sided` flags each object whose back has a light map too: because light crosses it, or viewers see it. The
-    light map leaves out the scene's sun unless `sun_left_out` is false. Objects in `unmapped` have no texels in it. The
+    light map leaves out the scene's sun unless `sun_left_out` is false. If `lamps_apart`, its samples leave out lamps at
+    points, whose light is `lamp_light`. Objects in `unmapped` have no texels in it. The
     sky is guided with `effort` (`sky.guide.learn`).
     """
 
     def __init__(
         self, atlas: Atlas, merged: dict[str, Floats], two_sided: list[bool], progress: Progress = silent, *,
-        sun_left_out: bool = True, unmapped: Collection[str] = (), effort: float = 1.0,
+        sun_left_out: bool = True, lamps_apart: bool = False, unmapped: Collection[str] = (), effort: float = 1.0,
     ) -> None:  # fmt: skip
         self.atlas, self.scene, self.merged, self.progress = atlas, atlas.scene, merged, progress
         self.two_sided, self._sun_left_out, self._unmapped, self._effort = two_sided, sun_left_out, unmapped, effort
+        self._lamps_apart = lamps_apart
         counts = [len(o.mesh.faces) for o in self.scene.objects]
         self._two_sided, self._crossed = np.repeat(two_sided, counts), np.repeat(crossed_by_light(self.scene), counts)
         self._builder: tuple[tuple[bool, bool], SceneBuilder] | None = None
@@ -60,6 +64,7 @@ class TracedScene:
         self._sky_without: tuple[Any] | None = None
         self._sides: dict[float, Sides] = {}
         self._views: dict[float, tuple[Sides, Indices]] = {}
+        self._lamp_light: dict[float, LampLight] = {}
 
     def builder(self, *, diffuse: bool, photons: bool = False) -> SceneBuilder:
         """Builder of the scene, with or without diffuse terms; kept until the other one is needed.
@@ -107,20 +112,69 @@ class TracedScene:
     def _found_sun(self) -> FoundSun | None:
         return sun_of(self.scene) if self._sun_left_out else None
 
-    def unseen(self, *, diffuse: bool) -> Sun | None:
-        """That sun with the emitters of `whole(diffuse=diffuse)`, for sampling at points of the light map."""
-        if self._found_sun is None:
+    def unseen(self, *, diffuse: bool, lamps: bool = True) -> Unseen | None:
+        """That sun with the emitters of `whole(diffuse=diffuse)`, for sampling at points of the light map.
+
+        Emitters do not include lamps at points, whose light is `lamp_light`, unless `lamps` is false.
+        """
+        without = self.lamps if lamps else ()
+        if self._found_sun is None and not without:
             return None
         builder, whole = self.builder(diffuse=diffuse), self.whole(diffuse=diffuse)
         if self._sky_without is None:
-            self._sky_without = (sky_without(self._found_sun, builder, whole, self._effort),)
-        return Sun(self._found_sun, FirstLight(builder, whole, self._found_sun, *self._sky_without))
+            bare = self._found_sun and sky_without(self._found_sun, builder, whole, self._effort)
+            self._sky_without = (builder.environment if self._found_sun is None else bare,)
+        first = FirstLight(builder, whole, self._found_sun, *self._sky_without, without)
+        return NoSun(first) if self._found_sun is None else Sun(self._found_sun, first)
 
-    def cache(self, irradiance: Floats, irradiance_back: Floats | None, factor_of_sun: Triple = WHITE) -> LightMapCache:
-        """A light map (H, W, 3) as radiance cache of the scene without diffuse terms, including the sun it lacks."""
+    @cached_property
+    def lamps(self) -> tuple[int, ...]:
+        """Numbers of the scene's lights whose light on the light map is `lamp_light`."""
+        return lamps_among(self.scene.lights) if self._lamps_apart else ()
+
+    def lamp_rays(self, lamps: Sequence[tuple[int, int]], factors: Floats | None = None) -> LampRays:
+        """Shadow rays to some of the scene's lights, by number and light group, times factors (G, 3) by group."""
+        kind = self._at_hand
+        emitters = [self.builder(**kind).lights[number] for number, _ in lamps]
+        return LampRays(self.whole(**kind), emitters, None if factors is None else factors[[g for _, g in lamps]])
+
+    @cached_property
+    def drawn_lamps(self) -> tuple[int, ...]:
+        """The lamps that a renderer draws by pixel, as places in `lamps`, the most important first."""
+        if not self.lamps:
+            return ()
+        return drawn_of(LampPoints(self.lamp_rays(self._grouped_lamps), *self.in_view(1.0)).detail())
+
+    @property
+    def _grouped_lamps(self) -> list[tuple[int, int]]:
+        """The `lamps` with their light groups."""
+        return [(number, self.sorted_lights.of_lights[number]) for number in self.lamps]
+
+    def lamp_light(self, sign: float) -> LampLight:
+        """The direct light of lamps on the normals' side (sign +1) or the other (-1)."""
+        if sign not in self._lamp_light:
+            self.progress(0, 1, "lamps")
+            points = LampPoints(self.lamp_rays(self._grouped_lamps), *self.in_view(sign))
+            groups = [group for _, group in self._grouped_lamps]
+            self._lamp_light[sign] = points.light(groups, len(self.sorted_lights.groups), self.drawn_lamps)
+        return self._lamp_light[sign]
+
+    def cache(
+        self, irradiance: Floats, irradiance_back: Floats | None, factor_of_sun: Triple = WHITE,
+        lamps: LampRays | None = None,
+    ) -> LightMapCache:  # fmt: skip
+        """A light map (H, W, 3) as radiance cache of the scene without diffuse terms, including the sun it lacks.
+
+        It may lack the direct light of `lamps` as well.
+        """
         builder = self.builder(diffuse=False)
         sun = None if self.sun is None else SunRays(self.sun, self.whole(diffuse=False), factor_of_sun)
-        return LightMapCache(builder, irradiance, irradiance_back, sun)
+        return LightMapCache(builder, irradiance, irradiance_back, sun, self._drawn_light(), lamps)
+
+    def _drawn_light(self) -> list[Floats]:
+        """By side with a light map, the direct light (H, W, 3) of lamps that renderers draw; empty without lamps."""
+        signs = (1.0, -1.0) if self.lamps and any(self.two_sided) else (1.0,) if self.lamps else ()
+        return [self.lamp_light(sign).drawn.sum(axis=0, dtype=np.float32) for sign in signs]
 
     @cached_property
     def sorted_lights(self) -> SortedLights:

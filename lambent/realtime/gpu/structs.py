@@ -12,13 +12,13 @@ Record = NDArray[np.void]
 _DECLARED = {
     "LambentLobe": "lobes", "PlacedLobe": "surface", "Frame": "frame", "Material": "material", "Object": "surface",
     "Sun": "sun_record", "MirroredView": "planar_view", "Plan": "planar_walls", "Prefilter": "prefilter",
-    "LightFieldRecord": "light_field_record",
+    "LightFieldRecord": "light_field_record", "PointLamp": "lamp_record",
 }  # fmt: skip
 STRUCTS = {
     name: wgsl_dtype(name, assemble(f"{file}.wgsl", given={"look_up.wgsl": ""}))[0] for name, file in _DECLARED.items()
 }
 FRAME_DTYPE, MATERIAL_DTYPE, OBJECT_DTYPE = STRUCTS["Frame"], STRUCTS["Material"], STRUCTS["Object"]
 PLACED_LOBE_DTYPE, PREFILTER_DTYPE = STRUCTS["PlacedLobe"], STRUCTS["Prefilter"]
-SUN_DTYPE = STRUCTS["Sun"]
+SUN_DTYPE, LAMP_DTYPE = STRUCTS["Sun"], STRUCTS["PointLamp"]
 LIGHT_FIELD_DTYPE = STRUCTS["LightFieldRecord"]
 MIRRORED_VIEW_DTYPE, PLAN_DTYPE = STRUCTS["MirroredView"], STRUCTS["Plan"]

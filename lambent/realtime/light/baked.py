@@ -17,6 +17,7 @@ from lambent.core.arrays import Floats
 from lambent.core.discovery import known
 from lambent.core.plain import first_of, triple
 from lambent.realtime.gpu.cube_mips import finite
+from lambent.realtime.lamps.drawn import DrawnLamps, read_lamps
 from lambent.realtime.light.group_arrays import GroupArrays, groups_in
 from lambent.scenes.scene import MaterialTextures
 from lambent.store import contract
@@ -88,6 +89,7 @@ class BakedScene:
     policy: str = LEAST_RECENT  # eviction policy of their caches
     sun: SunRecord | None = None  # its direct light is not in the light maps
     sunlit: NDArray[np.uint8] | None = None  # (H, W), 0 for texels that the sun does not reach (`store.sunlit`)
+    lamps: DrawnLamps | None = None  # drawn by pixel; their light is in the light maps too
     groups: GroupArrays | None = None  # light by group; None if baked without groups
     replaced: bool = False  # whether a mesh replaces an object; light maps then differ from the store's
 
@@ -206,6 +208,7 @@ def read_baked(
         policy=policy,
         sun=_in_units(sun, unit),
         sunlit=read_sunlit(store, sun),
+        lamps=read_lamps(store, unit),
         groups=groups_in(store, unit),
         replaced=False,
     )

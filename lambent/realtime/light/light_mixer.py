@@ -184,6 +184,9 @@ class LightMixer:
 
     def _map(self, factors: Floats) -> Any:
         sides, before = self._surfaces.light_map(factors), self._sky_of
+        if (lamps := self._scene.lamps) is not None:
+            front, back = (*sides, None)[:2]
+            sides = front, back, None, None, *map(with_alpha, lamps.in_map(factors))
         if before is not None and not self._light.turns_sky(factors, before):
             return sides, (None, None)
         self._sky_of = factors
@@ -211,6 +214,7 @@ class LightMixer:
         sides, (shown, mirrored) = made
         self._shown = factors
         resources.show_light_map(sides)
+        resources.lamps.shine(factors)
         if shown is not None and mirrored is not None:
             resources.sky_group = resources.sky_group_of(shown)
             resources.mirrored_sky_group = resources.sky_group_of(mirrored)

@@ -82,6 +82,7 @@ def _replaced(scene: BakedScene, one: Replacement) -> BakedScene:
         probe_share=room.joined(scene.probe_share),
         light_fields={name: room.moved_field(f) for name, f in scene.light_fields.items()} | {record.name: own},
         sunlit=None,
+        lamps=None,
         groups=None,
         replaced=True,
     )

@@ -76,7 +76,8 @@ class Shading:
             if not runs:
                 continue
             reflecting = context.reflections if self._is_reflecting(draw) else light
-            wanted = [self._pipeline(draw, formats), draw.material_group, draw.object_group, reflecting]
+            pipeline = self._pipeline(draw, formats, context.resources.lamps.constants)
+            wanted = [pipeline, draw.material_group, draw.object_group, reflecting]
             if wanted[0] is not bound[0]:
                 render.set_pipeline(wanted[0])
             for number in (1, 2, 3):
@@ -88,8 +89,8 @@ class Shading:
     def _is_reflecting(self, draw: Draw) -> bool:
         return draw.planar and self._reflections is not None
 
-    def _pipeline(self, draw: Draw, formats: tuple[str, ...]) -> Any:
-        stage, constants = self._stage, draw.constants
+    def _pipeline(self, draw: Draw, formats: tuple[str, ...], lamps: dict[str, int]) -> Any:
+        stage, constants = self._stage, draw.constants | lamps
         shaders = (stage.shaders(draw), draw.look_up.NAME)
         key = (*shaders, formats, *constants.items())
         if key not in self._pipelines:

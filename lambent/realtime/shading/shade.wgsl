@@ -5,6 +5,7 @@
 #include "dominant_direction.wgsl"
 #include "part_share.wgsl"
 #include "sun_light.wgsl"
+#include "lamp_direct.wgsl"
 
 @group(3) @binding(0) var light_maps: texture_2d_array<f32>;
 
@@ -24,6 +25,12 @@ fn mesh_frame(v: Varyings) -> mat3x3f {
     let flat_t = rejection(v.t_world, n);
     let t = flat_t * inverseSqrt(max(dot(flat_t, flat_t), 1e-12));
     return mat3x3f(t, cross(n, t), n);
+}
+
+// The triangle's normal, by the differences between neighbouring pixels; n where they vanish.
+fn flat_normal(v: Varyings, n: vec3f) -> vec3f {
+    let found = cross(dpdx(v.p_world), dpdy(v.p_world));
+    return select(n, normalize(found), dot(found, found) > 0.0);
 }
 
 // The place on the light map, by the differences between neighbouring pixels.
@@ -88,24 +95,31 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
     let mesh = mesh_frame(v);
     let facing = dot(mesh[2], sun.towards.xyz) * select(-1.0, 1.0, front);
     let direct = sun.irradiance.rgb * sun_share(s);
-    let e_front = light_map(FRONT, v.uv2);
-    let e_back = light_map(BACK, v.uv2);
+    var e_front = light_map(FRONT, v.uv2);
+    var e_back = light_map(BACK, v.uv2);
+    if (LAMPS > 0u) {
+        e_front = max(e_front - light_map(FRONT_OF_LAMPS, v.uv2), vec3f(0.0));
+        e_back = max(e_back - light_map(BACK_OF_LAMPS, v.uv2), vec3f(0.0));
+    }
     var e_here = select(e_back, e_front, front);
     let e_beyond = select(e_front, e_back, front) + max(-facing, 0.0) * direct;
     var e_bent = e_here;
     var sun_cos = max(facing, 0.0);
+    let side = select(-1.0, 1.0, front);
+    var bent = mesh[2] * side;
     if ((TEXTURES & 8u) != 0u && front) {
-        let bent = normalize(mesh * vec3f(s.painted.slope, 1.0));
+        bent = normalize(mesh * vec3f(s.painted.slope, 1.0));
         e_bent = e_here * bent_share(light_map(DIRECTION, v.uv2), mesh[2], bent);
         sun_cos = select(0.0, max(dot(bent, sun.towards.xyz), 0.0), facing > 0.0);
     }
-    if (LOBES > 0u) { s = with_shares(s, light_maps, v.uv2, front, e_bent); } // light without the sun, as in probes
-    e_bent += sun_cos * direct;
-    e_here += max(facing, 0.0) * direct;
-    let diffuse = diffuse_light(wo.z, e_bent, e_beyond, s.painted);
+    if (LOBES > 0u) { s = with_shares(s, light_maps, v.uv2, front, e_bent); } // light without sun and lamps, as in probes
+    let of_lamps = light_of_lamps(v.p_world, v.uv2, mesh[2] * side, flat_normal(v, mesh[2]), bent, wo, s);
+    e_bent += sun_cos * direct + of_lamps.bent;
+    e_here += max(facing, 0.0) * direct + of_lamps.here;
+    let diffuse = diffuse_light(wo.z, e_bent, e_beyond + of_lamps.beyond, s.painted);
     let emitted = select(vec3f(0.0), object.emission.rgb, front);
 
-    let specular = specular_light(wo, s);
+    let specular = specular_light(wo, s) + of_lamps.specular;
     let light = frame.show.x * (diffuse + emitted) + frame.show.y * specular + frame.show.w * e_here;
     return clamp(light, vec3f(0.0), vec3f(HALF_MAX));
 }

@@ -55,7 +55,8 @@ class SunPass:
                 if draws:
                     views[index] = self._texture(size, index).create_view()
                     self._encode(context, draws, views[index])
-        context.light, context.pane_light = ((resources.light_view, sun.uniform, view) for view in views)
+        lamps = resources.lamps.bindings
+        context.light, context.pane_light = ((resources.light_view, sun.uniform, view, *lamps) for view in views)
 
     def _encode(self, context: FrameContext, draws: list[Draw], view: Any) -> None:
         sun = context.resources.sun

@@ -80,9 +80,27 @@ class Sun:
         return dr.clip(1 - self.radiance(w) / dr.maximum(environment.eval(si), 1e-20), 0, 1)
 
     def is_light(self, emitter: Any, w: Any) -> Any:
-        """Whether emitters (mi.EmitterPtr) seen along w are the sun."""
+        """Whether emitters (mi.EmitterPtr) seen along w (mi.Vector3f) are the sun."""
         directional = mi.has_flag(emitter.flags(), mi.EmitterFlags.DeltaDirection)
         return directional & (self._picture is None) & (dr.dot(w, self.direction) > 1 - ALIGNED)
+
+
+class NoSun:
+    """In place of a `Sun` where only lamps at points are left out: all light of other emitters counts."""
+
+    passes_panes = False
+
+    def __init__(self, first: FirstEmitters) -> None:
+        self.first = first
+
+    def radiance(self, w: Any) -> Any:
+        return mi.Color3f(0.0)
+
+    def goes_on(self, si: Any, wi: Any, active: Any) -> Any:
+        return mi.Bool(False)
+
+
+Unseen = Sun | NoSun  # what samples at points of the light map leave out
 
 
 class SunRays:

@@ -1,0 +1,78 @@
+"""Lamps at points that renderers draw by pixel: see `store.lamps`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, lamps_apart, side_count
+from lambent.bake.context import BakeContext
+from lambent.bake.engine import engine
+from lambent.bake.methods import sorts_light
+from lambent.bake.running.keys import key_of
+from lambent.core.plain import triple
+from lambent.scenes.scene import IesLight, PointLight
+from lambent.store.lamps import DISTANCES, LAMPS, PROFILES, REACHED, LampRecord
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+KIND = "lamps"
+NEEDS = ("geometry", "light_map")
+REVISION = 1
+
+
+def keys(context: BakeContext) -> dict[str, str]:
+    if not lamps_apart(context):
+        return {}
+    key = key_of(KIND, REVISION, context.keys("light_map")[IRRADIANCE[0]], sorts_light(context.methods))
+    return dict.fromkeys((PROFILES, DISTANCES, REACHED, *LAMPS[: side_count(context)]), key)
+
+
+def bake(context: BakeContext) -> None:
+    engine()  # before Mitsuba is imported
+    from lambent.bake.light.lamp_maps import shadow_map
+
+    traced, scene = context.traced, context.scene
+    drawn = [traced.lamps[place] for place in traced.drawn_lamps]
+    lamps = [light for light in (scene.lights[number] for number in drawn) if isinstance(light, PointLight | IesLight)]
+    profiles, records = _records(context, drawn, lamps)
+    context.put(KIND, PROFILES, profiles, context.provenance())
+    reached = np.zeros((traced.texels.height, traced.texels.width), np.uint64)
+    for side in range(side_count(context)):
+        light = traced.lamp_light(SIGNS[side])
+        of_map = light.drawn if sorts_light(context.methods) else light.drawn.sum(axis=0, keepdims=True)
+        context.put(KIND, LAMPS[side], of_map, context.provenance())
+        reached |= light.reached
+    words = np.stack([reached, reached >> np.uint64(32)], axis=-1).astype(np.uint32)
+    context.put(KIND, REACHED, words, context.provenance())
+    whole = traced.whole(diffuse=False)
+    maps = []
+    for number, lamp in enumerate(lamps):
+        context.progress(number, len(lamps), "shadow maps of lamps")
+        maps.append(shadow_map(whole, lamp))
+    distances = np.stack(maps) if maps else np.zeros((0, 1, 1), np.float16)
+    context.put(KIND, DISTANCES, distances, context.provenance(lamps=records))
+
+
+def _records(
+    context: BakeContext, numbers: list[int], lamps: list[PointLight | IesLight]
+) -> tuple[NDArray[np.float32], list[dict[str, Any]]]:
+    """The profiles of lamps, equal ones once, and their records as JSON."""
+    from lambent.bake.light.lamp_maps import RADII, axes_of, azimuths, profile, reach_deg
+
+    groups, grouped = context.traced.sorted_lights.of_lights, sorts_light(context.methods)
+    count = max(map(azimuths, lamps), default=1)
+    known: dict[bytes, int] = {}
+    profiles, records = list[Any](), []
+    for number, lamp in zip(numbers, lamps, strict=True):
+        shape, intensity = profile(lamp, count)
+        if (place := known.setdefault(shape.tobytes(), len(profiles))) == len(profiles):
+            profiles.append(shape)
+        rows = [triple(axis) for axis in axes_of(lamp)]
+        record = LampRecord(
+            number=number, position=lamp.position, axes=(rows[0], rows[1], rows[2]), intensity=triple(intensity),
+            reach_deg=reach_deg(lamp), profile=place, group=groups[number] if grouped else 0,
+        )  # fmt: skip
+        records.append(record.model_dump(mode="json"))
+    return np.stack(profiles) if profiles else np.zeros((0, count, RADII), np.float32), records

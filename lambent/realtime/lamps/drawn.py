@@ -1,0 +1,62 @@
+"""Lamps at points of a baked scene, drawn by pixel: their arrays from a store (`store.lamps`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.arrays import Floats
+from lambent.store.lamps import DISTANCES, LAMPS, PROFILES, REACHED, LampRecord, drawn_lamps
+from lambent.store.store import Store
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnLamps:
+    """The lamps of a scene, in units of `BakedScene.unit`, and what the light map holds of their direct light.
+
+    Attributes
+    ----------
+    records : (n,) LampRecord
+        The most important lamp first.
+    profiles : (P, A, B) float32
+    distances : (n, S, S) float16
+        m.
+    reached : (H, W, 2) uint32
+        Bits of the lamps whose light arrives at texels.
+    light : list of (G, H, W, 3) float32
+        Direct light in the light map, by side and light group.
+    """
+
+    records: tuple[LampRecord, ...]
+    profiles: NDArray[np.float32]
+    distances: NDArray[np.float16]
+    reached: NDArray[np.uint32]
+    light: list[Floats]
+
+    def intensities(self, factors: Floats | None = None) -> Floats:
+        """(n, 3) largest intensities, in a mix of light groups with factors (G, 3)."""
+        found = np.array([lamp.intensity for lamp in self.records]).reshape(-1, 3)
+        return found if factors is None else found * factors[[lamp.group for lamp in self.records]]
+
+    def in_map(self, factors: Floats | None = None) -> list[Floats]:
+        """Direct light (H, W, 3) in the light map, by side, in a mix of light groups with factors (G, 3)."""
+        if factors is None:
+            return [side.sum(axis=0) for side in self.light]
+        return [np.einsum("ghwc,gc->hwc", side, factors, optimize=True) for side in self.light]
+
+
+def read_lamps(store: Store, unit: float) -> DrawnLamps | None:
+    """The lamps of a store; None if it has none, as earlier stores."""
+    records = drawn_lamps(store)
+    if not records:
+        return None
+    scaled = tuple(
+        lamp.model_copy(update={"intensity": tuple(np.divide(lamp.intensity, unit).tolist())}) for lamp in records
+    )
+    light = [store.read(name).astype(np.float32) / np.float32(unit) for name in LAMPS if name in store]
+    for name in (REACHED, LAMPS[0]):
+        if store.artefact(name).shape[-3:-1] != (of_map := store.artefact("light_map/irradiance").shape[:2]):
+            raise store.broken(name, got=store.artefact(name).shape, expected=f"{of_map}, as the light map")
+    return DrawnLamps(scaled, store.read(PROFILES), store.read(DISTANCES), store.read(REACHED), light)

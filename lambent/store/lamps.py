@@ -1,0 +1,59 @@
+"""Lamps at points that renderers draw by pixel: light, shadow maps, and what the light map holds of them.
+
+A direction d from a lamp, in its axes, is at q = d.xy / (2 cos(theta/2)) / sin(reach/2) in the unit disc, which keeps
+areas (Lambert's azimuthal projection): |q| = sin(theta/2) / sin(reach/2).
+
+    lamps/profiles         (P, A, B) float32, intensities over the largest; A azimuths from 0 to 360 degrees, B |q| from 0 to 1
+    lamps/distances        (n, S, S) float16, m to the first surface that blocks light; texel (row, column) has its
+                           centre at q = (2 (column + 1/2)/S - 1, 2 (row + 1/2)/S - 1). meta["lamps"]: LampRecords
+    light_map/lamps, lamps_back  (G, H, W, 3) float16, W/m^2, their direct light in the light map, by light group
+    light_map/lamps_reach  (H, W, 2) uint32, bit k % 32 of word k // 32: whether the light of lamp k arrives
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from lambent.core.errors import invalid
+from lambent.core.plain import Triple
+from lambent.core.strict import Strict
+from lambent.store.contract import SIDES
+from lambent.store.store import MANIFEST, Store
+
+MOST_LAMPS = 64
+PROFILES, DISTANCES, REACHED = "lamps/profiles", "lamps/distances", "light_map/lamps_reach"
+LAMPS = tuple(f"light_map/{side.replace('irradiance', 'lamps')}" for side in SIDES)  # by side
+
+
+class LampRecord(Strict):
+    """A lamp: `axes` are unit rows, the last one along its axis; `intensity` is the largest, W/sr.
+
+    `number` is its place among the scene's lights.
+    """
+
+    number: int = Field(ge=0)
+    position: Triple
+    axes: tuple[Triple, Triple, Triple]
+    intensity: Triple
+    reach_deg: float = Field(gt=0, le=180)
+    profile: int = Field(ge=0)
+    group: int = Field(ge=0)
+
+
+def drawn_lamps(store: Store) -> tuple[LampRecord, ...]:
+    """The lamps that renderers draw; empty for a store without any. `UserError` if one is invalid."""
+    if DISTANCES not in store or LAMPS[0] not in store:
+        return ()
+    said = store.artefact(DISTANCES).meta.get("lamps")
+    try:
+        found = tuple(map(LampRecord.model_validate, said if isinstance(said, list) else ()))
+    except ValidationError as error:
+        raise invalid(error, store.folder / MANIFEST) from error
+    numbers = np.array([[*lamp.position, *lamp.intensity, *np.ravel(lamp.axes)] for lamp in found])
+    profiles, groups = store.artefact(PROFILES).shape[0], store.artefact(LAMPS[0]).shape[0]
+    whole = all(lamp.profile < profiles and lamp.group < groups for lamp in found)
+    count = store.artefact(DISTANCES).shape[0]
+    if not (whole and np.isfinite(numbers).all() and len(found) == count <= MOST_LAMPS):
+        raise store.broken(f"{DISTANCES}: lamps", got=said, expected=f"{count} lamps of {profiles} profiles")
+    return found
