@@ -202,8 +202,8 @@ class SceneResources:
         both = (self.scene.noise, self.scene.noise_back)
         front, back = (None if noise is None else np.repeat(noise[..., None], 3, axis=-1) for noise in both)
         dark = SunLight(self._layouts)
-        view = upload(self._layouts.device, [light_layers(front, back)], "rgba16float").create_view(dimension="2d-array")
-        lamps = PointLamps(self._layouts, None)
+        noise, lamps = light_layers(front, back), PointLamps(self._layouts, None)
+        view = upload(self._layouts.device, [noise], "rgba16float").create_view(dimension="2d-array")
         return self._layouts.group(self._layouts.light, view, dark.uniform, dark.nowhere, *lamps.bindings)
 
 

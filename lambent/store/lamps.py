@@ -3,7 +3,7 @@
 A direction d from a lamp, in its axes, is at q = d.xy / (2 cos(theta/2)) / sin(reach/2) in the unit disc, which keeps
 areas (Lambert's azimuthal projection): |q| = sin(theta/2) / sin(reach/2).
 
-    lamps/profiles         (P, A, B) float32, intensities over the largest; A azimuths from 0 to 360 degrees, B |q| from 0 to 1
+    lamps/profiles         (P, A, B) float32, intensities over the largest; A azimuths, 0 to 360 degrees, B |q|, 0 to 1
     lamps/distances        (n, S, S) float16, m to the first surface that blocks light; texel (row, column) has its
                            centre at q = (2 (column + 1/2)/S - 1, 2 (row + 1/2)/S - 1). meta["lamps"]: LampRecords
     light_map/lamps, lamps_back  (G, H, W, 3) float16, W/m^2, their direct light in the light map, by light group

@@ -44,9 +44,9 @@ class TracedScene:
     """Shared by the artefacts of a bake. `merged` is the concatenated geometry of the atlas, as from `atlas.merged`.
 
     `two_sided` flags each object whose back has a light map too: because light crosses it, or viewers see it. The
-    light map leaves out the scene's sun unless `sun_left_out` is false. If `lamps_apart`, its samples leave out lamps at
-    points, whose light is `lamp_light`. Objects in `unmapped` have no texels in it. The
-    sky is guided with `effort` (`sky.guide.learn`).
+    light map leaves out the scene's sun unless `sun_left_out` is false. If `lamps_apart`, its samples leave out lamps
+    at points, whose light is `lamp_light`. Objects in `unmapped` have no texels in it. The sky is guided with `effort`
+    (`sky.guide.learn`).
     """
 
     def __init__(

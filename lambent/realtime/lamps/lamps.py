@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from lambent.core.arrays import Floats
@@ -15,7 +13,7 @@ from lambent.store.lamps import MOST_LAMPS
 
 
 class PointLamps:
-    """Bindings of lamps for the shaders of light; `constants` are those of their pipelines. Without `drawn`, no lamp."""
+    """Bindings of lamps for the shaders of light, and constants of their pipelines; no lamps without `drawn`."""
 
     def __init__(self, layouts: Layouts, drawn: DrawnLamps | None) -> None:
         self._drawn, self._queue = drawn, layouts.device.queue
