@@ -82,7 +82,13 @@ def sound() -> tuple[Sound, ...]:
             "spectrum file": "a.spd",
             "lat-long HDR": "sky.hdr",
         },
-        "scene.toml": {"material of a scene": "copper.json", "IES photometry": "lamp.ies"},
+        "scene.toml": {
+            "material of a scene": "copper.json",
+            "IES photometry": "lamp.ies",
+            "IES photometry, type B": "flood.ies",
+            "tilt file": "flood.tlt",
+            "EULUMDAT": "lamp.ldt",
+        },
     }
     for one in [s for s in found if s.main in within]:
         files = one.files | ({"scene.xml": scene_seeds.PLAIN_MITSUBA} if one.main == "scene.xml" else {})

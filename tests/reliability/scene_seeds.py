@@ -374,6 +374,17 @@ file = "lamp.ies"
 position = [0.0, 2.5, 0.0]
 lumens = 800.0
 
+[[lights]]
+kind = "ies"
+file = "lamp.ldt"
+lamp_set = 1
+position = [0.0, 2.5, 0.0]
+
+[[lights]]
+kind = "ies"
+file = "flood.ies"
+position = [0.0, 2.5, 0.0]
+
 [[cameras]]
 name = "entrance"
 position = [0.0, 1.6, 3.0]
@@ -405,11 +416,30 @@ TILT=INCLUDE
 300 270 180 80 0
 300 260 160 70 0
 """
+FLOOD = b"""IESNA:LM-63-1995
+TILT=flood.tlt
+1 -1 1 5 3 2 1 -.6 0 0
+1 1 40
+-90 -45 0 45 90
+0 45 90
+0 100 300 200 0
+0 80 150 90 0
+0 0 0 0 0
+"""
+TILT = b"1\n3\n0 45 90\n1 .9 .8\n"
+
+
+def ldt() -> bytes:
+    """Symmetric to both planes, two lamp sets, a round opening."""
+    head = ["ACME", 1, 4, 8, 45, 3, 45, "R 1", "Dummy", "N 1", "lamp.ldt", "2024", 200, 0, 90, 150, 0, 10, 10, 10, 10]
+    sets = [1, "LED", 500, 3000, 80, 15, 2, "LED", "1200,0", 3000, 80, 30]
+    angles, values = [*range(0, 360, 45), 0, 45, 90], [300, 200, 5, 300, 180, 5, 300, 150, 5]
+    return "\r\n".join(map(str, [*head, 100, 100, 1, 0, 2, *sets, *[0.5] * 10, *angles, *values])).encode()
 
 
 def toml(material: bytes, table: bytes) -> Files:
     """A scene.toml with a file of every kind that it may name."""
     return {
         "scene.toml": TOML, **gltf("glb"), **ply("ascii"), "sky.hdr": HDR, "copper.json": material, "oak.txt": table,
-        "lamp.ies": IES,
+        "lamp.ies": IES, "lamp.ldt": ldt(), "flood.ies": FLOOD, "flood.tlt": TILT,
     }  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from lambent.core.errors import UserError
 from lambent.scenes.photometry.opening import POINT, Opening
 
 MOST_CD = 1e12
-EDGE_DEG = 1e-6  # tolerance beyond the first and the last angle
+EDGE_DEG = 1e-6  # tolerance beyond the first and the last angle, and least step
 ANGLE_DIGITS = 6  # mirrored angles are equal up to rounding
 
 
@@ -101,23 +101,23 @@ def numbers_of(words: Iterable[str], file: Path) -> Iterator[float]:
         yield number
 
 
-def check_angles(angles_deg: Floats, least: float, most: float, file: Path, field: str) -> None:
-    """Raise `UserError` if angles do not increase or are outside `least` to `most` degrees."""
-    if (np.diff(angles_deg) <= 0).any():
-        raise UserError("angles do not increase", file=file, field=field, expected="increasing angles in degrees")
+def check_angles(angles_deg: Floats, least: float, most: float, file: Path, field: str, fewest: int = 1) -> None:
+    """Raise `UserError` unless angles increase, lie from `least` to `most` degrees, and are at least `fewest`."""
+    error = partial(UserError, file=file, field=field)
+    if len(angles_deg) < fewest:
+        raise error("are too few for a distribution", got=len(angles_deg), expected=f"{fewest} or more")
+    if (np.diff(angles_deg) < EDGE_DEG).any():
+        raise error("angles do not increase", expected="increasing angles in degrees")
     if not least <= angles_deg[0] <= angles_deg[-1] <= most:
-        fault, got = f"are outside {least:g} to {most:g} degrees", f"{angles_deg[0]:g} to {angles_deg[-1]:g}"
-        raise UserError(fault, file=file, field=field, got=got)
+        raise error(f"are outside {least:g} to {most:g} degrees", got=f"{angles_deg[0]:g} to {angles_deg[-1]:g}")
 
 
-def check_candela(candela: Floats, file: Path, field: str) -> None:
-    """Raise `UserError` if there are too few intensities for a distribution, or they are beyond all luminaires."""
-    most = float(np.abs(candela).max())
-    if candela.shape[1] < 2:
-        raise UserError("too few for a distribution", file=file, field="vertical angles", got="1", expected="2 or more")
-    if not most <= MOST_CD:
-        fault, expected = "intensities are out of range", f"up to {MOST_CD:g}"
-        raise UserError(fault, file=file, field=field, got=f"{most:g}", expected=expected)
+def check_candela(candela: Floats, file: Path) -> None:
+    """Raise `UserError` if intensities are beyond all luminaires."""
+    if not (most := float(np.abs(candela).max())) <= MOST_CD:
+        raise UserError(
+            "are out of range", file=file, field="intensities", got=f"{most:g}", expected=f"up to {MOST_CD:g}"
+        )
 
 
 def whole_turn(horizontal_deg: Floats, values: Floats, mirrors_deg: Iterable[float] = ()) -> tuple[Floats, Floats]:

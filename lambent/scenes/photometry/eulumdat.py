@@ -68,7 +68,7 @@ class _Reading:
             raise self._error("file is truncated", field="intensities", got=len(values), expected=len(c_deg) * angles)
         factor = self._number(24, "conversion factor", 0, MOST_FACTOR) or 1.0  # some programs leave it at 0
         candela = factor * values[: len(c_deg) * angles].reshape(len(c_deg), angles)
-        check_candela(candela, self._path, "intensities")
+        check_candela(candela, self._path)
         whole = whole_turn(c_deg, np.maximum(candela, 0.0), MIRRORS.get(symmetry, ()))
         ratio, downward = (self._number(line, "percentage", 0, 1000) / 100 for line in (23, 22))
         return Luminaire(

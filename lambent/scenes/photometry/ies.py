@@ -46,7 +46,7 @@ MIRRORS = {  # by the first and last horizontal angle: the symmetry, and its pla
     (0.0, 180.0): ("to C0-C180", (180.0,)),
 }
 _SEPARATORS = re.compile(r"[\s,]+")
-_TILT = re.compile(r"^[ \t]*TILT\b", re.IGNORECASE | re.MULTILINE)
+_TILT = re.compile(r"^[ \t]*TILT[ \t]*=", re.IGNORECASE | re.MULTILINE)
 _KEYWORD = re.compile(r"^\s*\[(\w+)\]\s*(.*?)\s*$", re.MULTILINE)
 
 
@@ -89,7 +89,7 @@ class _Reading:
         vertical = np.array(self._take(verticals, "vertical angles"))
         horizontal = np.array(self._take(horizontals, "horizontal angles"))
         values = scale * np.reshape(self._take(verticals * horizontals, "candela"), (horizontals, verticals))
-        check_candela(values, self._path, "candela")
+        check_candela(values, self._path)
         made, symmetry = self._whole_sphere(kind, vertical, horizontal, np.maximum(values, 0))
         name = self._version if self._version in (*FULL, "IESNA91") else "IES LM-63"
         known, count = self._keywords.get, int(np.clip(lamps, 0, MOST_CD))
@@ -107,7 +107,7 @@ class _Reading:
         if kind != "C":
             symmetry = "left to right" if first == 0 else "none"
             return type_c(kind, vertical, horizontal, values, self._path), symmetry
-        check_angles(vertical, 0, 180, self._path, "vertical angles")
+        check_angles(vertical, 0, 180, self._path, "vertical angles", 2)
         symmetry, mirrors = MIRRORS.get((first, last), ("about the axis" if first == last else "none", ()))
         if not (mirrors or first == last or (first == 0 and last > 180)):
             expected = "0 to 0, 90, 180 or 360, or 90 to 270"

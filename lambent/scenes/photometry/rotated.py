@@ -38,8 +38,8 @@ def type_c(kind: str, vertical_deg: Floats, horizontal_deg: Floats, candela: Flo
     Horizontal or vertical angles that start at 0 are mirrored there. The grid is refined until values at the file's
     angles and the flux agree to half a per cent.
     """
-    check_angles(vertical_deg, -90, 90, file, "vertical angles")
-    check_angles(horizontal_deg, -90, 90, file, "horizontal angles")
+    check_angles(vertical_deg, -90, 90, file, "vertical angles", 2)
+    check_angles(horizontal_deg, -90, 90, file, "horizontal angles", 2)
     (h_deg, h), (v_deg, v) = _both_sides(horizontal_deg), _both_sides(vertical_deg)
     values = candela[np.ix_(h, v)]
     in_plane, of_plane, values = (v_deg, h_deg, values) if kind == "A" else (h_deg, v_deg, values.T)

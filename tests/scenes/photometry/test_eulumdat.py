@@ -150,7 +150,7 @@ def changed(line: int, new: object) -> str:
         (changed(16, 1e99), "luminous area"),
         (SOUND[: SOUND.rindex("200")], "intensities: file is truncated; found 0; expected 2"),
         (SOUND.replace("\n200\n", "\nnan\n"), "numbers are not finite"),
-        (SOUND.replace("\n200\n", "\n1e30\n"), "intensities: intensities are out of range"),
+        (SOUND.replace("\n200\n", "\n1e30\n"), "intensities: are out of range"),
         (ldt([(1, 2)], gamma_deg=(90, 0)), "gamma angles: angles do not increase"),
         (ldt([(1, 2)], gamma_deg=(0, 190)), "gamma angles: are outside 0 to 180 degrees; found 0 to 190"),
         (ldt([(1, 2)], gamma_deg=(-10, 90)), "gamma angles: are outside 0 to 180"),
