@@ -19,10 +19,10 @@ from lambent.core.files import atomic_path, write_text
 from lambent.core.light.false_colour import STOPS, fitting_range, number
 from lambent.core.outputs import MARK
 from lambent.core.plain import printable
-from lambent.core.progress import Progress, silent
+from lambent.core.progress import Progress
 from lambent.materials.plots import new_figure
 from lambent.render.images import Settings
-from lambent.render.output import Note, ignore, images
+from lambent.render.output import Note, images
 from lambent.render.traced import TracedImages
 from lambent.scenes.grids import Grid
 from lambent.scenes.loaders.scene_toml.grids import GridSection
@@ -53,13 +53,12 @@ class Illuminated:
 
 def illuminated(
     store: Store, settings: Settings, wanted: GridSection | Sequence[str], state: str, limit: float, maintenance: float,
-    note: Note = ignore, progress: Progress = silent,
+    note: Note, progress: Progress,
 ) -> list[Illuminated]:  # fmt: skip
     """Trace grids in the state of `settings`, to a relative standard error `limit`; results times `maintenance`.
 
-    They are the scene's grids of the names `wanted`, by default all, or the one described. Points within closed
-    objects, such as furniture on the floor, are left out. `UserError` if the store cannot be traced or has no such
-    grid or light.
+    They are the scene's grids of the names `wanted`, by default all, or the one described; without points within closed
+    objects, such as furniture. `UserError` if the store cannot be traced or has no such grid or light.
     """
     if why := why_untraceable(store):
         raise UserError(f"cannot be traced: {why}", file=store.folder)
@@ -99,13 +98,13 @@ def write_pages(path: Path, results: Sequence[Illuminated], store: Store, note: 
     title = printable(f"{scene_record(store).name} ({store.folder.name}), baked {baked:%Y-%m-%d %H:%M}")
     with atomic_path(path) as temporary, PdfPages(temporary, metadata={"Creator": MARK}) as pages:
         for one in results:
-            figure = new_figure(*A4_INCHES)
+            figure, grid = new_figure(*A4_INCHES), one.grid
             plan, beside = figure.subplots(1, 2, width_ratios=(3, 1))
             figure.suptitle(title, parse_math=False)
             _draw_plan(figure, plan, one)
             facts = {name: f"{value:.4g}" if isinstance(value, float) else value for name, value in one.facts().items()}
-            grid = {"corner, m": one.grid.corner, "edges, m": one.grid.edges, "normal": one.grid.normal}
-            facts |= {name: np.round(value, 3).tolist() for name, value in grid.items()}
+            places = {"corner, m": grid.corner, "edges, m": grid.edges, "normal": grid.normal}
+            facts |= {name: np.round(value, 3).tolist() for name, value in places.items()}
             lines = [printable(f"{name}: {value}") for name, value in facts.items()]
             beside.text(0, 1, "\n\n".join([*lines, note]), va="top", fontsize=9, parse_math=False, wrap=True)
             beside.axis("off")
@@ -116,14 +115,13 @@ def _draw_plan(figure: Any, axis: Any, one: Illuminated) -> None:
     """Draw false colours, isolux lines and numbers over the grid's own axes, m."""
     from matplotlib.colors import LinearSegmentedColormap
 
-    scale, (width, height) = fitting_range(one.lx, log=False), one.grid.size_m
-    shown = np.full(one.grid.inside.shape, np.nan)
+    scale, (width, height) = fitting_range(one.lx, log=False), np.linalg.norm(one.grid.edges, axis=1)
+    (rows, columns), shown = one.grid.inside.shape, np.full(one.grid.inside.shape, np.nan)
     shown[one.grid.inside] = one.lx
     colours = {"cmap": LinearSegmentedColormap.from_list("lx", STOPS), "vmin": scale.low, "vmax": scale.high}
     drawn = axis.imshow(shown, origin="lower", extent=(0, width, 0, height), **colours)
     figure.colorbar(drawn, ax=axis, label="lx", location="bottom")
     levels = [mark for mark in scale.marks() if one.lx.min() < mark < one.lx.max()]
-    rows, columns = one.grid.inside.shape
     x, y = (np.arange(columns) + 0.5) * width / columns, (np.arange(rows) + 0.5) * height / rows
     if levels and min(rows, columns) > 1:
         lines = axis.contour(x, y, shown, levels=levels, colors="black", linewidths=0.8)

@@ -11,8 +11,8 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import box, merge, patch, placed
-from lambent.scenes.grids import Grid, cells_of
-from lambent.scenes.loaders.scene_toml.grids import GridSection
+from lambent.scenes.grids import Grid
+from lambent.scenes.loaders.scene_toml.grids import GridSection, cells_of
 from lambent.scenes.scene import SceneObject
 from tests.bake.small_scenes import turned_inwards
 from tests.scenes.loaders.test_toml import MATERIALS, written
@@ -22,7 +22,11 @@ DESK = SceneObject("desk", placed(box((1.6, 0.7, 0.8)), (1, 0.35, 0)), "grey")
 
 
 def grid_on(*objects: SceneObject, **keys: object) -> Grid:
-    return GridSection(name="g", **keys).grid(objects, Path("scene.toml"))
+    return GridSection(name="g", **keys).grid(objects, Path("scene.toml"), "grids.g")
+
+
+def size(grid: Grid) -> list[float]:
+    return [float(side) for side in np.linalg.norm(grid.edges, axis=1)]
 
 
 @pytest.mark.parametrize(("metres", "count"), [(0.4, 4), (1.0, 5), (2.0, 6), (5.0, 8), (10.0, 10), (100.0, 20)])
@@ -48,23 +52,25 @@ def test_a_rectangle_has_its_points_at_the_middles_of_cells():
     same = grid_on(centre=(2, 0.3, 1.5), edges=((2, 0, 0), (0, 0, -1)), spacing_m=0.5, height_m=0.5)
     np.testing.assert_allclose(same.points, grid.points)
     inset = grid_on(corner=(1, 0.8, 2), edges=((2, 0, 0), (0, 0, -1)), margin_m=0.25, normal=(0, 0, -3))
-    assert inset.size_m.tolist() == [1.5, 0.5] and inset.corner.tolist() == [1.25, 0.8, 1.75]
+    assert size(inset) == [1.5, 0.5] and inset.corner.tolist() == [1.25, 0.8, 1.75]
     np.testing.assert_allclose(inset.normal, [0, 0, -1])
 
 
 def test_a_room_has_a_workplane_over_its_floor_without_a_band_of_half_a_metre():
     grid = grid_on(SHELL, object="shell")
     assert (grid.points[:, 1] == 0.75).all() and grid.normal.tolist() == [0, 1, 0]
-    np.testing.assert_allclose(grid.size_m, [5, 3])
+    assert size(grid) == pytest.approx([5, 3])
     assert grid.inside.shape == (5, 8) and grid.inside.all()
-    assert grid_on(SHELL, DESK, object="desk", height_m=0.0, margin_m=0.0).size_m.tolist() == pytest.approx([1.6, 0.8])
+    assert size(grid_on(SHELL, DESK, object="desk", height_m=0.0, margin_m=0.0)) == pytest.approx([1.6, 0.8])
     narrow = replace(SHELL, mesh=placed(turned_inwards(box((9, 3, 1.2))), (0, 1.5, 0)))
-    np.testing.assert_allclose(grid_on(narrow, object="shell").size_m, [9 - 0.36, 0.84])
+    assert size(grid_on(narrow, object="shell")) == pytest.approx([9 - 0.36, 0.84])
 
 
 def test_the_top_is_the_floor_of_a_house_and_the_plate_of_a_table():
     house = SceneObject("house", merge([box((6.4, 3.4, 4.4)), turned_inwards(box((6, 3, 4)))]), "grey")
     assert grid_on(house, object="house").points[0, 1] == pytest.approx(-1.5 + 0.75), "not the roof"
+    worn = SceneObject("worn", merge([house.mesh, placed(box((0.5, 0.1, 0.5)), (0, -1.45, 0))]), "grey")
+    assert grid_on(worn, object="worn").points[0, 1] == pytest.approx(-1.5 + 0.75), "not a step on it"
     legs = [placed(box((0.05, 0.7, 0.05)), (x, 0.35, z)) for x in (-0.7, 0.7) for z in (-0.3, 0.3)]
     plate = placed(box((1.6, 0.04, 0.8)), (0, 0.72, 0))
     shelf = placed(box((1.2, 0.02, 0.4)), (0, 0.2, 0))

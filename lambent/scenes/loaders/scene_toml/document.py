@@ -117,7 +117,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry, crease_deg: float | None 
         reflector_rules=_reflector_rules(document, objects, path),
         crease_deg=document.crease_angle,
         light_groups=_light_groups(document, objects, lights, path),
-        grids=tuple(section.grid(objects, path) for section in document.grids),
+        grids=tuple(g.grid(objects, path, f"grids.{g.name}") for g in document.grids),
     )
     of_geometry = {name: [o.material for o in changed] for name, changed in by_variant.items()}
     variants = parse_variants(document.variants, of_geometry, scene, LookFiles(path, files))
