@@ -49,6 +49,11 @@ class Photometry:
         return cls(tuple(vertical_deg.tolist()), tuple(horizontal_deg.tolist()), tuple(map(tuple, candela.tolist())))
 
     @cached_property
+    def table(self) -> Floats:
+        """The candela as an array (H, V)."""
+        return np.array(self.candela)
+
+    @cached_property
     def lumens(self) -> float:
         """Luminous flux of all directions, the exact integral of `at`."""
         return self.lumens_within(180.0)
@@ -56,7 +61,7 @@ class Photometry:
     def lumens_within(self, most_deg: float) -> float:
         """Luminous flux of directions up to `most_deg` from the axis."""
         theta, phi = np.radians(self.vertical_deg), np.radians(self.horizontal_deg)
-        around = ((np.array(self.candela)[1:] + np.array(self.candela)[:-1]) / 2 * np.diff(phi)[:, None]).sum(axis=0)
+        around = ((self.table[1:] + self.table[:-1]) / 2 * np.diff(phi)[:, None]).sum(axis=0)
         a, b = theta[:-1], np.minimum(theta[1:], np.radians(most_deg))
         slope = np.diff(around) / np.diff(theta)
         # of (start + slope (x - a)) sin x from a to b
@@ -65,7 +70,7 @@ class Photometry:
 
     def scaled(self, factor: float) -> Photometry:
         """With all intensities multiplied by `factor`."""
-        return replace(self, candela=tuple(map(tuple, (factor * np.array(self.candela)).tolist())))
+        return replace(self, candela=tuple(map(tuple, (factor * self.table).tolist())))
 
     def tilted(self, tilt_deg: float) -> float:
         """Factor on all intensities of a luminaire whose axis is tilted by `tilt_deg` from straight down."""
@@ -79,7 +84,7 @@ class Photometry:
         j = np.clip(np.searchsorted(theta, wanted, side="right") - 1, 0, len(theta) - 2)
         s = np.clip((turn - phi[i]) / (phi[i + 1] - phi[i]), 0, 1)
         t = np.clip((wanted - theta[j]) / (theta[j + 1] - theta[j]), 0, 1)
-        cd = np.array(self.candela)
+        cd = self.table
         found = (1 - s) * ((1 - t) * cd[i, j] + t * cd[i, j + 1]) + s * ((1 - t) * cd[i + 1, j] + t * cd[i + 1, j + 1])
         return np.where(_within(wanted, theta) & _within(turn, phi), found, 0.0)
 
@@ -112,7 +117,7 @@ def check_angles(angles_deg: Floats, least: float, most: float, file: Path, fiel
         raise error(f"are outside {least:g} to {most:g} degrees", got=f"{angles_deg[0]:g} to {angles_deg[-1]:g}")
 
 
-def check_candela(candela: Floats, file: Path) -> None:
+def check_cd(candela: Floats, file: Path) -> None:
     """Raise `UserError` if intensities are beyond all luminaires."""
     if not (most := float(np.abs(candela).max())) <= MOST_CD:
         raise UserError(

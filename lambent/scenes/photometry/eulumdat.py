@@ -19,7 +19,7 @@ from lambent.core.arrays import Floats
 from lambent.core.ceilings import IES_ANGLES
 from lambent.core.errors import UserError
 from lambent.core.inputs import decoded
-from lambent.scenes.photometry.distribution import Photometry, check_angles, check_candela, numbers_of, whole_turn
+from lambent.scenes.photometry.distribution import Photometry, check_angles, check_cd, numbers_of, whole_turn
 from lambent.scenes.photometry.luminaire import LampSet, Luminaire
 from lambent.scenes.photometry.opening import POINT, Opening
 
@@ -68,12 +68,12 @@ class _Reading:
             raise self._error("file is truncated", field="intensities", got=len(values), expected=len(c_deg) * angles)
         factor = self._number(24, "conversion factor", 0, MOST_FACTOR) or 1.0  # some programs leave it at 0
         candela = factor * values[: len(c_deg) * angles].reshape(len(c_deg), angles)
-        check_candela(candela, self._path)
-        whole = whole_turn(c_deg, np.maximum(candela, 0.0), MIRRORS.get(symmetry, ()))
+        check_cd(candela, self._path)
+        whole = Photometry.of(gamma_deg, *whole_turn(c_deg, np.maximum(candela, 0.0), MIRRORS.get(symmetry, ())))
         ratio, downward = (self._number(line, "percentage", 0, 1000) / 100 for line in (23, 22))
         return Luminaire(
             self._path, "EULUMDAT", SYMMETRIES[symmetry], self._lines[8], self._lines[0], self._lines[7],
-            tuple(map(self._lamps, sets)), replace(Photometry.of(gamma_deg, *whole), opening=self._opening()), True,
+            tuple(map(self._lamps, sets)), replace(whole, opening=self._opening()), True,
             self._number(HEADER_LINES + 1, "number of lamps", -1e6, 1e6) < 0, ratio, downward,
             self._number(25, "tilt", -360, 360),
         )  # fmt: skip

@@ -23,19 +23,13 @@ from lambent.core.ceilings import IES_ANGLES, IES_BYTES
 from lambent.core.errors import UserError
 from lambent.core.inputs import decoded
 from lambent.scenes.loaders.scene_files import SceneFiles
-from lambent.scenes.photometry.distribution import (
-    MOST_CD,
-    Photometry,
-    check_angles,
-    check_candela,
-    numbers_of,
-    whole_turn,
-)
+from lambent.scenes.photometry.distribution import MOST_CD, Photometry, check_angles, check_cd, numbers_of, whole_turn
 from lambent.scenes.photometry.luminaire import LampSet, Luminaire
 from lambent.scenes.photometry.opening import Opening, opening_of_signs
 from lambent.scenes.photometry.rotated import type_c
 
 FEET_M = 0.3048
+UP, AROUND = "vertical angles", "horizontal angles"
 TWO_DIAMETERS = ("IESNA:LM-63-2002", "IES:LM-63-2019")  # both diameters of round openings are given
 FULL = ("IESNA:LM-63-1995", *TWO_DIAMETERS)
 STAYS_LEVEL = 2  # lamp-to-luminaire geometry: the lamp does not tilt with the luminaire
@@ -45,9 +39,8 @@ MIRRORS = {  # by the first and last horizontal angle: the symmetry, and its pla
     (0.0, 90.0): ("to both planes", (90.0, 180.0)),
     (0.0, 180.0): ("to C0-C180", (180.0,)),
 }
-_SEPARATORS = re.compile(r"[\s,]+")
 _TILT = re.compile(r"^[ \t]*TILT[ \t]*=", re.IGNORECASE | re.MULTILINE)
-_KEYWORD = re.compile(r"^\s*\[(\w+)\]\s*(.*?)\s*$", re.MULTILINE)
+_KEYWORD = re.compile(r"^[ \t]*\[(\w+)\][ \t]*(.*?)[ \t]*$", re.MULTILINE)
 
 
 def is_ies(content: bytes) -> bool:
@@ -75,7 +68,7 @@ class _Reading:
     def luminaire(self, files: SceneFiles) -> Luminaire:
         tilt_deg, tilt_factors = self._tilts(files)
         lamps, lumens, multiplier = self._take(3, "lamps, lumens and multiplier")
-        verticals, horizontals = self._count("vertical angles"), self._count("horizontal angles")
+        verticals, horizontals = self._count(UP), self._count(AROUND)
         kind, units = KINDS.get(self._whole("photometric type")), self._whole("units")
         if kind is None:
             raise self._error("is unknown", field="photometric type", expected="1 (C), 2 (B) or 3 (A)")
@@ -83,13 +76,10 @@ class _Reading:
         ballast, ballast_lamp, watts = self._take(3, "ballast factors and watts")
         scale = multiplier * ballast * (1.0 if self._version in FULL else ballast_lamp)
         if not 0 <= scale <= MOST_CD:
-            raise self._error(
-                "intensities are out of range", field="multiplier", got=f"{scale:g}", expected="0 or more"
-            )
-        vertical = np.array(self._take(verticals, "vertical angles"))
-        horizontal = np.array(self._take(horizontals, "horizontal angles"))
+            raise self._error("is out of range", field="multiplier", got=f"{scale:g}", expected="0 or more")
+        vertical, horizontal = (np.array(self._take(n, name)) for n, name in ((verticals, UP), (horizontals, AROUND)))
         values = scale * np.reshape(self._take(verticals * horizontals, "candela"), (horizontals, verticals))
-        check_candela(values, self._path)
+        check_cd(values, self._path)
         made, symmetry = self._whole_sphere(kind, vertical, horizontal, np.maximum(values, 0))
         name = self._version if self._version in (*FULL, "IESNA91") else "IES LM-63"
         known, count = self._keywords.get, int(np.clip(lamps, 0, MOST_CD))
@@ -102,18 +92,16 @@ class _Reading:
 
     def _whole_sphere(self, kind: str, vertical: Floats, horizontal: Floats, values: Floats) -> tuple[Photometry, str]:
         """Extend to the whole sphere, by the symmetry that the horizontal angles imply; that symmetry in words."""
-        check_angles(horizontal, -360, 360, self._path, "horizontal angles")
+        check_angles(horizontal, -360, 360, self._path, AROUND)
         first, last = float(horizontal[0]), float(horizontal[-1])
         if kind != "C":
-            symmetry = "left to right" if first == 0 else "none"
-            return type_c(kind, vertical, horizontal, values, self._path), symmetry
-        check_angles(vertical, 0, 180, self._path, "vertical angles", 2)
+            made = type_c(kind, vertical, horizontal, values, self._path)
+            return made, "left to right" if first == 0 else "none"
+        check_angles(vertical, 0, 180, self._path, UP, 2)
         symmetry, mirrors = MIRRORS.get((first, last), ("about the axis" if first == last else "none", ()))
         if not (mirrors or first == last or (first == 0 and last > 180)):
-            expected = "0 to 0, 90, 180 or 360, or 90 to 270"
-            raise self._error(
-                "unsupported range", field="horizontal angles", got=f"{first:g} to {last:g}", expected=expected
-            )
+            got, expected = f"{first:g} to {last:g}", "0 to 0, 90, 180 or 360, or 90 to 270"
+            raise self._error("unsupported range", field=AROUND, got=got, expected=expected)
         return Photometry.of(vertical, *whole_turn(horizontal, values, mirrors)), symmetry
 
     def _opening(self, kind: str, metres: float) -> Opening:
@@ -159,10 +147,8 @@ class _Reading:
     def _take(self, count: int, field: str) -> Sequence[float]:
         taken, self._numbers = self._numbers[:count], self._numbers[count:]
         if len(taken) < count:
-            raise self._error(
-                "file is truncated", field=field, got=f"{len(taken)} numbers", expected=f"{count} numbers"
-            )
+            raise self._error("file is truncated", field=field, got=len(taken), expected=f"{count} numbers")
         return taken
 
     def _numbers_of(self, text: str) -> Sequence[float]:
-        return list(numbers_of(filter(None, _SEPARATORS.split(text)), self._path))
+        return list(numbers_of(text.replace(",", " ").split(), self._path))

@@ -23,8 +23,7 @@ def facts_of(luminaire: Luminaire) -> dict[str, Any]:
     """Facts by name; faults are sentences under `findings`. Flux and candela are of the first lamp set."""
     lamps = luminaire.sets[0]
     light = luminaire.photometry() if lamps.lumens else luminaire.values
-    candela = np.array(light.candela)
-    c, gamma = np.unravel_index(candela.argmax(), candela.shape)
+    c, gamma = np.unravel_index(light.table.argmax(), light.table.shape)
     found = light.lumens / lamps.lumens if lamps.lumens and not luminaire.absolute else None
     planes = {name: plane_of(light, deg) for name, deg in PLANES.items()}
     return {
@@ -37,7 +36,7 @@ def facts_of(luminaire: Luminaire) -> dict[str, Any]:
         "flux_lm": light.lumens,
         "light_output_ratio": {"stated": luminaire.ratio, "found": found},
         "downward_share": {"stated": luminaire.downward, "found": _downward(light)},
-        "most_cd": float(candela.max()),
+        "most_cd": float(light.table.max()),
         "most_at_deg": {"gamma": light.vertical_deg[gamma], "C": light.horizontal_deg[c]},
         "beam_angle_deg": {name: angle_above(*plane, 0.5) for name, plane in planes.items()},
         "field_angle_deg": {name: angle_above(*plane, 0.1) for name, plane in planes.items()},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from lambent.core.errors import UserError
@@ -56,17 +57,12 @@ class Luminaire:
     downward: float | None = None
     measured_tilt_deg: float = 0.0
 
-    def lamps(self, lamp_set: int = 0) -> LampSet:
-        """The lamp set of that index; raise `UserError` if there is none."""
-        if not 0 <= lamp_set < len(self.sets):
-            expected = f"0 to {len(self.sets) - 1}"
-            raise UserError("has no such lamp set", file=self.file, field="lamp_set", got=lamp_set, expected=expected)
-        return self.sets[lamp_set]
-
     def photometry(self, lamp_set: int = 0) -> Photometry:
-        """Intensities in candela with the lamp set of that index; `UserError` if its flux is needed and unknown."""
-        lumens = self.lamps(lamp_set).lumens
+        """Intensities in candela with the lamp set of that index; `UserError` if there is none, or none with a flux."""
+        error = partial(UserError, file=self.file, field="lamp_set", got=lamp_set)
+        if not 0 <= lamp_set < len(self.sets):
+            raise error("has no such lamp set", expected=f"0 to {len(self.sets) - 1}")
+        lumens = self.sets[lamp_set].lumens
         if self.per_klm and not lumens:
-            hint = "write it into the file, or give the light's lumens"
-            raise UserError("states no flux of the lamps", file=self.file, field=f"lamp set {lamp_set}", hint=hint)
+            raise error("has no luminous flux", hint="write it into the file, or give the light's lumens")
         return self.values.scaled(lumens / KLM) if self.per_klm else self.values

@@ -88,7 +88,7 @@ def test_absolute_and_relative_have_the_same_light(tmp_path: Path) -> None:
 
 def test_lamps_without_flux(tmp_path: Path) -> None:
     made = read(tmp_path, ldt([(200, 0)], sets=((1, 0),)))
-    with pytest.raises(UserError, match="lamp set 0: states no flux of the lamps; write it into the file"):
+    with pytest.raises(UserError, match="lamp_set: has no luminous flux; found 0; write it into the file"):
         made.photometry()
     assert "no flux" in facts_of(made)["findings"][0]
 

@@ -92,6 +92,19 @@ def test_symmetries(tmp_path: Path, horizontal: str, values: str, asked: tuple, 
     assert made.at(np.zeros(len(asked)), np.array(asked, float)) == pytest.approx(expected)
 
 
+def test_keywords_and_separators(tmp_path: Path) -> None:
+    """A keyword may be empty; commas separate too; text after the data is ignored."""
+    text = ies().replace("[MANUFAC] none", "[MANUFAC]\n[LUMCAT]  D 1 \n[LUMINAIRE]\n[LAMP] LED [3000 K]\n[MORE] x")
+    made = read_luminaire(written(tmp_path, text.replace("1000 500 0", "1000,500, 0\r\nEND 7")))
+    assert (made.maker, made.name, made.report, made.sets[0].kind) == ("", "D 1", "by hand", "LED [3000 K]")
+    assert made.values.candela[0] == (1000, 500, 0)
+    relative = read_luminaire(written(tmp_path, ies(numbers="2 800 1", factors="1 1 36")))
+    assert (relative.absolute, relative.sets[0].count, relative.sets[0].lumens, relative.sets[0].watts) == (
+        False, 2, 1600, 36,
+    )  # fmt: skip
+    assert made.absolute and made.sets[0].lumens == 0
+
+
 def test_tilt(tmp_path: Path) -> None:
     for geometry, factors in ((1, (1.0, 0.9, 0.8)), (2, (1.0, 1.0, 1.0))):
         made = read_ies(written(tmp_path, ies(tilt=f"TILT=INCLUDE\n{geometry}\n3\n0 45 90\n1 .9 .8")))

@@ -137,7 +137,6 @@ class IesSection(_Coloured):
     _direction = field_validator("direction")(not_zero)
 
     def light_of(self, luminaire: Luminaire) -> IesLight:
-        luminaire.lamps(self.lamp_set)
         photometry = luminaire.photometry(self.lamp_set) if self.lumens is None else luminaire.values
         aim = unit(self.direction)
         tilt_deg = math.degrees(math.acos(min(max(-aim[1], -1.0), 1.0)))
