@@ -30,7 +30,7 @@ PLACES = np.array([(x, y, z) for x in (-0.8, -0.3, 0.7) for z in (-0.8, 0.1, 0.6
 
 
 def baked(scene: Scene, folder: Path, **options: Any) -> Store:
-    return bake(scene, folder / "s", quality=TINY, only=("light_map",), **options)
+    return bake(scene, folder / "s", quality=TINY, only=("light_map", "lamps"), **options)
 
 
 @pytest.fixture(scope="module")
