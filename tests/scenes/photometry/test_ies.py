@@ -88,8 +88,20 @@ def test_factors(tmp_path: Path, year: int) -> None:
 def test_symmetries(tmp_path: Path, horizontal: str, values: str, asked: tuple, expected: tuple) -> None:
     candela = "\n".join(f"{value} 0" for value in values.split())
     made = read_ies(written(tmp_path, ies("0 90", horizontal, candela)))
-    assert (made.horizontal_deg[0], made.horizontal_deg[-1]) == (0, 360)
+    assert (made.horizontal_deg[0], made.horizontal_deg[-1]) == (0, 360) and (np.diff(made.horizontal_deg) > 0).all()
     assert made.at(np.zeros(len(asked)), np.array(asked, float)) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("horizontal", "words"),
+    [
+        ("0", "about the axis"), ("0 90", "to both planes"), ("0 180", "to C0-C180"), ("90 270", "to C90-C270"),
+        ("0 180 360", "none"),
+    ],
+)  # fmt: skip
+def test_symmetries_in_words(tmp_path: Path, horizontal: str, words: str) -> None:
+    candela = "1 0\n" * len(horizontal.split())
+    assert read_luminaire(written(tmp_path, ies("0 90", horizontal, candela))).symmetry == words
 
 
 def test_keywords_and_separators(tmp_path: Path) -> None:

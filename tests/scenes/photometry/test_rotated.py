@@ -92,6 +92,11 @@ def test_uneven_light_agrees_at_the_files_own_angles(tmp_path: Path, kind: str) 
     assert made.lumens == pytest.approx(own.lumens, rel=5e-3)
 
 
+def test_broad_light_needs_no_fine_grid(tmp_path: Path) -> None:
+    made = read(tmp_path, ies_of(lobe(1), "B", BOTH, BOTH)).values
+    assert (len(made.vertical_deg), len(made.horizontal_deg)) == (len(FINE), 73)
+
+
 def _planes_first(candela: np.ndarray, kind: str) -> np.ndarray:
     return candela if kind == "A" else candela.T
 
