@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from lambent.cli.console import Force, Json, progress_bar, say, show, table, words
-from lambent.core.errors import UserError
+from lambent.core.errors import UserError, invalid
 
 
 def command(
@@ -34,6 +34,8 @@ def command(
 
     Example: lambent illuminance room.store --object floor --light sun=off -o desks.pdf
     """
+    from pydantic import ValidationError
+
     from lambent.core.light.light_mix import parse_light
     from lambent.core.outputs import check_output
     from lambent.render import Settings
@@ -45,7 +47,10 @@ def command(
         check_output(path, (".csv", ".pdf"), force=force)
     wanted: GridSection | list[str] = grid or []
     if over is not None:
-        wanted = GridSection(name=over, object=over, height_m=height, spacing_m=spacing, margin_m=margin)
+        try:
+            wanted = GridSection(name=over, object=over, height_m=height, spacing_m=spacing, margin_m=margin)
+        except ValidationError as fault:
+            raise invalid(fault, "--object") from fault
     elif (height, spacing, margin) != (None, None, None):
         raise UserError("apply to --object only", field="--height, --spacing, --margin", hint="name it with --object")
     opened, results = Store.open(store), []

@@ -14,6 +14,7 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.core.outputs import is_marked
 from lambent.scenes import load_scene
+from lambent.store.store import Store
 from tests.bake.small_scenes import TINY
 from tests.traced.lit_grids import CANDELA, PLANE, VERTICAL_DEG, lux_from, write_hall
 
@@ -117,6 +118,8 @@ def test_a_grid_over_an_object_in_a_mix(lambent, store, tmp_path):
         (("--object", "left"), "--object: object has no level top"),
         (("--object", "floor", "--margin", "2"), "--object: a margin of 2 m leaves nothing of 4 m"),
         (("--object", "floor", "--spacing", "0.001"), "--object: grid has too many points"),
+        (("--object", "floor", "--height", "nan"), "--object: height_m: "),
+        (("--object", ""), "--object: name: "),
         (("--height", "1"), "apply to --object only"),
         (("--light", "lump=off"), "unknown light group; found lump"),
         (("--light", "lamp"), "cannot be read as light"),
@@ -127,6 +130,17 @@ def test_a_grid_over_an_object_in_a_mix(lambent, store, tmp_path):
 )
 def test_what_is_refused(refused, store, options, words):
     assert words in refused("illuminance", store, *options)
+
+
+def test_a_grid_added_after_the_bake_needs_no_other(lambent, tmp_path):
+    scene, store = write_hall(tmp_path, SCENE.split("[[grids]]")[0]), tmp_path / "a.store"
+    common = ("bake", scene, "-o", store, "--quality", "preview", "--only", "light_map")
+    assert lambent(*common).code == 0
+    keys = {one.name: one.key for one in Store.open(store).artefacts()}
+    scene.write_text(scene.read_text() + PLANE)
+    outcome = lambent("illuminance", store, "--json")
+    assert outcome.code == 0 and outcome.json["results"][0]["mean_lx"] > 10
+    assert lambent(*common).code == 0 and {one.name: one.key for one in Store.open(store).artefacts()} == keys
 
 
 def test_a_store_that_cannot_be_traced_says_why(refused, lambent, tmp_path):
