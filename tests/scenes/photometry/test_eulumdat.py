@@ -96,7 +96,7 @@ def test_lamps_without_flux(tmp_path: Path) -> None:
 def test_notations_of_other_programs(tmp_path: Path) -> None:
     plain = ldt([(200.5, 0.25)], area_mm=(600, 300, 0, 0, 0, 0), name="Leuchte grün")
     made = read(tmp_path, plain)
-    assert made.name == "Leuchte grün" and made.format == "EULUMDAT"
+    assert (made.name, made.maker, made.report, made.format) == ("Leuchte grün", "Maker", "R 1", "EULUMDAT")
     header = plain.split("\n")
     ratios = header[:32] + [""] * 10 + header[42:]
     for other in (

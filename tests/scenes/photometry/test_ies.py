@@ -12,7 +12,6 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.scenes.photometry.distribution import Photometry
 from lambent.scenes.photometry.files import read_luminaire
-from lambent.scenes.photometry.ies import FEET_M
 from lambent.scenes.scene import IesLight
 
 
@@ -71,7 +70,7 @@ def test_factors(tmp_path: Path, year: int) -> None:
     text = ies(head=HEADS[year], numbers="1 800 2", factors=".9 .5 50", units=1)
     made = read_ies(written(tmp_path, text))
     assert made.at(np.array(0.0), np.array(0.0)) == pytest.approx(1000 * 2 * 0.9 * (0.5 if year < 1995 else 1))
-    assert made.opening.size_m[1] == pytest.approx(0.5 * FEET_M)
+    assert made.opening.size_m[1] == pytest.approx(0.5 * 0.3048)
 
 
 @pytest.mark.parametrize(
