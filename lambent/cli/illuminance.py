@@ -14,12 +14,8 @@ from lambent.core.errors import UserError, invalid
 def command(
     store: Annotated[Path, typer.Argument(help="Folder of a baked store.")],
     output: Annotated[list[Path] | None, typer.Option("-o", help="Points (.csv), pages (.pdf). Repeatable.")] = None,
-    grid: Annotated[
-        list[str] | None, typer.Option(help="Grid by name. Repeatable. [default: all of the scene]")
-    ] = None,
-    over: Annotated[
-        str | None, typer.Option("--object", help="Instead: over an object, or a room's floor; * and ? match names.")
-    ] = None,
+    grid: Annotated[list[str] | None, typer.Option(help="Grid by name. Repeatable. [default: all]")] = None,
+    over: Annotated[str | None, typer.Option("--object", help="Instead: over an object or a room's floor.")] = None,
     height: Annotated[float | None, typer.Option(help="Above the object, m. [default: .75]")] = None,
     spacing: Annotated[float | None, typer.Option(min=1e-3, help="Of points, m. [default: as in EN 12464-1]")] = None,
     margin: Annotated[float | None, typer.Option(min=0, help="Band left out, m. [default: .5; narrow: 15 %]")] = None,
@@ -51,16 +47,16 @@ def command(
             wanted = GridSection(name=over, object=over, height_m=height, spacing_m=spacing, margin_m=margin)
         except ValidationError as fault:
             raise invalid(fault, "--object") from fault
+        if grid:
+            raise UserError("excludes --object", field="--grid", hint="leave out one")
     elif (height, spacing, margin) != (None, None, None):
         raise UserError("apply to --object only", field="--height, --spacing, --margin", hint="name it with --object")
-    opened, results = Store.open(store), []
+    opened, results, note = Store.open(store), [], lambda text: say(f"note: {text}")
     with progress_bar() as progress:
         for name in variant or [""]:
             settings = Settings(light=parse_light(light) if light else None, variant=name)
             state = ", ".join([name] * bool(name) + (light or [])) or "as baked"
-            results += illuminated(
-                opened, settings, wanted, state, error / 100, maintenance, lambda text: say(f"note: {text}"), progress
-            )
+            results += illuminated(opened, settings, wanted, state, error / 100, maintenance, note, progress)
     for path in output or ():
         if path.suffix.lower() == ".csv":
             write_points(path, results)

@@ -121,6 +121,7 @@ def test_a_grid_over_an_object_in_a_mix(lambent, store, tmp_path):
         (("--object", "floor", "--height", "nan"), "--object: height_m: "),
         (("--object", ""), "--object: name: "),
         (("--height", "1"), "apply to --object only"),
+        (("--object", "floor", "--grid", "plane"), "--grid: excludes --object"),
         (("--light", "lump=off"), "unknown light group; found lump"),
         (("--light", "lamp"), "cannot be read as light"),
         (("--variant", "evning"), "did you mean 'evening'?"),
