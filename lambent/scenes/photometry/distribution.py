@@ -120,9 +120,8 @@ def check_angles(angles_deg: Floats, least: float, most: float, file: Path, fiel
 def check_cd(candela: Floats, file: Path) -> None:
     """Raise `UserError` if intensities are beyond all luminaires."""
     if not (most := float(np.abs(candela).max())) <= MOST_CD:
-        raise UserError(
-            "are out of range", file=file, field="intensities", got=f"{most:g}", expected=f"up to {MOST_CD:g}"
-        )
+        got, expected = f"{most:g}", f"up to {MOST_CD:g}"
+        raise UserError("are out of range", file=file, field="intensities", got=got, expected=expected)
 
 
 def whole_turn(horizontal_deg: Floats, values: Floats, mirrors_deg: Iterable[float] = ()) -> tuple[Floats, Floats]:

@@ -96,12 +96,11 @@ class _Reading:
         return LampSet(abs(count), self._lines[start + 1], lumens, watts, self._lines[start + 3])
 
     def _opening(self) -> Opening:
-        """The luminous area: round if its width is 0. Its sides may be of different heights; the mean counts."""
+        """The luminous area: round if its width is 0; as high as its highest side, because lower ones shine less."""
         length, width, *heights = (MM * self._number(n, "luminous area", 0, MOST_MM) for n in range(16, 22))
-        height = sum(heights) / len(heights)
-        if not (length or width or height):
+        if not any((length, width, *heights)):
             return POINT
-        return Opening("box", (width, length, height)) if width else Opening("cylinder", (length, length, height))
+        return Opening("cylinder" if width == 0 else "box", (width or length, length, max(heights)))
 
     def _number(self, line: int, field: str, least: float, most: float) -> float:
         """The number on a line, counted from 1; 0 where it is empty."""

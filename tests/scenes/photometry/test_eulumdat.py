@@ -115,7 +115,7 @@ def test_notations_of_other_programs(tmp_path: Path) -> None:
         ((1200, 300, 0, 0, 0, 0), "rectangle, 0.3 x 1.2 x 0 m"),  # C0 is across
         ((1200, 300, 50, 50, 50, 50), "box, 0.3 x 1.2 x 0.05 m"),
         ((200, 0, 0, 0, 0, 0), "disc, 0.2 x 0.2 x 0 m"),
-        ((200, 0, 100, 100, 0, 0), "cylinder, 0.2 x 0.2 x 0.05 m"),
+        ((200, 0, 100, 100, 0, 0), "cylinder, 0.2 x 0.2 x 0.1 m"),
     ],
 )
 def test_luminous_areas(tmp_path: Path, area_mm: tuple[float, ...], words: str) -> None:
