@@ -100,12 +100,11 @@ class SceneResources:
         vertices = np.concatenate([scene.positions, scene.normals, scene.tangents, scene.uv2, uv], axis=1)
         self.vertices = layouts.buffer("VERTEX", np.nan_to_num(vertices).astype(np.float32))
         self.indices = layouts.buffer("INDEX", scene.faces.astype(np.uint32))
-        of_lamps = [] if scene.lamps is None else scene.lamps.in_map()
-        layers = light_layers(
-            scene.irradiance, scene.irradiance_back, scene.dominant_direction, scene.probe_share, *of_lamps
-        )
-        self.light_layers = list(layers)  # (H, W, 4) each, as shown
-        self._light_texture = upload(device, [layers], "rgba16float")
+        layers = light_layers(scene.irradiance, scene.irradiance_back, scene.dominant_direction, scene.probe_share)
+        self.light_layers = list(layers)  # (H, W, 4) each, as shown, the direct light of lamps included
+        self.lamps = PointLamps(layouts, scene.lamps)
+        without = [self.lamps.taken_out(side, texels) for side, texels in enumerate(layers)]
+        self._light_texture = upload(device, [np.stack(without)], "rgba16float")
         self.light_view = self._light_texture.create_view(dimension="2d-array")
         self.light_version = 0  # grows when light answers edited materials, and when textures change
         sky = scene.far_light or DARK
@@ -143,7 +142,6 @@ class SceneResources:
         self.show_textures({})
         self.mixes_parts = any(beyond.values())
         self.sun = sun_light(layouts, scene, self)
-        self.lamps = PointLamps(layouts, scene.lamps)
 
     def show_textures(self, looks: Mapping[str, Look]) -> None:
         """Show materials with images or other materials' textures; materials left out show their own.
@@ -175,15 +173,15 @@ class SceneResources:
     def show_light_map(self, sides: Sequence[NDArray[np.float16] | None]) -> None:
         """Show new light maps (H, W, 4) on the front and the back; None leaves a side as it is.
 
-        A third map is the dominant direction, a fourth holds the shares of probes' light, and two more are the direct
-        light of lamps on both sides.
+        A third map is the dominant direction, a fourth holds the shares of probes' light.
         """
         for layer, texels in enumerate(sides):
             if texels is not None:
                 self.light_layers[layer] = texels
                 height, width = texels.shape[:2]
                 self._layouts.device.queue.write_texture(
-                    {"texture": self._light_texture, "origin": (0, 0, layer)}, np.ascontiguousarray(texels),
+                    {"texture": self._light_texture, "origin": (0, 0, layer)},
+                    np.ascontiguousarray(self.lamps.taken_out(layer, texels)),
                     {"bytes_per_row": width * 8, "rows_per_image": height}, (width, height, 1),
                 )  # fmt: skip
 
@@ -208,18 +206,15 @@ class SceneResources:
 
 
 def light_layers(
-    front: Floats | None, back: Floats | None, direction: Floats | None = None, share: Floats | None = None,
-    *lamps: Floats,
-) -> NDArray[np.float16]:  # fmt: skip
+    front: Floats | None, back: Floats | None, direction: Floats | None = None, share: Floats | None = None
+) -> NDArray[np.float16]:
     """Layers (n, H, W, 4): light on the front and on the back, dominant direction (H, W, 3 each), shares (H, W, 4).
-
-    Then the direct light of `lamps` on the front and on the back.
 
     Layers end with the last map that is not None. Missing maps before it are black; the shader reads later layers as
     black.
     """
     maps = [None if light is None else finite(light)[0] for light in (front, back)]
-    maps += [None if values is None else np.nan_to_num(values) for values in (direction, share, *lamps)]
+    maps += [None if values is None else np.nan_to_num(values) for values in (direction, share)]
     count = max((i + 1 for i, values in enumerate(maps) if values is not None), default=1)
     height, width = max((values.shape[:2] for values in maps if values is not None), default=(1, 1))
     layers = np.zeros((count, height, width, 4), np.float16)

@@ -3,11 +3,13 @@
 A direction d from a lamp, in its axes, is at q = d.xy / (2 cos(theta/2)) / sin(reach/2) in the unit disc, which keeps
 areas (Lambert's azimuthal projection): |q| = sin(theta/2) / sin(reach/2).
 
-    lamps/profiles         (P, A, B) float32, intensities over the largest; A azimuths, 0 to 360 degrees, B |q|, 0 to 1
-    lamps/distances        (n, S, S) float16, m to the first surface that blocks light; texel (row, column) has its
-                           centre at q = (2 (column + 1/2)/S - 1, 2 (row + 1/2)/S - 1). meta["lamps"]: LampRecords
+    lamps/profiles         (P, S, S) float16, intensities over the largest; texel (row, column) has its centre at
+                           q = (2 (column + 1/2)/S - 1, 2 (row + 1/2)/S - 1)
+    lamps/distances        (n, S, S) float16, likewise, m to the first surface that blocks light. meta["lamps"]:
+                           LampRecords
     light_map/lamps, lamps_back  (G, H, W, 3) float16, W/m^2, their direct light in the light map, by light group
-    light_map/lamps_reach  (H, W, 2) uint32, bit k % 32 of word k // 32: whether the light of lamp k arrives
+    light_map/lamps_reach  (H, W, 4) uint32, bit k % 32 of word k // 32: whether the light of lamp k arrives; of word
+                           2 + k // 32: whether a part of the texel, or of a neighbour, may be in its shadow
 """
 
 from __future__ import annotations
@@ -53,7 +55,8 @@ def drawn_lamps(store: Store) -> tuple[LampRecord, ...]:
     numbers = np.array([[*lamp.position, *lamp.intensity, *np.ravel(lamp.axes)] for lamp in found])
     profiles, groups = store.artefact(PROFILES).shape[0], store.artefact(LAMPS[0]).shape[0]
     whole = all(lamp.profile < profiles and lamp.group < groups for lamp in found)
-    count = store.artefact(DISTANCES).shape[0]
+    count, side, _ = store.artefact(DISTANCES).shape
+    whole &= store.artefact(PROFILES).shape[1:] == (side, side)
     if not (whole and np.isfinite(numbers).all() and len(found) == count <= MOST_LAMPS):
         raise store.broken(f"{DISTANCES}: lamps", got=said, expected=f"{count} lamps of {profiles} profiles")
     return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.ndimage import maximum_filter
 
 from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, lamps_apart, side_count
 from lambent.bake.context import BakeContext
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 KIND = "lamps"
 NEEDS = ("geometry", "light_map")
-REVISION = 1
+REVISION = 2
 
 
 def keys(context: BakeContext) -> dict[str, str]:
@@ -38,35 +39,36 @@ def bake(context: BakeContext) -> None:
     lamps = [light for light in (scene.lights[number] for number in drawn) if isinstance(light, PointLight | IesLight)]
     profiles, records = _records(context, drawn, lamps)
     context.put(KIND, PROFILES, profiles, context.provenance())
-    reached = np.zeros((traced.texels.height, traced.texels.width), np.uint64)
+    size = traced.texels.height, traced.texels.width
+    reached, shaded = np.zeros(size, np.uint64), np.zeros(size, np.uint64)
     for side in range(side_count(context)):
         light = traced.lamp_light(SIGNS[side])
         of_map = light.drawn if sorts_light(context.methods) else light.drawn.sum(axis=0, keepdims=True)
         context.put(KIND, LAMPS[side], of_map, context.provenance())
         reached |= light.reached
-    words = np.stack([reached, reached >> np.uint64(32)], axis=-1).astype(np.uint32)
-    context.put(KIND, REACHED, words, context.provenance())
-    whole = traced.whole(diffuse=False)
-    maps = []
+    whole, maps = traced.whole(diffuse=False), []
     for number, lamp in enumerate(lamps):
         context.progress(number, len(lamps), "shadow maps of lamps")
-        maps.append(shadow_map(whole, lamp))
-    distances = np.stack(maps) if maps else np.zeros((0, 1, 1), np.float16)
-    context.put(KIND, DISTANCES, distances, context.provenance(lamps=records))
+        distances, behind = shadow_map(whole, lamp, size)
+        maps.append(distances)
+        shaded |= maximum_filter(behind, 3).astype(np.uint64) << np.uint64(number)
+    words = [part >> np.uint64(32 * word) for part in (reached, shaded) for word in (0, 1)]
+    context.put(KIND, REACHED, np.stack(words, axis=-1).astype(np.uint32), context.provenance())
+    stacked = np.stack(maps) if maps else np.zeros((0, 1, 1), np.float16)
+    context.put(KIND, DISTANCES, stacked, context.provenance(lamps=records))
 
 
 def _records(
     context: BakeContext, numbers: list[int], lamps: list[PointLight | IesLight]
-) -> tuple[NDArray[np.float32], list[dict[str, Any]]]:
+) -> tuple[NDArray[np.float16], list[dict[str, Any]]]:
     """The profiles of lamps, equal ones once, and their records as JSON."""
-    from lambent.bake.light.lamp_maps import RADII, axes_of, azimuths, profile, reach_deg
+    from lambent.bake.light.lamp_maps import axes_of, profile, reach_deg
 
     groups, grouped = context.traced.sorted_lights.of_lights, sorts_light(context.methods)
-    count = max(map(azimuths, lamps), default=1)
     known: dict[bytes, int] = {}
     profiles, records = list[Any](), []
     for number, lamp in zip(numbers, lamps, strict=True):
-        shape, intensity = profile(lamp, count)
+        shape, intensity = profile(lamp)
         if (place := known.setdefault(shape.tobytes(), len(profiles))) == len(profiles):
             profiles.append(shape)
         rows = [triple(axis) for axis in axes_of(lamp)]
@@ -75,4 +77,4 @@ def _records(
             reach_deg=reach_deg(lamp), profile=place, group=groups[number] if grouped else 0,
         )  # fmt: skip
         records.append(record.model_dump(mode="json"))
-    return np.stack(profiles) if profiles else np.zeros((0, count, RADII), np.float32), records
+    return np.stack(profiles) if profiles else np.zeros((0, 1, 1), np.float16), records

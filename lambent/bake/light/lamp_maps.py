@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.tracing import rays
+from lambent.bake.tracing.scene_builder import light_map_texel
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import basis, normalize
 from lambent.core.light.colour import HALF_MAX
 from lambent.scenes.scene import IesLight, PointLight
 
-RADII = 513  # nodes of a profile: .2 degrees apart for a hemisphere
-SIDE = 1024  # texels of a shadow map: .16 degrees for a hemisphere
-FULL_DEG = 360.0
+SIDE = 1024  # texels along a disc: .16 degrees apart for a hemisphere
+MOST_HITS = 16  # surfaces along a ray that may lie in a shadow
 
 
 def axes_of(lamp: PointLight | IesLight) -> Floats:
@@ -37,26 +37,19 @@ def reach_deg(lamp: PointLight | IesLight) -> float:
     return float(angles[min(int(lit[-1]) + 1, len(angles) - 1)]) if len(lit) else float(angles[-1])
 
 
-def azimuths(lamp: PointLight | IesLight) -> int:
-    """Number of azimuths that a profile needs: 1 for a lamp that shines the same all around."""
-    if isinstance(lamp, PointLight) or (np.ptp(np.array(lamp.photometry.candela), axis=0) == 0).all():
-        return 1
-    return round(FULL_DEG / max(float(np.diff(lamp.photometry.horizontal_deg).min()), 1.0)) + 1
-
-
-def profile(lamp: PointLight | IesLight, count: int) -> tuple[NDArray[np.float32], Floats]:
-    """Intensities (count, RADII) over the largest one, and that in W/sr (3,)."""
-    reach = np.radians(reach_deg(lamp))
-    theta_deg = np.degrees(2 * np.arcsin(np.linspace(0, 1, RADII) * np.sin(reach / 2)))
+def profile(lamp: PointLight | IesLight) -> tuple[NDArray[np.float16], Floats]:
+    """Intensities (SIDE, SIDE) over the largest one, and that in W/sr (3,)."""
+    local, there = directions(reach_deg(lamp))
+    theta_deg = np.degrees(np.arccos(local[:, 2].clip(-1, 1)))
     if isinstance(lamp, IesLight):
-        phi_deg = np.linspace(0, FULL_DEG, count)[:, None] if count > 1 else np.zeros((1, 1))
-        found, scale = lamp.photometry.at(np.minimum(theta_deg, lamp.photometry.vertical_deg[-1]), phi_deg), lamp.scale
+        turn_deg = np.degrees(np.arctan2(local[:, 1], local[:, 0]))
+        found, scale = lamp.photometry.at(theta_deg, turn_deg), lamp.scale
     else:
         falloff = max(lamp.outer_deg - lamp.inner_deg, 1e-6)
-        share = np.ones(RADII) if lamp.direction is None else ((lamp.outer_deg - theta_deg) / falloff).clip(0, 1)
-        found, scale = np.broadcast_to(share, (count, RADII)), lamp.intensity
+        is_spot = lamp.direction is not None
+        found, scale = ((lamp.outer_deg - theta_deg) / falloff).clip(0, 1) if is_spot else there * 1.0, lamp.intensity
     most = max(float(found.max()), 1e-30)
-    return (found / most).astype(np.float32), np.array(scale) * most
+    return (found / most).reshape(SIDE, SIDE).astype(np.float16), np.array(scale) * most
 
 
 def directions(reach: float) -> tuple[Floats, NDArray[np.bool_]]:
@@ -69,12 +62,35 @@ def directions(reach: float) -> tuple[Floats, NDArray[np.bool_]]:
     return np.column_stack([2 * s * np.sqrt(1 - square)[:, None], 1 - 2 * square]), there
 
 
-def shadow_map(scene: Any, lamp: PointLight | IesLight) -> NDArray[np.float16]:
-    """(SIDE, SIDE) distances from a lamp to the first surfaces of a mi.Scene that block light; HALF_MAX if none."""
+def shadow_map(
+    scene: Any, lamp: PointLight | IesLight, size: tuple[int, int]
+) -> tuple[NDArray[np.float16], NDArray[np.bool_]]:
+    """Distances (SIDE, SIDE) from a lamp to the first surfaces of a mi.Scene that block light; HALF_MAX if there are none.
+
+    And the texels (H, W) of a light map of this `size` that lie behind these, in the shadow of at least one ray.
+    """
     local, there = directions(reach_deg(lamp))
     world = local @ axes_of(lamp)
     ray = rays.rays_from(np.asarray(lamp.position) + rays.APPROACH * world, world)
-    si = rays.intersect(scene, ray, mi.Bool(True), rays.has_holes(scene))
-    distance = np.array(dr.select(si.is_valid(), dr.norm(si.p - mi.Point3f(*lamp.position)), dr.inf))
-    found = np.where(there, np.minimum(distance, HALF_MAX), HALF_MAX)
-    return found.reshape(SIDE, SIDE).astype(np.float16)
+    shaded = dr.zeros(mi.UInt32, size[0] * size[1])
+    distance = _first_hits(scene, mi.Ray3f(ray), mi.Point3f(*lamp.position), shaded, size[1], size[0],
+                           rays.has_holes(scene))  # fmt: skip
+    dr.eval(distance, shaded)
+    found = np.where(there, np.minimum(np.array(distance), HALF_MAX), HALF_MAX)
+    return found.reshape(SIDE, SIDE).astype(np.float16), np.array(shaded).reshape(size) > 0
+
+
+@dr.syntax
+def _first_hits(scene, ray, start, shaded, width, height, holes):  # type: ignore[no-untyped-def]
+    """Distances from `start` to the first hits of rays; texels of later hits become 1 in `shaded`."""
+    distance = dr.full(mi.Float, dr.inf, dr.width(ray.o))
+    active = dr.full(mi.Bool, True, dr.width(ray.o))
+    hits = dr.zeros(mi.UInt32, dr.width(ray.o))
+    while active & (hits < MOST_HITS):
+        si = rays.intersect(scene, ray, active, holes)
+        active &= si.is_valid()
+        distance = dr.select(active & (hits == 0), dr.norm(si.p - start), distance)
+        dr.scatter(shaded, mi.UInt32(1), light_map_texel(si, width, height, active), active & (hits > 0))
+        ray = rays.leaving(scene, si.p, si.n, ray.d)
+        hits += 1
+    return distance

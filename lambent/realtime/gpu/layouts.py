@@ -29,8 +29,8 @@ KINDS: dict[str, dict[str, Any]] = {
 }
 
 
-# Light maps; the sun, and the share of it that each pixel sees; lamps, their profiles, texels they reach, shadow maps.
-LIGHT = "layers", "uniform", "exact", "uniform", "storage", "storage", "exact layers"
+# Light maps; the sun, and the share of it that each pixel sees; lamps, texels they reach, shadow maps and profiles.
+LIGHT = "layers", "uniform", "exact", "uniform", "storage", "layers"
 # The sun, depths towards it, and their blocks; depths of panes before it, and their transmittances; texels it reaches.
 SHADOW_MAP = "uniform", "depth layers", "exact layers", "depth layers", "exact layers", "exact"
 PANE = "uniform", "depth layers", "depth layers"  # terms of clear glass, opaque depths, depths of the previous layer

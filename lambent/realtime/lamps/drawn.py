@@ -20,17 +20,17 @@ class DrawnLamps:
     ----------
     records : (n,) LampRecord
         The most important lamp first.
-    profiles : (P, A, B) float32
+    profiles : (P, S, S) float16
     distances : (n, S, S) float16
         m.
-    reached : (H, W, 2) uint32
-        Bits of the lamps whose light arrives at texels.
+    reached : (H, W, 4) uint32
+        Bits of the lamps whose light arrives at texels, and of those whose shadows may.
     light : list of (G, H, W, 3) float32
         Direct light in the light map, by side and light group.
     """
 
     records: tuple[LampRecord, ...]
-    profiles: NDArray[np.float32]
+    profiles: NDArray[np.float16]
     distances: NDArray[np.float16]
     reached: NDArray[np.uint32]
     light: list[Floats]

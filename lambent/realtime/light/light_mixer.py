@@ -184,13 +184,11 @@ class LightMixer:
 
     def _map(self, factors: Floats) -> Any:
         sides, before = self._surfaces.light_map(factors), self._sky_of
-        if (lamps := self._scene.lamps) is not None:
-            front, back = (*sides, None)[:2]
-            sides = front, back, None, None, *map(with_alpha, lamps.in_map(factors))
+        lamps = None if self._scene.lamps is None else self._scene.lamps.in_map(factors)
         if before is not None and not self._light.turns_sky(factors, before):
-            return sides, (None, None)
-        self._sky_of = factors
-        return sides, tuple(None if sky is None else with_alpha(finite(sky)[0]) for sky in self._light.sky(factors))
+            return sides, lamps, (None, None)
+        self._sky_of, skies = factors, self._light.sky(factors)
+        return sides, lamps, tuple(None if sky is None else with_alpha(finite(sky)[0]) for sky in skies)
 
     def _probe(self, number: int, factors: Floats) -> ProbeLight | None:
         light, owner = self._resources.objects[self._users[number][0]].light, self._owners[number]
@@ -211,10 +209,11 @@ class LightMixer:
                 item = resources.objects[number]
                 item.relight(made, item.emission)
             return
-        sides, (shown, mirrored) = made
+        sides, of_lamps, (shown, mirrored) = made
         self._shown = factors
+        if of_lamps is not None:
+            resources.lamps.shine(factors, of_lamps)
         resources.show_light_map(sides)
-        resources.lamps.shine(factors)
         if shown is not None and mirrored is not None:
             resources.sky_group = resources.sky_group_of(shown)
             resources.mirrored_sky_group = resources.sky_group_of(mirrored)

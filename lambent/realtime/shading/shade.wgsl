@@ -95,12 +95,8 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
     let mesh = mesh_frame(v);
     let facing = dot(mesh[2], sun.towards.xyz) * select(-1.0, 1.0, front);
     let direct = sun.irradiance.rgb * sun_share(s);
-    var e_front = light_map(FRONT, v.uv2);
-    var e_back = light_map(BACK, v.uv2);
-    if (LAMPS > 0u) {
-        e_front = max(e_front - light_map(FRONT_OF_LAMPS, v.uv2), vec3f(0.0));
-        e_back = max(e_back - light_map(BACK_OF_LAMPS, v.uv2), vec3f(0.0));
-    }
+    let e_front = light_map(FRONT, v.uv2);
+    let e_back = light_map(BACK, v.uv2);
     var e_here = select(e_back, e_front, front);
     let e_beyond = select(e_front, e_back, front) + max(-facing, 0.0) * direct;
     var e_bent = e_here;
@@ -113,7 +109,7 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
         sun_cos = select(0.0, max(dot(bent, sun.towards.xyz), 0.0), facing > 0.0);
     }
     if (LOBES > 0u) { s = with_shares(s, light_maps, v.uv2, front, e_bent); } // light without sun and lamps, as in probes
-    let of_lamps = light_of_lamps(v.p_world, v.uv2, mesh[2] * side, flat_normal(v, mesh[2]), bent, wo, s);
+    let of_lamps = light_of_lamps(UnderLamps(v.p_world, mesh[2] * side, flat_normal(v, mesh[2]), bent, wo), v.uv2, s);
     e_bent += sun_cos * direct + of_lamps.bent;
     e_here += max(facing, 0.0) * direct + of_lamps.here;
     let diffuse = diffuse_light(wo.z, e_bent, e_beyond + of_lamps.beyond, s.painted);

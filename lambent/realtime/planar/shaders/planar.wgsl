@@ -155,11 +155,7 @@ struct PlanarLight {
     // One comparison: software Vulkan (Mesa 22.3) crashes on further branches here.
     let height = abs(dot(mirrored.plane.xyz, v.p_world) + mirrored.plane.w);
     if (max(height - mirrored.tolerance, FLAT_COS - abs(upright)) > 0.0) { discard; }
-    var e = layer_of(reflector_light_maps, select(BACK, FRONT, front), v.uv2).rgb;
-    if (LAMPS > 0u) {
-        let of_lamps = layer_of(reflector_light_maps, select(BACK_OF_LAMPS, FRONT_OF_LAMPS, front), v.uv2).rgb;
-        e = max(e - of_lamps, vec3f(0.0));
-    }
+    let e = layer_of(reflector_light_maps, select(BACK, FRONT, front), v.uv2).rgb;
     s = with_shares(s, reflector_light_maps, v.uv2, front, e);
     let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), max(dot(view, s.n), 1e-3)));
     let place = place_of(v, s, to_world(s, vec3f(-wo.xy, wo.z)));

@@ -6,7 +6,7 @@
 #include "lobe_width.wgsl"
 #include "planar_layers.wgsl"
 
-@group(3) @binding(7) var planar_light: texture_2d_array<f32>;
+@group(3) @binding(6) var planar_light: texture_2d_array<f32>;
 
 const WIDE = 3.0; // half-width in pixels of a lobe from which on 8 x 8 pixels are mixed, not 4 x 4
 
