@@ -38,7 +38,7 @@ def objects() -> tuple[SceneObject, ...]:
     feet = [o.mesh for o in furniture.sofa() if o.name == "sofa_feet"]
     couch_at, turned = (-0.75, 0.0, -1.95), turn("y", 6)
     return (
-        thing("floor", "floor", block((-X - LAP, -THICK, -Z - LAP), (X + LAP, 0.0, Z + LAP))),
+        thing("floor", "floor", block((-X - LAP / 2, -THICK, -Z - LAP / 2), (X + LAP / 2, 0.0, Z + LAP / 2))),
         *_walls(),
         *(thing(f"sill_{k}", "sills", *_sill(*z)) for k, z in enumerate(WINDOWS_Z, start=1)),
         thing("stairs", "stairs", *_stairs()),

@@ -24,6 +24,7 @@ from lambent.materials.document import Material
 from lambent.scenes import builtin, loaders
 from lambent.scenes.loaders.contents import Contents, LoadOptions
 from lambent.scenes.loaders.meshes.creases import deviation_warnings, with_creases
+from lambent.scenes.loaders.meshes.flush import with_flush_raised
 from lambent.scenes.loaders.meshes.repair import box_mapped
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.document import load_toml
@@ -59,7 +60,8 @@ def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> 
     if angle is not None:
         scene = replace(scene, objects=with_creases(scene.objects, angle), crease_deg=angle)
     notes = deviation_warnings(scene.objects) if angle is None else []
-    return replace(scene, warnings=(*counted(scene.warnings), *notes, *size_warnings(scene)), origin=origin)
+    scene = replace(scene, warnings=(*counted(scene.warnings), *notes, *size_warnings(scene)), origin=origin)
+    return with_flush_raised(scene)
 
 
 def with_uv(scene: Scene) -> Scene:

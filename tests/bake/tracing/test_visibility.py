@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import mitsuba as mi
@@ -10,11 +11,13 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.surfaces.texels import BEYOND, POINTS, Texels
+from lambent.bake.tracing.rays import rays_from
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.bake.tracing.seen.visibility import seen, viewing_places, without_hidden
 from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
 from lambent.scenes.geometry import patch
+from lambent.scenes.loaders.meshes.flush import with_flush_raised
 from lambent.scenes.scene import ImageEnvironment, Scene, SceneObject
 from tests.bake.small_scenes import TINY, constant_picture
 
@@ -78,6 +81,27 @@ def test_only_what_cameras_reach_is_seen(tmp_path: Path) -> None:
     normals = np.array([[0, 0, 1], [0, 0, 1], [0, 1, 0], [0, 0, -1]], float)
     assert seen(traced, places, points, normals).tolist() == [True, False, True, False]
     assert not seen(traced, places[:0], points, normals).any()
+
+
+def test_a_flush_poster_covers_its_wall_and_leaves_no_dark_border(tmp_path: Path) -> None:
+    """Every ray meets the poster, grazing ones too; the wall beside it has the light of the furnace, pi."""
+    bare = house(tmp_path)
+    poster = SceneObject("poster", patch((0.5, 0.5, 0), (0.7, 0, 0), (0, 0.9, 0)), "paper", emission=(0.5, 0.5, 0.5))
+    both = replace(bare, objects=(*bare.objects, poster), materials={"grey": GREY, "paper": Material(kd=0.5)})
+    scene = with_flush_raised(both)
+    assert "poster on back" in scene.warnings[0]
+    builder = SceneBuilder(scene)
+    u, v = np.meshgrid(np.linspace(0.53, 1.17, 60), np.linspace(0.53, 1.37, 60))
+    for eye in ((1.0, 1.0, 1.9), (0.02, 1.0, 0.05), (1.99, 0.01, 0.01)):
+        aims = np.stack([u, v, np.zeros_like(u)], axis=-1).reshape(-1, 3) - eye
+        ray = rays_from(np.array(eye), aims / np.linalg.norm(aims, axis=1, keepdims=True))
+        met = builder.build().ray_intersect_preliminary(ray, coherent=True)
+        assert set(np.array(builder.numbers.at(met, met.is_valid())).tolist()) == {len(bare.objects)}, eye
+    store = bake(scene, tmp_path / "s", quality=TINY.changed(geometry={"texels": 128}), only=["light_map"])
+    for away in (1e-3, 4e-3, 0.02):
+        left = [np.array([0.5 - away, y, 0.0]) for y in np.linspace(0.52, 1.38, 40)]
+        above = [np.array([x, 1.4 + away, 0.0]) for x in np.linspace(0.52, 1.18, 40)]
+        np.testing.assert_allclose([looked_up(store, p, "back") for p in (*left, *above)], np.pi, rtol=0.1)
 
 
 @pytest.fixture(scope="module", autouse=True)

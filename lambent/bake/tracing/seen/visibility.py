@@ -15,7 +15,16 @@ import numpy as np
 
 from lambent.bake.running.tiles import slices
 from lambent.bake.surfaces.texels import BEYOND, POINTS, Texels
-from lambent.bake.tracing.rays import array_of, cosine_directions, leaving, rays_from, towards, vectors
+from lambent.bake.tracing.rays import (
+    APPROACH,
+    array_of,
+    cosine_directions,
+    distances,
+    leaving,
+    rays_from,
+    towards,
+    vectors,
+)
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.geometry.sequences import r2
 from lambent.scenes.scene import Scene
@@ -61,12 +70,22 @@ def _hits(traced: Any, ray: Any) -> tuple[Indices, Floats, Floats]:
 
 
 def seen(traced: Any, places: Floats, positions: Floats, normals: Floats) -> Flags:
-    """(n,) bool: whether points (n, 3) are seen from any of `places`, on the side of their normals (n, 3)."""
-    found = np.zeros(len(positions), bool)
+    """(n,) bool: whether points (n, 3) are seen from any of `places`, on the side of their normals (n, 3).
+
+    Through the gap below a flush surface, such as a poster's, points near its border would be seen: they count as
+    hidden.
+    """
+    found, covered = np.zeros(len(positions), bool), _covered(traced, positions, normals)
     for some in np.split(places, FEW):
-        left = np.flatnonzero(~found)
+        left = np.flatnonzero(~(found | covered))
         found[left] = _seen_from(traced, some, positions[left], normals[left])
     return found
+
+
+def _covered(traced: Any, positions: Floats, normals: Floats) -> Flags:
+    """(n,) whether something lies right above points (n, 3) of unit normals (n, 3)."""
+    reach = APPROACH * (1 + np.abs(positions).max(axis=1, initial=0))
+    return np.asarray(distances(traced, leaving(traced, positions, normals, normals)) < reach)
 
 
 def _seen_from(traced: Any, places: Floats, positions: Floats, normals: Floats) -> Flags:
