@@ -65,7 +65,7 @@ def directions(reach: float) -> tuple[Floats, NDArray[np.bool_]]:
 def shadow_map(
     scene: Any, lamp: PointLight | IesLight, size: tuple[int, int]
 ) -> tuple[NDArray[np.float16], NDArray[np.bool_]]:
-    """Distances (SIDE, SIDE) from a lamp to the first surfaces of a mi.Scene that block light; HALF_MAX if there are none.
+    """Distances (SIDE, SIDE) from a lamp to the first surfaces of a mi.Scene that block light; HALF_MAX for none.
 
     And the texels (H, W) of a light map of this `size` that lie behind these, in the shadow of at least one ray.
     """

@@ -38,7 +38,7 @@ class PointLamps:
         return np.maximum(found, 0).astype(np.float16)
 
     def shine(self, factors: Floats | None, in_map: list[Floats]) -> None:
-        """Shine in a mix of light groups from now on, factors (G, 3) or None as baked, with `DrawnLamps.in_map` of it."""
+        """Shine in a mix of light groups: factors (G, 3) or None as baked, and `DrawnLamps.in_map` of it."""
         if self._drawn is None:
             return
         self._in_map = in_map

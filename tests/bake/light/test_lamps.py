@@ -7,13 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lambent.bake.bake import bake
 from lambent.bake.engine import engine
+from lambent.bake.surfaces.texels import texels_of
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize
 from lambent.materials.document import Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.photometry.distribution import Photometry
 from lambent.scenes.scene import DirectionalLight, IesLight, PointLight, Scene, SceneObject
+from lambent.store.lamps import DISTANCES, LAMPS, REACHED, drawn_lamps
+from lambent.store.store import Store
+from tests.bake.small_scenes import TINY
 
 SPOT = PointLight((0.2, 2.0, -0.1), (3.0, 2.0, 1.0), tuple(normalize(np.array([0.1, -1.0, 0.2])).tolist()), 15.0, 40.0)
 BULB = PointLight((-0.3, 1.5, 0.4), (1.0, 1.0, 2.0))
@@ -29,7 +34,7 @@ WASHER = IesLight(
     aim=tuple(normalize(np.array([0.2, -1.0, 0.0])).tolist()),
     rotation_deg=25.0,
 )
-LAMPS = [SPOT, BULB, WASHER]
+OF_ROOM = [SPOT, BULB, WASHER]
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -83,7 +88,7 @@ def test_rays_bring_the_intensity_over_the_square_of_the_distance(number: int) -
     si.p, si.n = vectors(mi.Point3f, p), mi.Normal3f(0, 1, 0)
     si.sh_frame = mi.Frame3f(mi.Normal3f(0, -1, 0))  # turned over: the light is on the back
     found = array_of(rays.of(dr.opaque(mi.UInt32, number), si, mi.Bool(True)))
-    lamp, position = LAMPS[number], np.array(LAMPS[number].position)
+    lamp, position = OF_ROOM[number], np.array(OF_ROOM[number].position)
     away = position - p
     distance = np.linalg.norm(away, axis=1)
     expected = intensity(lamp, -away / distance[:, None]) * (away[:, 1] / distance**3)[:, None]
@@ -97,53 +102,88 @@ def test_rays_bring_the_intensity_over_the_square_of_the_distance(number: int) -
         assert not front.any() and (back.sum(axis=0) > 1.5 * -found.sum(axis=0)).all()
 
 
-@pytest.mark.parametrize("lamp", LAMPS, ids=["spot", "bulb", "washer"])
+@pytest.mark.parametrize("lamp", OF_ROOM, ids=["spot", "bulb", "washer"])
 def test_profiles_are_the_lamps(lamp: PointLight | IesLight) -> None:
-    from lambent.bake.light.lamp_maps import RADII, axes_of, azimuths, profile, reach_deg
+    from scipy.ndimage import map_coordinates
 
-    shape, most = profile(lamp, azimuths(lamp))
-    assert shape.max() == 1 and (azimuths(lamp) == 1) == (lamp is not WASHER)
+    from lambent.bake.light.lamp_maps import SIDE, axes_of, profile, reach_deg
+
+    disc, most = profile(lamp)
     axes, scale = axes_of(lamp), np.sin(np.radians(reach_deg(lamp)) / 2)
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
     w = normalize(np.random.default_rng(1).normal(size=(5000, 3)))
     local = w @ axes.T
     q = local[:, :2] / np.sqrt(2 + 2 * local[:, 2:]) / scale
-    radius = np.linalg.norm(q, axis=1)
-    inside = radius < 1
-    column = radius[inside] * (RADII - 1)
-    row = np.mod(np.arctan2(q[inside, 1], q[inside, 0]) / (2 * np.pi), 1) * (len(shape) - 1)
-    i, j = column.astype(int), np.minimum(row.astype(int), max(len(shape) - 2, 0))
-    last = np.minimum(j + 1, len(shape) - 1)
-    f, g = column - i, row - j
-    found = (1 - g) * ((1 - f) * shape[j, i] + f * shape[j, i + 1])
-    found += g * ((1 - f) * shape[last, i] + f * shape[last, i + 1])
+    inside = np.linalg.norm(q, axis=1) < 1 - 2 / SIDE
+    at = (q[inside, ::-1].T + 1) / 2 * SIDE - 0.5
+    found = map_coordinates(disc.astype(float), at, order=1, mode="nearest")
     expected = intensity(lamp, w)
+    assert disc.max() == 1
     np.testing.assert_allclose(found[:, None] * most, expected[inside], atol=4e-3 * most.max())
-    assert not expected[~inside].any()
+    assert not expected[np.linalg.norm(q, axis=1) > 1].any()
 
 
-def test_shadow_maps_have_the_distances_of_surfaces() -> None:
-    from lambent.bake.light.lamp_maps import SIDE, axes_of, directions, reach_deg, shadow_map
-    from lambent.bake.tracing.scene_builder import SceneBuilder
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
+    return bake(room(), tmp_path_factory.mktemp("lamps") / "s", quality=TINY, only=("lamps",))
+
+
+@pytest.mark.parametrize("number", [0, 2])
+def test_shadow_maps_have_the_distances_of_surfaces(store: Store, number: int) -> None:
+    from lambent.bake.light.lamp_maps import SIDE, axes_of, directions, reach_deg
     from lambent.core.light.colour import HALF_MAX
 
-    built = SceneBuilder(room()).build()
-    for lamp in (SPOT, BULB):
-        local, there = directions(reach_deg(lamp))
-        w = local @ axes_of(lamp)
-        angle = np.degrees(np.arccos(w @ axes_of(lamp)[2]))[there]
-        corner = np.degrees(2 * np.arcsin(np.sqrt(2) * np.sin(np.radians(20))))
-        assert angle.max() == pytest.approx(180.0 if lamp is BULB else corner, abs=1.0)
-        found = shadow_map(built, lamp).reshape(-1).astype(float)
-        position = np.array(lamp.position)
-        down = w[:, 1] < -0.1
-        floor = position + w * (position[1] / -np.where(down, w[:, 1], -1))[:, None]
-        hidden = is_behind_plate(floor, position)
-        on_floor = down & (np.abs(floor[:, [0, 2]]).max(axis=1) < 1.9) & ~np.isnan(hidden) & there
-        expected = np.where(hidden == 1, position[1] - 0.5, position[1]) / np.abs(w[:, 1])
-        np.testing.assert_allclose(found[on_floor], expected[on_floor], rtol=1e-3)
-        assert (found[w[:, 1] > 0] == HALF_MAX).all() and len(found) == SIDE**2
-        assert 0 < (hidden[on_floor] == 1).mean() < 0.5
+    place = [record.number for record in drawn_lamps(store)].index(number)
+    lamp = room().lights[number]
+    assert isinstance(lamp, PointLight)
+    local, there = directions(reach_deg(lamp))
+    w = local @ axes_of(lamp)
+    corner = np.degrees(2 * np.arcsin(np.sqrt(2) * np.sin(np.radians(20))))
+    widest = np.degrees(np.arccos(w @ axes_of(lamp)[2]))[there].max()
+    assert widest == pytest.approx(180.0 if lamp is BULB else corner, abs=1.0)
+    found = store.read(DISTANCES)[place].reshape(-1).astype(float)
+    position = np.array(lamp.position)
+    down = w[:, 1] < -0.1
+    floor = position + w * (position[1] / -np.where(down, w[:, 1], -1))[:, None]
+    hidden = is_behind_plate(floor, position)
+    on_floor = down & (np.abs(floor[:, [0, 2]]).max(axis=1) < 1.9) & ~np.isnan(hidden) & there
+    expected = np.where(hidden == 1, position[1] - 0.5, position[1]) / np.abs(w[:, 1])
+    np.testing.assert_allclose(found[on_floor], expected[on_floor], rtol=1e-3)
+    assert (found[w[:, 1] > 0] == HALF_MAX).all() and len(found) == SIDE**2
+    assert 0 < (hidden[on_floor] == 1).mean() < 0.5
+
+
+def test_the_light_map_has_their_light_and_says_where_it_and_shadows_fall(store: Store) -> None:
+    light, of_map = store.read(LAMPS[0]).astype(float), store.read("light_map/irradiance").astype(float)
+    geometry = {name: store.read(f"geometry/{name}") for name in ("positions", "normals", "uv2", "faces")}
+    texels = texels_of(geometry, *of_map.shape[1::-1])
+    floor = (texels.face[:, 0] < 2) & (texels.area_m2 > 0)
+    p = texels.positions[floor].mean(axis=1).astype(float)
+    records = drawn_lamps(store)
+    bits = store.read(REACHED).reshape(-1, 4)[texels.index[floor]]
+    total = np.zeros_like(p)
+    clear = np.ones(len(p), bool)
+    for place, record in enumerate(records):
+        lamp, position = room().lights[record.number], np.array(record.position)
+        assert isinstance(lamp, PointLight | IesLight)
+        away = position - p
+        distance = np.linalg.norm(away, axis=1)
+        whole = intensity(lamp, -away / distance[:, None]) * (away[:, 1] / distance**3)[:, None]
+        reached, shaded = (bits[:, word] >> place & 1 for word in (0, 2))
+        hidden = is_behind_plate(p, position)
+        deep = hidden == 1
+        assert shaded[deep].all(), "what the plate hides may be in its shadow"
+        assert (reached[whole.max(axis=1) * (hidden == 0) > 1e-3] == 1).all()
+        if lamp is SPOT:
+            assert not reached[-away / distance[:, None] @ SPOT.direction < np.cos(np.radians(55))].any()
+        total += np.where(deep[:, None], 0, whole)
+        clear &= shaded == 0
+    assert 0.3 < clear.mean() < 1
+    found = light.reshape(len(light), -1, 3)[:, texels.index[floor]].sum(axis=0)
+    np.testing.assert_allclose(found[clear], total[clear], rtol=0.05, atol=0.02)
+    whole_map = of_map.reshape(-1, 3)[texels.index[floor]]
+    assert (whole_map >= 0.999 * found - 1e-3).all()
+    np.testing.assert_allclose(whole_map[clear], found[clear], rtol=0.2, atol=0.05)  # little else lights it
 
 
 def test_the_lamps_with_most_detail_are_drawn() -> None:
