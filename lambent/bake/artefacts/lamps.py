@@ -14,6 +14,7 @@ from lambent.bake.methods import sorts_light
 from lambent.bake.running.keys import key_of
 from lambent.core.plain import triple
 from lambent.scenes.scene import IesLight, PointLight
+from lambent.store.lamp_discs import axes_of, profile, reach_deg
 from lambent.store.lamps import DISTANCES, LAMPS, PROFILES, REACHED, LampRecord
 
 if TYPE_CHECKING:
@@ -62,8 +63,6 @@ def _records(
     context: BakeContext, numbers: list[int], lamps: list[PointLight | IesLight]
 ) -> tuple[NDArray[np.float16], list[dict[str, Any]]]:
     """The profiles of lamps, equal ones once, and their records as JSON."""
-    from lambent.bake.light.lamp_maps import axes_of, profile, reach_deg
-
     groups, grouped = context.traced.sorted_lights.of_lights, sorts_light(context.methods)
     known: dict[bytes, int] = {}
     profiles, records = list[Any](), []

@@ -106,7 +106,7 @@ def test_rays_bring_the_intensity_over_the_square_of_the_distance(number: int) -
 def test_profiles_are_the_lamps(lamp: PointLight | IesLight) -> None:
     from scipy.ndimage import map_coordinates
 
-    from lambent.bake.light.lamp_maps import SIDE, axes_of, profile, reach_deg
+    from lambent.store.lamp_discs import SIDE, axes_of, profile, reach_deg
 
     disc, most = profile(lamp)
     axes, scale = axes_of(lamp), np.sin(np.radians(reach_deg(lamp)) / 2)
@@ -130,8 +130,8 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
 
 @pytest.mark.parametrize("number", [0, 2])
 def test_shadow_maps_have_the_distances_of_surfaces(store: Store, number: int) -> None:
-    from lambent.bake.light.lamp_maps import SIDE, axes_of, directions, reach_deg
     from lambent.core.light.colour import HALF_MAX
+    from lambent.store.lamp_discs import SIDE, axes_of, directions, reach_deg
 
     place = [record.number for record in drawn_lamps(store)].index(number)
     lamp = room().lights[number]
