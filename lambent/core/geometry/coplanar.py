@@ -9,13 +9,12 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import MIXERS, Floats, Indices, hashes
 from lambent.core.geometry.sequences import cosine_hemisphere, r2
 from lambent.core.geometry.triangles import triangle_normals
 
 PARALLEL = float(np.cos(np.radians(2.0)))  # cosine of the angle up to which planes count as parallel
 SECTORS = cosine_hemisphere(r2(31)).T.astype(np.float32)  # axes of normals, in no special direction
-MIXERS = np.array([0x1E3779B97F4A7C15, 0x42B2AE3D27D4EB4F, 0x165667B19E3779F9])  # odd, without a pattern
 CLASSES = 48  # of sizes; smaller triangles are in the last
 
 
@@ -45,13 +44,6 @@ def coplanar_overlaps(corners: Floats, group: Indices, within_m: Floats) -> Indi
         pairs = _with_class(corners, normals, boxes / 2.0**one, kinds - [0, 0, one], within_m[once])
         found.append(np.unique(pairs[:, 0] * len(once) + pairs[:, 1]))
     return np.asarray(once[np.stack(np.divmod(np.unique(np.concatenate(found)), len(once)), axis=1)])
-
-
-def hashes(points: Floats) -> Indices:
-    """(n,) hashes of points (n, 3) in float32; those of different points hardly ever agree."""
-    bits = np.asarray(points + 0.0, np.float32).view(np.int32).astype(np.int64)  # -0 is 0
-    mixed = bits @ MIXERS
-    return np.asarray((mixed ^ (mixed >> 29)) * MIXERS[0])
 
 
 @numba.njit(cache=True)

@@ -25,6 +25,12 @@ def triangle_normals(corners: Floats) -> Floats:
     return normalize(area_vectors(corners))
 
 
+def corner_angles(corners: Floats) -> Floats:
+    """Angles (..., 3) in radians at the corners of triangles (..., 3, 3)."""
+    after, before = (normalize(np.roll(corners, -k, axis=-2) - corners) for k in (1, 2))
+    return np.asarray(np.arccos(np.clip((after * before).sum(axis=-1), -1, 1)))
+
+
 def points_on_triangles(corners: Floats, face: NDArray[np.integer], rng: np.random.Generator) -> Floats:
     """One point (K, 3) on each of the triangles `face` (K,), uniform by area; corners (F, 3, 3) of all triangles."""
     weights = rng.dirichlet((1, 1, 1), size=len(face))

@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from lambent.core.arrays import Floats
-from lambent.core.geometry.coplanar import _overlap, coplanar_overlaps, hashes
+from lambent.core.arrays import Floats, hashes
+from lambent.core.geometry.coplanar import _overlap, coplanar_overlaps
 from lambent.core.geometry.directions import basis, normalize
 from lambent.core.geometry.triangles import triangle_normals
 

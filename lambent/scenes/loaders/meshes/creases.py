@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Floats, Indices, hashes
 from lambent.core.geometry.directions import normalize
-from lambent.core.geometry.triangles import area_vectors, triangle_normals
+from lambent.core.geometry.triangles import area_vectors, corner_angles, triangle_normals
 from lambent.scenes.geometry import tangents_along
 from lambent.scenes.mesh import Mesh, batches_of, corners_of, vertices_at_corners
 from lambent.scenes.scene import SceneObject
@@ -17,6 +17,8 @@ from lambent.scenes.scene import SceneObject
 DEVIATION_DEG = 40.0  # of a normal from its face's, above which it is reported; a smooth prism of 10 sides has 18
 DEVIATION_SHARE = 0.2  # of an object's area: the normals of fillets deviate, and are meant to
 NAMED = 2
+MEETING = 256  # faces in one place, of which normals are the mean
+CORNERS_AT_ONCE = 1 << 20
 
 
 def deviating_faces(meshes: Sequence[Mesh]) -> Indices:
@@ -55,35 +57,48 @@ def deviation_warnings(objects: Sequence[SceneObject]) -> list[str]:
 def creased(mesh: Mesh, angle_deg: float) -> Mesh:
     """The mesh with new normals: smooth where faces meet at less than an angle, hard elsewhere.
 
-    A corner's normal is the area-weighted mean of the faces that meet there within the angle of its own face. Vertices
-    are split if their corners get different normals.
+    A corner's normal is the mean of the faces that meet there within the angle of its own, weighted by their angles
+    there, so that it does not matter how quads are divided. Vertices are split if their corners get different normals.
     """
-    corners = mesh.corners.astype(float)
-    vectors, faces = area_vectors(corners), triangle_normals(corners)
-    turned = (faces * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1) < 0  # against the winding, as in the file
-    vectors[turned], faces[turned] = -vectors[turned], -faces[turned]
-    _, place = np.unique(mesh.positions, axis=0, return_inverse=True)
-    place = place.reshape(-1)[mesh.faces.reshape(-1)]  # by corner
-    order = np.argsort(place, kind="stable")
-    count = np.bincount(place)
-    first = np.cumsum(count) - count
-    own = np.repeat(order, count[place[order]])  # pairs of corners at one place
-    step = np.arange(len(own)) - np.repeat(np.cumsum(count[place[order]]) - count[place[order]], count[place[order]])
-    other = order[first[place[own]] + step]
-    near = (faces[own // 3] * faces[other // 3]).sum(axis=1) >= np.cos(np.radians(angle_deg)) - 1e-6
-    near |= own == other
-    sums = [np.bincount(own[near], vectors[other[near] // 3, axis], len(place)) for axis in range(3)]
-    total = np.stack(sums, axis=1).astype(float)
-    normals = normalize(total)
-    normals[(normals == 0).all(axis=1)] = faces[np.flatnonzero((normals == 0).all(axis=1)) // 3]
-    vertex = mesh.faces.reshape(-1).astype(float)
+    faces = triangle_normals(mesh.corners)
+    faces[(faces * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1) < 0] *= -1  # against the winding, as in the file
+    at = hashes(mesh.positions[mesh.faces].reshape(-1, 3))
+    _, place = np.unique(at, return_inverse=True)
+    vectors = (faces[:, None] * corner_angles(mesh.corners)[..., None]).reshape(-1, 3)
+    normals = normalize(_sums_within(vectors, faces, place, angle_deg))
+    lost = np.flatnonzero((normals == 0).all(axis=1))
+    normals[lost] = faces[lost // 3]
+    uv = mesh.uv[mesh.faces].reshape(-1, 2)
     _, kept, index = np.unique(
-        np.column_stack([vertex, normals.round(5)]), axis=0, return_index=True, return_inverse=True
+        at + 3 * hashes(uv) + 5 * hashes(normals.round(5)), return_index=True, return_inverse=True
     )
     copied = mesh.at_vertices(mesh.faces.reshape(-1)[kept], index.reshape(-1, 3).astype(np.uint32))
     new: Floats = normals[kept]
     tangents = tangents_along(new, copied.tangents.astype(float))
     return replace(copied, normals=new.astype(np.float32), tangents=tangents.astype(np.float32))
+
+
+def _sums_within(vectors: Floats, faces: Floats, place: Indices, angle_deg: float) -> Floats:
+    """(3 F, 3) sums by corner of vectors (3 F, 3) of corners in its place (3 F,), of faces within the angle of its own.
+
+    `faces` (F, 3) are unit normals. Where very many meet, as at the apex of a cone, some of them count.
+    """
+    order, count = np.argsort(place, kind="stable"), np.bincount(place)
+    first, met = np.cumsum(count) - count, np.minimum(count, MEETING)[place]
+    total, ends = np.zeros((len(place), 3)), np.cumsum(met)
+    start = 0
+    while start < len(place):
+        before = ends[start] - met[start]
+        stop = max(start + 1, int(np.searchsorted(ends, before + CORNERS_AT_ONCE)))
+        own = np.repeat(np.arange(start, stop), met[start:stop])
+        turn = np.arange(len(own)) + before - (ends - met)[own]
+        other = order[first[place[own]] + turn * count[place[own]] // met[own]]
+        near = (faces[own // 3] * faces[other // 3]).sum(axis=1) >= np.cos(np.radians(angle_deg)) - 1e-6
+        near |= own == other
+        for axis in range(3):
+            total[start:stop, axis] = np.bincount(own[near] - start, vectors[other[near], axis], stop - start)
+        start = stop
+    return total
 
 
 def with_creases(objects: Sequence[SceneObject], angle_deg: float) -> tuple[SceneObject, ...]:

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.geometry.coplanar import MIXERS, PARALLEL, coplanar_overlaps, hashes
+from lambent.core.arrays import MIXERS, Flags, Floats, Indices, hashes
+from lambent.core.geometry.coplanar import PARALLEL, coplanar_overlaps
 from lambent.core.geometry.triangles import triangle_areas, triangle_normals
 from lambent.core.plain import first_of
 from lambent.scenes.mesh import vertices_at_corners

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.geometry.directions import basis, normalize
-from lambent.core.geometry.triangles import area_vectors, cross_2d
+from lambent.core.geometry.triangles import area_vectors, corner_angles, cross_2d
 
 
 def triangulate(positions: Floats, corners: Indices, sizes: Indices) -> tuple[Indices, Indices]:
@@ -100,10 +100,8 @@ def smooth_normals(positions: Floats, triangles: NDArray[np.integer], shared: ND
     corner = positions[triangles]
     total = np.zeros((int(shared.max()) + 1 if shared.size else 0, 3))
     with np.errstate(invalid="ignore", over="ignore"):
-        normal = normalize(np.nan_to_num(area_vectors(corner)))
+        normal, angles = normalize(np.nan_to_num(area_vectors(corner))), np.nan_to_num(corner_angles(corner))
         for i in range(3):
-            e1, e2 = (normalize(corner[:, (i + k) % 3] - corner[:, i]) for k in (1, 2))
-            angle = np.arccos(np.clip(np.nan_to_num(np.sum(e1 * e2, axis=-1)), -1, 1))
             for axis in range(3):
-                total[:, axis] += np.bincount(shared[:, i], angle * normal[:, axis], minlength=len(total))
+                total[:, axis] += np.bincount(shared[:, i], angles[:, i] * normal[:, axis], minlength=len(total))
     return normalize(total)

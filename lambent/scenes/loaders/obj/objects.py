@@ -13,6 +13,7 @@ from lambent.core.ceilings import MATERIALS, TRIANGLES
 from lambent.core.errors import UserError
 from lambent.core.plain import UniqueNames
 from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
+from lambent.scenes.loaders.meshes.creases import DEVIATION_DEG
 from lambent.scenes.loaders.meshes.polygons import smooth_normals, triangulate
 from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.loaders.obj.mtl import Library
@@ -21,12 +22,16 @@ from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.scene import Mesh, SceneObject
 
 OBJECTS_MAX = 4096  # more groups than this are an artefact of the exporter, not objects
+UNSTATED = -1
 UNREAD = {"l": "lines", "p": "points", "curv": "curves", "surf": "surfaces", "vp": "curves"}
 
 
 @dataclass(frozen=True)
 class Triangles:
-    """Corners (T, 3, 3) as indices into v, vt, vn of every triangle, its line number and its smoothing group (T,)."""
+    """Corners (T, 3, 3) as indices into v, vt, vn of every triangle, its line number and its smoothing group (T,).
+
+    Group 0 is flat, UNSTATED comes before the first statement.
+    """
 
     corners: Indices
     lines: Indices
@@ -83,7 +88,7 @@ def triangles_of(text: ObjText, file: Path) -> Triangles:
     places, polygon = triangulate(text.v, text.corners[:, 0], text.sizes)
     TRIANGLES.check(len(places), file=file)
     lines = text.lines[polygon]
-    at, groups = [0], [0]
+    at, groups = [0], [UNSTATED]
     for line, word, rest in text.words:
         if word == "s":
             at.append(line)
@@ -135,8 +140,9 @@ def mesh_of_triangles(
 ) -> tuple[Mesh | None, list[str]]:
     """Mesh of some of a file's triangles, None if nothing is left, and notes of repairs.
 
-    Missing normals follow the smoothing groups; if there is neither a normal nor a group, they are as of `mesh_of`. If
-    `faceted` is True all normals are flat; if False, missing ones are smooth everywhere.
+    Missing normals follow the smoothing groups; if there is neither a normal nor a group, they are as of `mesh_of`,
+    with DEVIATION_DEG if nothing says that faces are flat. If `faceted` is True all normals are flat; if False, missing
+    ones are smooth everywhere.
     """
     notes = []
     corners, normals = triangles.corners.copy(), text.vn
@@ -144,6 +150,8 @@ def mesh_of_triangles(
     if faceted:
         lacking[:] = True
     smooth = (triangles.smoothing > 0) if faceted is None else np.full(len(corners), not faceted)
+    if crease_deg is None and (triangles.smoothing == UNSTATED).all():
+        crease_deg = DEVIATION_DEG
     bare = crease_deg is not None and faceted is None and bool(lacking.all()) and not smooth.any()
     if lacking.any() and not bare:
         made, numbers = _made_normals(text.v, corners[lacking, :, 0], triangles.smoothing[lacking], smooth[lacking])
