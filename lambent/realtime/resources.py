@@ -16,9 +16,10 @@ from lambent.realtime.gpu.device import WEBGPU_LIMITS
 from lambent.realtime.gpu.layouts import Layouts
 from lambent.realtime.gpu.pipelines import VERTEX_FLOATS
 from lambent.realtime.gpu.structs import OBJECT_DTYPE
-from lambent.realtime.gpu.uploads import half, upload, with_alpha
+from lambent.realtime.gpu.uploads import half, upload, upload_layer, with_alpha
 from lambent.realtime.incident import LookUp, brings_light, look_ups
 from lambent.realtime.integrators.integrators import Cube
+from lambent.realtime.lamps.changed import ChangedLamps
 from lambent.realtime.lamps.lamps import PointLamps
 from lambent.realtime.light.baked import DARK, BakedScene, Probe
 from lambent.realtime.light.probe_light import ProbeLight, kind_of
@@ -178,12 +179,13 @@ class SceneResources:
         for layer, texels in enumerate(sides):
             if texels is not None:
                 self.light_layers[layer] = texels
-                height, width = texels.shape[:2]
-                self._layouts.device.queue.write_texture(
-                    {"texture": self._light_texture, "origin": (0, 0, layer)},
-                    np.ascontiguousarray(self.lamps.taken_out(layer, texels)),
-                    {"bytes_per_row": width * 8, "rows_per_image": height}, (width, height, 1),
-                )  # fmt: skip
+                without = self.lamps.taken_out(layer, texels)
+                upload_layer(self._layouts.device, self._light_texture, layer, without)
+
+    @cached_property
+    def changed_lamps(self) -> ChangedLamps:
+        """Shows lamps that were moved, aimed or exchanged."""
+        return ChangedLamps(self._layouts, self)
 
     def light_of(self, name: str) -> ProbeLight:
         """The light of the object of this name, shared with other objects."""

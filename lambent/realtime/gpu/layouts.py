@@ -60,8 +60,9 @@ class Layouts:
         return self.device.create_bind_group_layout(entries=entries)
 
     def buffer(self, usage: str, data: NDArray[Any]) -> Any:
-        """Constant buffer of an array; `usage` is UNIFORM, STORAGE, VERTEX or INDEX."""
-        return self.device.create_buffer_with_data(data=data.tobytes(), usage=wgpu.BufferUsage[usage])
+        """Buffer of an array, which can be written again; `usage` is UNIFORM, STORAGE, VERTEX or INDEX."""
+        usages = wgpu.BufferUsage[usage] | wgpu.BufferUsage.COPY_DST
+        return self.device.create_buffer_with_data(data=data.tobytes(), usage=usages)
 
     def uniform(self, size: int) -> Any:
         """Uniform buffer of `size` bytes, rewritten for each frame."""

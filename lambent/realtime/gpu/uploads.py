@@ -31,10 +31,15 @@ def with_alpha(rgb: Floats) -> NDArray[np.float16]:
     return rgba
 
 
-def upload(device: Any, levels: Sequence[NDArray[Any]], format: str) -> Any:
-    """Texture of MIP levels (layers, rows, columns, channels) with texels of `format`, to be sampled and written to."""
+def upload(device: Any, levels: Sequence[NDArray[Any]], format: str, *, drawn_into: bool = False) -> Any:
+    """Texture of MIP levels (layers, rows, columns, channels) with texels of `format`, to be sampled and written to.
+
+    It can be `drawn_into` and read back too, if that is asked for.
+    """
     layers, height, width = levels[0].shape[:3]
     usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
+    if drawn_into:
+        usage |= wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.COPY_SRC
     size = (width, height, layers)
     texture = device.create_texture(size=size, format=format, mip_level_count=len(levels), usage=usage)
     for level, values in enumerate(levels):
@@ -46,6 +51,15 @@ def upload(device: Any, levels: Sequence[NDArray[Any]], format: str) -> Any:
             (columns, rows, layers),
         )
     return texture
+
+
+def upload_layer(device: Any, texture: Any, layer: int, texels: NDArray[Any]) -> None:
+    """Replace a layer of a texture by texels (rows, columns, ...)."""
+    rows, columns = texels.shape[:2]
+    device.queue.write_texture(
+        {"texture": texture, "origin": (0, 0, layer)}, np.ascontiguousarray(texels),
+        {"bytes_per_row": texels.nbytes // rows, "rows_per_image": rows}, (columns, rows, 1),
+    )  # fmt: skip
 
 
 def cube_texture(device: Any, levels: Sequence[Floats], format: str = "rgba16float") -> Any:

@@ -2,32 +2,90 @@
 
 from __future__ import annotations
 
+import operator
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.realtime.gpu.layouts import Layouts
 from lambent.realtime.gpu.structs import LAMP_DTYPE
-from lambent.realtime.gpu.uploads import upload
+from lambent.realtime.gpu.uploads import upload, upload_layer
 from lambent.realtime.lamps.drawn import DrawnLamps
-from lambent.store.lamps import MOST_LAMPS
+from lambent.store.lamps import MOST_LAMPS, LampRecord
 
 
 class PointLamps:
     """Bindings of lamps for the shaders of light, and constants of their pipelines; no lamps without `drawn`."""
 
     def __init__(self, layouts: Layouts, drawn: DrawnLamps | None) -> None:
-        self._drawn, self._queue = drawn, layouts.device.queue
+        self._drawn, self._device = drawn, layouts.device
+        self._factors: Floats | None = None
         self._records = layouts.uniform(MOST_LAMPS * LAMP_DTYPE.itemsize)
         self.constants = {"LAMPS": 0 if drawn is None else len(drawn.records)}
-        reached = np.zeros(4, np.uint32) if drawn is None else drawn.reached
-        discs = np.zeros((1, 1, 1), np.float16) if drawn is None else np.concatenate([drawn.distances, drawn.profiles])
-        texture = upload(layouts.device, [discs[..., None]], "r16float")
-        stored = layouts.buffer("STORAGE", reached)
-        self.bindings = self._records, stored, texture.create_view(dimension="2d-array")
+        self._reached = np.zeros(4, np.uint32) if drawn is None else drawn.reached
+        self._stored = layouts.buffer("STORAGE", self._reached)
+        self._changed: frozenset[int] = frozenset()
+        self._profiles: list[NDArray[np.float16]] = []  # beyond those of `drawn`
+        self._discs = self._uploaded_discs()
         self._in_map: list[Floats] = []
         if drawn is not None:
             self.shine(None, drawn.in_map())
+
+    @property
+    def bindings(self) -> tuple[Any, ...]:
+        """The last resources of `layouts.LIGHT`."""
+        return self._records, self._stored, self._view
+
+    @property
+    def records(self) -> tuple[LampRecord, ...]:
+        """The lamps as they shine, in units of the scene."""
+        return () if self._drawn is None else self._drawn.records
+
+    def _uploaded_discs(self) -> Any:
+        """Texture of shadow maps, and profiles of `drawn` and beyond."""
+        discs = np.zeros((1, 1, 1), np.float16)
+        if (drawn := self._drawn) is not None:
+            discs = np.concatenate([drawn.distances, drawn.profiles, *(one[None] for one in self._profiles)])
+        texture = upload(self._device, [discs[..., None]], "r16float", drawn_into=True)
+        self._view = texture.create_view(dimension="2d-array")
+        return texture
+
+    def change(self, drawn: DrawnLamps, profiles: list[NDArray[np.float16]], places: frozenset[int]) -> bool:
+        """Shine as the records of `drawn`, which may have these further profiles; return whether shadow maps are lost.
+
+        At some `places` among the records, lamps are not as baked: their light may arrive anywhere.
+        """
+        self._drawn, lost = drawn, len(profiles) > len(self._profiles)
+        is_same = len(profiles) == len(self._profiles) and all(map(operator.is_, profiles, self._profiles))
+        if not is_same:
+            self._profiles, lost = profiles, True
+            self._discs = self._uploaded_discs()
+        if places != self._changed:
+            self._changed = places
+            bits = np.zeros(4, np.uint32)
+            for place in places:
+                bits[[place // 32, 2 + place // 32]] |= np.uint32(1 << place % 32)
+            self._device.queue.write_buffer(self._stored, 0, self._reached | bits)
+        self.shine(self._factors, self._in_map)
+        return lost
+
+    def disc(self, place: int) -> Any:
+        """View of the shadow map of a lamp, by its place among the records."""
+        return self._discs.create_view(dimension="2d", base_array_layer=place, array_layer_count=1)
+
+    def distances(self, place: int) -> NDArray[np.float16]:
+        """(S, S) the shadow map of a lamp, m; waits for the GPU."""
+        side = self._discs.size[0]
+        source = {"texture": self._discs, "origin": (0, 0, place)}
+        data = self._device.queue.read_texture(source, {"bytes_per_row": 2 * side}, (side, side, 1))
+        return np.frombuffer(data, np.float16).reshape(side, side)
+
+    def restore(self, place: int) -> None:
+        """Show a lamp's shadow map as baked."""
+        assert self._drawn is not None, "there are lamps"
+        upload_layer(self._device, self._discs, place, self._drawn.distances[place])
 
     def taken_out(self, side: int, texels: NDArray[np.float16]) -> NDArray[np.float16]:
         """A layer (H, W, 4) of the light map: sides without the direct light of the lamps, others as they are."""
@@ -41,11 +99,11 @@ class PointLamps:
         """Shine in a mix of light groups: factors (G, 3) or None as baked, and `DrawnLamps.in_map` of it."""
         if self._drawn is None:
             return
-        self._in_map = in_map
+        self._factors, self._in_map = factors, in_map
         data = np.zeros(MOST_LAMPS, LAMP_DTYPE)
         lamps = self._drawn.records
         for row, lamp, intensity in zip(data, lamps, self._drawn.intensities(factors), strict=False):
             row["place"] = *lamp.position, np.sin(np.radians(lamp.reach_deg) / 2)
             row["across"][:3], row["down"][:3] = lamp.axes[:2]
             row["along"], row["intensity"][:3] = (*lamp.axes[2], lamp.profile), intensity
-        self._queue.write_buffer(self._records, 0, data.tobytes())
+        self._device.queue.write_buffer(self._records, 0, data.tobytes())
