@@ -76,7 +76,8 @@ class MaterialTextures:
 class SceneObject:
     """A named mesh, the name of its material, and the radiance it emits (one-sided, along the normal).
 
-    `light_map_scale` multiplies its light map texels per metre: small for surfaces that are never seen.
+    `light_map_scale` multiplies its light map texels per metre: small for surfaces that are never seen. An object with
+    a `luminaire` is its opening: paths see the radiance of its photometry, of which `emission` is the mean.
     """
 
     name: str
@@ -84,6 +85,7 @@ class SceneObject:
     material: str
     emission: Triple = (0.0, 0.0, 0.0)
     light_map_scale: float = 1.0
+    luminaire: IesLight | None = None
 
 
 @dataclass(frozen=True)

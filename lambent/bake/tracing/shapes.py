@@ -16,6 +16,7 @@ import mitsuba as mi
 import numpy as np
 
 from lambent.bake.bsdfs.material_plugin import TANGENT_ATTRIBUTE
+from lambent.bake.tracing.lights.opening_emitter import opening_emitter
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.scenes.geometry import merge
 from lambent.scenes.scene import SceneObject
@@ -135,7 +136,9 @@ def mesh_of(o: SceneObject, bsdf: Any, uv2: Floats | None = None) -> Any:
     """mi.Mesh of an object with a BSDF, its brushing direction and, if given, its light map coordinates."""
     props = mi.Properties()
     props["mesh_bsdf"] = bsdf
-    if any(o.emission):
+    if o.luminaire is not None:
+        props["mesh_emitter"] = opening_emitter(o.luminaire)
+    elif any(o.emission):
         radiance = {"type": "rgb", "value": list(o.emission)}
         props["mesh_emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
     vertices, faces = len(o.mesh.positions), len(o.mesh.faces)

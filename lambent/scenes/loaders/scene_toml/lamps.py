@@ -124,7 +124,10 @@ class DirectionalSection(_Coloured):
 
 
 class IesSection(_Coloured):
-    """A luminaire of an IES or EULUMDAT file, straight down unless aimed; `lumens` scales it to that flux."""
+    """A luminaire of an IES or EULUMDAT file, straight down unless aimed; `lumens` scales it to that flux.
+
+    Its light leaves a point, or the `opening` that the file describes.
+    """
 
     kind: Literal["ies"]
     file: str
@@ -133,8 +136,13 @@ class IesSection(_Coloured):
     direction: Vector = (0.0, -1.0, 0.0)
     rotation_deg: Finite = 0.0
     lumens: NotNegative | None = None
+    opening: Literal["point", "file"] = "point"
 
     _direction = field_validator("direction")(not_zero)
+
+    @property
+    def has_size(self) -> bool:
+        return self.opening == "file"
 
     def light_of(self, luminaire: Luminaire) -> IesLight:
         photometry = luminaire.photometry(self.lamp_set) if self.lumens is None else luminaire.values
