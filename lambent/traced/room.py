@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from lambent.core.errors import UserError
 from lambent.core.light.light_mix import Factors, factors_of
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
+from lambent.scenes.lamp_edits import LampEdit, with_lamp_edits
 from lambent.scenes.looks.textures import prepared
 from lambent.scenes.looks.variants import textures_in_look, textures_in_looks
 from lambent.scenes.replacement import Replacement, with_replacements
@@ -126,17 +128,19 @@ class TracedRoom:
 
 
 def room_of_store(
-    store: Store, scene: Scene, *, sky_turn_deg: float = 0.0, replacements: Sequence[Replacement] = ()
-) -> TracedRoom:
+    store: Store, scene: Scene, *, sky_turn_deg: float = 0.0, replacements: Sequence[Replacement] = (),
+    lamps: Mapping[int, LampEdit] = MappingProxyType({}),
+) -> TracedRoom:  # fmt: skip
     """A store's room: its geometry and light map, under the lights of its scene (`store.source.scene_of`).
 
-    Sky and sun can be rotated about the vertical, and meshes take the place of objects; the light map stays as baked.
+    Sky and sun can be rotated about the vertical, `lamps` edited, and meshes take the place of objects; the light map
+    stays as baked.
     """
     engine()
     from lambent.bake.pictures.stored import stored_scene  # imports Mitsuba, whose variant `engine` has set
 
     folder = TemporaryDirectory()
-    lit = under_turned_sky(_as_drawn(scene), sky_turn_deg, Path(folder.name))
+    lit = under_turned_sky(_as_drawn(with_lamp_edits(scene, lamps)), sky_turn_deg, Path(folder.name))
     return TracedRoom(stored_scene(store, lit, replacements), StoredLight(store, scene.lights), folder)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 from lambent.bake.bake import bake
 from lambent.bake.quality import Quality
@@ -15,6 +16,7 @@ from lambent.bake.running.watch import Watch
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
+from lambent.scenes.lamp_edits import LampEdit, with_lamp_edits
 from lambent.scenes.looks.variants import textures_in_looks
 from lambent.scenes.scene import ImageTexture, Look, Scene
 from lambent.store.contract import LAST_RUN, SIDES, TIMINGS, needs_probe, probe_name, scene_record, shared_probes
@@ -39,6 +41,7 @@ def bake_again(
     progress: Progress = silent,
     *,
     textures: Mapping[str, str | ImageTexture] | None = None,
+    lamps: Mapping[int, LampEdit] = MappingProxyType({}),
     quality: Quality | None = None,
     watch: Watch | None = None,
 ) -> Store:
@@ -50,6 +53,8 @@ def bake_again(
     ----------
     textures : mapping, optional
         By material, the name of the material whose textures it uses, "" for none, or an image.
+    lamps : mapping, optional
+        Edits of lamps, by their place among the scene's lights.
     quality : Quality, optional
         By default the store's preset.
     watch : Watch, optional
@@ -67,7 +72,7 @@ def bake_again(
     if LIGHT not in store:
         raise UserError("store has no light map", file=folder, field=LIGHT)
     made_with = store.artefact(LIGHT).meta
-    scene = scene_of(store)
+    scene = with_lamp_edits(scene_of(store), lamps)
     exchanged = {name: Look(scene.materials[name], of) for name, of in (textures or {}).items()}
     scene = replace(
         scene,
@@ -82,7 +87,15 @@ def bake_again(
         if not _same_geometry(store, copied):
             what = "these materials need probes or parts that the store lacks, or its geometry is of an older version"
             raise UserError(what, file=folder, hint="bake the scene again, with these materials")
-    return bake(scene, copy, only=set(KINDS), quality=effort, seed=seed, progress=progress, watch=watch)
+    return bake(
+        scene,
+        copy,
+        only={*KINDS, *(("lamps",) if lamps else ())},
+        quality=effort,
+        seed=seed,
+        progress=progress,
+        watch=watch,
+    )
 
 
 def _check_parts(store: Store, scene: Scene, materials: Mapping[str, Material]) -> None:

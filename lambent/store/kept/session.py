@@ -21,6 +21,7 @@ from lambent.core.inputs import parse_json, read_bytes
 from lambent.core.light.light_mix import LightMix
 from lambent.core.strict import Strict
 from lambent.materials.document import Material
+from lambent.scenes.lamp_edits import LampEdit
 from lambent.scenes.scene import ImageTexture
 from lambent.store.lock import lock
 
@@ -60,12 +61,14 @@ class RoomState(Strict):
     """The look of a room: replacement materials by name, and the mix of its light groups.
 
     `textures` maps a material to what it shows instead of its own textures: those of another material, "" for none, or
-    an image, by its name in the store (`store.kept.images`).
+    an image, by its name in the store (`store.kept.images`). `lamps` are edited, by their place in the
+    scene.
     """
 
     materials: dict[str, Material] = Field(default_factory=dict)
     textures: dict[str, str | ImageTexture] = Field(default={}, exclude_if=lambda one: not one)
     light: LightMix = LightMix()
+    lamps: dict[int, LampEdit] = Field(default={}, exclude_if=lambda one: not one)
 
     def unknown(self, materials: Collection[str], groups: Collection[str]) -> list[str]:
         """Names of materials and light groups that are missing from a store."""
@@ -80,7 +83,7 @@ class RoomState(Strict):
             name: of for name, of in self.textures.items()
             if name in materials and (isinstance(of, ImageTexture) or of in (*materials, ""))
         }  # fmt: skip
-        return RoomState(materials=known, textures=textures, light=self.light)
+        return RoomState(materials=known, textures=textures, light=self.light, lamps=self.lamps)
 
 
 class WalkSession(Strict):

@@ -12,6 +12,7 @@ from lambent.core.light.light_mix import LightMix, MixTrack
 from lambent.core.plain import Triple, plain_name
 from lambent.editing.session.history import History
 from lambent.materials.document import Material
+from lambent.scenes.lamp_edits import LampEdit
 from lambent.scenes.scene import ImageTexture
 from lambent.store.kept.session import RoomState, WalkSession
 
@@ -87,6 +88,11 @@ class MaterialEdits:
         """Change the light mix within the present stroke, or begin a stroke."""
         if light != self.light:
             self._go_on(room=self.room.model_copy(update={"light": light}))
+
+    def edit_lamp(self, number: int, edit: LampEdit | None) -> None:
+        """Move, aim or exchange a lamp, None for as baked, within the present stroke, or begin a stroke."""
+        others = {other: one for other, one in self.room.lamps.items() if other != number}
+        self._go_on(room=self.room.model_copy(update={"lamps": others if edit is None else {**others, number: edit}}))
 
     def take(self, room: RoomState) -> None:
         """Set the state of the whole room as one stroke; ignore materials that the scene does not have."""

@@ -14,7 +14,7 @@ from lambent.core.views.camera import Camera, rays_through
 from lambent.viewer.cameras import cameras
 from lambent.viewer.cameras.framing import framed
 from lambent.viewer.cameras.picking import Geometry
-from lambent.viewer.input import CLICK_PX, Input
+from lambent.viewer.input import CLICK_PX, LEFT, Input
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.modes.walk.views.walls import Walls
 
@@ -28,6 +28,7 @@ SHORTCUTS = (
     ("right, middle drag", "pan (orbit)"),
     ("wheel", "move towards the orbit's centre, or away"),
     ("click", "select the object under the mouse"),
+    ("drag a lamp's mark", "move the lamp in the plane of the view (Lamps panel)"),
     ("Esc", "clear the selection"),
     ("1 ... 9", "jump to a camera of the scene or a saved view"),
     ("V", "save the view"),
@@ -53,6 +54,7 @@ class WalkInput(Input):
         self.held: set[str] = set()
         self._tapped: set[str] = set()  # pressed since the last step; may be released before a slow frame ends
         self._fast = self._on_divider = self._flew = False
+        self._lamp: int | None = None  # the lamp that the mouse holds
 
     @property
     def walking(self) -> bool:
@@ -87,9 +89,30 @@ class WalkInput(Input):
         """Grab the divider here, because Dear ImGui reacts only after a frame with the mouse over it."""
         place, divider = self.screen.picture, self._state.divider
         self._on_divider = divider is not None and abs(x - place.x - divider.share * place.width) <= CLICK_PX
+        grabs = self._button == LEFT and not self._on_divider and not self._state.lamps.aiming
+        self._lamp = self._lamp_at(*self._at) if grabs else None
+
+    @property
+    def moves_lamp(self) -> bool:
+        """Whether the mouse holds a lamp."""
+        return self._button is not None and self._lamp is not None
+
+    def choose_lamp_under_cursor(self) -> None:
+        """Choose the lamp whose mark is under the mouse, if there is one."""
+        if (cursor := self._state.meter.cursor) is not None:
+            self._lamp_at(*self.screen.picture.point(*cursor))
+
+    def _lamp_at(self, x: float, y: float) -> int | None:
+        place, state = self.screen.picture, self._state
+        at = x - place.x, y - place.y
+        return state.lamps.pick(state.navigation.camera, at, (max(1, place.width), max(1, place.height)))
 
     def dragged(self, dx: float, dy: float) -> None:
         divider = self._state.divider
+        if self._lamp is not None:
+            place, camera = self.screen.picture, self.navigation.camera
+            self._state.lamps.drag(self._lamp, camera, dx, dy, (place.width, place.height))
+            return
         if self._on_divider and divider is not None:
             place = self.screen.picture
             divider.move((self._at[0] - place.x) / place.width)
@@ -99,11 +122,15 @@ class WalkInput(Input):
             super().dragged(dx, dy)
 
     def clicked(self, x: float, y: float) -> None:
-        if self._on_divider:
+        if self._on_divider or self._lamp is not None:
             return
         camera, place = self.navigation.camera, self.screen.picture
         towards = rays_through(camera, x, y, place.width, place.height)
         found, distance_m = self._geometry.hit(camera.position, towards)
+        if self._state.lamps.aiming:
+            if found is not None:
+                self._state.lamps.aim_at(triple(np.array(camera.position) + distance_m * towards))
+            return
         at_px = (x - place.x, y - place.y)
         if self._state.fields.pick(camera, at_px, (place.width, place.height), distance_m):
             return

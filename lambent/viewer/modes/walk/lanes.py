@@ -10,9 +10,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from lambent.core.errors import UserError
 from lambent.core.plain import Triple
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
+from lambent.scenes.lamp_edits import LampEdit
 from lambent.scenes.scene import ImageTexture, Look
 from lambent.store.kept.images import readable
 from lambent.store.kept.session import RoomState
@@ -20,6 +22,7 @@ from lambent.viewer.modes.walk.light.answering import Answering, AnsweringLight
 from lambent.viewer.picture import Picture
 from lambent.viewer.screen import Screen
 
+Lamps = Mapping[int, LampEdit]
 MIX_S = 0.01  # interval of polling for a light mix
 ANSWER_S = 0.01  # interval of polling for computed light
 
@@ -35,6 +38,7 @@ class Lane:
     say: Callable[[str], None]
     folder: Path | None = None  # of the store
     room: RoomState = field(default_factory=RoomState)
+    lamps: Lamps = field(default_factory=dict)  # of `room`, without files that cannot be read
     textures: Mapping[str, str | ImageTexture] = field(default_factory=dict)  # of `room`, images that can be read alone
 
     @classmethod
@@ -60,6 +64,8 @@ class Lane:
             show_textures(self.renderer, self.textures)
             for fault in faults:
                 self.say(fault)
+        if room.lamps != self.room.lamps:
+            self.lamps = show_lamps(self.renderer, room.lamps, self.say)
         self.room = room
         if self.answering is not None:
             self.answering.update(room.materials, self.textures)
@@ -91,8 +97,21 @@ class Lane:
     def lend_light(self, other: Renderer) -> None:
         """Let another renderer of the scene show this lane's state in any light mix."""
         show_textures(other, self.textures)
+        show_lamps(other, self.lamps, self.say)
         if (groups := self.renderer.mixer.groups) is not None:
             other.mixer.answer(groups)
+
+
+def show_lamps(renderer: Renderer, edits: Lamps, say: Callable[[str], None]) -> Lamps:
+    """Show edited lamps, if a file cannot be read all with their own light; return what is shown."""
+    lamps = renderer.resources.changed_lamps
+    try:
+        lamps.show(edits)
+    except UserError as error:
+        say(f"luminaire not shown: {error}")
+        edits = {number: replace(edit, file="") for number, edit in edits.items()}
+        lamps.show(edits)
+    return edits
 
 
 def show_textures(renderer: Renderer, textures: Mapping[str, str | ImageTexture]) -> None:

@@ -16,6 +16,7 @@ from lambent.realtime.objects.replaced import with_replacements
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.resources import device_needs
 from lambent.realtime.sun.turned_sky import under_turned_sky
+from lambent.scenes.photometry.files import ENDINGS as LUMINAIRES
 from lambent.scenes.replacement import parse_replacements
 from lambent.store.source import SOURCE
 from lambent.store.store import Store
@@ -30,6 +31,7 @@ from lambent.viewer.modes.walk.light.answering import AnsweringLight
 from lambent.viewer.modes.walk.panels import (
     compare,
     film,
+    lamps,
     light_field,
     lights,
     marks,
@@ -64,6 +66,7 @@ def open_store(
     state = WalkState.of(baked.record, movement, screen, store.folder)
     state.marks.sources, state.fields.fields = baked.probes, baked.light_fields
     state.lights.groups = baked.groups.records if baked.groups is not None else ()
+    state.lamps.records = () if baked.lamps is None else baked.lamps.records
     state.lights.fields = bool(baked.light_fields)
     state.sky_turn_deg, state.replaced = sky_turn_deg, replaced
     from_scene = isinstance(store.documents.get(SOURCE), str) and not replaced
@@ -113,6 +116,7 @@ class WalkMode(Mode):
         state, place = self.state, self.screen.picture
         overlay.over(place, textures.get("outline"))
         light_field.draw_over(state.fields, place, textures)
+        lamps.draw_over(state.lamps, state.navigation.camera, place)
         marks.draw(state.marks, state.selected_parts, place, textures)
         comparison, recorder, filming = state.comparison, state.recordings.recorder, state.films.under_way
         if comparison.mode == "error map" and comparison.figures is not None:
@@ -125,7 +129,7 @@ class WalkMode(Mode):
             lines.append(f"recording {self.screen.clock() - recorder.began_s:.0f} s   (R stops)")
         overlay.draw(self.screen, lines)
 
-        if not imgui.is_any_item_active():
+        if not imgui.is_any_item_active() and not self.input.moves_lamp:
             state.materials.edits.end_stroke()
 
     def advance(self, dt_s: float) -> None:
@@ -143,9 +147,12 @@ class WalkMode(Mode):
         return least(POLL_S if busy else None, self.state.session.wait_s())
 
     def drop(self, path: str) -> None:
-        """Show an image on the selected object's material, or open a document or measurement in its editor."""
+        """Exchange a lamp, show an image on the selected object's material, or open a file in the material's editor."""
         name, materials = self.state.selection.material, self.state.materials
-        if path.lower().endswith(ENDINGS):
+        if path.lower().endswith(LUMINAIRES):
+            self.input.choose_lamp_under_cursor()
+            self.state.lamps.exchange(path)
+        elif path.lower().endswith(ENDINGS):
             self.state.texturing.open(name, path)
         elif materials.editor is not None:
             materials.editor.files.open(path)
@@ -189,6 +196,7 @@ class WalkMode(Mode):
 def panels(state: WalkState) -> tuple[Panel, ...]:
     """Panels of the column."""
     about = (state.missing, state.scene.warnings)
+    of_lamps = Panel("Lamps", partial(lamps.draw, state.lamps), "move, aim and exchange a lamp of the scene")
     return (
         Panel(
             "Material",
@@ -214,6 +222,7 @@ def panels(state: WalkState) -> tuple[Panel, ...]:
             partial(lights.draw, state.lights, state.recordings),
             "each group of lamps: on or off, brightness, colour",
         ),
+        *([of_lamps] if state.lamps.records else []),
         Panel("Drawing", partial(view.draw_drawing, state), "how reflections are drawn, and how fast"),
         Panel(
             "Light field",

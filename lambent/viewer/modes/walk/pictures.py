@@ -142,7 +142,8 @@ class Pictures(Pair):
     def _appearance(self) -> Appearance:
         """The materials' textures and the light of the room."""
         lane, answers = self._lane, self._lane.shown.on and self._lane.shown.possible
-        return Appearance(lane.textures, answers, self._rebaked is not None and self._rebaked.is_copied(lane.room))
+        copied = self._rebaked is not None and self._rebaked.is_copied(lane.room)
+        return Appearance(lane.textures, lane.lamps, answers, copied)
 
     def _traced_kinds(self, wanted: FrameState) -> tuple[Kind, ...]:
         """Kinds of traced pictures that the window shows at rest."""

@@ -18,6 +18,7 @@ from lambent.viewer.look import Look
 from lambent.viewer.mode import Divider
 from lambent.viewer.modes.walk.comparison import Comparison
 from lambent.viewer.modes.walk.light.answering import Answering
+from lambent.viewer.modes.walk.light.lamps import Lamps
 from lambent.viewer.modes.walk.light.light_fields import FieldView
 from lambent.viewer.modes.walk.light.lights import Lights
 from lambent.viewer.modes.walk.light.metering import Meter
@@ -135,6 +136,7 @@ class WalkState:
     films: Films = field(default_factory=Films)
     fields: FieldView = field(default_factory=FieldView)
     lights: Lights = field(default_factory=Lights)
+    lamps: Lamps = field(default_factory=Lamps)
     store: Path | None = None  # folder of the store
     sky_turn_deg: float = 0.0  # rotation of the sky, as opened
     replaced: tuple[str, ...] = ()  # replacement meshes, as `scenes.replacement` reads them
@@ -173,7 +175,7 @@ class WalkState:
             Materials(edits, screen), Recordings(views, navigation, screen, lights),
             Marks({}, scene.reflectors), SessionKeeper(edits, store, screen), States(edits, scene),
             Texturing(edits, screen, store),
-            meter=meter, lights=lights,
+            meter=meter, lights=lights, lamps=Lamps(edits, say=screen.say),
             store=store, store_name="STORE" if store is None else store.name,
             missing=() if fault is None else (fault,),  # a message would vanish before the window is open
         )  # fmt: skip

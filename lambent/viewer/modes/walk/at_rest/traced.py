@@ -19,6 +19,7 @@ from lambent.core.light.false_colour import Range
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.targets import pixels
 from lambent.realtime.overlays.computed_picture import UploadedPicture
+from lambent.scenes.lamp_edits import LampEdit
 from lambent.scenes.scene import ImageTexture
 from lambent.viewer.modes.walk.at_rest.tracing import ALL_LIGHT, MOST_SAMPLES, Kind, Traced, Tracing, Wish
 from lambent.viewer.modes.walk.light.light_fields import shows_choice
@@ -41,11 +42,14 @@ class Appearance:
     ----------
     textures : mapping
         Textures in place of materials' own.
+    lamps : mapping
+        Edits of lamps, by number.
     answers, rebaked : bool
         Whether light follows edited materials, and whether the copy beside the store has it.
     """
 
     textures: Textures
+    lamps: Mapping[int, LampEdit]
     answers: bool
     rebaked: bool
 
@@ -357,5 +361,5 @@ def _wish_of(frame: FrameState, appearance: Appearance) -> Wish:
     """What pictures of a frame depend on, without their kinds and without where their light is."""
     return Wish(
         0, (), frame.camera, frame.size, dict(frame.materials), dict(appearance.textures), dict(frame.light),
-        frame.show if frame.show in TRACEABLE else ALL_LIGHT, appearance.answers,
+        frame.show if frame.show in TRACEABLE else ALL_LIGHT, appearance.answers, lamps=dict(appearance.lamps),
     )  # fmt: skip

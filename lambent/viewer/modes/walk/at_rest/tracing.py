@@ -15,6 +15,7 @@ from lambent.core.light.light_mix import Factors
 from lambent.core.plain import triple
 from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
+from lambent.scenes.lamp_edits import LampEdit
 from lambent.scenes.scene import ImageTexture
 from lambent.store.kept.session import RoomState
 from lambent.viewer.background.worker_process import WorkerProcess
@@ -46,6 +47,8 @@ class Wish:
         Samples of the one wanted picture; 0: pictures with more and more.
     coarse : bool
         Whether the first picture may have half the width and height, to appear at once.
+    lamps : mapping
+        Edits of lamps, by their place among the scene's lights.
     """
 
     number: int
@@ -60,6 +63,7 @@ class Wish:
     rebaked: bool = False
     samples: int = 0
     coarse: bool = False
+    lamps: Mapping[int, LampEdit] = field(default_factory=dict)
 
     def numbered(self, number: int) -> Wish:
         """The same request under another number."""
@@ -67,7 +71,7 @@ class Wish:
 
     def said(self) -> dict[str, Any]:
         """As a JSON object."""
-        room = RoomState(materials=dict(self.materials), textures=dict(self.textures))
+        room = RoomState(materials=dict(self.materials), textures=dict(self.textures), lamps=dict(self.lamps))
         plain = {
             name: getattr(self, name)
             for name in ("number", "kinds", "size", "show", "answers", "rebaked", "samples", "coarse")
@@ -87,7 +91,7 @@ class Wish:
             (int(said["size"][0]), int(said["size"][1])), room.materials, room.textures,
             {name: triple(factor) for name, factor in said["light"].items()}, str(said["show"]),
             bool(said["answers"]), bool(said["rebaked"]),
-            int(said["samples"]), bool(said["coarse"]),
+            int(said["samples"]), bool(said["coarse"]), room.lamps,
         )  # fmt: skip
 
 

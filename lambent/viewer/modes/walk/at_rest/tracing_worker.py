@@ -17,13 +17,14 @@ import threading
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
+from lambent.scenes.lamp_edits import LampEdit, with_lamp_edits
 from lambent.scenes.replacement import parse_replacements
 from lambent.scenes.scene import Look
 from lambent.store.source import SOURCE, scene_of
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from lambent.traced.picture import TracedPicture
     from lambent.traced.room import TracedRoom
 
+Lamps = Mapping[int, LampEdit]
 NICENESS = 10  # the window has priority
 PASS_S = 0.1  # time of a pass, as far as single samples allow
 PICTURE_S = 0.5  # shortest time between two pictures
@@ -80,7 +82,7 @@ class Rooms:
                 "the store has no path of its scene file", file=folder, hint="bake the scene again from its file"
             )
         self._scene, self._replacements = scene_of(self._store), parse_replacements(replaced)
-        self._by_kind: dict[Kind, TracedRoom] = {}
+        self._by_kind: dict[Kind, tuple[Lamps, TracedRoom]] = {}  # the last room of each kind, and its lamps
         self._rebaked: tuple[object, TracedRoom] | None = None
 
     @property
@@ -91,35 +93,37 @@ class Rooms:
     def of(self, kind: Kind, wish: Wish) -> TracedRoom:
         """The room of a kind in the state of a wish."""
         if wish.rebaked and kind == "traced":
-            room = self._baked_again((wish.materials, wish.textures))
+            room = self._baked_again((wish.materials, wish.textures, wish.lamps), wish.lamps)
         else:
-            room, given = self.as_baked(kind), self.materials
+            room, given = self.with_lamps(kind, wish.lamps), self.materials
             room.set_materials({name: Look(given[name], of) for name, of in wish.textures.items()}, wish.materials)
             room.follow(wish.answers)
         room.mix(wish.light)
         return room
 
-    def as_baked(self, kind: Kind) -> TracedRoom:
-        """The room of a kind in the state of the last wish."""
+    def with_lamps(self, kind: Kind, lamps: Lamps) -> TracedRoom:
+        """The room of a kind in the state of the last wish with these edits of lamps."""
         from lambent.traced.room import room_of_paths, room_of_store
 
-        if kind not in self._by_kind:
-            turned, replaced = self._sky_turn_deg, self._replacements
-            self._by_kind[kind] = (
-                room_of_store(self._store, self._scene, sky_turn_deg=turned, replacements=replaced)
+        if kind not in self._by_kind or self._by_kind[kind][0] != lamps:
+            self._by_kind.pop(kind, None)
+            how: dict[str, Any] = {"sky_turn_deg": self._sky_turn_deg, "replacements": self._replacements}
+            room = (
+                room_of_store(self._store, self._scene, lamps=lamps, **how)
                 if kind == "traced"
-                else room_of_paths(self._scene, sky_turn_deg=turned, replacements=replaced)
+                else room_of_paths(with_lamp_edits(self._scene, lamps), **how)
             )
-        return self._by_kind[kind]
+            self._by_kind[kind] = lamps, room
+        return self._by_kind[kind][1]
 
-    def _baked_again(self, state: object) -> TracedRoom:
-        """The room of the copy beside the store, baked with these materials and textures."""
+    def _baked_again(self, state: object, lamps: Lamps) -> TracedRoom:
+        """The room of the copy beside the store, baked in a state with these lamps."""
         from lambent.bake.running.again import rebaked_copy
         from lambent.traced.room import room_of_store
 
         if self._rebaked is None or self._rebaked[0] != state:
             copy = Store.open(rebaked_copy(self._folder))
-            self._rebaked = state, room_of_store(copy, scene_of(copy))
+            self._rebaked = state, room_of_store(copy, with_lamp_edits(scene_of(copy), lamps))
         return self._rebaked[1]
 
 
@@ -200,7 +204,7 @@ def warm_up(rooms: Rooms) -> None:
     """Compile what pictures against the baked light need, also of edited materials, by small ones."""
     from lambent.traced.picture import ENDED, TracedPicture
 
-    room = rooms.as_baked("traced")
+    room = rooms.with_lamps("traced", {})
     for materials in (dict(list(rooms.materials.items())[:1]), {}):
         room.set_materials({}, materials)
         picture = TracedPicture(room.tracer, Wish(0).camera, (8, 8))

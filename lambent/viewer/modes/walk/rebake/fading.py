@@ -67,9 +67,9 @@ class Fade:
     def serves(self, lane: Lane, light: Factors) -> bool:
         """Whether this light applies to the lane's state; once complete, it serves every light mix."""
         same_mix = light == self._light or (self.done and self._groups is not None)
-        materials = lane.room.materials, lane.room.textures
+        state = lane.room.model_copy(update={"light": self._room.light})
         same_lane = lane is self.lane and lane.shown.on == self._answered
-        return same_lane and materials == (self._room.materials, self._room.textures) and same_mix
+        return same_lane and state == self._room and same_mix
 
     def step(self) -> None:
         """Upload the next step if the thread has prepared it."""

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +21,9 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.light.light_mix import Factors
 from lambent.core.views.camera import Camera, image_plane
 from lambent.realtime.gpu.cube_mips import finite
+from lambent.realtime.lamps.drawn import read_lamps
 from lambent.realtime.light.baked import BakedScene, Probe, read_probe
-from lambent.realtime.light.group_arrays import groups_in
+from lambent.realtime.light.group_arrays import GroupArrays, groups_in
 from lambent.realtime.light.group_light import GroupLight
 from lambent.realtime.light.probe_light import ProbeLight
 from lambent.realtime.resources import ObjectResources, SceneResources, light_layers
@@ -60,23 +63,26 @@ class Rebaked:
     lit: Flags
 
     @classmethod
-    def read(cls, copy: Path, shown: BakedScene, arrived: Arrived, before: Rebaked | None = None) -> Rebaked:
+    def read(
+        cls, copy: Path, shown: BakedScene, arrived: Arrived, before: Rebaked | None = None, *, lamps: bool = False
+    ) -> Rebaked:
         """Read the arrived light from the copy into memory, except light that was read `before`.
 
+        With `lamps` that were edited, regions do not count: they do not say what they hold of lamps' direct light.
         In memory it is safe from another bake, which may change the copy.
         """
         texel_object = texel_objects(shown) if before is None else before.texel_object
         count = len(shown.record.objects)
         if not arrived.light_map:
             lit = np.ones(count + 1, bool)
-            if arrived.region is not None:
+            if arrived.region is not None and not lamps:
                 lit[texel_object[~arrived.region.finished]] = False
             else:
                 lit[:] = False
             return cls(replace(shown, probes={}), texel_object, arrived, lit[:count])
         store = Store.open(copy)
         known = before is not None and before.arrived.light_map
-        scene = before.scene if before is not None and known else _with_light_map(store, shown)
+        scene = before.scene if before is not None and known else _with_light_map(store, shown, lamps)
         groups = None if scene.groups is None else replace(scene.groups, store=store)
         probes = dict(scene.probes)
         for name in shown.probes:
@@ -90,7 +96,7 @@ class Rebaked:
         """Layers (H, W, 4), as in `resources.light_layers`, for a light mix; `shown` for texels without new light."""
         scene, groups, region = self.scene, self.scene.groups, self.arrived.region
         if not self.arrived.light_map:
-            if region is None:
+            if region is None or not self.lit.any():
                 return list(shown)
             factors = np.ones((len(region.light), 3), np.float32) if groups is None else groups.factors(light)
             front = np.einsum("nhwc,nc->hwc", region.light.astype(np.float32), factors / np.float32(scene.unit))
@@ -112,12 +118,35 @@ class Rebaked:
         return by_group or without_sun(found, scene.sun, scene.unit)
 
 
-def _with_light_map(store: Store, shown: BakedScene) -> BakedScene:
-    """The shown scene with the light map of a store, without probes."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RelitGroups(GroupArrays):
+    """Light by group whose light map is changed, by side, by `change` (n, H, W, 3)."""
+
+    change: Sequence[Floats]
+
+    @cached_property
+    def sides(self) -> tuple[Floats | None, ...]:
+        """Light maps by group, float32; None for a side without light."""
+        both = zip_longest(super().sides, self.change, fillvalue=None)
+        return tuple(
+            side if more is None else np.maximum((0 if side is None else side) + more, 0) for side, more in both
+        )
+
+
+def _with_light_map(store: Store, shown: BakedScene, lamps: bool) -> BakedScene:
+    """The shown scene with the light map of a store, without probes; of edited `lamps`, it holds what `shown` does."""
     scale = np.float32(1 / shown.unit)
     front, back = (finite(store.read(name))[0] * scale if name in store else None for name in map(light_name, SIDES))
     direction = store.read(DOMINANT_DIRECTION) if DOMINANT_DIRECTION in store else None
-    groups = groups_in(store, shown.unit)
+    groups, now = groups_in(store, shown.unit), read_lamps(store, shown.unit) if lamps else None
+    if now is not None and shown.lamps is not None:
+        both = zip(shown.lamps.light, now.light, strict=True)
+        change = [of_shown - of_store for of_shown, of_store in both]
+        front, back = (
+            side if side is None or k >= len(change) else np.maximum(side + change[k].sum(axis=0), 0)
+            for k, side in enumerate((front, back))
+        )
+        groups = groups and RelitGroups(groups.records, groups.store, groups.unit, change=change)
     if groups is not None:
         _ = groups.lit_sides  # read into memory
     return replace(

@@ -173,7 +173,9 @@ class RebakedLight:
             if wanted == self._wanted:  # else another bake has changed the copy
                 self._fail(str(error))
 
-        self._reading = Work(lambda progress: Rebaked.read(copy, scene, arrived, before), done, failed)
+        self._reading = Work(
+            lambda progress: Rebaked.read(copy, scene, arrived, before, lamps=bool(wanted.lamps)), done, failed
+        )
 
     def _fail(self, error: str) -> None:
         self._stop()

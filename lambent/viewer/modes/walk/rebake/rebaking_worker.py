@@ -38,14 +38,17 @@ class StreamWatch(Watch):
 
     region_pause: float | None = REGION_PAUSE
 
-    def __init__(self, out: BinaryIO) -> None:
-        self._out, self._reported = out, set[str]()
+    def __init__(self, out: BinaryIO, lamps: bool = False) -> None:
+        """`lamps`: the light map counts as finished with what it holds of edited lamps."""
+        self._out, self._reported, self._lamps = out, set[str](), lamps
 
     def say(self, **words: object) -> None:
         self._out.write(json.dumps(words).encode() + b"\n")
         self._out.flush()
 
     def arrived(self, kind: str, names: Collection[str]) -> None:
+        if self._lamps:
+            kind = {"light_map": "", "lamps": "light_map"}.get(kind, kind)
         new = sorted(set(names) - self._reported)
         if kind in KINDS and new:
             self._reported.update(new)
@@ -61,14 +64,14 @@ class StreamWatch(Watch):
 def main(store: Path, copy: Path, asked: bytes, out: BinaryIO) -> None:
     """Bake, and report progress."""
     wanted = RoomState.model_validate_json(asked)
-    watch = StreamWatch(out)
+    watch = StreamWatch(out, bool(wanted.lamps))
 
     def progress(done: float, total: float, what: str) -> None:
         watch.say(what=what, done=done, total=total)
 
     try:
         textures = with_paths(wanted.textures, store)
-        bake_again(store, copy, wanted.materials, progress, textures=textures, watch=watch)
+        bake_again(store, copy, wanted.materials, progress, textures=textures, lamps=wanted.lamps, watch=watch)
     except UserError as error:
         watch.say(error=str(error))
     else:

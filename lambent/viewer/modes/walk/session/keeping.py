@@ -107,6 +107,7 @@ class SessionKeeper:
         names = [name for name in edits.scene if not self._is_saved(name)]
         more = [
             *((f"the texture of {name}", True) for name in self._unsaved_textures),
+            ("the lamps", edits.room.lamps != kept.now.lamps),
             ("the light mix", edits.light != kept.now.light),
             ("stored states", edits.stored != kept.states),
             ("the state to compare with", edits.other != kept.beside),

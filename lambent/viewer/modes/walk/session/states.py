@@ -86,6 +86,7 @@ class States:
                 materials={**materials, **one.materials},
                 textures={**textures, **self._textures_of(one)},
                 light=LightMix({**mixes, **one.light.groups}),
+                lamps=room.lamps,
             )
             for one in self._variants
         }
