@@ -111,9 +111,10 @@ def _raised(scene: Scene, faces: _Faces, height: Floats, pairs: Indices) -> Scen
         moved[mesh.faces] = positions[first:end]
         objects[i] = replace(objects[i], mesh=replace(mesh, positions=moved))
     on = [f"{objects[a].name} on {objects[b].name}" for a, b in np.unique(pairs, axis=0)]
+    count = len(np.unique(pairs[:, 0]))
     warning = (
-        f"{len(on)} flush surfaces ({first_of(on)}): of two in one plane the smaller, or else the later, is raised by "
-        f"at most {1000 * np.abs(height).max():.2g} mm"
+        f"{count} flush surface{'s' * (count > 1)} ({first_of(on)}): of two in one plane the smaller, or else the "
+        f"later, is raised by at most {1000 * np.abs(height).max():.2g} mm"
     )
     return replace(scene, objects=tuple(objects), warnings=(*scene.warnings, warning))
 
