@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 KIND = "probe_share"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 2
+REVISION = 3
 
 
 def keys(context: BakeContext) -> dict[str, str]:

@@ -13,7 +13,8 @@ solutions would average their noise.
 
 An object uses its shares only if they lower the error of the rays below that of its probe's specular occlusion
 (`selection`). Lobes wider than WIDE blur the rays, so for them squared errors count: among white and black rays, a grey
-mean is right for a wide lobe, and wrong for a mirror.
+mean is right for a wide lobe, and wrong for a mirror. For them, L counts up to MOST_LIGHT P: a few rays to a lamp that
+the probe misses would tilt the shares of all directions, in each texel otherwise.
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ RAYS = 64  # per texel, a multiple of POINTS
 SMOOTH = 12  # rounds of averaging the texels' equations over their charts
 PENALTY = 0.01  # of a share's dependence on direction, relative to the mean of the equations' diagonal
 WIDE = 0.1  # roughness of a lobe
+MOST_LIGHT = 5.0  # relative to the probe's
 WORTH = 0.95  # factor to which shares must lower the error
 JUDGED = 1 << 16  # rays per object that judge its shares
 RAYS_AT_ONCE = 1 << 21
@@ -109,7 +111,8 @@ class ShareTracer:
             m = max(float(np.median(np.concatenate([part.light for part in traced]))), 1e-6) if traced else 1.0
             for part in traced:
                 first = part.row.reshape(-1, RAYS)[:, 0]
-                sums[texels.index[first]] = _equations(part, m)
+                most = MOST_LIGHT if one.roughness > WIDE else None
+                sums[texels.index[first]] = _equations(part, m, most)
             kept.append(_some(traced, np.random.default_rng(seed + i)))
         known = sums.any(axis=1).reshape(texels.height, texels.width)
         whole = fill(sums.reshape(texels.height, texels.width, -1), known, labels, smooth=SMOOTH)
@@ -175,12 +178,13 @@ def solved(sums: Floats) -> Floats:
     return np.asarray(found.clip(-2 * MOST_SHARE, 2 * MOST_SHARE))  # for a black probe, the share is arbitrary
 
 
-def _equations(traced: _Rays, m: float) -> NDArray[np.float32]:
-    """Equations (k, EQUATIONS) of texels from consecutive blocks of RAYS rays."""
+def _equations(traced: _Rays, m: float, most: float | None) -> NDArray[np.float32]:
+    """Equations (k, EQUATIONS) of texels from consecutive blocks of RAYS rays; `most` bounds light by the probe's."""
+    light = traced.light if most is None else np.minimum(traced.light, most * traced.probe)
     basis = np.concatenate([np.ones((len(traced.w), 1), np.float32), traced.w], axis=1) * traced.probe[:, None]
     g = (traced.fresnel / (m + traced.probe))[:, None]
     matrix = basis[:, UPPER[0]] * basis[:, UPPER[1]] * g
-    right = basis * (g * traced.light[:, None])
+    right = basis * (g * light[:, None])
     rows = np.concatenate([matrix, right], axis=1) / (m * RAYS)  # numbers about 1, in any unit of light
     return np.asarray(rows.reshape(-1, RAYS, EQUATIONS).sum(axis=1), np.float32)
 

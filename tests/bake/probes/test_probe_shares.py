@@ -10,7 +10,7 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.probes.device_lookup import DeviceProbe
-from lambent.bake.probes.shares import EQUATIONS, UPPER, share_along, solved
+from lambent.bake.probes.shares import EQUATIONS, MOST_LIGHT, RAYS, UPPER, _equations, _Rays, share_along, solved
 from lambent.bake.tracing.rays import vectors
 from lambent.baked.probes.lookups import distance_lookup, inverse_depth, planes_lookup
 from lambent.core.geometry.cubemap import sample
@@ -52,6 +52,23 @@ def test_shares_that_are_linear_are_found_and_those_of_a_black_probe_are_bounded
     np.testing.assert_allclose(found[1], [1, 0, 0, 0])
     assert (np.abs(found) <= 4).all()
     assert share_along(np.array([[-1.0, 0, 0, 0], [9, 0, 0, 0]]), w[:2]).tolist() == [0, 2]
+
+
+def test_a_lamp_that_the_probe_misses_leaves_the_shares_of_other_directions() -> None:
+    """A wall as bright as the probe has it, and three of 64 rays to a lamp of which the probe sees a dark underside."""
+    w = normalize(RNG.normal(size=(RAYS, 3)))
+    w[:, 2] = np.abs(w[:, 2])
+    probe = np.full(RAYS, 0.3)
+    light, lamp = probe.copy(), np.argsort(-w[:, 1])[:3]
+    light[lamp], probe[lamp] = 8.0, 0.05
+    rays = _Rays(np.zeros(RAYS, np.int64), *(a.astype(np.float32) for a in (w, light, probe, np.ones(RAYS))))
+    others = np.setdiff1d(np.arange(RAYS), lamp)
+
+    def shares(most: float | None) -> np.ndarray:
+        return share_along(solved(_equations(rays, 0.3, most)).repeat(len(others), axis=0), w[others])
+
+    np.testing.assert_allclose(shares(MOST_LIGHT), 1, atol=0.1)
+    assert np.abs(shares(None) - 1).max() > 0.3, "otherwise it would"
 
 
 def test_below_a_roof_no_light_comes_from_above_and_all_from_the_side(tmp_path: Path) -> None:
