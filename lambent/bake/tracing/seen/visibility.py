@@ -32,6 +32,7 @@ from lambent.scenes.scene import Scene
 PLACES = 256
 FEW = (8, 32, 96)  # positions tried before all the others; most points are seen from one of the first
 RAYS_AT_ONCE = 1 << 21
+COVERED_M = 2e-3  # largest distance of a surface that covers a point
 
 
 def camera_eyes(scene: Scene) -> Floats:
@@ -83,8 +84,9 @@ def seen(traced: Any, places: Floats, positions: Floats, normals: Floats) -> Fla
 
 
 def _covered(traced: Any, positions: Floats, normals: Floats) -> Flags:
-    """(n,) whether something lies right above points (n, 3) of unit normals (n, 3)."""
-    reach = APPROACH * (1 + np.abs(positions).max(axis=1, initial=0))
+    """(n,) whether something lies as close above points (n, 3) of unit normals (n, 3) as flush faces are raised."""
+    box = traced.bbox()
+    reach = min(APPROACH * (1 + np.abs([box.min, box.max]).max()), COVERED_M)
     return np.asarray(distances(traced, leaving(traced, positions, normals, normals)) < reach)
 
 
