@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 KIND = "light_map"
 NEEDS = ("geometry",)
-REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 5, 6, 3, 1, 1
+REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 5, 7, 3, 1, 1
 REVISION_OF_DIRECT, REVISION_OF_PARTS, REVISION_OF_LAMPS = 4, 3, 1
 IRRADIANCE = tuple(f"light_map/{side}" for side in SIDES)
 NOISE = tuple(noise_name(side) for side in SIDES)
@@ -276,7 +276,8 @@ def _samples(
     if faces is not None:
         sides = replace(sides, valid=sides.valid & faces[texels.face])
     if writer.missing:
-        how = replace(how, unseen=context.traced.unseen(diffuse=diffuse))
+        lamps = lamp_light(context, side).sum(axis=0) if lamps_apart(context) else None
+        how = replace(how, unseen=context.traced.unseen(diffuse=diffuse), lamps=lamps)
         covered = np.zeros(texels.width * texels.height, bool)
         covered[texels.index[sides.valid.any(axis=1)]] = True
         of_map = covered.reshape(texels.height, texels.width)

@@ -40,7 +40,8 @@ class Sampling:
 
     With a `cache` (`path_tracer.radiance`), paths end at diffuse surfaces, and the scene must have no diffuse terms.
     Direct light of the sun `unseen` is left out. A `tally` sums parts of the light, the last `parts` of which are
-    stored in addition to the whole; the cache must then suit the tally.
+    stored in addition to the whole; the cache must then suit the tally. Noise is relative to the light with that of
+    `lamps` (H, W, 3), which samples do not have.
     """
 
     samples: tuple[int, int]
@@ -52,6 +53,7 @@ class Sampling:
     unseen: Unseen | None = None
     tally: path_tracer.Tally | None = None
     parts: int = 0
+    lamps: Floats | None = None
 
 
 def path_traced(samples: tuple[int, int], noise: float, max_depth: int) -> Sampling:
@@ -82,12 +84,13 @@ def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int,
     points = points_of(sides, mine)
     sums = np.zeros((2, len(mine), 3 + 3 * how.parts))
     fewest, most = how.samples
+    of_lamps = 0.0 if how.lamps is None else how.lamps.reshape(-1, 3)[sides.texels.index[mine]].astype(float)
     passes = 0
     while passes * how.per_pass < most:
         sums += _sums_of_pass(scene, points, len(mine), (seed, passes), how)
         passes += 2
         samples = passes * how.per_pass
-        if samples >= fewest and relative_noise(sums[..., :3] * 2 / samples) <= how.noise:
+        if samples >= fewest and relative_noise(sums[..., :3] * 2 / samples + of_lamps) <= how.noise:
             break
     place = (row[mine] - rows.start) * width + column[mine] - columns.start
     raw[:, place, :3], raw[:, place, 4:] = sums[..., :3], sums[..., 3:]

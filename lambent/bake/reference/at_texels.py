@@ -28,7 +28,7 @@ def retraced(
     of the light map's samples.
     """
     edited = _with_materials(traced, materials)
-    scene, unseen = edited.whole(diffuse=True), edited.unseen(diffuse=True)
+    scene, unseen = edited.whole(diffuse=True), edited.unseen(diffuse=True, lamps=False)
     per_pass = 64
     how = Sampling((paths, paths), 0.0, DEPTH, per_pass, unseen=unseen)
     parts: list[NDArray[np.float32]] = []
