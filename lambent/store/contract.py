@@ -18,6 +18,7 @@
                                            the incident light, weighted by its irradiance; 0 without a normal map
     light_map/probe_share                  (H, W, 4) float16, a and b for meta["objects"]: store.occlusion; optional
     light_map/sunlit                       (H, W) uint8, 0 where no sunlight arrives: store.sunlit; optional
+    light_map/lamps, lamps_back, lamps_reach, lamps/...  lamps that are drawn by pixel: store.lamps; optional
     environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap) of radiance, sun disc included,
                                            in units of meta["unit"] W/(sr m^2): a power of two, 1 if absent
     probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"] in meta["unit"] as
