@@ -7,19 +7,25 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lambent.baked.answering.stored import has_answer, read_answer
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.light.light_mix import Factors
+from lambent.core.plain import triple
 from lambent.materials.document import Material
+from lambent.realtime.lamps.drawn import ShadowedLamp
 from lambent.realtime.light.baked import read_baked
 from lambent.realtime.light.group_arrays import BAKE_GROUPS, NO_GROUPS, GroupArrays
-from lambent.scenes.scene import Light, MaterialTextures
+from lambent.scenes.lamp_edits import LampEdit
+from lambent.scenes.scene import IesLight, Light, MaterialTextures, PointLight
+from lambent.store.lamp_discs import axes_of
 from lambent.store.store import Store
 
 if TYPE_CHECKING:
     from lambent.bake.pictures.tracer import LightMap
+    from lambent.bake.tracing.traced_scene import TracedScene
     from lambent.realtime.answering.answering import AnsweredLight, Lit
 
 Textures = Mapping[str, MaterialTextures | None]  # exchanged ones, by material
@@ -40,10 +46,20 @@ class StoredLight:
         if any(positions.get(lamp.number) != lamp.position for lamp in records):
             self._lamps = None
         self._lit: tuple[object, Lit] | None = None
+        self._edits: Mapping[int, LampEdit] = {}
 
-    def of(self, materials: Mapping[str, Material], textures: Textures, factors: Factors) -> LightMap:
-        """The light map for edited materials, exchanged textures and factors of light groups, all by name."""
-        lit, baked = self._answered(materials, textures), self._baked
+    def edit(self, traced: TracedScene, lamps: Mapping[int, LampEdit]) -> None:
+        """Answer edits of lamps, which the scene that is traced has."""
+        self._traced, self._edits = traced, lamps
+
+    def of(
+        self, materials: Mapping[str, Material], textures: Textures, factors: Factors, *, lamps: bool = True
+    ) -> LightMap:
+        """The light map for edited materials, exchanged textures and factors of light groups, all by name.
+
+        With `lamps`, it answers those that were edited.
+        """
+        lit, baked = self._answered(materials, textures, lamps and bool(self._edits)), self._baked
         if not factors:
             maps = (baked.irradiance, baked.irradiance_back) if lit is None else self._answer.maps(lit)
             return self._without_lamps(maps, None)
@@ -63,14 +79,33 @@ class StoredLight:
             raise UserError(NO_GROUPS, field="--light", hint=BAKE_GROUPS)
         return self._baked.groups
 
-    def _answered(self, materials: Mapping[str, Material], textures: Textures) -> Lit | None:
+    def _answered(self, materials: Mapping[str, Material], textures: Textures, lamps: bool) -> Lit | None:
         """The answer to edits; None without edits, or where light stays as baked."""
-        if not self.answers or not (materials or textures):
+        if not self.answers or not (materials or textures or lamps):
             return None
-        of = dict(materials), dict(textures)
+        of = dict(materials), dict(textures), lamps
         if self._lit is None or self._lit[0] != of:
-            self._lit = of, self._answer.lit(materials, textures)
+            self._lit = of, self._answer.lit(materials, textures, self._change if lamps else None)
         return self._lit[1]
+
+    @cached_property
+    def _change(self) -> NDArray[np.float32]:
+        """The change of direct light (G, T, 3) on the answering texels, by shadow maps of the edited lamps."""
+        from lambent.bake.light.lamp_maps import shadow_map  # imports Mitsuba, whose variant `engine` has set
+        from lambent.realtime.lamps.changed import changed  # imports what draws
+
+        pairs, drawn = [], self._baked.lamps
+        for place, was in enumerate(() if drawn is None else drawn.records):
+            if (edit := self._edits.get(was.number)) is None or drawn is None:
+                continue
+            light = self._traced.scene.lights[was.number]
+            assert isinstance(light, PointLight | IesLight), "lamps are at points"
+            now, shape = changed(was, edit, self._baked.unit)
+            now = now.model_copy(update={"axes": tuple(map(triple, axes_of(light)))})
+            distances, _ = shadow_map(self._traced.whole(diffuse=False), light, (1, 1))
+            before, profile = drawn.profiles[was.profile], shape if shape is not None else drawn.profiles[was.profile]
+            pairs.append((ShadowedLamp(was, before, drawn.distances[place]), ShadowedLamp(now, profile, distances)))
+        return self._answer.lamp_changes.of(pairs)
 
     @cached_property
     def _answer(self) -> AnsweredLight:

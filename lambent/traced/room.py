@@ -120,7 +120,8 @@ class TracedRoom:
         if self._tracer is None and self._light is not None:
             textures = {name: textures_in_look(name, look, self._scene.textures) for name, look in self._looks.items()}
             edits = (self._materials, textures) if self._follows else ({}, {})
-            self._tracer = Tracer.of_baked(self._traced, self._light.of(*edits, self._factors))
+            light = self._light.of(*edits, self._factors, lamps=self._follows)
+            self._tracer = Tracer.of_baked(self._traced, light)
         elif self._tracer is None:
             factors = factors_of(self._names, self._factors) if self._factors else None
             self._tracer = Tracer.of_paths(self._traced, factors)
@@ -134,14 +135,17 @@ def room_of_store(
     """A store's room: its geometry and light map, under the lights of its scene (`store.source.scene_of`).
 
     Sky and sun can be rotated about the vertical, `lamps` edited, and meshes take the place of objects; the light map
-    stays as baked.
+    stays as baked, or answers lamps.
     """
     engine()
     from lambent.bake.pictures.stored import stored_scene  # imports Mitsuba, whose variant `engine` has set
 
     folder = TemporaryDirectory()
     lit = under_turned_sky(_as_drawn(with_lamp_edits(scene, lamps)), sky_turn_deg, Path(folder.name))
-    return TracedRoom(stored_scene(store, lit, replacements), StoredLight(store, scene.lights), folder)
+    traced, light = stored_scene(store, lit, replacements), StoredLight(store, scene.lights)
+    if lamps:
+        light.edit(traced, lamps)
+    return TracedRoom(traced, light, folder)
 
 
 def room_of_paths(scene: Scene, *, sky_turn_deg: float = 0.0, replacements: Sequence[Replacement] = ()) -> TracedRoom:

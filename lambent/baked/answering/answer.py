@@ -113,16 +113,17 @@ class Solution:
     converged: bool
 
 
-def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> Solution:
-    """Solve for the light between patches by Gauss-Seidel sweeps.
+def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE, direct: Floats | None = None) -> Solution:
+    """Solve for the light between patches by Gauss-Seidel sweeps, of their own or this `direct` light (G, P, 3).
 
     The sweeps end when no patch of any group changes by more than `tolerance` of its own light; a bound relative to the
     brightest patch would leave dark corners unsolved. If they diverge, `passive_rows` replace the rows.
     """
+    direct = patches.direct if direct is None else direct
     crossing = (patches.paired != np.arange(patches.direct.shape[1]))[:, None]
     reflected = albedos.reflected[patches.material].astype(np.float32)
     transmitted = (albedos.transmitted[patches.material] * crossing).astype(np.float32)
-    direct, paired = np.ascontiguousarray(patches.direct, np.float32), np.asarray(patches.paired, np.int64)
+    direct, paired = np.ascontiguousarray(direct, np.float32), np.asarray(patches.paired, np.int64)
 
     def by(rows: SparseRows) -> Solution:
         light, step = direct.copy(), np.float32(tolerance)
@@ -278,6 +279,14 @@ class Answer:
         for step in STEPS:
             sent = self.points.exitance(albedos, gathered(self.few_rays, sent), self._inverse_of_few, grows, sent, step)
         return smoothed(gathered(self.rays, sent), self.around)
+
+    @cached_property
+    def sender(self) -> NDArray[np.int64]:
+        """(T,) the sending point that counts most for each texel, -1 without one."""
+        shares = np.where(self.near.points < len(self.points.other), self.near.shares, 0)
+        most = shares.argmax(axis=1)[:, None]
+        best, share = (np.take_along_axis(of, most, axis=1)[:, 0] for of in (self.near.points, shares))
+        return np.where(share > 0, best.astype(np.int64), -1)
 
     @cached_property
     def few_rays(self) -> Rays:

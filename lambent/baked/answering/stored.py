@@ -117,6 +117,7 @@ class StoredAnswer:
     sun : (3,) normal irradiance of the sun, W/m^2
     of_sun : number of the sun's light group
     point_sun : (K + F, 3) direct irradiance of the sun at the points, W/m^2
+    patch : (T,) patch of each texel
     """
 
     answer: Answer
@@ -128,6 +129,7 @@ class StoredAnswer:
     sun: Floats
     of_sun: int = 0
     point_sun: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3), np.float32))
+    patch: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
 
 
 def read_answer(store: Store) -> StoredAnswer:
@@ -209,7 +211,7 @@ def read_answer(store: Store) -> StoredAnswer:
     answer = Answer(patches, sending, all_rays, around, nearest, directs, baked, albedos)
     return StoredAnswer(
         answer, texels, other, material[of_patch].astype(np.int64), names, _seen(store, record, number),
-        np.zeros(3) if sun is None else np.array(sun.irradiance), of_sun, point_sun,
+        np.zeros(3) if sun is None else np.array(sun.irradiance), of_sun, point_sun, of_patch,
     )  # fmt: skip
 
 

@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 
 from lambent.baked.answering.albedos import albedos_of, changed_lobes, edited_albedos
 from lambent.baked.answering.answer import Albedos, Answer, side_by_side, upsampled
+from lambent.baked.answering.direct_change import with_direct_change
 from lambent.baked.answering.probes import change
 from lambent.baked.answering.stored import StoredAnswer
 from lambent.baked.probes.irradiance import irradiance_of
 from lambent.core.arrays import Floats
 from lambent.materials.document import Material
+from lambent.realtime.answering.lamp_change import LampChanges
 from lambent.realtime.answering.texture_detail import (
     Detail,
     TextureDetails,
@@ -49,6 +51,7 @@ class Lit:
 
     `is_baked`: this is the baked light. `detail`: that of exchanged textures. `lobes`: (M, 3) how much the lobes of
     materials scatter less or more than the baked ones.
+    `change`: (G, T, 3) by which direct light differs, which renderers draw by pixel and `irradiance` leaves out.
     """
 
     irradiance: NDArray[np.float32]
@@ -57,6 +60,12 @@ class Lit:
     is_baked: bool
     detail: Detail | None = None
     lobes: Floats | None = None
+    change: NDArray[np.float32] | None = None
+
+    @property
+    def whole(self) -> NDArray[np.float32]:
+        """All irradiance (G, T, 3), as probes see it."""
+        return self.irradiance if self.change is None else np.maximum(self.irradiance + self.change, 0)
 
 
 class AnsweredLight:
@@ -76,11 +85,22 @@ class AnsweredLight:
         """The light before any edit."""
         return self._as_baked
 
-    def lit(self, edited: Mapping[str, Material], textures: Textures = NO_TEXTURES) -> Lit:
-        """The light with these materials and textures, by name, in place of the baked ones."""
+    @cached_property
+    def lamp_changes(self) -> LampChanges:
+        """The direct light of edited lamps on the texels."""
+        return LampChanges(self._baked, self._stored)
+
+    def lit(
+        self, edited: Mapping[str, Material], textures: Textures = NO_TEXTURES,
+        change: NDArray[np.float32] | None = None,
+    ) -> Lit:  # fmt: skip
+        """The light with these materials and textures, by name, in place of the baked ones.
+
+        Direct light on the texels differs by a `change` (G, T, 3), W/m^2, from `lamp_changes`.
+        """
         now = [edited.get(name, given) for name, given in zip(self._stored.materials, self._materials, strict=True)]
         detail, of_materials = self._detail(textures), edited_albedos(self._materials, now)
-        if detail is None and of_materials.same_as(self._stored.answer.albedos):
+        if change is None and detail is None and of_materials.same_as(self._stored.answer.albedos):
             return self._as_baked
         answer, albedos = self._stored.answer, of_materials
         if detail is not None:
@@ -88,7 +108,9 @@ class AnsweredLight:
             albedos = detail.albedos(Albedos(of_materials.reflected[rows], of_materials.transmitted[rows]))
         lobes = changed_lobes(self._materials, now)
         irradiance = answer.irradiance(albedos, self._reference)
-        return Lit(irradiance, *_shown(now), is_baked=False, detail=detail, lobes=lobes)
+        if change is not None:
+            irradiance = with_direct_change(answer, self._stored.patch, albedos, irradiance, change)
+        return Lit(irradiance, *_shown(now), is_baked=False, detail=detail, lobes=lobes, change=change)
 
     @cached_property
     def _by_point(self) -> Answer:
@@ -167,8 +189,7 @@ class AnsweredLight:
             tints = [self._per_exitance(one[places]) for one in self._details.tints(name, seen, light.detail)]
         found = np.zeros((len(light.irradiance), seen.texel.size, 3), np.float32)
         states = (
-            (one.irradiance, by, one.reflected, one.transmitted)
-            for one, by in zip((as_baked, light), tints, strict=True)
+            (one.whole, by, one.reflected, one.transmitted) for one, by in zip((as_baked, light), tints, strict=True)
         )
         change(found, places, texels, stored.material, stored.other, sun, stored.of_sun, *states)
         return found.reshape(len(found), *seen.texel.shape, 3)

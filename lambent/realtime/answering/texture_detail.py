@@ -59,9 +59,10 @@ def own_rows(answer: Answer) -> Indices:
 
 
 class Samples(NamedTuple):
-    """Samples (n,) of a material's surface, even in the light map: face, texel of the light map, uv (n, 2)."""
+    """Samples (n,) of surfaces, even in the light map: face, its corners' weights, texel of the map, uv (n, 2)."""
 
     face: NDArray[np.integer]
+    weights: Floats
     texel: Indices
     uv: Floats
 
@@ -130,13 +131,8 @@ class TextureDetails:
     @cached_property
     def _sender_of_code(self) -> Indices:
         """(2 H W,) the sending point that counts most for each texel and side, -1 without one."""
-        near, count = self._stored.answer.near, len(self._stored.answer.points.material)
-        sends = near.points < count
-        shares = np.where(sends, near.shares, 0)
-        most = shares.argmax(axis=1)[:, None]
         found = np.full(2 * self._size[0] * self._size[1], -1)
-        best = np.take_along_axis(near.points, most, axis=1)[:, 0].astype(np.int64)
-        found[self._stored.texels] = np.where(np.take_along_axis(shares, most, axis=1)[:, 0] > 0, best, -1)
+        found[self._stored.texels] = self._stored.answer.sender
         return found
 
     @property
@@ -220,7 +216,7 @@ def samples_of(baked: BakedScene, faces: NDArray[np.integer], size: tuple[int, i
     areas = triangle_areas(np.pad(uv2, ((0, 0), (0, 0), (0, 1))))
     total = float(areas.sum())
     if not total > 0:
-        return Samples(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 2)))
+        return Samples(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros((0, 2)))
     count = min(MOST_SAMPLES, max(len(faces), int(PER_TEXEL * total)))
     at = (np.arange(count) + 0.5) / count * total
     chosen = np.minimum(np.searchsorted(np.cumsum(areas), at), len(faces) - 1)
@@ -230,7 +226,9 @@ def samples_of(baked: BakedScene, faces: NDArray[np.integer], size: tuple[int, i
     weights = np.stack([1 - a - b, a, b], axis=1)[..., None]
     place = np.floor((weights * uv2[chosen]).sum(axis=1)).astype(np.int64)
     column, row = np.clip(place, 0, np.array(size) - 1).T
-    return Samples(faces[chosen], row * size[0] + column, (weights * _uv(baked)[corner[chosen]]).sum(axis=1))
+    return Samples(
+        faces[chosen], weights[..., 0], row * size[0] + column, (weights * _uv(baked)[corner[chosen]]).sum(axis=1)
+    )
 
 
 def placed_alike(one: MaterialTextures | None, other: MaterialTextures | None) -> bool:

@@ -15,7 +15,7 @@ from lambent.core.geometry.cubemap import faces_at
 from lambent.core.plain import triple
 from lambent.realtime.gpu.layouts import Layouts
 from lambent.realtime.gpu.pipelines import cover, screen_pipeline
-from lambent.realtime.lamps.drawn import DrawnLamps
+from lambent.realtime.lamps.drawn import DrawnLamps, ShadowedLamp
 from lambent.realtime.sun.solid_depths import SolidDepths, depth_texture
 from lambent.scenes.lamp_edits import LampEdit, exchanged
 from lambent.scenes.photometry.distribution import Photometry
@@ -120,6 +120,16 @@ class ChangedLamps:
                 self._shadows[place] = of
                 self._draw(records[place], lamps.disc(place))
         self._resources.light_version += 1
+
+    def pairs(self) -> list[tuple[ShadowedLamp, ShadowedLamp]]:
+        """The edited lamps as baked and as they are; waits for the GPU."""
+        drawn, lamps = self._drawn, self._resources.lamps
+        if drawn is None:
+            return []
+        return [
+            (ShadowedLamp(was, drawn.profiles[was.profile], drawn.distances[k]), lamps.shadowed(k))
+            for k, was in enumerate(drawn.records) if k in self._shadows
+        ]  # fmt: skip
 
     @cached_property
     def _solid(self) -> SolidDepths:

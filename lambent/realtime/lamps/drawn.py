@@ -11,6 +11,8 @@ from lambent.core.arrays import Floats
 from lambent.store.lamps import DISTANCES, LAMPS, PROFILES, REACHED, LampRecord, drawn_lamps
 from lambent.store.store import Store
 
+BIAS, NEAR_TEXELS = 2e-3, 1.5  # as LAMP_BIAS and LAMP_NEAR of lamp_direct.wgsl, for the nearest texel alone
+
 
 @dataclass(frozen=True, eq=False)
 class DrawnLamps:
@@ -45,6 +47,38 @@ class DrawnLamps:
         if factors is None:
             return [side.sum(axis=0) for side in self.light]
         return [np.einsum("ghwc,gc->hwc", side, factors, optimize=True) for side in self.light]
+
+
+@dataclass(frozen=True, eq=False)
+class ShadowedLamp:
+    """A lamp with its profile and shadow map, (S, S) each, as in `store.lamps`."""
+
+    record: LampRecord
+    profile: NDArray[np.float16]
+    distances: NDArray[np.float16]
+
+    def irradiance(self, p: Floats, n: Floats) -> Floats:
+        """(k, 3), in units of the record, at points p (k, 3) of normals n (k, 3)."""
+        lamp, side, found = self.record, len(self.profile), np.zeros_like(p)
+        away = (p - np.array(lamp.position)) @ np.array(lamp.axes).T
+        normal = n @ np.array(lamp.axes).T
+        distance = np.linalg.norm(away, axis=1)
+        d = away / np.maximum(distance, 1e-6)[:, None]
+        scale = np.sin(np.radians(lamp.reach_deg) / 2)
+        place = d[:, :2] / np.sqrt(np.maximum(2 + 2 * d[:, 2:], 1e-12)) / scale
+        cosine = -(normal * d).sum(axis=1)
+        lit = np.flatnonzero(((place**2).sum(axis=1) < 1) & (cosine > 0))
+        column, row = ((place[lit] * 0.5 + 0.5) * side).astype(int).clip(0, side - 1).T
+        s = (np.stack([column, row], axis=-1) * 2 + 1 - side) / side * scale
+        square = np.minimum((s * s).sum(axis=1), 1.0)
+        centre = np.column_stack([2 * s * np.sqrt(1 - square)[:, None], 1 - 2 * square])
+        plane = cosine[lit] / np.maximum(-(normal[lit] * centre).sum(axis=1), 1e-6) * distance[lit]  # along `centre`
+        first = self.distances[row, column].astype(float)
+        near = distance[lit] * (1 - NEAR_TEXELS * 4 * scale / side)
+        seen = lit[(first >= plane * (1 - BIAS)) | (first >= near)]
+        share = self.profile.astype(float)[row, column][np.searchsorted(lit, seen)]
+        found[seen] = (share * cosine[seen] / distance[seen] ** 2)[:, None] * lamp.intensity
+        return found
 
 
 def read_lamps(store: Store, unit: float) -> DrawnLamps | None:

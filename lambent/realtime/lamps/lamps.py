@@ -12,7 +12,7 @@ from lambent.core.arrays import Floats
 from lambent.realtime.gpu.layouts import Layouts
 from lambent.realtime.gpu.structs import LAMP_DTYPE
 from lambent.realtime.gpu.uploads import upload, upload_layer
-from lambent.realtime.lamps.drawn import DrawnLamps
+from lambent.realtime.lamps.drawn import DrawnLamps, ShadowedLamp
 from lambent.store.lamps import MOST_LAMPS, LampRecord
 
 
@@ -81,6 +81,12 @@ class PointLamps:
         source = {"texture": self._discs, "origin": (0, 0, place)}
         data = self._device.queue.read_texture(source, {"bytes_per_row": 2 * side}, (side, side, 1))
         return np.frombuffer(data, np.float16).reshape(side, side)
+
+    def shadowed(self, place: int) -> ShadowedLamp:
+        """A lamp as it shines; waits for the GPU."""
+        record, own = self.records[place], self._drawn.profiles if self._drawn is not None else ()
+        profile = [*own, *self._profiles][record.profile]
+        return ShadowedLamp(record, profile, self.distances(place))
 
     def restore(self, place: int) -> None:
         """Show a lamp's shadow map as baked."""

@@ -68,7 +68,7 @@ class Lane:
             self.lamps = show_lamps(self.renderer, room.lamps, self.say)
         self.room = room
         if self.answering is not None:
-            self.answering.update(room.materials, self.textures)
+            self.answering.update(room.materials, self.textures, self.lamps)
 
     def frame(self, wanted: FrameState, light: Mapping[str, Triple]) -> FrameState:
         """A frame of this lane's state with these factors of light groups."""

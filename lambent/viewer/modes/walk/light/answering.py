@@ -22,9 +22,11 @@ from lambent.materials.document import Material
 from lambent.realtime.answering.answer_shown import answered, users_of
 from lambent.realtime.answering.answering import AnsweredLight, Lit
 from lambent.realtime.gpu.device import adapter_info
+from lambent.realtime.lamps.drawn import ShadowedLamp
 from lambent.realtime.light.group_arrays import GroupArrays
 from lambent.realtime.light.probe_light import ProbeLight
 from lambent.realtime.renderer import Renderer
+from lambent.scenes.lamp_edits import LampEdit
 from lambent.scenes.looks.variants import textures_in_look
 from lambent.scenes.scene import ImageTexture, Look
 from lambent.store.store import Store
@@ -33,6 +35,8 @@ from lambent.viewer.background.work import Work
 AS_BAKED = "indirect light: as baked"
 ESTIMATED = "indirect light: estimated"
 WITHOUT = "light on other surfaces stays as baked: the store has no answer data (`lambent bake --only answer`)"
+
+Pairs = list[tuple[ShadowedLamp, ShadowedLamp]]  # lamps as baked, and as they are
 
 
 @dataclass
@@ -53,10 +57,11 @@ class Answering:
 
 
 class Wanted(NamedTuple):
-    """Edited materials, and exchanged textures with paths of images, by material."""
+    """Edited materials, exchanged textures with paths of images, by material, and edited lamps by number."""
 
     materials: Mapping[str, Material]
     textures: Mapping[str, str | ImageTexture]
+    lamps: Mapping[int, LampEdit]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +84,9 @@ class AnsweringLight:
     def __init__(self, store: Store, renderer: Renderer, shown: Answering) -> None:
         self._store, self._renderer, self._shown = store, renderer, shown
         self._answer: AnsweredLight | None = None  # made in the thread at the first edit
-        self._of: Wanted | None = Wanted({}, {})  # materials and textures of the shown light; None: compute it again
+        self._of: Wanted | None = Wanted(
+            {}, {}, {}
+        )  # materials and textures of the shown light; None: compute it again
         self._work: Work | None = None
         self._probes_of: Lit | None = None  # light whose probes are waiting
         self._probing: Lit | None = None  # light whose probes are being computed
@@ -105,12 +112,13 @@ class AnsweringLight:
         return self._work is not None
 
     def update(
-        self, edited: Mapping[str, Material], textures: Mapping[str, str | ImageTexture] = MappingProxyType({})
-    ) -> None:
-        """Take finished light, and start the light for these materials and exchanged textures."""
+        self, edited: Mapping[str, Material], textures: Mapping[str, str | ImageTexture] = MappingProxyType({}),
+        lamps: Mapping[int, LampEdit] = MappingProxyType({}),
+    ) -> None:  # fmt: skip
+        """Take finished light, and start the light for these materials, exchanged textures and shown lamps."""
         if not self._shown.possible:
             return
-        wanted = Wanted(dict(edited), dict(textures)) if self._shown.on else Wanted({}, {})
+        wanted = Wanted(dict(edited), dict(textures), dict(lamps)) if self._shown.on else Wanted({}, {}, {})
         if self._work is not None and self._work.poll():
             self._work = self._probing = None
         if wanted != self._of and self._work is not None and self._probing is not None:
@@ -120,7 +128,8 @@ class AnsweringLight:
             return
         if wanted != self._of:
             self._of, self._probes_of = wanted, None
-            self._work = Work(lambda progress: self._maps(wanted), self._show_maps, self._failed)
+            pairs = self._renderer.resources.changed_lamps.pairs() if wanted.lamps else []
+            self._work = Work(lambda progress: self._maps(wanted, pairs), self._show_maps, self._failed)
         elif self._probes_of is not None:
             light, self._probes_of = self._probes_of, None
             self._begin_probes(light)
@@ -136,18 +145,19 @@ class AnsweringLight:
             self._work.wait()
             self._work = None
 
-    def _maps(self, wanted: Wanted) -> _Maps:
+    def _maps(self, wanted: Wanted, pairs: Pairs) -> _Maps:
         """Compute the light maps of edited materials and textures; runs in the thread."""
         with yielding_to_frames(self._is_software):
-            return self._computed_maps(wanted)
+            return self._computed_maps(wanted, pairs)
 
-    def _computed_maps(self, wanted: Wanted) -> _Maps:
+    def _computed_maps(self, wanted: Wanted, pairs: Pairs) -> _Maps:
         if self._answer is None:
             self._answer = AnsweredLight(self._renderer.scene, read_answer(self._store))
         scene = self._renderer.scene
         looks = {name: Look(scene.record.materials[name], of) for name, of in wanted.textures.items()}
         textures = {name: textures_in_look(name, look, scene.textures) for name, look in looks.items()}
-        light = self._answer.lit(wanted.materials, textures)
+        change = self._answer.lamp_changes.of(pairs) if pairs else None
+        light = self._answer.lit(wanted.materials, textures, change)
         groups = self._answer.groups(light)
         off = None if light.is_baked else self._answer.likely_error(light, self._renderer.mixer.factors)
         return _Maps(light, None if groups else self._answer.layers(light), groups, off)
