@@ -227,7 +227,7 @@ def test_time_of_nodes_is_linear(tmp_path: Path, chained: bool) -> None:
         "wheel: the name is used 2000 times; the others are renamed to wheel_2 ... wheel_2000"
     ]
     last = scene.objects[-1].mesh.positions[0]
-    np.testing.assert_allclose(last, (2.0, 0, 0) if chained else (1999 % 300, 0, 6), atol=1e-4)
+    np.testing.assert_allclose(last, (2.0, 0, 0) if chained else (1999 % 300, 0, 6), atol=2e-3)  # flush ones are raised
 
 
 def _zeros(count: int, **more: Any) -> dict[str, Any]:

@@ -29,6 +29,8 @@ RAISED = 5e-5  # metres, and share of the largest coordinate: five times the off
 RAISED_OF_SCENE = 2e-7  # likewise, of the scene's diagonal: twice the offset of rays
 IN_PLANE = 0.4  # of that, apart: surfaces that count as flush
 ALIKE = 1e-3  # relative difference of areas that count as equal
+MOST_LAYERS = 8  # a long row of copies that overlap must not climb
+NAMED = 4  # pairs, one more than a warning lists
 SAME_WAY = 0.05  # relative eigenvalue: planes that meet at less than 25 degrees move along their mean normal
 
 
@@ -110,10 +112,13 @@ def _raised(scene: Scene, faces: _Faces, height: Floats, pairs: Indices) -> Scen
         moved = mesh.positions.copy()
         moved[mesh.faces] = positions[first:end]
         objects[i] = replace(objects[i], mesh=replace(mesh, positions=moved))
-    on = [f"{objects[a].name} on {objects[b].name}" for a, b in np.unique(pairs, axis=0)]
+    unique = np.unique(pairs, axis=0)  # millions, of a stack of copies
+    on = [f"{objects[a].name} on {objects[b].name}" for a, b in unique[:NAMED]]
+    more = len(unique) - NAMED + 1
+    named = first_of(on) if more < 2 else f"{', '.join(on[:-1])} and {more:,} more"
     count = len(np.unique(pairs[:, 0]))
     warning = (
-        f"{count} flush surface{'s' * (count > 1)} ({first_of(on)}): of two in one plane the smaller, or else the "
+        f"{count} flush surface{'s' * (count > 1)} ({named}): of two in one plane the smaller, or else the "
         f"later, is raised by at most {1000 * np.abs(height).max():.2g} mm"
     )
     return replace(scene, objects=tuple(objects), warnings=(*scene.warnings, warning))
@@ -190,11 +195,11 @@ def _ranks(sheets: _Sheets, looks: Indices, pairs: Indices) -> Indices:
 
 
 def _layers(upper: Indices, lower: Indices, count: int) -> Indices:
-    """(count,) layer of each sheet: 0, or one more than the highest of those that it lies on."""
+    """(count,) layer of each sheet: 0, or one more than the highest of those that it lies on, up to MOST_LAYERS."""
     layer, before = np.zeros(count, np.int64), np.full(count, -1)
     while (layer != before).any():
         before = layer.copy()
-        np.maximum.at(layer, upper, layer[lower] + 1)
+        np.maximum.at(layer, upper, np.minimum(layer[lower] + 1, MOST_LAYERS))
     return layer
 
 
