@@ -130,7 +130,7 @@ def _owners(context: BakeContext) -> dict[str, str]:
     materials = [scene.materials[scene.object(name).material] for name in names]
     look = [(m.transmits, [(lobe.mx, lobe.my) for lobe in m.lobes]) for m in materials]
     lamps = [o.name for o in scene.objects if any(o.emission)]
-    key = key_of(SHARED_PROBES, 7, names, look, given, lamps, *geometry_inputs(scene))
+    key = key_of(SHARED_PROBES, 8, names, look, given, lamps, *geometry_inputs(scene))
     said = store.documents.get(SHARED_PROBES)
     if not isinstance(said, dict) or said.get("key") != key:
         with context.timed(SHARING):

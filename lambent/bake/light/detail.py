@@ -3,6 +3,10 @@
 The filter carries light into gaps, and knows objects of few texels badly. Where it does, samples and filtered light are
 mixed by Wiener's rule, in proportion to the part of their squared difference that is not noise. Squares are relative to
 the light: otherwise a bright neighbour would decide for a dark gap.
+
+Two halves know the noise of rare bright paths badly: in a few of many texels such a path arrives in both.
+The mean square therefore counts as far as it exceeds its own standard error: not at all where one texel makes it, fully
+where four do.
 """
 
 from __future__ import annotations
@@ -33,7 +37,11 @@ def with_detail(clean: Floats, noisy: Floats, variance: Floats, known: Flags, la
     least = max(DARK * float(light[known].mean()), 1e-12) if known.any() else 1.0
     squared = np.maximum(light, least) ** 2
     difference = luminance(np.asarray(noisy, np.float32)) - light
-    parts = np.stack([difference**2, np.asarray(variance, np.float32)], axis=-1) / squared[..., None]
-    found, expected = np.moveaxis(chart_means(parts.astype(np.float32), known, labels)[0], -1, 0)
+    square = difference**2 / squared
+    parts = np.stack([square, square**2, np.asarray(variance, np.float32) / squared], axis=-1)
+    means, count = chart_means(parts.astype(np.float32), known, labels)
+    found, fourth, expected = np.moveaxis(means, -1, 0)
+    error = np.sqrt(fourth / np.maximum(count, 1))
     trust = np.clip(1 - DOUBT * expected / np.maximum(found, 1e-12), 0, 1) * known
+    trust *= np.clip(found / np.maximum(error, 1e-12) - 1, 0, 1)
     return np.asarray(clean + trust[..., None] * (noisy - clean), clean.dtype)

@@ -4,10 +4,11 @@ A probe suits another object as far as its centre sees what viewers see mirrored
 mirrored at points all over each object, and two shares of them are wrong in a neighbour's probe: rays whose hits are
 hidden from its centre, and rays that hit an object that the probe leaves out. A probe suits if both together stay below
 a limit: HIDDEN at MEDIUM size as seen by the median viewer, scaled by the inverse root of the size. Of the left out
-hits, at most OPEN may have nothing behind them, because even a small thing would then mirror the sky. An object does
-not share a probe if it is larger than SMALL plus its lobe's roughness, which blurs as much, or if the probe's centre is
-farther away than NEAR of the mirrored distance, or less for narrow lobes: distant look-ups are turned wrongly. Groups
-are found greedily, the largest first.
+hits, at most OPEN may have nothing behind them, because even a small thing would then mirror the sky. What is left out
+may hide at most OPEN of the emitters' light, because the probe shows a lamp without its shade. An object does not share
+a probe if it is larger than SMALL plus its lobe's roughness, which blurs as much, or if the probe's centre is farther
+away than NEAR of the mirrored distance, or less for narrow lobes: distant look-ups are turned wrongly. Groups are found
+greedily, the largest first.
 
 Objects that fill only a few pixels when close, or that nobody sees, have no probe and show the nearest, as do the
 groups that fill least of the view if a scene has very many (leaves, for example): there are MOST probes.
@@ -28,7 +29,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from lambent.bake.probes.centre import flat_axis, outside
-from lambent.bake.probes.division import HIDDEN
+from lambent.bake.probes.division import HIDDEN, family
 from lambent.bake.probes.hidden import SHORT, spread
 from lambent.bake.probes.screening import median_distances, widths
 from lambent.bake.probes.selection import viewers_of, widest_lobe
@@ -36,6 +37,8 @@ from lambent.bake.tracing.rays import leaving, rays_from
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize, reflect
+from lambent.core.geometry.triangles import points_on_triangles, triangle_areas, triangle_normals
+from lambent.core.light.colour import luminance
 from lambent.scenes.mesh import boxes_of
 from lambent.scenes.scene import Mesh
 
@@ -47,7 +50,7 @@ MEDIUM, SMALL = 0.1, 0.06  # radians
 NEAR, REACH = 0.5, 0.75  # limit relative to the mirrored distance, for wide lobes, and the quantile of that distance
 MOST_BEYOND, LEAST_MET = 4.0, 0.05  # limit of that distance by the median hit, if more than this share of rays hits
 NEAR_MIRROR, PER_BLUR = 0.2, 2.0  # limit for mirrors, and its increase by a lobe's roughness, which blurs errors
-OPEN = 0.04  # share of an object's mirrored rays that may hit left out objects with nothing behind
+OPEN = 0.04  # share of an object's mirrored rays that may hit left out objects with nothing, or emitters, behind
 CROSSINGS = 4  # of left out objects, after which something counts as behind
 ONE_SIDE = 0.95  # share of a flat object's mirrored rays that leave on one side of it
 FEW = 0.006  # radians: six pixels of a picture of 60 degrees and 1080 rows
@@ -137,6 +140,7 @@ def _judged(builder: SceneBuilder, whole: Any, places: Floats, names: list[str])
     held = ~shown | (flat & ~clear & ~given)
     limits = np.minimum(HIDDEN * np.sqrt(MEDIUM / np.maximum(looked.size, 1e-9)), 1)
     lost, bare = (_lost(looked, rays, held) for rays in (looked.valid, looked.valid & looked.open))
+    bare += _revealed(builder, whole, names, held)
     wrong = _wrong(builder, whole, names, centres, looked, pairs, held)
     owner = _grouped(worth, pairs, wrong, lost, bare, limits)
     own = _largest(owner, worth, looked.size, given)
@@ -243,6 +247,37 @@ def _lost(looked: Looked, rays: NDArray[np.bool_], held: NDArray[np.bool_]) -> F
     seen = rays & (looked.met != NOTHING) & (looked.met != own) & ~held[looked.met]
     flat = np.bincount((own * count + looked.met)[seen], minlength=count * count).reshape(count, count)
     return np.asarray(flat / np.maximum(looked.valid.sum(axis=1, keepdims=True), 1))
+
+
+def _revealed(builder: SceneBuilder, whole: Any, names: list[str], held: NDArray[np.bool_]) -> Floats:
+    """(N, N): share of an object's points from which another object, with its other parts, hides emitters.
+
+    It counts if it is the first thing on the way from the emitter, and not `held` (N,).
+    """
+    scene, count = builder.scene, len(names)
+    lamps = [o for o in scene.objects if any(o.emission)]
+    corners = np.concatenate([lamp.mesh.corners for lamp in lamps] or [np.zeros((0, 3, 3))])
+    bright = [float(luminance(np.array(lamp.emission, float))) for lamp in lamps]
+    power = triangle_areas(corners) * np.repeat(bright, [len(lamp.mesh.faces) for lamp in lamps])
+    if not power.any():
+        return np.zeros((count, count))
+    rng = np.random.default_rng(0)
+    face = rng.choice(len(corners), count * POINTS, p=power / power.sum())
+    lit, facing = points_on_triangles(corners, face, rng), triangle_normals(corners)[face]
+    points, normals = (
+        np.concatenate(a) for a in zip(*(spread(scene.object(n).mesh, POINTS) for n in names), strict=True)
+    )
+    distance = np.linalg.norm(points - lit, axis=1)
+    w = (points - lit) / np.maximum(distance, 1e-9)[:, None]
+    start = SHORT * (1 + distance)
+    t, between = _FirstHits(builder, whole, names)(rays_from(lit + w * start[:, None], w))
+    hidden = ((facing * w).sum(axis=1) > 0) & ((normals * w).sum(axis=1) < 0) & (t < distance - 2 * start)
+    hidden &= (between != NOTHING) & ~held[between]
+    pair = np.repeat(np.arange(count), POINTS) * count + between
+    by_part = np.bincount(pair[hidden], minlength=count * count).reshape(count, count) / POINTS
+    wholes = np.array([min(family(scene.parts, name)) for name in names])
+    same = wholes[:, None] == wholes
+    return np.where(same, 0.0, by_part @ same)
 
 
 def _wrong(

@@ -15,7 +15,7 @@ from lambent.core.errors import UserError
 from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.light.baked import read_baked
-from lambent.scenes.geometry import box, patch, placed, sphere
+from lambent.scenes.geometry import box, merge, patch, placed, sphere
 from lambent.scenes.scene import ConstantEnvironment, Scene, SceneObject
 from lambent.store.contract import probe_name, scene_record, shared_probes
 from lambent.store.store import Store
@@ -82,6 +82,27 @@ def test_a_lamp_is_not_left_out_of_its_neighbours_reflections(tmp_path: Path) ->
     lit = tuple(replace(o, emission=(3.0, 3.0, 3.0)) if o.name == "bead2" else o for o in scene.objects)
     owners = shared_probes(bake_probes(replace(scene, objects=lit), tmp_path / "s"))
     assert "bead2" not in owners.values() and "bead2" not in owners
+
+
+def test_no_probe_shows_a_lamp_without_its_shade(tmp_path: Path) -> None:
+    """Beads under a lamp in a tray: a probe that they share with the tray leaves it out, and shows them the lamp."""
+    walls = [((0.16, 0.01, 0.16), (0, 0, 0))]
+    walls += [((0.01, 0.08, 0.16), (sign * 0.08, 0.04, 0)) for sign in (-1, 1)]
+    walls += [((0.16, 0.08, 0.01), (0, 0.04, sign * 0.08)) for sign in (-1, 1)]
+    tray = placed(merge([placed(box(size), at) for size, at in walls]), (-1.2, 0.7, -1.5))
+    lamp = placed(box((0.1, 0.01, 0.1)), (-1.2, 0.72, -1.5))
+    beads = [
+        SceneObject(f"bead{i}", placed(sphere(0.03, 12, 8), (-1.24 + 0.08 * i, 0.6, -1.5)), "mirror") for i in range(2)
+    ]
+    room = room_with_step()
+    lit = [SceneObject("tray", tray, "mirror"), SceneObject("disc", lamp, "black", emission=(500.0,) * 3), *beads]
+    store = bake_probes(replace(room, objects=(*room.objects, *lit), cameras=(CAMERA,)), tmp_path / "s")
+    shown = {name: shared_probes(store).get(name, name) for name in ("bead0", "bead1")}
+    trays = {shared_probes(store).get(o.name, o.name) for o in scene_record(store).objects if o.name.startswith("tray")}
+    assert not any(name.startswith("tray") for name in shown.values()) and trays.isdisjoint(shown.values())
+    for name in shown.values():
+        array = store.artefact(probe_name(name, "radiance"))
+        assert float(store.read(array.name).astype(float).max()) * array.meta["unit"] < 250, "the lamp is hidden"
 
 
 def test_in_a_closed_room_no_probe_shows_the_sky(tmp_path: Path) -> None:
