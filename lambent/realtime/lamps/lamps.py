@@ -57,10 +57,10 @@ class PointLamps:
 
         At some `places` among the records, lamps are not as baked: their light may arrive anywhere.
         """
-        self._drawn, lost = drawn, len(profiles) > len(self._profiles)
-        is_same = len(profiles) == len(self._profiles) and all(map(operator.is_, profiles, self._profiles))
-        if not is_same:
-            self._profiles, lost = profiles, True
+        self._drawn = drawn
+        lost = len(profiles) != len(self._profiles) or not all(map(operator.is_, profiles, self._profiles))
+        if lost:
+            self._profiles = profiles
             self._discs = self._uploaded_discs()
         if places != self._changed:
             self._changed = places

@@ -103,8 +103,10 @@ class Lane:
 
 
 def show_lamps(renderer: Renderer, edits: Lamps, say: Callable[[str], None]) -> Lamps:
-    """Show edited lamps, if a file cannot be read all with their own light; return what is shown."""
-    lamps = renderer.resources.changed_lamps
+    """Show edits of lamps that are drawn, if a file cannot be read all with their own light; return what is shown."""
+    lamps, drawn = renderer.resources.changed_lamps, renderer.scene.lamps
+    known = () if drawn is None else [record.number for record in drawn.records]
+    edits = {number: edit for number, edit in edits.items() if number in known}
     try:
         lamps.show(edits)
     except UserError as error:

@@ -209,6 +209,7 @@ class AtRest:
         self._tracing = None if store is None else Tracing(store, sky_turn_deg, replaced, lambda: screen.wake())
         self._pictures: dict[Kind, TracedPicture] = {}
         self._frame: FrameState | None = None  # what is drawn, without its display
+        self._lamps: Mapping[int, LampEdit] = {}
         self._of: tuple[Wish, tuple[Kind, ...]] | None = None  # what pictures depend on
         self._wish: Wish | None = None  # the request
         self._shown: Wish | None = None  # the request whose pictures are shown
@@ -296,8 +297,8 @@ class AtRest:
             return
         tracing.tick()
         frame = _drawn(wanted)
-        if frame != self._frame:
-            self._frame, self._changed_s = frame, now_s
+        if (frame, appearance.lamps) != (self._frame, self._lamps):
+            self._frame, self._lamps, self._changed_s = frame, appearance.lamps, now_s
         self.still = now_s - self._changed_s >= STILL_S
         of = _wish_of(wanted, appearance), kinds
         if of != self._of:
