@@ -50,7 +50,8 @@ class StoredLight:
 
     def edit(self, traced: TracedScene, lamps: Mapping[int, LampEdit]) -> None:
         """Answer edits of lamps, which the scene that is traced has."""
-        self._traced, self._edits = traced, lamps
+        self._traced, self._edits, self._lit = traced, lamps, None
+        self.__dict__.pop("_change", None)
 
     def of(
         self, materials: Mapping[str, Material], textures: Textures, factors: Factors, *, lamps: bool = True

@@ -130,21 +130,21 @@ class TracedRoom:
 
 def room_of_store(
     store: Store, scene: Scene, *, sky_turn_deg: float = 0.0, replacements: Sequence[Replacement] = (),
-    lamps: Mapping[int, LampEdit] = MappingProxyType({}),
+    lamps: Mapping[int, LampEdit] = MappingProxyType({}), before: TracedRoom | None = None,
 ) -> TracedRoom:  # fmt: skip
     """A store's room: its geometry and light map, under the lights of its scene (`store.source.scene_of`).
 
     Sky and sun can be rotated about the vertical, `lamps` edited, and meshes take the place of objects; the light map
-    stays as baked, or answers lamps.
+    stays as baked, or answers lamps. What the store's light needs is taken from a room of it `before`, which ends.
     """
     engine()
     from lambent.bake.pictures.stored import stored_scene  # imports Mitsuba, whose variant `engine` has set
 
     folder = TemporaryDirectory()
     lit = under_turned_sky(_as_drawn(with_lamp_edits(scene, lamps)), sky_turn_deg, Path(folder.name))
-    traced, light = stored_scene(store, lit, replacements), StoredLight(store, scene.lights)
-    if lamps:
-        light.edit(traced, lamps)
+    traced, light = stored_scene(store, lit, replacements), None if before is None else before._light
+    light = light or StoredLight(store, scene.lights)
+    light.edit(traced, lamps)
     return TracedRoom(traced, light, folder)
 
 

@@ -106,10 +106,10 @@ class Rooms:
         from lambent.traced.room import room_of_paths, room_of_store
 
         if kind not in self._by_kind or self._by_kind[kind][0] != lamps:
-            self._by_kind.pop(kind, None)
+            _, before = self._by_kind.pop(kind, (None, None))
             how: dict[str, Any] = {"sky_turn_deg": self._sky_turn_deg, "replacements": self._replacements}
             room = (
-                room_of_store(self._store, self._scene, lamps=lamps, **how)
+                room_of_store(self._store, self._scene, lamps=lamps, before=before, **how)
                 if kind == "traced"
                 else room_of_paths(with_lamp_edits(self._scene, lamps), **how)
             )
