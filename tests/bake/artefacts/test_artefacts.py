@@ -154,9 +154,9 @@ NAMES = (
     "probe/floor/planes",
 )
 PINNED = {
-    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 b84c2534 4c79c1d5 565d5a03 ee3622dc",
-    ("normal", "photons", "traced"): "6161cd22 5095e777 c3dd8d8a 38d64f44 07608b62 a04d8932",
-    ("final", "photons", "traced"): "a38141f9 cef94a2c 95888972 a2a93adc a9c082c5 6272e483",
+    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 d5b58fb6 68037f7f 649a2624 c3ad556d",
+    ("normal", "photons", "traced"): "6161cd22 5095e777 c3dd8d8a 6e917429 3526a2be cd51ab56",
+    ("final", "photons", "traced"): "a38141f9 cef94a2c 95888972 addfa020 f405cebb 4e61597c",
 }
 
 

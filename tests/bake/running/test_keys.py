@@ -25,11 +25,14 @@ from lambent.materials.document import Lobe, Material, Provenance
 from lambent.materials.factored.of_models import editable
 from lambent.materials.models.phong import Phong
 from lambent.scenes.geometry import patch, placed, sphere
+from lambent.scenes.grids import Grid
 from lambent.scenes.looks.textures import CHANNELS
+from lambent.scenes.photometry.distribution import Photometry
 from lambent.scenes.scene import (
     ComputedEnvironment,
     ConstantEnvironment,
     DirectionalLight,
+    IesLight,
     ImageEnvironment,
     LightFieldWish,
     LightGroup,
@@ -52,7 +55,7 @@ SHARES = "light_map/probe_share"
 PROBES = ("probe/", "answer/probe/", SHARES)
 FIELDS = ("light_field/",)
 ANSWER = ("answer/",)
-BAKED = ("light_map/", *PROBES, *FIELDS, *ANSWER)
+BAKED = ("light_map/", "lamps/", *PROBES, *FIELDS, *ANSWER)
 OF_BALL = ("probe/ball/", "answer/probe/ball/", SHARES)
 CAMERA = Camera("front", (0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
 SEEN = View(CAMERA, 8, 6)
@@ -77,6 +80,8 @@ Keys = Callable[..., dict[str, str]]
 Answers = dict[str, tuple[Any, tuple[str, ...]]]  # by field: a value that it has not yet, and prefixes of stale arrays
 VIEW = Camera("view", (0.0, 1.0, 3.0), (0.0, 1.0, 0.0))
 
+DOWNLIGHT = Photometry((0.0, 90.0), (0.0, 360.0), ((1.0, 0.0), (1.0, 0.0)))
+
 MESH: Answers = {
     "positions": (lambda a: a + np.float32(0.001), SURFACES),
     "normals": (lambda a: -a, SURFACES),
@@ -90,6 +95,10 @@ OBJECT: Answers = {
     "material": ("worn", LOOK),
     "emission": ((0.0, 0.0, 0.1), LIGHTS),
     "light_map_scale": (0.5, SURFACES),
+    "luminaire": (
+        IesLight((0.0, 2.0, 0.0), Photometry((0.0, 90.0), (0.0, 360.0), ((1.0, 0.0),) * 2), (1.0, 1.0, 1.0)),
+        LIGHTS,
+    ),
 }
 MATERIAL: Answers = {
     "name": ("renamed", NOTHING),
@@ -175,6 +184,7 @@ SCENE: Answers = {
     "variants": ((Variant("walnut", {"worn": Look(Material(kd=0.1))}),), NOTHING),
     "light_groups": ((LightGroup("all", ("sky",)),), NOTHING),  # sorted by them where a bake is asked to
     "parts": ({"ball": "balls"}, NOTHING),  # given by the names of the objects, which are in the key
+    "grids": ((Grid("desk", np.zeros(3), np.eye(3)[:2], np.eye(3)[2], np.ones((1, 1), bool)),), NOTHING),
     "borders": ({"ball": ((1.0, 0.0, 0.0, 0.0),)}, NOTHING),  # given by the faces of the parts, likewise
     "origin": ("builtin:room", NOTHING),
     "measured": (lambda files: {"grey": files["grey"].with_name("dusk.exr")}, LIT),
@@ -249,6 +259,7 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
     "probe": {"texels": (32, PROBES), "samples": (17, PROBES), "noise": (0.2, PROBES)},
     "probe_share": {},
     "sunlit": {},
+    "lamps": {},
     "light_field": {
         "points": (15, NOTHING),  # the scene says how many
         "texels": (12, FIELDS),
