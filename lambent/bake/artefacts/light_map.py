@@ -347,7 +347,9 @@ def _dominant_direction(context: BakeContext) -> None:
     cache = context.traced.cache(front, back)
     how = moments(cache, context.settings(KIND).max_depth)
     raw, _ = _samples(context, MOMENTS, 0, how, _bumpy_faces(context))
-    context.put(KIND, DOMINANT_DIRECTION, dominant_direction(raw, front, context.traced.labels), context.provenance())
+    sampled = np.maximum(front - lamp_light(context, 0).sum(axis=0, dtype=np.float32), 0)
+    found = dominant_direction(raw, sampled, context.traced.labels)
+    context.put(KIND, DOMINANT_DIRECTION, found, context.provenance())
 
 
 def _noise(context: BakeContext) -> None:

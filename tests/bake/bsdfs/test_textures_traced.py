@@ -174,7 +174,7 @@ def test_diffuse_light_on_bumps_is_that_of_path_tracing(adapter, tmp_path) -> No
     shade = SceneObject("shade", patch((0.52, -0.5, 0), (0, 0, 0.5), (0, 1, 0)), "grey")
     grey = scene.materials | {"grey": Material(kd=0.8)}
     scene = replace(scene, objects=(*scene.objects, shade), materials=grey)
-    store = bake(scene, tmp_path / "s", quality=TINY.changed(light_map={"gather_samples": 64}), only={"light_map"})
+    store = bake(scene, tmp_path / "s", quality=TINY.changed(light_map={"gather_samples": 64}), only={"lamps"})
     drawn = Renderer(open_device(), store).image(FrameState(ABOVE, 32, 32))
     traced, _ = render_reference(scene, ABOVE, 32, 32, 256)
     halves = (slice(4, 28), slice(3, 13)), (slice(4, 28), slice(19, 29))

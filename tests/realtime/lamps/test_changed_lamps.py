@@ -23,7 +23,7 @@ from lambent.scenes.lamp_edits import LampEdit, edited_lamp
 from lambent.scenes.scene import IesLight, PointLight
 from lambent.store.lamp_discs import directions
 from lambent.store.store import Store
-from tests.bake.light.test_lamps import BULB, SPOT, WASHER, intensity, is_behind_plate, room
+from tests.bake.light.test_point_lamps import BULB, SPOT, WASHER, intensity, is_behind_plate, room
 from tests.bake.small_scenes import TINY
 from tests.realtime.lamps.test_drawn_lamps import CAMERA, SIZE, floor_seen
 

@@ -21,7 +21,7 @@ from lambent.realtime.renderer import Renderer
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.store import Store
-from tests.bake.light.test_lamps import BULB, SPOT, WASHER, intensity, is_behind_plate
+from tests.bake.light.test_point_lamps import BULB, SPOT, WASHER, intensity, is_behind_plate
 from tests.bake.small_scenes import TINY
 
 SIZE = 192
