@@ -323,6 +323,11 @@ class Scene:
         return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
 
     @property
+    def lamps(self) -> tuple[int, ...]:
+        """Numbers of the lights that shine from a point: all but directional ones."""
+        return tuple(number for number, light in enumerate(self.lights) if isinstance(light, PointLight | IesLight))
+
+    @property
     def corners(self) -> Array:
         """(F, 3, 3) float64 world positions of the corners of all triangles, object after object."""
         return corners_of([o.mesh for o in self.objects])

@@ -17,7 +17,7 @@ import trimesh
 from numpy.random import Generator, default_rng
 from trimesh.creation import cylinder, icosphere
 
-from tests.generated.rooms import Add, Vector, between
+from tests.generated.rooms import Add, Vector, adding_to, between, saved
 
 HEAD = """format = "lambent-scene"
 version = 1
@@ -184,22 +184,9 @@ def written(name: str, folder: Path, seed: int = 1) -> Path:
     """Write a room, of `LIT_ROOMS`, into a folder; the path of its scene file."""
     fill, eye, target, files = LIT_ROOMS[name]
     scene = trimesh.Scene()
-
-    def add(
-        mesh: trimesh.Trimesh, name: str, at: Vector = (0, 0, 0), turn_deg: float = 0.0, about: Vector = (0, 1, 0)
-    ) -> None:
-        place = trimesh.transformations.rotation_matrix(np.radians(turn_deg), about)
-        place[:3, 3] = at
-        scene.add_geometry(mesh, node_name=name, geom_name=name, transform=place)
-
-    lights = fill(add, default_rng(seed))
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{name}.glb").write_bytes(trimesh.exchange.gltf.export_glb(scene, include_normals=True))
-    for file in files:
-        (folder / f"{file}.ies").write_text(photometry(file))
+    lights = fill(adding_to(scene), default_rng(seed))
     head = HEAD.format(name=name, eye=list(eye), target=list(target))
-    (folder / "scene.toml").write_text(head + lights)
-    return folder / "scene.toml"
+    return saved(scene, name, folder, head + lights, {f"{file}.ies": photometry(file) for file in files})
 
 
 if __name__ == "__main__":

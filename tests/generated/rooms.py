@@ -9,7 +9,7 @@ windows and a few hundred small things. Their placing is drawn from `seed`.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +112,12 @@ def written(name: str, folder: Path, seed: int = 1) -> Path:
     """Write a room, of `ROOMS`, into a folder; the path of its scene file."""
     fill, toml = ROOMS[name]
     scene = trimesh.Scene()
+    lights = fill(adding_to(scene), default_rng(seed))
+    return saved(scene, name, folder, toml + lights, {"downlight.ies": IES})
+
+
+def adding_to(scene: trimesh.Scene) -> Add:
+    """A function that adds a mesh to a scene, by name, rotated and then moved."""
 
     def add(
         mesh: trimesh.Trimesh, name: str, at: Vector = (0, 0, 0), turn_deg: float = 0.0, about: Vector = (0, 1, 0)
@@ -120,11 +126,15 @@ def written(name: str, folder: Path, seed: int = 1) -> Path:
         place[:3, 3] = at
         scene.add_geometry(mesh, node_name=name, geom_name=name, transform=place)
 
-    lights = fill(add, default_rng(seed))
+    return add
+
+
+def saved(scene: trimesh.Scene, name: str, folder: Path, toml: str, files: Mapping[str, str] | None = None) -> Path:
+    """Write a room as NAME.glb, scene.toml and text `files` by name; the path of the scene.toml."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / f"{name}.glb").write_bytes(trimesh.exchange.gltf.export_glb(scene, include_normals=True))
-    (folder / "downlight.ies").write_text(IES)
-    (folder / "scene.toml").write_text(toml + lights)
+    for file, text in {**(files or {}), "scene.toml": toml}.items():
+        (folder / file).write_text(text)
     return folder / "scene.toml"
 
 

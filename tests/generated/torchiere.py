@@ -16,7 +16,7 @@ from numpy.random import default_rng
 from trimesh.creation import annulus, cylinder, icosphere, revolve
 
 from tests.generated.lit_rooms import shell, spot
-from tests.generated.rooms import Vector, between
+from tests.generated.rooms import adding_to, between, saved
 
 TOML = """format = "lambent-scene"
 version = 1
@@ -65,13 +65,7 @@ def written(folder: Path, seed: int = 1) -> Path:
     """Write the room into a folder; the path of its scene file."""
     rng = default_rng(seed)
     scene = trimesh.Scene()
-
-    def add(
-        mesh: trimesh.Trimesh, name: str, at: Vector = (0, 0, 0), turn_deg: float = 0.0, about: Vector = (0, 1, 0)
-    ) -> None:
-        place = trimesh.transformations.rotation_matrix(np.radians(turn_deg), about)
-        place[:3, 3] = at
-        scene.add_geometry(mesh, node_name=name, geom_name=name, transform=place)
+    add = adding_to(scene)
 
     shell(add, 2.2, 2.6, 2.7)
     x, z, turn = rng.uniform(-0.4, 0.1), rng.uniform(-0.4, 0.1), rng.uniform(-30, 30)
@@ -92,14 +86,10 @@ def written(folder: Path, seed: int = 1) -> Path:
     add(standing(cylinder(0.09, 0.01, sections=48)), "disc", (lx, high - 0.05, lz))
     cx, cz = x + rng.uniform(0.1, 0.5), z + rng.uniform(-0.2, 0.3)
     add(standing(annulus(0.05, 0.055, 0.18, sections=48)), "enamel_can", (cx, 2.6, cz))
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "torchiere.glb").write_bytes(trimesh.exchange.gltf.export_glb(scene, include_normals=True))
     light = spot((cx, 2.6, cz), (cx, 0, cz), 600.0, 40.0)
-    (folder / "scene.toml").write_text(
-        TOML.format(x=round(float(x), 3) - 0.3, z=round(float(z), 3) - 0.3, m=round(float(rng.uniform(0.02, 0.12)), 3))
-        + light
-    )
-    return folder / "scene.toml"
+    roughness = round(float(rng.uniform(0.02, 0.12)), 3)
+    toml = TOML.format(x=round(float(x), 3) - 0.3, z=round(float(z), 3) - 0.3, m=roughness)
+    return saved(scene, "torchiere", folder, toml + light)
 
 
 if __name__ == "__main__":

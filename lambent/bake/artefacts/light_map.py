@@ -21,7 +21,7 @@ from lambent.bake.running.tiles import run_tiles
 from lambent.bake.surfaces.backs import backs_of
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.scenes.panes import panes_of
-from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, IesLight, PointLight, Scene
+from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, Scene
 from lambent.store.contract import DOMINANT_DIRECTION, SIDES, noise_name
 from lambent.store.light_groups import group_name
 from lambent.store.store import Writer
@@ -296,7 +296,7 @@ def _samples(
 
 def lamps_apart(context: BakeContext) -> bool:
     """Whether light of lamps at points is computed apart from samples, as renderers draw it."""
-    return not _by_photons(context) and any(isinstance(x, PointLight | IesLight) for x in context.scene.lights)
+    return not _by_photons(context) and bool(context.scene.lamps)
 
 
 def lamp_light(context: BakeContext, side: int) -> Floats:

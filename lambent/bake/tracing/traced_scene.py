@@ -23,7 +23,7 @@ from lambent.bake.surfaces.texels import POINTS, Sides, Texels, chart_labels, te
 from lambent.bake.tracing.first_light import FirstLight, sky_without
 from lambent.bake.tracing.group_tally import Direct, GroupTally, MixTally, Sorting
 from lambent.bake.tracing.lights.emitters import balance_emitters
-from lambent.bake.tracing.lights.lamps import LampRays, lamps_among
+from lambent.bake.tracing.lights.lamps import LampRays
 from lambent.bake.tracing.lights.sun import NoSun, Sun, SunRays, Unseen
 from lambent.bake.tracing.scene_builder import EmitterSampling, SceneBuilder
 from lambent.bake.tracing.seen.visibility import seen, viewing_places, without_hidden
@@ -130,7 +130,7 @@ class TracedScene:
     @cached_property
     def lamps(self) -> tuple[int, ...]:
         """Numbers of the scene's lights whose light on the light map is `lamp_light`."""
-        return lamps_among(self.scene.lights) if self._lamps_apart else ()
+        return self.scene.lamps if self._lamps_apart else ()
 
     def lamp_rays(self, lamps: Sequence[tuple[int, int]], factors: Floats | None = None) -> LampRays:
         """Shadow rays to some of the scene's lights, by number and light group, times factors (G, 3) by group."""

@@ -74,13 +74,13 @@ def test_rays_bring_the_intensity_over_the_square_of_the_distance(number: int) -
     import drjit as dr
     import mitsuba as mi
 
-    from lambent.bake.tracing.lights.lamps import LampRays, lamps_among
+    from lambent.bake.tracing.lights.lamps import LampRays
     from lambent.bake.tracing.rays import array_of, vectors
     from lambent.bake.tracing.scene_builder import SceneBuilder
 
     scene, rng = room(), np.random.default_rng(number)
     builder = SceneBuilder(scene)
-    lamps = lamps_among(scene.lights)
+    lamps = scene.lamps
     assert lamps == (0, 2, 3), "the directional light is none"
     rays = LampRays(builder.build(), [builder.lights[k] for k in lamps], np.array([[1, 1, 1], [2, 1, 0.5], [1, 1, 1]]))
     p = np.column_stack([rng.uniform(-1.5, 1.5, 4000), np.zeros(4000), rng.uniform(-1.5, 1.5, 4000)])

@@ -11,12 +11,6 @@ import numpy as np
 
 from lambent.bake.tracing import rays
 from lambent.core.arrays import Floats
-from lambent.scenes.scene import IesLight, Light, PointLight
-
-
-def lamps_among(lights: Sequence[Light]) -> tuple[int, ...]:
-    """Numbers of the lights that shine from a point: all but directional ones, and dark ones."""
-    return tuple(number for number, light in enumerate(lights) if isinstance(light, PointLight | IesLight))
 
 
 class LampRays:
