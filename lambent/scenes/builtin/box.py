@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from lambent.scenes.builtin.placing import block, thing
+from lambent.scenes.builtin.things import block, thing
 from lambent.scenes.geometry import box as box_mesh
 from lambent.scenes.geometry import patch, placed, sphere, turn
 from lambent.scenes.scene import SceneObject

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from lambent.scenes.builtin.placing import thing
+from lambent.scenes.builtin.things import thing
 from lambent.scenes.geometry import box, patch, placed, turn
 from lambent.scenes.scene import Mesh, SceneObject
 

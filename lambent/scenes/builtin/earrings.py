@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 
 from lambent.core.geometry.directions import Floats
-from lambent.scenes.builtin.placing import POLISHED_SCALE, at, thing
+from lambent.scenes.builtin.things import POLISHED_SCALE, at, thing
 from lambent.scenes.geometry import cylinder, lathe, placed, smooth_curve, sphere, tube, turn
 from lambent.scenes.geometry.drape import Drape
 from lambent.scenes.scene import SceneObject

@@ -11,10 +11,8 @@ from functools import cache
 import numpy as np
 
 from lambent.materials.document import Lobe, Material
-from lambent.scenes.builtin import furniture, props
-from lambent.scenes.builtin.painted import of_one_colour, painted
-from lambent.scenes.builtin.placing import at, block, thing
-from lambent.scenes.builtin.wood import wood
+from lambent.scenes.builtin import furnishings
+from lambent.scenes.builtin.things import at, block, of_one_colour, painted, thing, wood
 from lambent.scenes.geometry import box, cylinder, patch, placed, sphere, tube, turn
 from lambent.scenes.scene import MaterialTextures, Mesh, SceneObject
 
@@ -34,8 +32,8 @@ COLOURS = {
 @cache
 def objects() -> tuple[SceneObject, ...]:
     """The room about the axis of y, its floor in y = 0, its windows towards -x."""
-    couch = [o.mesh for o in furniture.sofa() if o.name != "sofa_feet"]
-    feet = [o.mesh for o in furniture.sofa() if o.name == "sofa_feet"]
+    couch = [o.mesh for o in furnishings.sofa() if o.name != "sofa_feet"]
+    feet = [o.mesh for o in furnishings.sofa() if o.name == "sofa_feet"]
     couch_at, turned = (-0.75, 0.0, -1.95), turn("y", 6)
     return (
         thing("floor", "floor", block((-X - LAP / 2, -THICK, -Z - LAP / 2), (X + LAP / 2, 0.0, Z + LAP / 2))),
@@ -118,7 +116,7 @@ def _table() -> list[SceneObject]:
         placed(cylinder(0.022, TABLE_HIGH - 0.02, 24, 0.002), (x, 0, z)) for x in (-0.44, 0.44) for z in (-0.22, 0.22)
     ]
     top = block((-0.5, TABLE_HIGH - 0.035, -0.28), (0.5, TABLE_HIGH, 0.28), 0.008, segments=3)
-    books = [of_one_colour(o.mesh, (k + 0.5) / 4, 0.5) for k, o in enumerate(props.books_lying())]
+    books = [of_one_colour(o.mesh, (k + 0.5) / 4, 0.5) for k, o in enumerate(furnishings.books_lying())]
     pile = at([thing("books", "books", *books)], (-0.26, TABLE_HIGH, 0.02), turn("y", 70))
     return [thing("table", "table", top, *legs), *pile, *at([thing("toys", "toys", *_toys())], (0.0, TABLE_HIGH, 0.0))]
 

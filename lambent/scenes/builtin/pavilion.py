@@ -14,10 +14,8 @@ from numpy.typing import ArrayLike
 from lambent.core.arrays import Floats
 from lambent.core.plain import Triple
 from lambent.materials.document import Lobe, Material
-from lambent.scenes.builtin import furniture, props
-from lambent.scenes.builtin.painted import painted
-from lambent.scenes.builtin.placing import at, block, thing
-from lambent.scenes.builtin.wood import wood
+from lambent.scenes.builtin import furnishings
+from lambent.scenes.builtin.things import at, block, painted, thing, wood
 from lambent.scenes.geometry import cylinder, extrusion, fan, lathe, placed, sphere, teapot, tube, turn
 from lambent.scenes.geometry.drape import Drape
 from lambent.scenes.geometry.teapot import lid_seat
@@ -160,8 +158,8 @@ def _table() -> list[SceneObject]:
     return [
         thing("table", "timber", top, foot),
         thing("cloth", "cloth", placed(CLOTH.mesh(CLOTH_RADIUS, 260, (6, 10, 14)), (0, TABLE_HIGH, 0))),
-        *at(furniture.chair("chair_1"), (-1.15, 0.0, -0.35), turn("y", 73)),
-        *at(furniture.chair("chair_2"), (0.55, 0.0, -1.1), turn("y", -27)),
+        *at(furnishings.chair("chair_1"), (-1.15, 0.0, -0.35), turn("y", 73)),
+        *at(furnishings.chair("chair_2"), (0.55, 0.0, -1.1), turn("y", -27)),
     ]
 
 
@@ -171,7 +169,7 @@ def _tea() -> list[SceneObject]:
     on_cloth: list[SceneObject] = at([pot], (0, 0, 0), turn("y", 14))
     for name, x, z, yaw_deg in (("white", 0.02, 0.21, 40.0), ("blue", 0.28, -0.1, -35.0), ("red", -0.25, 0.13, 160.0)):
         on_cloth += at(_cup(name), (x, 0, z), turn("y", yaw_deg))
-    on_cloth += at(props.bowl(), (-0.06, 0, -0.33))
+    on_cloth += at(furnishings.bowl(), (-0.06, 0, -0.33))
     return at(on_cloth, (0.0, TABLE_HIGH, 0.0))
 
 

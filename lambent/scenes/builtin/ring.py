@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 
-from lambent.scenes.builtin.placing import POLISHED_SCALE, block, thing
+from lambent.scenes.builtin.things import POLISHED_SCALE, block, thing
 from lambent.scenes.geometry import lathe
 from lambent.scenes.scene import SceneObject
 

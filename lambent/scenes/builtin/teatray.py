@@ -11,9 +11,7 @@ import numpy as np
 
 from lambent.core.geometry.directions import Floats
 from lambent.materials.document import Lobe, Material
-from lambent.scenes.builtin.painted import painted
-from lambent.scenes.builtin.placing import POLISHED_SCALE, at, thing
-from lambent.scenes.builtin.wood import wood
+from lambent.scenes.builtin.things import POLISHED_SCALE, at, painted, thing, wood
 from lambent.scenes.geometry import fan, grid, merge, placed, smooth_curve, sphere, teapot_parts, tube, turn
 from lambent.scenes.geometry.teapot import lid_seat
 from lambent.scenes.scene import MaterialTextures, Mesh, SceneObject

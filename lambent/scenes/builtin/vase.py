@@ -11,9 +11,7 @@ import numpy as np
 
 from lambent.core.geometry.directions import Floats, normalize
 from lambent.materials.document import Lobe, Material
-from lambent.scenes.builtin.painted import of_one_colour, painted
-from lambent.scenes.builtin.placing import block, thing
-from lambent.scenes.builtin.wood import wood
+from lambent.scenes.builtin.things import block, of_one_colour, painted, thing, wood
 from lambent.scenes.geometry import cushion, grid, lathe, merge, placed, transformed, tube, turn
 from lambent.scenes.scene import MaterialTextures, Mesh, SceneObject
 

@@ -13,7 +13,7 @@ from lambent.core.plain import triple
 from lambent.core.views.camera import Camera
 from lambent.scenes import load_scene
 from lambent.scenes.builtin import cornell, loft
-from lambent.scenes.builtin.placing import block
+from lambent.scenes.builtin.things import block
 from lambent.scenes.scene import ConstantEnvironment, SceneObject
 
 
