@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from lambent.baked.transport.wavelets import TAPS
 from lambent.core.arrays import Floats
-from lambent.editing.packed_light import add_light
-from lambent.editing.products import Halves, half_of_float
+from lambent.editing.products import Halves, add_light, half_of_float
 
 TOGETHER = 16  # points whose rows stay in the first-level cache, each in another of its sets
 

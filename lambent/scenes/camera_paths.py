@@ -7,7 +7,7 @@ import numpy as np
 from lambent.core.geometry.directions import Floats, normalize
 from lambent.core.plain import triple
 from lambent.core.views.camera import Camera, CameraPath
-from lambent.scenes.geometry.curves import catmull_rom, centripetal_knots
+from lambent.scenes.geometry.shapes import catmull_rom, centripetal_knots
 
 STEPS = 256  # chords per segment that measure the curve's length
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from lambent.core.views.camera import Camera
-from lambent.editing.curves.as_table import EditedTable
 from lambent.editing.curves.operators import Operator, Region
-from lambent.editing.session.exported import export
+from lambent.editing.session.exported import EditedTable, export
 from lambent.editing.session.session import Session
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material, Provenance, load_material

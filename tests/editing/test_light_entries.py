@@ -7,8 +7,7 @@ import pytest
 
 from lambent.baked.shared_exponent import packed_rgb, unpacked_rgb
 from lambent.baked.transport.wavelets import transformed
-from lambent.editing.interreflection.entries import Entries, TermLight
-from lambent.editing.interreflection.folding import Cells, rows
+from lambent.editing.interreflection.entries import Cells, Entries, TermLight, rows
 
 
 def tile(points: int, numbers: int, share: float, seed: int) -> Entries:

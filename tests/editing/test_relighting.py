@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lambent.core.geometry.directions import normalize
-from lambent.editing.sparse_rows import SparseRows
+from lambent.editing.relit_view import SparseRows
 from lambent.scenes.sky.triangle_lights import icosahedron
 from lambent.scenes.sky.triangle_wavelets import FACES, TriangleTree, TurningLight
 

@@ -14,7 +14,7 @@ import numpy as np
 from lambent.core.light.colour import luminance
 from lambent.core.progress import Progress
 from lambent.core.views.camera import Camera
-from lambent.editing.interreflection.folding import Cells
+from lambent.editing.interreflection.entries import Cells
 from lambent.editing.interreflection.picture import frozen_light
 from lambent.editing.interreflection.powers import powers
 from lambent.editing.interreflection.stored import Interreflections, interreflections

@@ -1,6 +1,5 @@
 """Mesh building blocks: shapes with analytic normals, uv and a brushing direction."""
 
-from lambent.scenes.geometry.curves import catmull_rom, smooth_curve
 from lambent.scenes.geometry.grid import (
     build,
     copies_under,
@@ -8,12 +7,24 @@ from lambent.scenes.geometry.grid import (
     merge,
     placed,
     signed_volume,
+    subdivided,
     tangents_along,
     transformed,
     turn,
 )
-from lambent.scenes.geometry.shapes import box, cushion, cylinder, extrusion, fan, lathe, patch, sphere, tube
-from lambent.scenes.geometry.subdivision import subdivided
+from lambent.scenes.geometry.shapes import (
+    box,
+    catmull_rom,
+    cushion,
+    cylinder,
+    extrusion,
+    fan,
+    lathe,
+    patch,
+    smooth_curve,
+    sphere,
+    tube,
+)
 from lambent.scenes.geometry.teapot import teapot, teapot_parts
 
 __all__ = [

@@ -121,3 +121,34 @@ def signed_volume(mesh: Mesh) -> float:
     """Volume in m^3 of a closed mesh, negative where it is inside out."""
     a, b, c = np.moveaxis(mesh.corners, 1, 0)
     return float(np.sum(a * np.cross(b, c)) / 6)
+
+
+def subdivided(mesh: Mesh, longest_m: float, most: int) -> Mesh:
+    """The same surface, with triangles divided into four until no edge exceeds `longest_m`, or to `most` triangles."""
+    while 4 * len(mesh.faces) <= most and _longest_m(mesh) > longest_m:
+        mesh = _in_four(mesh)
+    return mesh
+
+
+def _longest_m(mesh: Mesh) -> float:
+    corners = mesh.corners
+    return float(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(initial=0))
+
+
+def _in_four(mesh: Mesh) -> Mesh:
+    """Divide triangles at the midpoints of their edges; a shared edge has one new vertex."""
+    faces = mesh.faces.astype(np.int64)
+    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1)
+    pairs, middle = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
+    a, b, c = faces.T
+    ab, bc, ca = (middle.reshape(-1, 3) + len(mesh.positions)).T
+    parts = np.concatenate([np.stack(t, axis=-1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+
+    def halved(values: np.ndarray, unit: bool) -> np.ndarray:
+        mean = values[pairs].mean(axis=1)
+        return np.concatenate([values, normalize(mean) if unit else mean]).astype(np.float32)
+
+    return Mesh(
+        halved(mesh.positions, False), halved(mesh.normals, True), halved(mesh.tangents, True), halved(mesh.uv, False),
+        parts.astype(np.uint32),
+    )  # fmt: skip

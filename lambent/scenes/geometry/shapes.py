@@ -1,4 +1,4 @@
-"""Shapes with analytic normals: y up, metres, standing on or centred at the origin."""
+"""Shapes with analytic normals: y up, metres, standing on or centred at the origin; smooth curves through points."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lambent.core.geometry.directions import Floats, normalize
-from lambent.scenes.geometry.curves import smooth_curve
 from lambent.scenes.geometry.grid import build, grid, merge
 from lambent.scenes.scene import Mesh
 
@@ -186,3 +185,48 @@ def patch(origin: ArrayLike, across: ArrayLike, up: ArrayLike, cells: tuple[int,
     positions = o + s[:, None, None] * a + t[None, :, None] * b
     uv = np.stack(np.broadcast_arrays(s[:, None] * np.linalg.norm(a), t[None, :] * np.linalg.norm(b)), axis=-1)
     return grid(positions, np.broadcast_to(np.cross(a, b), positions.shape), a, uv)
+
+
+def catmull_rom(points: Floats, t: Floats, closed: bool = False, knots: Floats | None = None) -> tuple[Floats, Floats]:
+    """Position and derivative (N, D) at parameters t (N,) of the Catmull-Rom curve through `points` (K, D).
+
+    The curve passes point k at t = knots[k], by default k (Catmull & Rom 1974). An open curve ends straight; a closed
+    one returns to its first point a step of 1 after the last.
+    """
+    if knots is None:
+        knots = np.arange(len(points), dtype=float)
+    if closed:
+        points = np.concatenate([points, points[:1]])
+        knots = np.append(knots, knots[-1] + 1)
+    step = np.diff(knots)[:, None]
+    slope = np.diff(points, axis=0) / step
+    if closed:
+        before, after = np.concatenate([slope[-1:], slope]), np.concatenate([slope, slope[:1]])
+        d0, d1 = np.concatenate([step[-1:], step]), np.concatenate([step, step[:1]])
+    else:
+        before, after = np.concatenate([slope[:1], slope]), np.concatenate([slope, slope[-1:]])
+        d0, d1 = np.concatenate([step[:1], step]), np.concatenate([step, step[-1:]])
+    tangents = (before * d1 + after * d0) / (d0 + d1)
+    k = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, len(step) - 1)
+    d = step[k]
+    s = (t[:, None] - knots[k][:, None]) / d
+    p0, p1, m0, m1 = points[k], points[k + 1], d * tangents[k], d * tangents[k + 1]
+    a, b = 2 * (p0 - p1) + m0 + m1, 3 * (p1 - p0) - 2 * m0 - m1
+    return p0 + s * (m0 + s * (b + s * a)), (m0 + s * (2 * b + 3 * s * a)) / d
+
+
+def centripetal_knots(points: Floats) -> Floats:
+    """Knots (K,) that keep a curve through unevenly spaced points free of loops (Yuksel et al. 2011).
+
+    Steps grow with the square root of the distance, and are at least a quarter of their mean, so that coincident points
+    take a finite time.
+    """
+    root = np.sqrt(np.linalg.norm(np.diff(points, axis=0), axis=-1))
+    mean = float(root.mean()) or 1.0
+    return np.concatenate([[0.0], np.cumsum(np.maximum(root, mean / 4))])
+
+
+def smooth_curve(points: Floats, steps: int, closed: bool = False) -> tuple[Floats, Floats]:
+    """Positions and derivatives at `steps` equal parameter steps between neighbours, ends included."""
+    count = len(points) if closed else len(points) - 1
+    return catmull_rom(points, np.linspace(0, count, count * steps + 1), closed)

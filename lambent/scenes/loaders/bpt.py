@@ -19,8 +19,8 @@ from lambent.core.errors import UserError
 from lambent.core.inputs import read_bytes
 from lambent.materials.document import Material
 from lambent.scenes.geometry import bezier
+from lambent.scenes.geometry.bezier import net_areas, oriented_alike, steps_to, tessellated, triangles_of
 from lambent.scenes.geometry.grid import FLAT
-from lambent.scenes.geometry.tessellation import net_areas, oriented_alike, steps_to, tessellated, triangles_of
 from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
 from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.scene import SceneObject

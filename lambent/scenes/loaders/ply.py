@@ -15,8 +15,7 @@ from lambent.core.errors import UserError
 from lambent.core.inputs import read_bytes
 from lambent.materials.document import Material
 from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
-from lambent.scenes.loaders.meshes.polygons import ranges, triangulate
-from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
+from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of, ranges, triangulate
 from lambent.scenes.scene import SceneObject
 
 NAME, ENDINGS = "PLY", (".ply",)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lambent.scenes.geometry import bezier
+from lambent.scenes.geometry.bezier import oriented_alike, steps_to, tessellated, triangles_of
 from lambent.scenes.geometry.teapot import patches
-from lambent.scenes.geometry.tessellation import oriented_alike, steps_to, tessellated, triangles_of
 from lambent.scenes.validation import mesh_faults
 from tests.scenes.geometry.test_geometry import boundary_edges
 

@@ -21,11 +21,9 @@ from lambent.core.errors import did_you_mean
 from lambent.core.geometry.directions import Floats
 from lambent.core.plain import is_number
 from lambent.scenes.loaders.mitsuba import fresnel
-from lambent.scenes.loaders.mitsuba.fresnel import COS, nearest_fresnel, nearest_passage
-from lambent.scenes.loaders.mitsuba.metals import IOR, METALS
+from lambent.scenes.loaders.mitsuba.fresnel import COS, IOR, METALS, nearest_fresnel, nearest_passage
 from lambent.scenes.loaders.mitsuba.principled import principled
-from lambent.scenes.loaders.mitsuba.textures import colour, number, opacity, raw_values
-from lambent.scenes.loaders.mitsuba.values import Plugin
+from lambent.scenes.loaders.mitsuba.values import Plugin, colour, number, opacity, raw_values
 from lambent.scenes.loaders.surfaces.surface import BLACK, GREY, ROUGHNESS_MIN, SpecularLobe, Surface, blended
 from lambent.scenes.loaders.surfaces.textured import Textured, absolute, combined, constant, scaled
 

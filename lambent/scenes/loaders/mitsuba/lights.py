@@ -12,8 +12,7 @@ from lambent.core.light.photometry import LM_PER_W
 from lambent.core.plain import Triple, triple
 from lambent.core.views.camera import Camera
 from lambent.scenes.loaders.contents import DAYLIGHT
-from lambent.scenes.loaders.mitsuba.textures import colour
-from lambent.scenes.loaders.mitsuba.values import Plugin
+from lambent.scenes.loaders.mitsuba.values import Plugin, colour
 from lambent.scenes.loaders.surfaces.surface import rgb
 from lambent.scenes.scene import (
     LEAST_SUN_DEG,

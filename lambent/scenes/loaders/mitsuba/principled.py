@@ -12,8 +12,7 @@ import numpy as np
 
 from lambent.core.geometry.directions import Floats
 from lambent.materials.fresnel import r0_of
-from lambent.scenes.loaders.mitsuba.textures import LUMINANCE, colour, number
-from lambent.scenes.loaders.mitsuba.values import Plugin
+from lambent.scenes.loaders.mitsuba.values import LUMINANCE, Plugin, colour, number
 from lambent.scenes.loaders.surfaces.surface import GREY, SpecularLobe, Surface, metallic_roughness
 from lambent.scenes.loaders.surfaces.textured import Textured, combined, constant, scaled
 
