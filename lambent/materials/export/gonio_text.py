@@ -1,4 +1,4 @@
-"""Gonio text, Lambent's own plain columns (measured/gonio_text.py): the tuples of a gonio table, unchanged.
+"""Gonio text, Lambent's own plain columns: the tuples of a gonio table, unchanged.
 
 Other subjects (MERL, RGL, LBNL, a material) are measured by the simulated gonio-photometer, without noise, with finer
 steps about the mirror direction.

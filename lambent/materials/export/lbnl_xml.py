@@ -17,13 +17,18 @@ from lambent.core.geometry.directions import Floats
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
 from lambent.materials.export.contract import Cost, Kind, Subject
-from lambent.materials.export.matching.proposal import knows_the_back, proposal_of
 from lambent.materials.export.resampling.lbnl_layout import END, END_OF_BLOCK, block_head, head, losses
 from lambent.materials.export.resampling.pairs import is_grey
 from lambent.materials.export.resampling.patch_mean import patch_means
-from lambent.materials.export.resampling.resampled import Scatterer, read_back, scatterer_of
-from lambent.materials.measured.parts.equal_energy import xyz_of_rgb
+from lambent.materials.export.resampling.resampled import (
+    Scatterer,
+    knows_the_back,
+    proposal_of,
+    read_back,
+    scatterer_of,
+)
 from lambent.materials.measured.parts.klems import KLEMS_FULL
+from lambent.materials.measured.parts.spectral import equal_energy_of_rgb
 
 NAME = "LBNL BSDF XML"
 ENDINGS = (".xml",)
@@ -94,7 +99,7 @@ def _lost_detail(front: Floats) -> list[str]:
 def _document(name: str, blocks: dict[str, Floats], grey: bool) -> str:
     data = []
     for part, values in blocks.items():
-        xyz = np.repeat(values[..., :1], 3, axis=-1) if grey else xyz_of_rgb(values)
+        xyz = np.repeat(values[..., :1], 3, axis=-1) if grey else equal_energy_of_rgb(values)
         for c, (wavelength, detector) in enumerate(_WAVELENGTHS):
             if wavelength == "Visible" or not grey:
                 data += [block_head(wavelength, detector, part, _BASES), *_rows(xyz[..., c]), END_OF_BLOCK]

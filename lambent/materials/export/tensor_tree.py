@@ -17,15 +17,20 @@ from lambent.core.geometry.directions import HALF_TURN, Floats, raised, rotation
 from lambent.core.progress import Progress, part_of, silent
 from lambent.materials.document import Material
 from lambent.materials.export.contract import Cost, Kind, Subject
-from lambent.materials.export.matching.proposal import knows_the_back, proposal_of
-from lambent.materials.export.resampling.lbnl_layout import END, END_OF_BLOCK, block_head, head, losses
+from lambent.materials.export.resampling.lbnl_layout import END, END_OF_BLOCK, block_head, head, losses, pieces_of
 from lambent.materials.export.resampling.pairs import is_grey
-from lambent.materials.export.resampling.resampled import Scatterer, read_back, scatterer_of, tuples_of
+from lambent.materials.export.resampling.resampled import (
+    Scatterer,
+    knows_the_back,
+    proposal_of,
+    read_back,
+    scatterer_of,
+    tuples_of,
+)
 from lambent.materials.export.resampling.tree_growth import TOLERANCE, Growth, Scouts
-from lambent.materials.export.resampling.tree_text import pieces_of
 from lambent.materials.lobes import COS_MIN
 from lambent.materials.measured.lbnl_xml import ISOTROPIC_WITHIN, LbnlTable
-from lambent.materials.measured.parts.equal_energy import xyz_of_rgb
+from lambent.materials.measured.parts.spectral import equal_energy_of_rgb
 from lambent.materials.measured.parts.tensor_tree import Rank, TensorTree, coordinates, disk_of
 from lambent.materials.measured.parts.tree_part import TreePart, on_sphere
 
@@ -154,7 +159,7 @@ def _content(scatterer: Scatterer, rank: Rank, side: int, through: bool, grey: b
     def content(place: Floats) -> Floats:
         wi, wo = _pairs_at(rank, place)
         f = np.maximum(scatterer.eval(wi * (1, 1, side), wo * (1, 1, far)), 0)
-        return f[:, :1] if grey else xyz_of_rgb(f)
+        return f[:, :1] if grey else equal_energy_of_rgb(f)
 
     return content
 

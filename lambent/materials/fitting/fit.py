@@ -17,16 +17,16 @@ from lambent.core.inputs import sha256_of
 from lambent.core.plain import Triple, triple
 from lambent.core.progress import Cancelled, Progress, silent
 from lambent.materials.document import Distribution, Kind, Lobe, Material, Provenance, Side
-from lambent.materials.fitting import account, albedos, gradient, parameters
-from lambent.materials.fitting.albedos import Comparison, Curve
+from lambent.materials.fitting import account, gradient, parameters
+from lambent.materials.fitting.account import Comparison, Curve
 from lambent.materials.fitting.choices import DISTRIBUTION, DistributionChoice
 from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.least_squares import Bounds
 from lambent.materials.fitting.parameters import BOUNDS, RETRO_BOUNDS, SHAPE, Box, Fixed, Ranges, parameter
 from lambent.materials.fitting.problem import Candidate, Found, Mixture, Problem, problem_of
+from lambent.materials.measured.inspecting.faults import towards_light
 from lambent.materials.measured.inspecting.metrics import Metric, errors_of, metric_named
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
-from lambent.materials.measured.tables.retro import towards_light
 
 Search = Callable[[Problem, Bounds, Floats, Progress, int], Iterator[Mixture]]
 """A search for the model with one lobe, two, ...; arguments as in `gradient.fit_lobes`."""
@@ -135,7 +135,7 @@ def fit(
     whole : MeasuredTable, optional
         The table of the tuples, for its albedos; by default `table`, if that is a MeasuredTable.
     keep_albedo : bool
-        Whether the albedo over theta_i must match the table's, per channel (`albedos.KEEP`).
+        Whether the albedo over theta_i must match the table's, per channel (`account.KEEP`).
     search : callable
         The method; by default least squares from several starts, all lobes and the diffuse term jointly.
     seed : int
@@ -161,7 +161,7 @@ def fit(
     share = gain if lobes == "auto" else 0.0
     kinds = DISTRIBUTIONS[distribution]
     samples = table if isinstance(table, MeasuredSamples) else table.samples()
-    curves = albedos.curves_of(whole, samples) if whole is not None else {}
+    curves = account.curves_of(whole, samples) if whole is not None else {}
     kept = curves if keep_albedo else {}
     task = Task(count, share, search, metric_named(metric), kinds, coupled, fix, ranges, seed, kept, retro)
     far = [name for name in [*fix, *ranges] if name.startswith(("t_", "kt"))]
@@ -193,7 +193,7 @@ def fit(
     model = account.evaluate(material, samples)
     errors = errors_of(samples, model)
     fitted = {side: one for side, one in found.items() if one.models}
-    compared = albedos.compare(curves, material)
+    compared = account.compare(curves, material)
     warnings = (
         *account.warnings_of(samples, material, model, fitted, task.metric.name),
         *(one.warning(keep_albedo) for one in compared if one.doubtful),
@@ -276,7 +276,7 @@ def _fit_side(
     problem = problem_of(samples, side, task.metric, task.distributions[0], task.coupled, retro)
     for number, distribution in enumerate(task.distributions):
         own = replace(problem, distribution=distribution)
-        one = Found(albedos.keep(task.kept[side], own, task.coupled) if task.kept else own, boxes, [])
+        one = Found(account.keep(task.kept[side], own, task.coupled) if task.kept else own, boxes, [])
         if number == 0:
             found[side] = one
 

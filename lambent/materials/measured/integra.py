@@ -39,10 +39,10 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import direction
+from lambent.materials.measured.parts.gonio_rows import SpecularGrid, specular_table
 from lambent.materials.measured.parts.spectral import rgb_of_measured
 from lambent.materials.measured.parts.text_numbers import angles_after, counted, head_text, numbers, read_text, shown
 from lambent.materials.measured.tables.gonio import GonioTable
-from lambent.materials.measured.tables.specular_grids import SpecularGrid, specular_table
 from lambent.materials.measured.tables.table import sensible
 
 NAME = "Integra DDR/DDT text"

@@ -19,7 +19,7 @@ import numpy as np
 from lambent.core.ceilings import MEASURED_BYTES
 from lambent.core.geometry.directions import HALF_TURN, Floats, raised
 from lambent.core.inputs import read_bytes
-from lambent.materials.measured.parts import lbnl_document, lbnl_parts
+from lambent.materials.measured.parts import lbnl_parts
 from lambent.materials.measured.parts.lbnl_parts import Part, Side, Way, Where
 from lambent.materials.measured.parts.text_numbers import shown
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable, TableInfo, collect
@@ -39,7 +39,7 @@ _NAMES: dict[Where, str] = {
 
 def recognise(head: bytes, size: int) -> bool:
     """Whether the root element is WindowElement."""
-    return lbnl_document.claims_to_be(head)
+    return lbnl_parts.claims_to_be(head)
 
 
 def read(path: Path) -> LbnlTable:
@@ -52,8 +52,8 @@ def read(path: Path) -> LbnlTable:
         than its bases need, a word that is no number or a value that is not finite, or nothing above zero.
     """
     content = read_bytes(path, MEASURED_BYTES)
-    parts, notes = lbnl_parts.parts_of(lbnl_document.parse(content, path), path)
-    if skipped := shown(lbnl_document.preamble(content)).split():
+    parts, notes = lbnl_parts.parts_of(lbnl_parts.parse(content, path), path)
+    if skipped := shown(lbnl_parts.preamble(content)).split():
         notes = (*notes, f"skipped before the XML: {' '.join(skipped)[:120]}")
     return LbnlTable(path.name, parts, notes)
 

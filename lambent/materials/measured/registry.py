@@ -1,4 +1,4 @@
-"""Find the reader of a measured file by its content.
+"""Find the reader of a measured file by its content, or say what an unread format is and what to do.
 
 A reader is a module of this package that has `NAME` (str), `recognise(head: bytes, size: int) -> bool` and
 `read(path: Path) -> MeasuredTable`, or one of the `FORMATS` of a module. File suffixes are ignored: three formats share
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 import sys
 from functools import cache
 from pathlib import Path
@@ -17,11 +18,39 @@ from typing import Literal, Protocol
 from lambent.core.discovery import modules_in
 from lambent.core.errors import UserError
 from lambent.core.inputs import foreign_bytes, open_input
-from lambent.materials.measured.inspecting.unread import kind_of
-from lambent.materials.measured.parts.text_numbers import UTF16, is_utf16
+from lambent.core.plain import is_number
+from lambent.materials.measured.parts.text_numbers import HINT_QUANTITY, UTF16, is_utf16, shown
 from lambent.materials.measured.protocol import MeasuredTable
-from lambent.materials.measured.tables.gonio import GonioTable
-from lambent.materials.measured.tables.reconstruction import AUTO, Reconstruction
+from lambent.materials.measured.tables.gonio import AUTO, GonioTable, Reconstruction
+
+_HEAD_BYTES = 4096
+_LEAST_NUMBERS = 5  # of a row of columns
+_TEXT_EXPORT = "export it as Zemax BSDF, ASTM E1392 or plain columns with named angles"
+_KINDS = (
+    ("ALTA binary", rb"#FORMAT[ \t]+binary", "convert it to ALTA text: data2data without `format binary`"),
+    ("SPEOS (OPTIS) BSDF", rb"OPTIS\s*-[^\n]*surface file", _TEXT_EXPORT),
+    ("Surface Scattering Distribution Data (SSDD)", rb"(?m)^DATA_TYPE[ \t]+(?:brdf|btdf|specular_\w+)\b",
+     "export it from BSDF Processor as Integra DDR or DDT"),
+    ("NVIDIA MDL measured BSDF (MBSDF)", rb"NVIDIA ARC MBSDF", "load the measurement that it was made of"),
+    ("VIAVI, RPC Photonics or Light Tec text with columns of its own",
+     rb"(?i:\bVIAVI\b|RPC[ _-]Photonics|Engineered Diffuser|Light[ -]?Tec\b)|\bED[CSLF]\d?-\d",
+     "take the same specimen's Zemax BSDF file (.bsdf), or name the columns: theta_i phi_i theta_o phi_o f"),
+    ("HDF5 or MATLAB 7.3", rb"\A\x89HDF\r\n", _TEXT_EXPORT),
+    ("ZIP archive", rb"\APK\x03\x04", "unpack it, and load the file inside"),
+    ("gzip archive", rb"\A\x1f\x8b", "unpack it, and load the file inside"),
+)  # fmt: skip
+
+
+def kind_of(head: bytes) -> tuple[str, str] | None:
+    """Format of a file that begins with `head`, and advice on it; None if unknown."""
+    begin = head[:_HEAD_BYTES]
+    found = next(((name, remedy) for name, signature, remedy in _KINDS if re.search(signature, begin)), None)
+    row = re.match(r"(?:\s*(?:[#%]|//)[^\n]*\n)*\s*([^\n]*)", shown(begin))
+    words = re.split(r"[\s;]+|,\s+", row[1].strip()) if row else []
+    if found is None and len(words) >= _LEAST_NUMBERS and all(is_number(word.replace(",", ".")) for word in words):
+        return "columns without names", f"{HINT_QUANTITY}, without decimal commas"
+    return found
+
 
 HEAD_BYTES = 1 << 16
 
@@ -52,7 +81,7 @@ def readers() -> tuple[Reader, ...]:
 def load(path: Path | str, reconstruction: Reconstruction | Literal["auto"] = AUTO) -> MeasuredTable:
     """Read a measured material of any known format.
 
-    `reconstruction` selects the look-up of a gonio table between its incident directions, see reconstruction.py.
+    `reconstruction` selects the look-up of a gonio table between its incident directions, see gonio.py.
 
     Raises
     ------

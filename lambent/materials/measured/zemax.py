@@ -22,6 +22,7 @@ from lambent.core.arrays import Floats
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import direction
+from lambent.materials.measured.parts.gonio_rows import SpecularGrid, specular_table
 from lambent.materials.measured.parts.spectral import rgb_of_xyz
 from lambent.materials.measured.parts.text_numbers import (
     angles_after,
@@ -33,7 +34,6 @@ from lambent.materials.measured.parts.text_numbers import (
 )
 from lambent.materials.measured.protocol import LARGEST_F
 from lambent.materials.measured.tables.gonio import GonioTable
-from lambent.materials.measured.tables.specular_grids import SpecularGrid, specular_table
 from lambent.materials.measured.tables.table import unmarked
 
 NAME = "Zemax BSDF text"

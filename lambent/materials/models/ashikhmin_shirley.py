@@ -10,8 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from lambent.materials.fresnel import schlick
-from lambent.materials.models.model import Floats, Model, Parameter
-from lambent.materials.models.pairs import Pair, reflected, sample_cosine, upper
+from lambent.materials.models.model import Floats, Model, Pair, Parameter, reflected, sample_cosine, upper
 
 DIFFUSE_SHARE = 0.5  # of the samples
 

@@ -6,8 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from lambent.materials.models.model import Floats, Model, Parameter
-from lambent.materials.models.pairs import reflected, upper
+from lambent.materials.models.model import Floats, Model, Parameter, reflected, upper
 
 
 class BlinnPhong(Model):

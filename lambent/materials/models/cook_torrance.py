@@ -10,8 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from lambent.materials.fresnel import conductor
-from lambent.materials.models.model import Floats, Model, Parameter
-from lambent.materials.models.pairs import Pair, beckmann, reflected, sample_beckmann, upper
+from lambent.materials.models.model import Floats, Model, Pair, Parameter, beckmann, reflected, sample_beckmann, upper
 
 
 class CookTorrance(Model):

@@ -11,8 +11,7 @@ import numpy as np
 
 from lambent.core.geometry.directions import normalize, raised
 from lambent.materials.fresnel import schlick
-from lambent.materials.models.model import Floats, Model, Parameter
-from lambent.materials.models.pairs import reflected, upper
+from lambent.materials.models.model import Floats, Model, Parameter, reflected, upper
 
 
 class Ggx(Model):

@@ -6,8 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from lambent.materials.models.model import Floats, Model, Parameter
-from lambent.materials.models.pairs import cosine_pdf, sample_cosine
+from lambent.materials.models.model import Floats, Model, Parameter, cosine_pdf, sample_cosine
 
 
 class Lambert(Model):

@@ -7,8 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from lambent.core.geometry.directions import elevation
-from lambent.materials.models.model import Floats, Model, Parameter
-from lambent.materials.models.pairs import cosine_pdf, sample_cosine, upper
+from lambent.materials.models.model import Floats, Model, Parameter, cosine_pdf, sample_cosine, upper
 
 
 class OrenNayar(Model):

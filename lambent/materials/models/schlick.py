@@ -13,8 +13,7 @@ import numpy as np
 
 from lambent.core.geometry.directions import normalize
 from lambent.materials.fresnel import schlick
-from lambent.materials.models.model import Floats, Model, Parameter
-from lambent.materials.models.pairs import Pair, reflected, upper
+from lambent.materials.models.model import Floats, Model, Pair, Parameter, reflected, upper
 
 
 class Schlick(Model):

@@ -6,8 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from lambent.materials.models.model import Floats, Model, Parameter
-from lambent.materials.models.pairs import Pair, beckmann, reflected, sample_beckmann, upper
+from lambent.materials.models.model import Floats, Model, Pair, Parameter, beckmann, reflected, sample_beckmann, upper
 
 
 class Ward(Model):

@@ -20,8 +20,8 @@ from lambent.materials.measured import load
 from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.materials.measured.lbnl_xml import LbnlTable, read
 from lambent.materials.measured.merl import directions_of
-from lambent.materials.measured.parts.equal_energy import xyz_of_rgb
 from lambent.materials.measured.parts.klems import KLEMS_FULL
+from lambent.materials.measured.parts.spectral import equal_energy_of_rgb
 from tests.materials.measured.lbnl_files import angles_away_from_borders, ask_radiance, lbnl_xml, needs_radiance, words
 from tests.materials.measured.measured_files import merl_bytes
 
@@ -97,7 +97,7 @@ def test_radiance_reads_it(foil, tmp_path: Path) -> None:
     np.testing.assert_allclose(luminance(f), answers["xyz"][:, 1], rtol=5e-4, atol=1e-9)
     hemi = luminance(np.stack([table.reflectivity(wi[:100]), table.transmissivity(wi[:100])], axis=1))
     np.testing.assert_allclose(hemi, answers["hemi"], rtol=4e-4)
-    x, _, z = np.moveaxis(xyz_of_rgb(f), -1, 0)
+    x, _, z = np.moveaxis(equal_energy_of_rgb(f), -1, 0)
     assert np.corrcoef(x - z, answers["xyz"][:, 0] - answers["xyz"][:, 2])[0, 1] > 0.99
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from lambent.bench.scenes.retro_tapes import TAPES
 from lambent.materials.document import Lobe, Material
-from lambent.materials.export.matching.proposal import proposal_of
+from lambent.materials.export.resampling.resampled import proposal_of
 from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, synthesise
 from tests.tools.chi_square import LEVEL, sampler_test
 

@@ -13,7 +13,7 @@ from lambent.core.geometry.directions import FLIP_Z, direction, normalize
 from lambent.core.plain import plain
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.fitting import albedos
+from lambent.materials.fitting import account
 from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.least_squares import Bounds, _add_albedos, _moved, _unknowns
 from lambent.materials.fitting.parameters import box_of
@@ -82,7 +82,7 @@ def test_a_good_fit_says_so_and_the_comparison_is_json():
 
 def test_the_albedos_are_the_whole_tables_at_measured_angles():
     table = CarPaint()
-    curve = albedos.curves_of(table, table.samples())["reflection"]
+    curve = account.curves_of(table, table.samples())["reflection"]
     assert curve.theta_deg.tolist() == [0, 15, 30, 45, 60, 70]
     wi = direction(np.radians(curve.theta_deg), 0.0)
     np.testing.assert_allclose(curve.albedo, table.reflectivity(wi))
@@ -109,8 +109,8 @@ def test_the_sheet_of_a_file_with_light_from_behind_alone_is_turned_over():
 
     table = Behind()
     np.testing.assert_allclose(
-        albedos.curves_of(table, table.samples())["reflection"].albedo,
-        albedos.curves_of(CarPaint(), table.samples())["reflection"].albedo,
+        account.curves_of(table, table.samples())["reflection"].albedo,
+        account.curves_of(CarPaint(), table.samples())["reflection"].albedo,
     )
 
 
@@ -125,7 +125,7 @@ def test_the_derivatives_of_the_kept_albedos_are_those_of_their_error(metric, di
     table = CarPaint()
     samples = table.samples(500)
     problem = problem_of(samples, "reflection", METRICS[metric], distribution, False)
-    kept = albedos.keep(albedos.curves_of(table, samples)["reflection"], problem, False).kept
+    kept = account.keep(account.curves_of(table, samples)["reflection"], problem, False).kept
     bounds = Bounds((box_of("reflection", 0, True, 3, {}, {}),), True)
     shape = np.array([np.log(0.1), np.log(0.1), np.log(0.2), 0.4])
     start = Mixture(np.array([0.1, 0.2, 0.3]), (Candidate(shape, np.array([0.3, 0.2, 0.1])),))

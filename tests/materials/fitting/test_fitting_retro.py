@@ -15,9 +15,9 @@ from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.parameters import box_of, check, to_search
 from lambent.materials.fitting.problem import Candidate, Mixture, problem_of
+from lambent.materials.measured.inspecting.faults import towards_light
 from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, synthesise
-from lambent.materials.measured.tables.retro import towards_light
 
 SETUP = replace(ISOTROPIC, about_lamp=True, sector_deg=0.0, step_deg=5.0, fine_deg=1.0)
 BEADS = Material(

@@ -10,7 +10,7 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import angles, direction, half_vector
 from lambent.materials.measured import load
-from lambent.materials.measured.parts.alta_directions import PARAMETRISATIONS
+from lambent.materials.measured.alta import PARAMETRISATIONS
 from tests.materials.measured.measured_files import Loaded, alta_text
 
 

@@ -1,4 +1,4 @@
-"""Tables and materials as functions of two directions, for writers that choose their own directions."""
+"""Tables and materials as functions of two directions, and where they scatter light, for writers."""
 
 from __future__ import annotations
 
@@ -9,15 +9,52 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.arrays import Floats
+from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.document import Material
+from lambent.materials.document import BLACK, Lobe, Material
 from lambent.materials.export.contract import Cost, Subject
 from lambent.materials.export.resampling.pairs import CHECK_LOG2, is_isotropic, pairs_of
+from lambent.materials.measured.inspecting.faults import retro, towards_light
 from lambent.materials.measured.inspecting.metrics import errors_and_shares, light_ratios
 from lambent.materials.measured.protocol import MeasuredSamples, negative_readings
 from lambent.materials.measured.registry import load
 from lambent.materials.measured.tables.gonio import Symmetry, symmetry_of
-from lambent.materials.measured.tables.retro import towards_light
+
+_WIDTHS = (0.004, 0.02, 0.08, 0.3)  # of the lobes of the proposal for a table
+_MOST_TUPLES = 100_000  # tuples of a table used to detect retro-reflection
+_ASKED_DEG, _TURN_DEG = (1.0, 20.0, 45.0, 70.0), 45.0  # theta, and steps of phi, at which light from behind is tested
+
+
+def proposal_of(subject: Subject) -> MaterialBSDF:
+    """A material itself; for a table, a material with lobes of every width that measured lobes can have.
+
+    For a retro-reflective table, lobes about the light are added.
+    """
+    if isinstance(subject, Material):
+        return MaterialBSDF(subject)
+    white, part = (1.0, 1.0, 1.0), (1 / len(_WIDTHS),) * 3
+    lobes = [Lobe(distribution="ggx", mx=m, my=m, r0=white, k=part) for m in _WIDTHS]
+    if retro(subject, subject.samples(_MOST_TUPLES))[0] > 1:
+        lobes += [lobe.of_kind("retro") for lobe in lobes]
+    if subject.info.transmits:
+        lobes += [lobe.model_copy(update={"side": "transmission", "r0": BLACK}) for lobe in lobes if lobe.mirrors]
+    quarter = (0.25, 0.25, 0.25)
+    return MaterialBSDF(Material(kd=quarter, kt_d=quarter if subject.info.transmits else BLACK, lobes=tuple(lobes)))
+
+
+def knows_the_back(subject: Subject) -> bool:
+    """Whether light from -z is scattered: as the table's `has_a_back` states, or as found at any of many directions.
+
+    A material is equal from both sides.
+    """
+    if isinstance(subject, Material):
+        return True
+    stated: bool | None = getattr(subject, "has_a_back", None)
+    if stated is not None:
+        return stated
+    theta, phi = np.meshgrid(180 - np.array(_ASKED_DEG), np.arange(0, 360, _TURN_DEG))
+    return bool(subject.albedo(direction(np.radians(theta), np.radians(phi))).any())
+
 
 MOST_TUPLES = 200_000  # tuples of a table at which the written file is compared
 PEAK_RATIO, PEAK_DEG, PEAK_TOLERANCE = 1.25, 10.0, 0.1  # of a retro-reflective peak; its tolerated loss

@@ -9,9 +9,9 @@ import numpy as np
 from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import more_than_arrives
 from lambent.materials.measured.inspecting import faults
+from lambent.materials.measured.inspecting.faults import retro
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.tables.gonio import GonioTable, symmetry_of
-from lambent.materials.measured.tables.retro import retro
 
 _THETA_I_DEG = (0, 15, 30, 45, 60, 75)
 
@@ -24,7 +24,7 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
     dict
         `file`, `format`, `stored`, `channels`, `symmetry`, `transmits`, `sizes`, `notes` as in `TableInfo`;
         `reconstruction`: of a gonio table, the way in use between incident directions, and E of each way in percent
-        of E against black, see reconstruction.py;
+        of E against black, see gonio.py;
         `albedo`: `theta_i_deg` and, per angle and channel, `reflectivity` and `transmissivity`;
         `tuples`: used, how many of these are below zero in a channel, and left out by reason;
         `faults`: `not_measured_percent`, `not_finite_percent` of the tuples, `negative_percent` of those used,

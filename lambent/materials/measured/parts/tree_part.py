@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from lambent.core.geometry.directions import HALF_TURN, Floats
-from lambent.materials.measured.parts.equal_energy import rgb_of_xyz, within_rec709, xyz_of_yuv
+from lambent.materials.measured.parts.spectral import rgb_of_equal_energy, within_rec709, xyz_of_yuv
 from lambent.materials.measured.parts.tensor_tree import (
     Cells,
     Rank,
@@ -126,7 +126,7 @@ class TreePart:
         y, *chroma = (tree.look_up(place)[0] for tree in self.trees)
         if not chroma:
             return y[:, None]
-        rgb = within_rec709(rgb_of_xyz(xyz_of_yuv(y, *chroma)))
+        rgb = within_rec709(rgb_of_equal_energy(xyz_of_yuv(y, *chroma)))
         return np.asarray(np.where(y[:, None] < 0, y[:, None], rgb))
 
     def _summed(self, fixed: tuple[int, ...], place: Floats) -> Floats:

@@ -1,21 +1,35 @@
 """Gonio-photometer tables: a grid of incident directions, and for each a sheet of outgoing ones on either side.
 
-Look-ups between the incident directions (thesis M, 3.2) blend p = f |cos theta_o| at the directions that
-reconstruction.py gives. Transmission is looked up as the reflection of the pair mirrored at the surface.
+Look-ups between the incident directions (thesis M, 3.2) blend p = f |cos theta_o|, looked up in the sheet of each
+neighbouring incident direction w_k at the direction that a method gives:
+
+- `half_vector`: w_k mirrored about h(wi, wo). Peaks follow the mirror direction (Rusinkiewicz 1998).
+- `back_vector`: the same, but if wo is nearer to the light than to its mirror direction, wo turned as wi is turned to
+  w_k. Peaks about the light, those of retro-reflectors, follow it: they have the same back vector, the half vector of
+  the viewer and the light's mirror image about n (Belcour et al. 2014), for every direction of the light. At normal
+  incidence the peaks coincide and count as the light's, which is far stronger in tables that use this method.
+- `quadrilinear`: wo itself. Peaks stay where they were measured.
+
+The choice is made by leaving one out: inner theta_i are predicted from their neighbours. The error is E under the
+cube-root metric, which weighs faint peaks and dark parts alike, relative to E against black. Transmission is looked up
+as the reflection of the pair mirrored at the surface.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.geometry.directions import FLIP_Z, angles, direction, raised
+from lambent.core.geometry.directions import FLIP_Z, angles, direction, half_vector, raised, reflect
+from lambent.materials.bsdf import components
 from lambent.materials.document import Material
+from lambent.materials.lobes import NUMPY, ArrayOps, Vector
+from lambent.materials.measured.inspecting.metrics import CUBEROOT
 from lambent.materials.measured.protocol import (
     RETRO_PROPOSAL,
     MeasuredSamples,
@@ -24,7 +38,6 @@ from lambent.materials.measured.protocol import (
     TableInfo,
     collect,
 )
-from lambent.materials.measured.tables.reconstruction import AUTO, Choice, Fold, Reconstruction, choice_of, looked_up
 from lambent.materials.measured.tables.sheets import ScatteredSheet, Sheet
 from lambent.materials.measured.tables.table import (
     bracket,
@@ -33,6 +46,93 @@ from lambent.materials.measured.tables.table import (
     require_values,
     usable_values,
 )
+
+Reconstruction = Literal["half_vector", "back_vector", "quadrilinear"]
+RECONSTRUCTIONS: tuple[Reconstruction, ...] = get_args(Reconstruction)
+AUTO: Literal["auto"] = "auto"
+CLEARLY = 0.9  # share of the error of `half_vector` that another method must not exceed
+_TUPLES = 3000  # per incident direction that is left out
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The method in use; `errors` has E of each method relative to E against black, and is empty if unknown."""
+
+    way: Reconstruction
+    errors: dict[Reconstruction, float] = field(default_factory=dict)
+
+
+Fold = tuple[MeasuredSamples, Callable[[Reconstruction, MeasuredSamples], Floats]]
+"""Tuples of an incident direction, and f (N, C) at them as predicted by the table without it."""
+
+
+def choice_of(folds: Iterable[Fold]) -> Choice:
+    """The method with the best predictions; `half_vector` unless another one is clearly better."""
+    off, whole = dict.fromkeys(RECONSTRUCTIONS, 0.0), 0.0
+    for samples, predicted in folds:
+        some = _thinned(samples)
+        whole += CUBEROOT.error(some, np.zeros_like(some.f)) ** 2
+        for way in off:
+            off[way] += CUBEROOT.error(some, predicted(way, some)) ** 2
+    if whole <= 0:
+        return Choice("half_vector")
+    errors = {way: float(np.sqrt(error / whole)) for way, error in off.items()}
+    best = min(errors, key=lambda way: errors[way])
+    return Choice(best if errors[best] < CLEARLY * errors["half_vector"] else "half_vector", errors)
+
+
+def _thinned(samples: MeasuredSamples) -> MeasuredSamples:
+    """Up to _TUPLES tuples, half of them by solid angle and half by light; weights compensate for the choice."""
+    if len(samples) <= _TUPLES:
+        return samples
+    light = samples.weight * np.abs(samples.wo[:, 2])
+    of_peaks = light * samples.f.mean(axis=1)
+    density = light / max(float(light.sum()), 1e-300) + of_peaks / max(float(of_peaks.sum()), 1e-300) + 1e-12
+    summed = np.cumsum(density)
+    drawn = np.searchsorted(summed, (np.arange(_TUPLES) + 0.5) / _TUPLES * summed[-1]).clip(max=len(samples) - 1)
+    some = samples.take(drawn)
+    return replace(some, weight=some.weight / density[drawn])
+
+
+def looked_up(way: Reconstruction, wi: Floats, wo: Floats) -> Callable[[Floats], list[tuple[Floats, Any, bool]]]:
+    """Where to look up the sheets of neighbouring incident directions (N, 3) for the pairs wi, wo (N, 3).
+
+    The returned function gives directions (N, 3), their weights (N), and whether they belong to a peak about the light.
+    """
+    if way == "quadrilinear":
+        return lambda neighbour: [(wo, 1.0, False)]
+    h = half_vector(wi, wo)
+    if way == "half_vector":
+        return lambda neighbour: [(reflect(neighbour, h), 1.0, False)]
+    share, behind = back_share(components(wi), components(wo)), reflect(wo, wi)
+
+    def both(neighbour: Floats) -> list[tuple[Floats, Any, bool]]:
+        mirrored = reflect(neighbour, h)
+        # two half turns, about wi and about the midpoint: the shortest rotation from wi to the neighbour
+        turned = reflect(behind, half_vector(wi, neighbour))
+        # if h is the neighbour itself, its peak about the light would appear elsewhere
+        of_light = np.maximum(share, back_share(components(neighbour), components(mirrored)))
+        return [(mirrored, 1 - of_light, False), (turned, of_light, True)]
+
+    return both
+
+
+_COS_NORMAL = 1 - 1e-6  # .08 degrees
+_STEEPNESS = 2.0  # from 0 to 1 over half the range of the measure below
+
+
+def back_share(wi: Vector, wo: Vector, ops: ArrayOps = NUMPY) -> Any:
+    """1 if wo is nearer to wi than to its mirror image, 0 if farther; continuous in between.
+
+    Based on (|h_b| - |h|)/(|h_b| + |h|) of the squared tangential components of wi + wo and wi' + wo; symmetric in wi
+    and wo. 1 for wi or wo along the normal.
+    """
+    across = wi[0] * wo[0] + wi[1] * wo[1]
+    size = wi[0] * wi[0] + wi[1] * wi[1] + wo[0] * wo[0] + wo[1] * wo[1]
+    nearness = 2 * across / ops.maximum(size, 1e-12)  # -1 at the mirror direction, 1 towards the light
+    share = ops.minimum(ops.maximum(0.5 + _STEEPNESS * nearness, 0.0), 1.0)
+    return ops.select((wi[2] > _COS_NORMAL) | (wo[2] > _COS_NORMAL), 1.0, share)
+
 
 AnySheet = Sheet | ScatteredSheet
 Sheets = tuple[tuple[AnySheet, ...], ...]

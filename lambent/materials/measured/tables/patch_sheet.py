@@ -35,9 +35,8 @@ from lambent.materials.measured.tables.half_vector_grid import (
     first_above,
     turns,
 )
-from lambent.materials.measured.tables.half_vector_resampling import grid_of
+from lambent.materials.measured.tables.half_vector_resampling import Reversed, grid_of
 from lambent.materials.measured.tables.retro_grid import RetroGrid, retro_grid_of
-from lambent.materials.measured.tables.two_sided import Reversed
 
 _WAYS: tuple[Way, ...] = ("reflection", "transmission")
 _BOUNDS = 6

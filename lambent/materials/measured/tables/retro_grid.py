@@ -16,8 +16,7 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.lobes import NUMPY, ArrayOps, Vector
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.tables.half_vector_grid import GridShape, HalfVectorGrid
-from lambent.materials.measured.tables.half_vector_resampling import grid_of
-from lambent.materials.measured.tables.two_sided import TwoSided
+from lambent.materials.measured.tables.half_vector_resampling import TwoSided, grid_of
 
 
 @dataclass(frozen=True)
