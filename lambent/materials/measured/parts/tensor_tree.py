@@ -12,8 +12,7 @@ bit of a child's number. Numbers in braces are a grid of 2^(rank k) leaves, with
 
 from __future__ import annotations
 
-from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -221,100 +220,67 @@ def parse_tree(text: bytes, rank: Rank) -> TensorTree:
     Malformed
         If braces do not match, a number of branches or values is impossible, or a word is not a number.
     """
-    nest = _Nest(rank)
-    for opens, words in _braces(text):
-        if opens:
-            nest.open(words)
-        else:
-            nest.close(words)
-    if nest.root is None:
-        raise Malformed("a brace that is not closed" if nest.unclosed else "no braces")
-    values = numbers_of(text)
-    logs = np.frombuffer(nest.logs, np.int8)
+    opens, words = _braces(text)
+    depth = np.cumsum(np.where(opens, np.int8(1), np.int8(-1)), dtype=np.int32)
+    _check_nesting(opens, words, depth)
+    branches, node = 1 << rank, np.flatnonzero(opens)
+    leaf, level = ~opens[node + 1], depth[node]
+    counts = words[node[leaf] + 1]
+    logs = np.round(np.log2(np.maximum(counts, 1)) / rank).astype(np.int8)
     sizes = np.left_shift(1, rank * logs, dtype=np.int32)  # no grid is longer than the text
+    if (counts != sizes).any():
+        raise Malformed(f"{counts[counts != sizes][0]} values in braces, expected a power of {branches}")
+    code = np.where(leaf, -np.cumsum(leaf, dtype=np.int32), np.cumsum(~leaf, dtype=np.int32) - 1)
+    children = np.empty((int((~leaf).sum()), branches), np.int32)
+    for deep in range(1, int(level.max())):
+        above, below = np.flatnonzero((level == deep) & ~leaf), np.flatnonzero(level == deep + 1)
+        found = np.bincount(np.searchsorted(above, below) - 1, minlength=len(above))
+        if (found > branches).any():
+            raise Malformed(f"more than {branches} branches in braces")
+        if (found < branches).any():
+            raise Malformed(f"{branches} branches expected in braces, found {found.min()}")
+        children[code[above]] = code[below].reshape(-1, branches)
+    values = numbers_of(text)
     if len(values) != sizes.sum():
         raise Malformed("a word that is not a number")
-    children = np.frombuffer(nest.children, np.int32).reshape(-1, 1 << rank)
-    return TensorTree(rank, children, np.cumsum(sizes, dtype=np.int32) - sizes, logs, values, nest.root)
+    return TensorTree(rank, children, np.cumsum(sizes, dtype=np.int32) - sizes, logs, values, int(code[0]))
 
 
-class _Nest:
-    """Collects branches and grids from braces in order; its explicit stack makes depth cheap."""
-
-    def __init__(self, rank: Rank) -> None:
-        self.children = array("i")
-        self.logs = array("b")
-        self.root: int | None = None
-        self._opened = False  # a brace was opened; its content is not yet known
-        self._rank, self._branches = rank, 1 << rank
-        self._log_of = {1 << rank * log: log for log in range(64 // rank)}
-        self._path: list[list[int]] = []  # open branches: number, halves filled
-
-    @property
-    def unclosed(self) -> bool:
-        return self._opened or bool(self._path)
-
-    def open(self, words: int) -> None:
-        if words:
-            raise Malformed("a number outside the innermost braces")
-        if self.root is not None:
-            raise Malformed("text after the last brace")
-        if self._opened:
-            if len(self._path) == DEEPEST:
-                raise Malformed(f"more than {DEEPEST} levels of braces")
-            self._path.append([len(self.children) // self._branches, 0])
-            self.children.extend([0] * self._branches)
-        self._opened = True
-
-    def close(self, words: int) -> None:
-        if self._opened:
-            if words not in self._log_of:
-                raise Malformed(f"{words} values in braces, expected a power of {self._branches}")
-            self.logs.append(self._log_of[words])
-            self._opened = False
-            self._put(-len(self.logs))
-            return
-        if not self._path:
-            raise Malformed("a brace too many")
-        number, filled = self._path.pop()
-        if words or filled != self._branches:
-            got = "a number beside them" if words else str(filled)
-            raise Malformed(f"{self._branches} branches expected in braces, found {got}")
-        self._put(number)
-
-    def _put(self, code: int) -> None:
-        if not self._path:
-            self.root = code
-            return
-        number, filled = self._path[-1]
-        if filled == self._branches:
-            raise Malformed(f"more than {self._branches} branches in braces")
-        self.children[number * self._branches + filled] = code
-        self._path[-1][1] += 1
+def _check_nesting(opens: Flags, words: Indices, depth: NDArray[np.int32]) -> None:
+    """Raise `Malformed` if braces do not match or words are outside the innermost; `depth` is that after each brace."""
+    if words[-1]:
+        raise Malformed("text after the last brace")
+    if len(opens) == 0:
+        raise Malformed("no braces")
+    if depth.max() > DEEPEST + 1:
+        raise Malformed(f"more than {DEEPEST} levels of braces")
+    end = int(np.argmax(depth <= 0))
+    if depth[end] > 0:
+        raise Malformed("a brace that is not closed")
+    if depth[end] < 0 or end + 1 < len(depth):
+        raise Malformed("text after the last brace" if depth[end] == 0 and opens[end + 1] else "a brace too many")
+    closes_leaf = np.append(False, opens[:-1] & ~opens[1:])
+    stray = np.flatnonzero((words[:-1] > 0) & ~closes_leaf)
+    if len(stray):
+        before_branch = opens[stray[0]]
+        raise Malformed(
+            "a number outside the innermost braces" if before_branch else "a number beside branches in braces"
+        )
 
 
-def _braces(text: bytes) -> Iterator[tuple[bool, int]]:
-    """Whether each brace opens, and the number of words since the last brace; in chunks, to save memory.
-
-    Raises
-    ------
-    Malformed
-        If words follow the last brace.
-    """
-    words = 0
+def _braces(text: bytes) -> tuple[Flags, Indices]:
+    """Whether each brace opens (K,), and the numbers (K + 1,) of words between braces; in chunks, to save memory."""
+    opens, words, rest = [np.zeros(0, bool)], [np.zeros(0, np.int32)], 0
     for start in range(0, len(text), _CHUNK):
         letters = np.frombuffer(text, np.uint8)[start : start + _CHUNK]
         begins = _word_starts(letters, text[start - 1] if start else _BLANKS[0])
         braces = np.flatnonzero((letters == _OPEN) | (letters == _CLOSE))
-        if len(braces) == 0:
-            words += int(begins.sum())
-            continue
-        between = np.add.reduceat(begins, np.concatenate([[0], braces]), dtype=np.int64)
-        between[0] += words
-        words = int(between[-1])
-        yield from zip((letters[braces] == _OPEN).tolist(), between[:-1].tolist(), strict=True)
-    if words:
-        raise Malformed("text after the last brace")
+        between = np.add.reduceat(begins, np.append(0, braces), dtype=np.int32)
+        between[0] += rest
+        opens.append(letters[braces] == _OPEN)
+        words.append(between[:-1])
+        rest = int(between[-1])
+    return np.concatenate(opens), np.append(np.concatenate(words), rest)
 
 
 def _word_starts(letters: NDArray[np.uint8], before: int) -> Flags:
