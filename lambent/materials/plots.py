@@ -13,8 +13,7 @@ import numpy as np
 from lambent.core.files import atomic_path
 from lambent.core.geometry.directions import Floats, direction
 from lambent.core.outputs import MARK
-from lambent.materials.fitting.shown.disks import measured_disk
-from lambent.materials.fitting.shown.incidence import Incidence, incidences
+from lambent.materials.fitting.shown.incidence import Incidence, incidences, measured_disk
 from lambent.materials.measured.protocol import MeasuredTable
 
 Eval = Callable[[Floats, Floats], Floats]

@@ -18,7 +18,7 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.progress import Progress
-from lambent.materials.fitting.least_squares import Bounds
+from lambent.materials.fitting.gradient import Bounds
 from lambent.materials.fitting.parameters import Box
 from lambent.materials.fitting.problem import ALPHA, MU, NU, R0, Candidate, Mixture, Problem
 from lambent.materials.fitting.scale import Channel, solve_coefficients, solve_scale

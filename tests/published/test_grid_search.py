@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from lambent.core.progress import silent
-from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.parameters import box_of, to_search
 from lambent.materials.fitting.problem import Mixture, problem_of
+from lambent.materials.fitting.scale import diffuse_mode
 from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.published import grid_search
 from lambent.published.grid_search import Schedule, fit_lobes, search

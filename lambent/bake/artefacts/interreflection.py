@@ -21,8 +21,7 @@ from lambent.bake.interreflection.tiles import Job, Tile, TileTracer
 from lambent.bake.running.keys import key_of, light_inputs, texture_inputs
 from lambent.bake.running.tiles import slices
 from lambent.bake.transport.view import View
-from lambent.materials.factored.roughness import varies
-from lambent.materials.factored.terms import Editable
+from lambent.materials.factored.terms import Editable, varies
 from lambent.store.source import environment_note
 
 if TYPE_CHECKING:

@@ -18,8 +18,7 @@ from lambent.bake.running.in_background import background
 from lambent.bake.running.keys import key_of, texture_inputs
 from lambent.bake.transport.view import View
 from lambent.core.progress import Progress
-from lambent.materials.factored.roughness import varies
-from lambent.materials.factored.terms import Factor, Term
+from lambent.materials.factored.terms import Factor, Term, varies
 from lambent.store.contract import TRANSPORT_BASIS
 from lambent.store.source import environment_note
 from lambent.store.store import Store, Writer

@@ -31,8 +31,8 @@ from lambent.bake.tracing.array_ops import array_ops
 from lambent.core.progress import Progress, silent
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.tables.half_vector_grid import GridShape, HalfVectorGrid
+from lambent.materials.measured.tables.half_vector_resampling import RetroGrid
 from lambent.materials.measured.tables.patch_sheet import Lookup, PatchSheet, lookup_of
-from lambent.materials.measured.tables.retro_grid import RetroGrid
 
 PLUGIN = "lambent_table"
 _LOOKUPS: dict[str, type[HalfVectorGrid] | type[PatchSheet] | type[RetroGrid]] = {

@@ -20,8 +20,7 @@ from lambent.bake.transport.view_points import ViewPoints
 from lambent.baked.transport.tails import Tails
 from lambent.materials.factored.curve import END_RAD
 from lambent.materials.factored.parametrisations import angle_of
-from lambent.materials.factored.roughness import narrowed, thinned, varies
-from lambent.materials.factored.terms import Editable, Term, upper_pair
+from lambent.materials.factored.terms import Editable, Term, narrowed, thinned, upper_pair, varies
 
 
 @dataclass(frozen=True)

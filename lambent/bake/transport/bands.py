@@ -27,8 +27,7 @@ from lambent.bake.transport.sums import accumulate, add
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.baked.shared_exponent import LARGEST, ONES, packed
 from lambent.materials.factored.parametrisations import angle_of
-from lambent.materials.factored.roughness import narrowed, thinned, varies
-from lambent.materials.factored.terms import Factor, Term
+from lambent.materials.factored.terms import Factor, Term, narrowed, thinned, varies
 from lambent.scenes.sky.triangle_lights import TriangleLights
 
 BLOCK = 1 << 14  # threads that Dr.Jit gives to one core at a time

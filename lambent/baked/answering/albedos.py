@@ -8,8 +8,8 @@ import numpy as np
 
 from lambent.baked.answering.answer import MOST_ALBEDO, Albedos
 from lambent.core.arrays import Floats
-from lambent.materials.diffuse_albedos import lobe_albedo
 from lambent.materials.document import Material
+from lambent.materials.factored.albedo import lobe_albedo
 
 
 def albedos_of(materials: Sequence[Material]) -> Albedos:

@@ -28,7 +28,7 @@ def command(
     Example: lambent convert chrome.binary chrome.bsdf --as rgl
     """
     from lambent.core.outputs import check_output
-    from lambent.materials.export.registry import writer_for
+    from lambent.materials.export.contract import writer_for
     from lambent.materials.export.resampling.resampled import read_back
     from lambent.materials.measured.registry import is_known
 

@@ -17,7 +17,7 @@ from lambent.core.plain import triple
 from lambent.editing.session.document import OfDocument, OfModel, OfTable
 from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material, Provenance, Side
-from lambent.materials.export.matching.verdict import Verdict, verdict_of
+from lambent.materials.export.contract import Verdict, verdict_of
 from lambent.materials.factored.curve import END_RAD, Curve, angles_rad
 from lambent.materials.factored.of_lobes import lobe_terms, of_material, prefixed
 from lambent.materials.factored.terms import Editable

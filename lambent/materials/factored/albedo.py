@@ -15,10 +15,30 @@ from typing import Any
 import numpy as np
 
 from lambent.core.arrays import Floats, Indices
+from lambent.core.plain import Triple, triple
+from lambent.materials.bsdf import specular_only
+from lambent.materials.document import Material
 from lambent.materials.factored.curve import END_RAD, Curve
+from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.parametrisations import angle_of
 from lambent.materials.factored.terms import Editable, Factor, Term
 from lambent.materials.lobes import NUMPY, Vector
+
+
+def possible_kd(material: Material, kd: Triple) -> Triple:
+    """A diffuse colour, reduced so that with the material's lobes and transmission no more than all light is scattered.
+
+    A metal has less room for one than a wall.
+    """
+    lobes = lobe_albedo(material, "reflection") + lobe_albedo(material, "transmission")
+    return triple(np.minimum(kd, np.maximum(1 - lobes - np.array(material.kt_d), 0)))
+
+
+def lobe_albedo(material: Material, side: str) -> Floats:
+    """Equivalent diffuse albedo (3,) of a material's lobes on a side, "reflection" or "transmission"."""
+    lobes = specular_only(material)
+    return albedo(of_material(lobes), side) if lobes.lobes else np.zeros(3)
+
 
 BANDS, BANDS_OF_TWO, BANDS_OF_VIEWER = 1024, 256, 64
 VIEWERS, ELEVATIONS, AZIMUTHS, TURNS = 32, 1024, 32, 8  # nodes; turns of both directions for anisotropic terms

@@ -16,7 +16,7 @@ from lambent.core.arrays import Flags, Indices
 from lambent.core.geometry.directions import FLIP_Z, Floats, direction
 from lambent.materials.bsdf import MaterialBSDF, more_than_arrives
 from lambent.materials.document import Kind, Material, Side
-from lambent.materials.fitting.least_squares import Bounds, minimise
+from lambent.materials.fitting.gradient import Bounds, minimise
 from lambent.materials.fitting.parameters import LEGAL, RETRO_LEGAL, SHAPE, Box, Fixed, Ranges, from_search, parameter
 from lambent.materials.fitting.problem import Candidate, Found, KeptAlbedo, Mixture, Problem, problem_of, replace_metric
 from lambent.materials.fitting.scale import weighted_median

@@ -29,7 +29,7 @@ from lambent.materials.factored.parametrisations import angle_of
 from lambent.materials.factored.quotients import Grooves, One
 from lambent.materials.factored.tabulated import MOST, Grid, Tabulated
 from lambent.materials.factored.terms import Editable, Factor, Quotient, Term
-from lambent.materials.fitting.diffuse import diffuse_mode
+from lambent.materials.fitting.scale import diffuse_mode
 from lambent.materials.lobes import NUMPY
 from lambent.materials.measured.inspecting.metrics import CUBEROOT, errors_and_shares
 from lambent.materials.measured.protocol import GRAZING_DEG, MeasuredSamples, MeasuredTable

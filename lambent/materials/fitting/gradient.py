@@ -4,22 +4,216 @@ Lobes are added one by one to the best model so far. A new lobe starts at severa
 alpha), whose optima are bimodal, and by splitting each existing lobe into a narrow and a wide one. Its coefficients are
 solved on the residual of the others (subtracted and clamped); then all shapes and coefficients move together. The best
 starts continue with more tuples. `fit` keeps the extra lobe only if it fits all tuples better.
+
+Each descent is damped Gauss-Newton with exact derivatives. Coefficients enter as logarithms: they stay positive, and
+ln k trades linearly against ln r0, which is poorly determined. L1 is minimised by reweighting: least squares with
+weights 1/|residual| has the same minimum. Steps respect the bounds: an unknown that would leave its interval stops at
+its end, and the rest of the step is solved again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.progress import Progress
-from lambent.materials.fitting.least_squares import Bounds, minimise
 from lambent.materials.fitting.parameters import Box, to_search
-from lambent.materials.fitting.problem import MU, NU, Candidate, Mixture, Problem
-from lambent.materials.fitting.scale import solve_coefficients
+from lambent.materials.fitting.problem import ALPHA, MU, NU, Candidate, KeptAlbedo, Mixture, Problem
+from lambent.materials.fitting.scale import TINY, solve_coefficients
+
+DAMPING = (1e-3, 1e7)  # initial and largest; shares of the normal matrix's diagonal
+LEAST_RESIDUAL = 1e-3  # share of the transformed measurement (and of its mean) below which L1 is quadratic
+LONGEST_STEP = 2.0  # of any logarithm: far from the optimum the model is not linear in it
+K_SPAN = 14.0  # range of ln k in one minimisation, to either side
+NOTHING = 1e-9  # a coefficient below this is 0
+SHAPE_AXES = range(MU, ALPHA + 1)
+COEFFICIENT = 4  # "axis" of unknowns that are ln k of a channel
+DIFFUSE = -1  # "lobe" number of the diffuse coefficients: a model's terms are this one, then the lobes
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One coordinate: ln mx, ln my, ln r0 or alpha of a lobe, or ln k of a lobe or of the diffuse term in a channel."""
+
+    lobe: int
+    axis: int
+    channel: int
+    start: float
+    lo: float
+    hi: float
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Search space of one side's model: a box per lobe, and whether the diffuse coefficients are free."""
+
+    boxes: Sequence[Box]
+    diffuse_free: bool
+
+
+def minimise(problem: Problem, bounds: Bounds, start: Mixture, steps: int, stop_share: float) -> tuple[Mixture, float]:
+    """The model after at most `steps` descent steps from `start`, and its residual (`Problem.remaining`).
+
+    Stops after a step that lowers the error by less than the share `stop_share`.
+    """
+    unknowns = _unknowns(bounds, start)
+    error = problem.remaining(start)
+    if not unknowns:
+        return start, error
+    x, lo, hi = (np.array([getattr(u, name) for u in unknowns]) for name in ("start", "lo", "hi"))
+    current, (damping, most) = start, DAMPING
+    for _ in range(steps):
+        matrix, gradient = _normal_equations(problem, bounds, current, unknowns)
+        before = error
+        while damping < most:
+            there = _step(matrix, gradient, damping, x, lo, hi)
+            candidate = _moved(bounds, start, unknowns, there)
+            reached = problem.remaining(candidate)
+            if reached < error:
+                x, error, current, damping = there, reached, candidate, max(damping / 10, 1e-9)
+                break
+            damping *= 10
+        if before - error <= stop_share * before:
+            break
+    return current, error
+
+
+def _step(matrix: Floats, gradient: Floats, damping: float, x: Floats, lo: Floats, hi: Floats) -> Floats:
+    """End point of a damped step: the minimum of the damped quadratic within the bounds (active set)."""
+    diagonal = np.diag(matrix)
+    damped = matrix + damping * np.diag(np.maximum(diagonal, 1e-12 * diagonal.max() + 1e-300))
+    least, most = np.maximum(lo - x, -LONGEST_STEP), np.minimum(hi - x, LONGEST_STEP)
+    step = np.zeros_like(x)
+    free = ~(((x <= lo) & (gradient < 0)) | ((x >= hi) & (gradient > 0)))
+    while free.any():
+        rest = gradient[free] - damped[np.ix_(free, ~free)] @ step[~free]
+        step[free] = np.linalg.solve(damped[np.ix_(free, free)], rest)
+        outside = free & ((step < least) | (step > most))
+        if not outside.any():
+            break
+        step[outside] = np.clip(step[outside], least[outside], most[outside])
+        free &= ~outside
+    return np.asarray(np.clip(x + step, lo, hi))
+
+
+def _normal_equations(
+    problem: Problem, bounds: Bounds, mixture: Mixture, unknowns: Sequence[Unknown]
+) -> tuple[Floats, Floats]:
+    """J^T W J (U, U) and J^T W r (U,), with r the transformed residual and J the model's derivative."""
+    matrix, gradient = np.zeros((len(unknowns),) * 2), np.zeros(len(unknowns))
+    for block in problem.blocks:
+        metric, c = block.metric, block.c
+        terms, slopes = _terms(block, mixture, c), _slopes(block, bounds, mixture)
+        for channel, target in enumerate(block.target):
+            parts = _coefficients(mixture, channel, c.dtype)[:, None] * terms
+            model = parts.sum(axis=0)
+            residual = target - metric.transform(model)
+            w = block.w
+            if metric.power == 1:
+                size = np.abs(target)
+                w = w / np.maximum(np.abs(residual), LEAST_RESIDUAL * (size + size.mean()) + TINY)
+            if not metric.linear:
+                parts *= metric.slope(model)
+            here, rows = _rows(unknowns, channel, parts, slopes, c.dtype)
+            weighted = rows * w
+            matrix[np.ix_(here, here)] += weighted @ rows.T
+            gradient[here] += weighted @ residual
+    if problem.kept is not None:
+        _add_albedos(problem.kept, bounds, mixture, unknowns, matrix, gradient)
+    return matrix, gradient
+
+
+def _add_albedos(
+    kept: KeptAlbedo, bounds: Bounds, mixture: Mixture, unknowns: Sequence[Unknown], matrix: Floats, gradient: Floats
+) -> None:
+    """Likewise for the albedos that the model must match."""
+    pairs = kept.pairs
+    terms, slopes = _terms(pairs, mixture, 1.0), _slopes(pairs, bounds, mixture)
+    weight = kept.weight / kept.albedo.shape[1] * 2 / pairs.metric.power  # L1's gradient lacks the 2 of squares
+    for channel, (residual, by_albedo) in enumerate(zip(*kept.off(mixture), strict=True)):
+        parts = _coefficients(mixture, channel, terms.dtype)[:, None] * terms
+        here, rows = _rows(unknowns, channel, parts, slopes, parts.dtype)
+        rows = kept.integral(rows) * by_albedo
+        matrix[np.ix_(here, here)] += weight * rows @ rows.T
+        gradient[here] += weight * rows @ residual
+
+
+def _terms(problem: Problem, mixture: Mixture, cosine: Floats | float) -> Floats:
+    """(1 + L, N) f in 1/sr, times a cosine, of the diffuse term and of every lobe with coefficient 1."""
+    return np.stack(
+        [cosine * problem.diffuse, *(cosine * problem.basis(lobe.shape, lobe.retro) for lobe in mixture.lobes)]
+    )
+
+
+def _coefficients(mixture: Mixture, channel: int, dtype: np.dtype[Any]) -> Floats:
+    return np.array([mixture.diffuse[channel], *(lobe.k[channel] for lobe in mixture.lobes)], dtype=dtype)
+
+
+def _slopes(problem: Problem, bounds: Bounds, mixture: Mixture) -> list[tuple[Floats, Floats, Floats, Floats]]:
+    pairs = zip(bounds.boxes, mixture.lobes, strict=False)
+    return [problem.log_derivatives(lobe.shape, box.tied, lobe.retro) for box, lobe in pairs]
+
+
+def _rows(
+    unknowns: Sequence[Unknown], channel: int, parts: Floats, slopes: Sequence[Sequence[Floats]], dtype: np.dtype[Any]
+) -> tuple[list[int], Floats]:
+    """Indices of the unknowns that affect a channel, and the derivatives (U, N) of its model by them."""
+    here = [i for i, u in enumerate(unknowns) if u.axis != COEFFICIENT or u.channel == channel]
+    rows = np.empty((len(here), parts.shape[1]), dtype=dtype)
+    for row, i in zip(rows, here, strict=True):
+        u = unknowns[i]
+        if u.axis == COEFFICIENT:
+            row[:] = parts[u.lobe + 1]
+        else:
+            np.multiply(parts[u.lobe + 1], slopes[u.lobe][u.axis], out=row)
+    return here, rows
+
+
+def _unknowns(bounds: Bounds, start: Mixture) -> list[Unknown]:
+    """The free coordinates; coefficients that are 0 or fixed are left out."""
+    unknowns = []
+    for index, (box, lobe) in enumerate(zip(bounds.boxes, start.lobes, strict=False)):
+        for axis in SHAPE_AXES:
+            lo, hi = float(box.lo[axis]), float(box.hi[axis])
+            if lo < hi and not (box.tied and axis == NU):
+                unknowns.append(Unknown(index, axis, 0, float(np.clip(lobe.coordinates[axis], lo, hi)), lo, hi))
+        for channel, (k, (least, most)) in enumerate(zip(lobe.k, box.k_limits, strict=True)):
+            if k > 0 and least < most:
+                unknowns.append(_coefficient(index, channel, float(k), least, most))
+    if bounds.diffuse_free:
+        for channel, k in enumerate(start.diffuse):
+            if k > 0:
+                unknowns.append(_coefficient(DIFFUSE, channel, float(k), 0.0, np.inf))
+    return unknowns
+
+
+def _coefficient(lobe: int, channel: int, k: float, least: float, most: float) -> Unknown:
+    start = float(np.log(k))
+    lo = max(start - K_SPAN, float(np.log(max(least, 1e-300))))
+    hi = min(start + K_SPAN, float(np.log(most)))
+    return Unknown(lobe, COEFFICIENT, channel, min(max(start, lo), hi), lo, hi)
+
+
+def _moved(bounds: Bounds, start: Mixture, unknowns: Sequence[Unknown], x: Floats) -> Mixture:
+    """The model with the unknowns at `x`."""
+    diffuse = start.diffuse.astype(np.float64)
+    lobes = [replace(lobe, coordinates=lobe.coordinates.copy(), k=lobe.k.astype(np.float64)) for lobe in start.lobes]
+    for u, value in zip(unknowns, x, strict=True):
+        if u.axis != COEFFICIENT:
+            lobes[u.lobe].coordinates[u.axis] = value
+            continue
+        k = np.exp(value)
+        (diffuse if u.lobe == DIFFUSE else lobes[u.lobe].k)[u.channel] = k if k > NOTHING else 0.0
+    for box, lobe in zip(bounds.boxes, lobes, strict=False):
+        if box.tied:
+            lobe.coordinates[NU] = lobe.coordinates[MU]
+    return Mixture(diffuse, tuple(lobes))
+
 
 VALUES = (12_000, 60_000, 300_000)  # measured values (tuples times channels) in the three stages
 KEPT = (3, 1)  # starts that continue to the second and to the third stage

@@ -17,7 +17,7 @@ from lambent.core.arrays import Floats
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.plain import Triple, is_number
-from lambent.materials.diffuse_albedos import possible_kd
+from lambent.materials.factored.albedo import possible_kd
 from lambent.scenes.looks.image_textures import MOST_REPEAT, mean_and_detail
 from lambent.scenes.scene import ImageTexture, Look, MaterialTextures
 

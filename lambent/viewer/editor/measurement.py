@@ -15,7 +15,7 @@ from lambent.core.plain import Triple, triple
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import components, evaluate
 from lambent.materials.document import Lobe, Material
-from lambent.materials.fitting.diffuse import diffuse_mode
+from lambent.materials.fitting.scale import diffuse_mode
 from lambent.materials.fitting.shown.incidence import Incidence, incidences
 from lambent.materials.lobes import Vector
 from lambent.materials.measured import load

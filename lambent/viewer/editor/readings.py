@@ -17,9 +17,14 @@ from lambent.core.geometry.directions import direction
 from lambent.core.geometry.sequences import radical_inverse
 from lambent.materials.bsdf import MaterialBSDF, components, evaluate
 from lambent.materials.document import Material
-from lambent.materials.fitting.shown.disks import brightness, disk_directions, in_plane_directions, measured_disk
-from lambent.materials.fitting.shown.incidence import Incidence
-from lambent.materials.fitting.symmetry import mirrored
+from lambent.materials.fitting.shown.incidence import (
+    Incidence,
+    brightness,
+    disk_directions,
+    in_plane_directions,
+    measured_disk,
+    mirrored,
+)
 from lambent.materials.lobes import Vector
 from lambent.viewer.mode import Image
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.materials.document import Material
-from lambent.materials.fitting.shown.disks import in_plane_tuples
+from lambent.materials.fitting.shown.incidence import in_plane_tuples
 from lambent.viewer.background.work import Work, pending
 from lambent.viewer.editor import readings
 from lambent.viewer.editor.measurement import Measurement

@@ -12,7 +12,7 @@ from lambent.bake.engine import engine
 from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import components
 from lambent.materials.factored.of_lobes import of_material
-from lambent.materials.factored.of_textures import of_textures
+from lambent.materials.factored.opening import of_textures
 from lambent.materials.factored.quotients import Grooves
 from lambent.materials.factored.tabulated import Grid, Tabulated
 from lambent.materials.lobes import NUMPY

@@ -19,7 +19,7 @@ from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.parametrisations import angle_of
-from lambent.materials.factored.roughness import narrowed, thinned
+from lambent.materials.factored.terms import narrowed, thinned
 from lambent.materials.lobes import NUMPY
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import ConstantEnvironment, ImageEnvironment, MaterialTextures, Scene, SceneObject, Texture

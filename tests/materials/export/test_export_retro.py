@@ -13,8 +13,8 @@ from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material, material_from
 from lambent.materials.export import gltf, gonio_text, lbnl_xml, materialx, merl, mitsuba
+from lambent.materials.export.contract import verdict_of
 from lambent.materials.export.matching.match import without_retro
-from lambent.materials.export.matching.verdict import verdict_of
 from lambent.materials.export.resampling import patch_mean
 from lambent.materials.export.resampling.resampled import read_back
 from lambent.materials.measured import load

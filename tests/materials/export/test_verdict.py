@@ -10,9 +10,7 @@ import pytest
 
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import gltf
-from lambent.materials.export.contract import Cost
-from lambent.materials.export.matching.verdict import LIGHT_LIMITS, LIMITS, RETRO_LIMITS, verdict_of
-from lambent.materials.export.registry import writers
+from lambent.materials.export.contract import LIGHT_LIMITS, LIMITS, RETRO_LIMITS, Cost, verdict_of, writers
 from lambent.materials.measured.inspecting.metrics import METRICS
 from tests.materials.export.export_materials import ALL
 

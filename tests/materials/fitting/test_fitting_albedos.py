@@ -15,7 +15,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting import account
 from lambent.materials.fitting.fit import fit
-from lambent.materials.fitting.least_squares import Bounds, _add_albedos, _moved, _unknowns
+from lambent.materials.fitting.gradient import Bounds, _add_albedos, _moved, _unknowns
 from lambent.materials.fitting.parameters import box_of
 from lambent.materials.fitting.problem import Candidate, Mixture, problem_of
 from lambent.materials.measured.inspecting.metrics import METRICS

@@ -7,7 +7,7 @@ import pytest
 
 from lambent.core.progress import silent
 from lambent.materials.fitting import gradient
-from lambent.materials.fitting.least_squares import Bounds, _normal_equations, _unknowns, minimise
+from lambent.materials.fitting.gradient import Bounds, _normal_equations, _unknowns, minimise
 from lambent.materials.fitting.parameters import box_of, to_search
 from lambent.materials.fitting.problem import Candidate, Mixture, problem_of
 from lambent.materials.measured.inspecting.metrics import METRICS

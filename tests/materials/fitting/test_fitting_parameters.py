@@ -10,9 +10,8 @@ from hypothesis.extra.numpy import arrays
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
-from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.parameters import check, parse_fix, parse_ranges
-from lambent.materials.fitting.scale import Channel, solve_scale, weighted_median
+from lambent.materials.fitting.scale import Channel, diffuse_mode, solve_scale, weighted_median
 from lambent.materials.measured.inspecting.metrics import METRICS
 from tests.materials.fitting.known_answers import FEW, grey
 

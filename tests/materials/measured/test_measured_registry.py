@@ -11,7 +11,7 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.core.inputs import UNREADABLE
 from lambent.core.progress import silent
-from lambent.materials.export.registry import writer_for
+from lambent.materials.export.contract import writer_for
 from lambent.materials.measured import load, registry
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.registry import HEAD_BYTES, readers

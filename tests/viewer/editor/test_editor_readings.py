@@ -10,8 +10,7 @@ import pytest
 from lambent.core.geometry.directions import angles
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.fitting.shown.incidence import incidences
-from lambent.materials.fitting.symmetry import mirrored
+from lambent.materials.fitting.shown.incidence import incidences, mirrored
 from lambent.materials.measured import load
 from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.materials.measured.inspecting.synthetic import synthesise

@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from lambent.core.geometry.directions import Floats, direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import BLACK, Material
-from lambent.materials.fitting.shown.disks import (
+from lambent.materials.fitting.shown.incidence import (
+    Incidence,
     brightness,
     disk_directions,
     in_plane_directions,
     in_plane_tuples,
+    incidences,
     measured_disk,
 )
-from lambent.materials.fitting.shown.incidence import Incidence, incidences
 from lambent.materials.fitting.shown.slices import Slice
 from lambent.materials.measured.inspecting.metrics import Metric
 from lambent.materials.measured.protocol import MeasuredSamples

@@ -35,8 +35,7 @@ from lambent.materials.measured.tables.half_vector_grid import (
     first_above,
     turns,
 )
-from lambent.materials.measured.tables.half_vector_resampling import Reversed, grid_of
-from lambent.materials.measured.tables.retro_grid import RetroGrid, retro_grid_of
+from lambent.materials.measured.tables.half_vector_resampling import RetroGrid, Reversed, grid_of, retro_grid_of
 
 _WAYS: tuple[Way, ...] = ("reflection", "transmission")
 _BOUNDS = 6

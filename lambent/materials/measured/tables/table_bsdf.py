@@ -15,9 +15,8 @@ from lambent.materials.checking.chi_square import ChiSquare, chi_square, combine
 from lambent.materials.lobes import COS_MIN
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.tables.half_vector_grid import GridShape, HalfVectorGrid
-from lambent.materials.measured.tables.half_vector_resampling import TwoSided
+from lambent.materials.measured.tables.half_vector_resampling import RetroGrid, TwoSided
 from lambent.materials.measured.tables.patch_sheet import Lookup, lookup_of, patch_sheet_of
-from lambent.materials.measured.tables.retro_grid import RetroGrid
 
 
 class _Part:

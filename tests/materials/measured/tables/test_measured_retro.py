@@ -18,7 +18,7 @@ from lambent.materials.measured import load
 from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, synthesise
 from lambent.materials.measured.protocol import TableInfo
 from lambent.materials.measured.tables.half_vector_grid import GridShape
-from lambent.materials.measured.tables.retro_grid import RetroGrid, retro_grid_of
+from lambent.materials.measured.tables.half_vector_resampling import RetroGrid, retro_grid_of
 from lambent.materials.measured.tables.table_bsdf import TableBSDF
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.plain import Triple
-from lambent.materials.diffuse_albedos import possible_kd
+from lambent.materials.factored.albedo import possible_kd
 from lambent.scenes.looks.image_textures import MOST_REPEAT, mean_and_detail
 from lambent.scenes.scene import ImageTexture, MaterialTextures, Texture
 from lambent.store.kept.images import kept_image, located

@@ -8,8 +8,8 @@ from PIL import Image
 
 from lambent.core.errors import UserError
 from lambent.core.light.colour import srgb_encode
-from lambent.materials.diffuse_albedos import lobe_albedo
 from lambent.materials.document import Lobe, Material
+from lambent.materials.factored.albedo import lobe_albedo
 from lambent.scenes.scene import ImageTexture, Look, MaterialTextures, Texture, Variant
 from lambent.store.contract import scene_record, write_scene_record
 from lambent.store.kept.images import IMAGES, kept_image, readable, with_paths
