@@ -1,19 +1,114 @@
-"""Faults of tables made with them are reported with their numbers; sound tables have none."""
+"""Faults of tables made with them are reported with their numbers; sound tables have none. Metrics by hand."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from lambent.core.errors import UserError
 from lambent.core.geometry.directions import direction
+from lambent.materials.bsdf import ENERGY_TOLERANCE
+from lambent.materials.checking.check_table import _warnings, albedos
 from lambent.materials.document import Lobe, Material
+from lambent.materials.fitting.account import _energy
+from lambent.materials.measured import load
 from lambent.materials.measured.inspecting.faults import too_bright
 from lambent.materials.measured.inspecting.inspection import inspect_table
+from lambent.materials.measured.inspecting.metrics import METRICS, metric_named
 from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, record, synthesise
+from lambent.materials.measured.protocol import LeftOut, MeasuredSamples, MeasuredTable, TableInfo, collect
 from tests.materials.measured.measured_files import GLOSSY
+
+
+def test_every_format_and_json(files: dict[str, Path]) -> None:
+    for path in files.values():
+        report = inspect_table(load(path))
+        assert json.loads(json.dumps(report)) == report
+        assert report["symmetry"] == "isotropic" and report["tuples"]["used"] > 0
+
+
+def test_real_files(shared_data: Path) -> None:
+    faults = inspect_table(load(shared_data / "measured" / "rgl" / "cc_ibiza_sunset_rgb.bsdf"))["faults"]
+    assert 3 < faults["non_reciprocal_percent"] < 25 and faults["negative_percent"] > 1
+
+
+@pytest.mark.parametrize(("excess", "warned"), [(8e-10, False), (0.9, False), (1.1, True)])
+def test_only_more_than_the_tolerance_is_more_than_arrives(excess: float, warned: bool) -> None:
+    """`excess` over 1 in units of the tolerance, but for the first, which is rounding."""
+    albedo = 1 + (excess if excess < 1e-6 else excess * ENERGY_TOLERANCE)
+
+    class White(MeasuredTable):
+        info = TableInfo("white", "made up", True, False, 1, "f")
+
+        def eval(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+            return np.full((*np.broadcast_shapes(wi.shape, wo.shape)[:-1], 1), albedo / np.pi)
+
+        def reflectivity(self, wi: np.ndarray) -> np.ndarray:
+            return np.full((*wi.shape[:-1], 1), albedo)
+
+        def samples(self, max_count: int | None = None) -> MeasuredSamples:
+            wi, wo = (direction(np.linspace(0, 1.2, 40), phi) for phi in (0.0, np.pi))
+            f = self.eval(wi, wo)
+            return collect(wi, wo, f, np.ones(len(f)), self.info, np.zeros(len(f), dtype=bool))
+
+    report = inspect_table(White())
+    assert report["faults"]["energy_above_one"] is warned
+    assert any("more than arrives" in line for line in report["findings"]) is warned
+    furnace = albedos(White())
+    assert any("more than arrives" in line or "measured well" in line for line in _warnings(0.0, furnace)) is warned
+    document = Material(kd=albedo)
+    assert any("more light than it receives" in line for line in _energy(document)) is warned
+
+
+INFO = TableInfo("by hand", "test", False, False, 1, "f")
+
+
+def two_tuples() -> MeasuredSamples:
+    """wi at 60 and 0 degrees, wo at 30 and 60 degrees; f 2 and 0.5; weights sin(theta_o)."""
+    theta_i, theta_o = np.radians([60.0, 0.0]), np.radians([30.0, 60.0])
+    f = np.array([[2.0], [0.5]])
+    return MeasuredSamples(direction(theta_i, 0.0), direction(theta_o, 1.0), f, np.sin(theta_o), LeftOut(), INFO)
+
+
+MODEL = np.array([[1.0], [1.5]])
+SIN_O, COS_O, COS_I = (0.5, 0.8660254), (0.8660254, 0.5), (0.5, 1.0)
+
+
+def mean(values, power=1.0):
+    return (sum(weight * value for weight, value in zip(SIN_O, values, strict=True)) / sum(SIN_O)) ** power
+
+
+ROOTS = [(c * f + 1e-5) ** (1 / 3) for c, f in zip(COS_I * 2, (2.0, 0.5, 1.0, 1.5), strict=True)]
+BY_HAND = {
+    "l1": mean((COS_I[0] * COS_O[0], COS_I[1] * COS_O[1])),  # equation 3.7
+    "l2_ngan": mean((COS_I[0] ** 2, COS_I[1] ** 2), 0.5),
+    "cuberoot": mean(((ROOTS[0] - ROOTS[2]) ** 2, (ROOTS[1] - ROOTS[3]) ** 2), 0.5),
+    "log": mean((np.log(2.0 / 1.5) ** 2, np.log(1.5 / 2.5) ** 2), 0.5),
+}
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_errors_by_hand(name):
+    assert METRICS[name].error(two_tuples(), MODEL) == pytest.approx(BY_HAND[name], rel=1e-6)
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_slope_is_the_derivative_of_the_transform(name):
+    x, step = np.array([1e-3, 0.1, 3.0]), 1e-7
+    metric = METRICS[name]
+    numeric = (metric.transform(x + step) - metric.transform(x - step)) / (2 * step)
+    np.testing.assert_allclose(metric.slope(x), numeric, rtol=1e-5)
+
+
+def test_unknown_metric_names_the_nearest():
+    with pytest.raises(UserError, match="did you mean 'cuberoot'"):
+        metric_named("cuberot")
+
 
 CLEAN = replace(
     ISOTROPIC, noise=0.0, floor=0.0, theta_i_deg=tuple(range(0, 80, 10)), sector_deg=0.0, step_deg=5, fine_deg=2.5
