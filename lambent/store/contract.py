@@ -162,6 +162,7 @@ class ObjectRecord(Strict):
     first_face: int
     face_count: int
     emission: Triple = (0.0, 0.0, 0.0)
+    luminaire: int | None = None  # number of the light whose opening it is; `emission` is its mean radiance
     bounds: tuple[Triple, Triple]
     probe: bool = False  # needs probe/NAME/*, its own or a shared one
     part_of: str = ""  # the object that the bake cut this part from, for probes

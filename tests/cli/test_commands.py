@@ -77,31 +77,6 @@ def test_unknown_option(refused, command):
     assert "No such option: --bogus" in said and f"(see `lambent {command} --help`)" in said
 
 
-def test_unknown_command(refused):
-    assert "Did you mean 'fit'? (see `lambent --help`)" in refused("fitt")
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("fit", "absent.bsdf"),
-        ("inspect", "absent.bsdf"),
-        ("check", "absent.json"),
-        ("bake", "absent.toml", "-o", "out.store"),
-        ("bake", "builtin:rom", "-o", "out.store"),
-        ("render", "absent.store", "-o", "a.png"),
-        ("walk", "absent.store"),
-        ("view", "absent.store"),
-        ("compare", "absent.png", "other.png"),
-        ("bench", "absent"),
-    ],
-)
-def test_what_does_not_exist(refused, tmp_path, monkeypatch, arguments):
-    monkeypatch.chdir(tmp_path)
-    refused(*arguments)
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.parametrize("command", ["fit", "inspect", "check"])
 @pytest.mark.parametrize("content", [b"", b"{", b"\x00" * 100])
 def test_garbage(refused, tmp_path, command, content):
@@ -143,15 +118,6 @@ def test_fit_writes_a_material_that_check_takes(lambent, shared_data, tmp_path):
     assert json.loads((tmp_path / "m.json").read_text()) == facts["material"]
     text = lambent("fit", file, "--fix", "r0=0.05")
     assert "0.0500 0.0500 0.0500  reflectance at normal incidence" in text.out
-
-
-@pytest.mark.parametrize(
-    ("options", "word"),
-    [(("--fix", "q=1"), "unknown parameter"), (("--fix", "mx"), "name=value"), (("--range", "mx=2:1"), "empty range"),
-     (("--lobes", "9"), "1 to 4"), (("--metric", "l2"), "unknown metric")],
-)  # fmt: skip
-def test_fit_options(refused, shared_data, options, word):
-    assert word in refused("fit", shared_data / "measured/cornell/garnet_red.brdf", *options)
 
 
 @pytest.mark.parametrize("cause", [None, SystemError("returned a result with an exception set")])
@@ -205,16 +171,3 @@ def test_a_reader_that_leaves_is_no_error():
     assert b"Traceback" not in process.stderr.read()
     process.stderr.close()
     process.wait()
-
-
-def test_infinity_where_a_table_begins_is_no_traceback(refused, tmp_path):
-    (tmp_path / "a.txt").write_text("inf 400 500 600\n1 2 3 4 5\n")
-    assert "known format" in refused("inspect", tmp_path / "a.txt")
-
-
-def test_errors_name_the_option_and_the_missing_file(refused, tmp_path):
-    said = refused("render", tmp_path / "a.store", "-o", tmp_path / "a.png", "--light", "lamp=2700")
-    assert "--light: intensity is out of range; found lamp=2700; " in said and "ends in K" in said
-    for name in ("missing", "missing.json", "missing.glb"):
-        assert f"{name}: cannot be read (" in refused("bake", tmp_path / name, "-o", tmp_path / "s")
-    assert "unknown scene format" in refused("bake", tmp_path, "-o", tmp_path / "s")

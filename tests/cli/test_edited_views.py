@@ -7,71 +7,16 @@ import shlex
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from lambent.core.pictures.images import read_image, write_image
 from lambent.editing.session.document import Surroundings
-from lambent.editing.session.session import Session
 from lambent.materials.models import model_named
-from lambent.scenes import load_scene
 from lambent.store.store import Store
-
-SIZE = (24, 16)
-SCENE = """
-format = "lambent-scene"
-version = 1
-name = "floor"
-geometry = "floor.obj"
-exposure_ev = 1.0
-[environment]
-kind = "constant"
-radiance = [1.0, 1.0, 1.0]
-[materials.paint]
-kd = 0.5
-[materials.chrome]
-lobes = [{ mx = 0.3, my = 0.3 }]
-[[cameras]]
-name = "above"
-position = [0.0, 2.0, 1.0]
-target = [0.0, 0.0, 0.0]
-fov_y_deg = 30.0
-"""
-FLOOR = """
-v -9 0 -9
-v -9 0 9
-v 9 0 9
-v 9 0 -9
-v -9 -1 -9
-v -9 -1 9
-v 9 -1 9
-usemtl paint
-o floor
-f 1 2 3 4
-usemtl chrome
-o below
-f 5 6 7
-"""
+from tests.cli.edited_floor import SIZE, saved, write_floor
 
 
-@pytest.fixture
-def scene(tmp_path: Path) -> Path:
-    (tmp_path / "floor.obj").write_text(FLOOR)
-    (tmp_path / "scene.toml").write_text(SCENE)
-    return tmp_path / "scene.toml"
-
-
-def saved(scene: Path, name: str, **changes: object) -> Path:
-    """A session of the floor's paint, half of it in blue."""
-    loaded = load_scene(str(scene))
-    start = changes.pop("start", loaded.materials["paint"])
-    session = Session.new("s", loaded.cameras[0], {"paint": start}, size=SIZE, **changes)  # type: ignore[arg-type]
-    session.tint("paint", session.editable("paint").terms[0].name, (1.0, 1.0, 0.5))
-    session.save(scene.parent / name)
-    return scene.parent / name
-
-
-def test_an_error_names_the_command_that_bakes_what_is_missing(lambent, refused, scene, tmp_path):
-    store, picture = tmp_path / "a store", tmp_path / "a.exr"
+def test_an_error_names_the_command_that_bakes_what_is_missing(lambent, refused, tmp_path):
+    scene, store, picture = write_floor(tmp_path), tmp_path / "a store", tmp_path / "a.exr"
 
     def drawn_after(session: Path, fault: str) -> np.ndarray:
         error = refused("render", store, "--edit", session, "-o", picture)
@@ -107,37 +52,11 @@ def test_an_error_names_the_command_that_bakes_what_is_missing(lambent, refused,
         np.testing.assert_allclose(shown, np.minimum(plain * 2**ev, 1), rtol=0.03)
 
 
-@pytest.mark.parametrize(
-    "option",
-    [("--size", "9x9"), ("--camera", "above"), ("--path", "tour"), ("--integrator", "path"), ("--samples", "4"),
-     ("--show", "diffuse"), ("--planar", "off"), ("--scene", "x"), ("--fps", "25")],
-)  # fmt: skip
-def test_what_a_session_decides_is_no_option(refused, scene, tmp_path, option):
-    session = saved(scene, "a.json")
-    error = refused("render", tmp_path / "none", "--edit", session, "-o", tmp_path / "a.png", *option)
-    assert f"error: {option[0]}: " in error and "fixes camera, size and light" in error
-
-
-def test_views_that_cannot_be_baked(refused, scene, tmp_path):
-    def error(*options: object) -> str:
-        return refused("bake", scene, "-o", tmp_path / "s", *options)
-
-    view = "--only", "transport", "--view"
-    assert "unknown camera" in (found := error(*view, "abov:9x9")) and "expected above" in found
-    for size in ("0x9", "9x99999", "9x99999999999"):
-        assert "expected WIDTHxHEIGHT" in error(*view, f"above:{size}")
-    assert "name them with --view" in error("--only", "transport")
-    assert "--only" in error("--only", "geometry", "--view", "above")
-    stranger = Session.new("s", load_scene(str(scene)).cameras[0], {"wool": model_named("oren-nayar")()})
-    stranger.save(tmp_path / "wool.json")
-    assert "unknown material" in error("--only", "transport", "--edit", tmp_path / "wool.json")
-    assert not (tmp_path / "s").exists()
-
-
 BOUNCED = "--only", "interreflection", "--view", "above:12x8", "--series", "4,1", "--samples", "4"
 
 
-def test_interreflections_are_proposed_and_baked_as_the_user_wants(lambent, scene, tmp_path):
+def test_interreflections_are_proposed_and_baked_as_the_user_wants(lambent, tmp_path):
+    scene = write_floor(tmp_path)
     asked = lambent("bake", scene, "--view", "above:12x8", "--series", "4,1", "--samples", "4", "--propose")
     assert asked.code == 0 and "paint " in asked.out and "on disk" in asked.out and not list(tmp_path.glob("*.store"))
     said = lambent("bake", scene, *BOUNCED[2:], "--propose", "--fixed", "paint", "--json").json["proposals"][0]
@@ -155,22 +74,3 @@ def test_interreflections_are_proposed_and_baked_as_the_user_wants(lambent, scen
     more = lambent("bake", scene, "-o", store, *BOUNCED[:-1], "8")
     assert more.code == 0 and edited() == chosen and "that the store has: chrome" in more.err, more.err
     assert lambent("bake", scene, "-o", store, *BOUNCED, "--fixed", "chrome").code == 0 and edited() == {"paint"}
-
-
-@pytest.mark.parametrize(
-    ("fault", "options"),
-    [
-        ("--view: is missing", ("-o", "s", "--only", "interreflection")),
-        ("expected 2 to 6 numbers", (*BOUNCED[2:], "--propose", "--series", "64")),
-        ("expected powers of two", (*BOUNCED[2:], "--propose", "--series", "63,1")),
-        ("--editable: unknown material", (*BOUNCED[2:], "--propose", "--editable", "carpet")),
-        ("--fixed and --editable; found paint", (*BOUNCED[2:], "--propose", "--fixed", "paint", "--editable", "paint")),
-        ("--editable: applies to interreflections only", ("-o", "s", "--editable", "paint")),
-        ("--fixed: applies to", ("-o", "s", "--only", "transport", "--view", "above", "--fixed", "paint")),
-        ("exclude each other", ("-o", "s", *BOUNCED, "--workers", "2", "--cluster", "a:1")),
-    ],
-)
-def test_proposals_that_cannot_be_made(refused, scene, tmp_path, monkeypatch, fault, options):
-    monkeypatch.chdir(tmp_path)
-    assert fault in refused("bake", scene, *options)
-    assert not (tmp_path / "s").exists()

@@ -88,15 +88,3 @@ def test_the_unit_of_the_polar_curve(lambent, downlight, tmp_path):
         assert lambent("inspect", path, "--plot", tmp_path / "p.svg").code == 0
         words = re.findall(r"<!-- (.*?) -->", (tmp_path / "p.svg").read_text())  # of which the outlines follow
         assert unit in words and max((word for word in words if word.isdigit()), key=int) == most, words
-
-
-def test_a_damaged_file_is_one_line_and_exit_code_2(lambent, tmp_path):
-    for name, text, word in (
-        ("a.ldt", "text\n" * 60, "is not a number"),
-        ("b.ies", "IESNA91\nTILT=NONE\n1 2\n", "file is truncated"),
-        ("c.gldf", "PK\x03\x04", "ask its maker for an .ies or .ldt file"),
-        ("d.ies", "hello", "is not an IES or EULUMDAT file"),
-    ):
-        (tmp_path / name).write_text(text)
-        outcome = lambent("inspect", tmp_path / name)
-        assert outcome.code == 2 and word in outcome.err and len(outcome.err.strip().splitlines()) == 1

@@ -43,14 +43,8 @@ def test_names_do_not_command_the_terminal(lambent, refused, tmp_path, caplog):
     Material(name=ESCAPES, kd=0.1).save(file)
     outcome = lambent("inspect", file)
     assert outcome.code == 0 and r"\x1b]0;title\x07" in outcome.out
-    said = [
-        outcome.out,
-        refused("fit", file),
-        refused("inspect", f"{file}x"),
-        refused(f"a{ESCAPES}"),
-        table([(ESCAPES,)]),
-    ]
-    said.append(lambent("inspect", file, "--json").out)
+    said = [outcome.out, *(refused(*words) for words in (("fit", file), ("inspect", f"{file}x"), (f"a{ESCAPES}",)))]
+    said += [table([(ESCAPES,)]), lambent("inspect", file, "--json").out]
     assert json.loads(said[-1])["name"] == ESCAPES
     lambent("convert", file, tmp_path / "a.mtlx")
     logging.getLogger("lambent").warning("%s", ESCAPES)
@@ -93,13 +87,6 @@ def test_long_errors_are_cut_and_their_hints_are_not():
     assert len(str(error)) < 6000 and str(error).endswith("h" * 2000)
     assert "end.txt: " in str(error)
     assert "more digits" in str(UserError("a", got=10**5000))
-
-
-def test_a_demo_takes_no_folder_of_others(refused, tmp_path):
-    (tmp_path / "notes.txt").write_text("mine")
-    for place in (tmp_path, tmp_path / "notes.txt"):
-        assert "is neither a demo folder nor empty" in refused("demo", "--headless", "--out", place)
-    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
 
 def test_what_exists_is_replaced_by_force_alone(lambent, refused, material, tmp_path):

@@ -39,31 +39,6 @@ def test_a_measured_file(lambent, tmp_path, monkeypatch):
     assert outcome.code == 0 and "swapping wi and wo changes" in outcome.out and outcome.out.endswith("passed\n")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (["wart"], "did you mean 'ward'"),
-        (["ward", "--set", "kss=1"], "did you mean"),
-        (["ward", "--set", "mx=wide"], "NAME=VALUE"),
-        (["ward", "--set", "mx"], "NAME=VALUE"),
-        (["ward", "--set", "mx=0.1,0.2,0.3"], "a number from"),
-        (["ward", "--set", "mx=7"], "from 0.003 to 1"),
-    ],
-)
-def test_nonsense(refused, arguments, complaint):
-    assert complaint in refused("check", *arguments)
-
-
-def test_files_take_no_parameters(refused, tmp_path):
-    Material(kd=0.5).save(tmp_path / "m.json")
-    assert "only a model" in refused("check", tmp_path / "m.json", "--set", "kd=1")
-
-
-def test_an_empty_document(refused, tmp_path):
-    (tmp_path / "m.json").write_text("{}")
-    assert "no scattering term" in refused("check", tmp_path / "m.json")
-
-
 STEEP = Material(kd=0.1, lobes=(Lobe(mx=0.4, my=0.4, k=0.8, r0=1, alpha=1),))
 
 
@@ -84,22 +59,3 @@ def test_normalise_writes_the_safe_version(lambent, tmp_path):
     assert 0 < safe.lobes[0].alpha < 1 and outcome.json["changed"]["lobes[0].alpha"] == [1, safe.lobes[0].alpha]
     again = lambent("check", tmp_path / "safe.json", "--normalise", "-o", tmp_path / "again.json")
     assert again.code == 0 and "nothing written" in again.out and not (tmp_path / "again.json").exists()
-
-
-def test_only_documents_are_normalised(refused, tmp_path):
-    out = tmp_path / "out.json"
-    assert "is a model" in refused("check", "ward", "--normalise", "-o", out)
-    setup = Setup((0.0, 30.0, 60.0), step_deg=20, fine_deg=10, noise=0.0, floor=0.0)
-    write_gonio(tmp_path / "m.txt", synthesise(STEEP, setup))
-    assert "fit it first" in refused("check", tmp_path / "m.txt", "--normalise", "-o", out)
-    assert not out.exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [(["--normalise"], "-o: is missing"), (["-o", "x.json"], "--normalise: is missing"),
-     (["--normalise", "-o", "x.png"], "expected .json")],
-)  # fmt: skip
-def test_normalise_and_its_output_go_together(refused, tmp_path, monkeypatch, arguments, complaint):
-    monkeypatch.chdir(tmp_path)
-    assert complaint in refused("check", "ward", *arguments)

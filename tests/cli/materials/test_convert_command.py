@@ -38,23 +38,3 @@ def test_a_person_is_told_the_loss_and_the_error(lambent, material, tmp_path):
     assert outcome.code == 0 and load(tmp_path / "out.bsdf").info.format == "RGL tensor file"
     assert "lost: nothing beyond the errors below" in outcome.out and "relative" in outcome.out
     assert all(name in outcome.out for name in METRICS)
-
-
-def test_a_measurement_is_no_material(refused, measured, tmp_path):
-    said = refused("convert", measured, tmp_path / "out.glb")
-    assert "is a table, which" in said and "lambent fit" in said and not (tmp_path / "out.glb").exists()
-
-
-def test_places_that_take_no_file(refused, measured, tmp_path):
-    before = measured.read_bytes()
-    assert "output is the input" in refused("convert", measured, measured, "--as", "gonio_text")
-    (tmp_path / "link.txt").symlink_to(measured)
-    assert "output is the input" in refused("convert", measured, tmp_path / "link.txt")
-    assert measured.read_bytes() == before
-    (tmp_path / "folder.txt").mkdir()
-    assert "is a folder" in refused("convert", measured, tmp_path / "folder.txt")
-    assert "unknown ending" in refused("convert", measured, tmp_path / "out.docx")
-    assert "did you mean 'merl'" in refused("convert", measured, tmp_path / "out.x", "--as", "merk")
-    assert "cannot be read" in refused("convert", tmp_path / "absent", tmp_path / "out.txt")
-    (tmp_path / "what").write_bytes(b"hello")
-    assert "known format" in refused("convert", tmp_path / "what", tmp_path / "out.txt")
