@@ -1,4 +1,4 @@
-"""Every export ends with a verdict in words, by limits that stand in one place; retro-reflection that is lost counts."""
+"""Every export ends with a verdict in words, by limits in one place; retro-reflection that is lost counts."""
 
 from __future__ import annotations
 

@@ -3,38 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lambent.materials.measured import load
-from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, synthesise
-from lambent.materials.measured.parts.gonio_text import write_gonio
 from lambent.materials.measured.protocol import MeasuredTable
-from tests.materials.measured.measured_files import (
-    GLOSSY,
-    Loaded,
-    cornell_rows,
-    cornell_text,
-    merl_bytes,
-    rgl_fields,
-    tensor_bytes,
-)
+from tests.materials.measured.measured_files import Loaded
+from tests.materials.measured.sound_files import seeds
 
 
 @pytest.fixture(scope="session")
 def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """One sound small file per format; all with the same ending, because readers look at the content."""
+    """A sound small file per format; all with the same ending, because readers look at the content."""
     folder = tmp_path_factory.mktemp("measured")
-    coarse = replace(ISOTROPIC, step_deg=15, fine_deg=10, theta_i_deg=(0.0, 30.0, 60.0))
-    paths = {name: folder / f"{name}.bsdf" for name in ("merl", "rgl", "cornell", "gonio")}
-    paths["merl"].write_bytes(merl_bytes(np.full((6, 5, 4, 3), 0.25)))
-    paths["rgl"].write_bytes(tensor_bytes(rgl_fields(np.zeros(1))))
-    paths["cornell"].write_text(cornell_text(cornell_rows(), np.linspace(400, 700, 5)))
-    write_gonio(paths["gonio"], synthesise(GLOSSY, coarse))
-    return paths
+    paths = {name.split()[0].lower(): contents[0] for name, contents in seeds().items()}
+    for name, content in paths.items():
+        (folder / f"{name}.bsdf").write_bytes(content)
+    return {name: folder / f"{name}.bsdf" for name in paths}
 
 
 @pytest.fixture

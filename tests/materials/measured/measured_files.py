@@ -9,23 +9,11 @@ import numpy as np
 
 from lambent.core.geometry.directions import direction
 from lambent.materials.document import Lobe, Material
+from lambent.materials.measured.parts.tensor_file import tensor_bytes as tensor_bytes
 from lambent.materials.measured.protocol import MeasuredTable
 
 Loaded = Callable[..., MeasuredTable]
 """The fixture `loaded`."""
-
-
-def tensor_bytes(fields: dict[str, np.ndarray], types: dict[str, int] | None = None) -> bytes:
-    """An RGL tensor file with `fields`."""
-    kinds = {np.dtype("u1"): 1, np.dtype("f4"): 10}
-    head_size = 18 + sum(13 + len(name) + 8 * a.ndim for name, a in fields.items())
-    head, body = b"tensor_file\0" + bytes([1, 0]) + struct.pack("<I", len(fields)), b""
-    for name, array in fields.items():
-        head += struct.pack("<H", len(name)) + name.encode() + struct.pack("<H", array.ndim)
-        head += struct.pack("<BQ", (types or {}).get(name, kinds[array.dtype]), head_size + len(body))
-        head += struct.pack(f"<{array.ndim}Q", *array.shape)
-        body += array.tobytes()
-    return head + body
 
 
 def rgl_fields(phi_i: np.ndarray, seed: int = 0) -> dict[str, np.ndarray]:
@@ -74,20 +62,12 @@ def zemax_text(
     """A Zemax file of f(wi, wo) with 1 or 3 channels; below the horizon it has zeros, TIS is .5 throughout."""
     incident, radial = (10, 40, 70), np.array([0, 5, 15, 30, 50, 70, 90])
     azimuth = azimuth or tuple(range(0, 181 if symmetry == "PlaneSymmetrical" else 360, 30))
-    r, a = (np.radians(grid) for grid in np.meshgrid(radial, azimuth))
     side = -1 if kind == "BTDF" else 1
     blocks = []
     for rotation in rotations:
-        turn = np.radians(rotation)
-        c, s = np.cos(turn), np.sin(turn)
-        about_n = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-        for theta in np.radians(incident):
-            wi = np.array([np.sin(theta), 0, np.cos(theta)])
-            mirror, towards_n = wi * (-1, 1, 1), np.array([np.cos(theta), 0, np.sin(theta)])
-            aside = np.cross(mirror, towards_n)
-            offset = np.cos(a)[..., None] * towards_n + np.sin(a)[..., None] * aside
-            wo = np.cos(r)[..., None] * mirror + np.sin(r)[..., None] * offset
-            seen = np.broadcast_to(wi @ about_n, wo.shape), (wo @ about_n) * (1, 1, side)
+        for theta in incident:
+            wi, wo = direction(np.radians(theta), 0.0), outgoing(theta, *np.meshgrid(azimuth, radial, indexing="ij"))
+            seen = (about_n(w, rotation) for w in (np.broadcast_to(wi, wo.shape), wo * (1, 1, side)))
             blocks.append(evaluate(*seen) * (wo[..., 2:] > 0))
     lines = ["# made up", "Source\tMeasured", f"Symmetry\t{symmetry}"]
     channels = blocks[0].shape[-1]
@@ -150,10 +130,17 @@ def lobe(wi, wo):
     return 0.1 + 0.05 * wo[..., 1] + 2 * np.exp(20 * ((ahead * wo).sum(axis=-1) - 1))
 
 
-def outgoing(specular_deg: float, phi_deg: float, theta_deg: float) -> np.ndarray:
-    """libbsdf's SpecularCoordinateSystem: a direction about n, turned about y until n is the mirror direction."""
+def outgoing(specular_deg: float, phi_deg: np.ndarray | float, theta_deg: np.ndarray | float) -> np.ndarray:
+    """libbsdf's SpecularCoordinateSystem: directions about n, turned about y until n is the mirror direction."""
     w, s = direction(np.radians(theta_deg), np.radians(phi_deg)), np.radians(specular_deg)
-    return np.array([np.cos(s) * w[0] - np.sin(s) * w[2], w[1], np.sin(s) * w[0] + np.cos(s) * w[2]])
+    return np.stack([np.cos(s) * w[..., 0] - np.sin(s) * w[..., 2], w[..., 1],
+                     np.sin(s) * w[..., 0] + np.cos(s) * w[..., 2]], axis=-1)  # fmt: skip
+
+
+def about_n(w: np.ndarray, turn_deg: float) -> np.ndarray:
+    """Directions (..., 3) turned about n, counter-clockwise."""
+    c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
+    return w @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
 
 
 def ddr(f=lobe, *, phi=PHI, model="BW", kind="Luminance Absolute", kbdf=0.8, psi=None, sigmat=None, tint=(1.0,)) -> str:
@@ -171,12 +158,10 @@ def ddr(f=lobe, *, phi=PHI, model="BW", kind="Luminance Absolute", kbdf=0.8, psi
             lines.append(f";; Psi = {turn}")
             for i, sigma in enumerate(SIGMA):
                 wi = direction(np.radians(sigma), 0.0)
-                for a in phi:
-                    wo = [outgoing((sigmat or SIGMA)[i], a, t) for t in THETA]
-                    values = [f(wi, w) * share * np.pi / (kbdf or 1) if w[2] > 1e-9 else 0.0 for w in wo]
-                    if kind.startswith("Intensity"):
-                        values = [v * w[2] / np.pi for v, w in zip(values, wo, strict=True)]
-                    lines.append(" " + " ".join(f"{v:.8g}" for v in values))
+                wo = outgoing((sigmat or SIGMA)[i], *np.meshgrid(phi, THETA, indexing="ij"))
+                values = np.where(wo[..., 2] > 1e-9, f(wi, wo) * share * np.pi / (kbdf or 1), 0.0)
+                values = values * wo[..., 2] / np.pi if kind.startswith("Intensity") else values
+                lines += [" " + " ".join(f"{v:.8g}" for v in row) for row in values]
         lines.append(" enddef")
     return "\n".join(lines) + "\n"
 

@@ -1,4 +1,4 @@
-"""Plain columns, ASTM E1392, Cornell and ALTA text: names, units, spectra, parametrisations, and the refusal to guess."""
+"""Plain columns, ASTM E1392, Cornell and ALTA text: names, units, spectra, parametrisations; no guesses."""
 
 from __future__ import annotations
 

@@ -20,18 +20,14 @@ from lambent.materials.measured.parts.tensor_tree import Malformed, disk_of, par
 from lambent.materials.measured.registry import HEAD_BYTES, readers
 from tests.materials.measured.lbnl_files import angle_basis, lbnl_xml, random_tree, words
 from tests.materials.measured.measured_files import Loaded
+from tests.materials.measured.sound_files import seeds
 
 FIXED_BYTES = 8 << 20
 HANGS_S = 10.0  # far beyond what any of these takes on a busy machine
 WI, WO = np.array([[0.6, 0.0, 0.8]]), np.array([[-0.6, 0.0, 0.8]])
 
 
-def sound() -> bytes:
-    """A matrix on a basis of its own."""
-    random = np.random.default_rng(0)
-    basis = angle_basis("mine", [(0, 30, 1), (30, 60, 4), (60, 90, 4)])
-    blocks = [("Visible", d, words(random.random((9, 9)) * 0.3)) for d in ("Reflection Back", "Transmission Front")]
-    return lbnl_xml("Columns", blocks, basis, "mine").encode()
+SOUND = seeds()["LBNL BSDF XML"][0]  # a matrix on a basis of its own
 
 
 def attempt(path: Path, content: bytes, tuples: int = 1000) -> str:
@@ -60,7 +56,7 @@ def attempt(path: Path, content: bytes, tuples: int = 1000) -> str:
 @pytest.fixture(scope="module")
 def target(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("broken") / "broken.xml"
-    path.write_bytes(sound())
+    path.write_bytes(SOUND)
     load(path).samples(10)  # imports are warm, and the sound file is sound
     return path
 
@@ -109,8 +105,8 @@ BOMB = '<!DOCTYPE x [<!ENTITY a "ha">' + "".join(
     ],
 )
 def test_hostile_matrices(target: Path, change, expected: str) -> None:
-    content = change(sound().decode())
-    assert content != sound().decode()
+    content = change(SOUND.decode())
+    assert content != SOUND.decode()
     said = attempt(target, content.encode())
     assert re.search(expected, said), said
 
@@ -118,8 +114,8 @@ def test_hostile_matrices(target: Path, change, expected: str) -> None:
 @pytest.mark.parametrize(
     "content",
     [
-        sound().replace(b"nobody", b"caf\xe9"),
-        sound().decode().replace("UTF-8", "UTF-16").encode("utf-16"),
+        SOUND.replace(b"nobody", b"caf\xe9"),
+        SOUND.decode().replace("UTF-8", "UTF-16").encode("utf-16"),
         b"\xef\xbb\xbf<WindowElement>" + b"\xff" * 100,
         b"<WindowElement>",
         b"<WindowElement/>",
@@ -150,7 +146,7 @@ def test_dense_trees_stay_in_proportion(target: Path) -> None:
 
 
 def test_prefixes_byte_order_mark_and_order_change_nothing(target: Path) -> None:
-    plain = sound().decode()
+    plain = SOUND.decode()
     target.write_text(plain)
     expected = load(target).eval(WI, WO * (1, 1, -1))
     prefixed = plain.replace("xmlns=", "xmlns:w=").replace("</", "</w:")
@@ -165,7 +161,7 @@ def test_prefixes_byte_order_mark_and_order_change_nothing(target: Path) -> None
 
 
 def test_a_second_layer_is_ignored_with_a_note(target: Path) -> None:
-    plain = sound().decode()
+    plain = SOUND.decode()
     start, end = plain.index("<Layer>"), plain.index("</Layer>") + 8
     layer = plain[start:end]
     target.write_text(plain[:end] + layer.replace("mine", "other").replace("0.", "9.") + plain[end:])
@@ -183,7 +179,7 @@ RECOVER = b"Recover using: genBSDF -recover /tmp/genBSDF.4711\n"
 @pytest.mark.parametrize("declared", [True, False])
 def test_lines_before_the_xml_are_skipped_and_noted(target: Path, lines: bytes, declared: bool) -> None:
     """genBSDF's own output begins with one."""
-    plain = sound()
+    plain = SOUND
     if not declared:
         plain = plain[plain.index(b"<WindowElement") :]
     target.write_bytes(plain)
@@ -201,11 +197,11 @@ def test_lines_before_the_xml_are_skipped_and_noted(target: Path, lines: bytes, 
 )
 def test_other_beginnings_are_refused(target: Path, lines: bytes) -> None:
     """Too many lines, too long a line, a binary line, and markup that hides a document type."""
-    assert attempt(target, lines + sound())
+    assert attempt(target, lines + SOUND)
 
 
 def test_a_document_type_after_the_lines_is_refused(target: Path) -> None:
-    hidden = sound().replace(b"<WindowElement ", b"<!DOCTYPE a><WindowElement ", 1)
+    hidden = SOUND.replace(b"<WindowElement ", b"<!DOCTYPE a><WindowElement ", 1)
     assert "document type" in attempt(target, RECOVER + hidden)
 
 

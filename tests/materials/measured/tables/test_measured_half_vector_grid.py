@@ -1,4 +1,4 @@
-"""Look-ups for path tracing agree with the table and their samplers with their densities: grids, retro grids, patches."""
+"""Look-ups for path tracing agree with the table, their samplers with their densities: grids, retro grids, patches."""
 
 from __future__ import annotations
 
