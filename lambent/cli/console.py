@@ -39,6 +39,12 @@ CreaseAngle = Annotated[
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace existing files, even the input.")]
 
+Memory = Annotated[float | None, typer.Option(min=0, help="GPU memory for light fields, MB. [default: enough for all]")]
+Cache = Annotated[
+    str, typer.Option(help="Which maps are dropped first where memory is short: least-recent or adaptive.")
+]
+LEAST_RECENT = "least-recent"
+
 
 def _version(value: bool) -> None:
     if value:
@@ -163,6 +169,11 @@ def parse_size(text: str, option: str = "--size") -> tuple[int, int]:
 def say(text: str) -> None:
     """Print a line on stderr, outside of the result."""
     sys.stderr.write(_lines(text) + "\n")
+
+
+def note(text: str) -> None:
+    """Print what a picture took otherwise than asked."""
+    say(f"note: {text}")
 
 
 def log_to_stderr() -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from lambent.cli.console import Force, Json, progress_bar, say, show, table
+from lambent.cli.console import Force, Json, note, progress_bar, show, table
 from lambent.core.errors import UserError
 
 SIDE_PX = 800
@@ -45,9 +45,7 @@ def command(
 
         settings = Settings(SIDE_PX, SIDE_PX, integrator, projection=Projection.fisheye)
         with progress_bar() as progress:
-            radiance, seen = drawn_view(
-                what, camera, settings, note=lambda text: say(f"note: {text}"), progress=progress
-            )
+            radiance, seen = drawn_view(what, camera, settings, note=note, progress=progress)
         view = settings.view_of(seen)
     elif camera is not None:
         raise UserError("applies to stores only", field="--camera", got=camera, hint="a picture has its own view")

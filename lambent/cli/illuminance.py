@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from lambent.cli.console import Force, Json, progress_bar, say, show, table, words
+from lambent.cli.console import Force, Json, note, progress_bar, show, table, words
 from lambent.core.errors import UserError, invalid
 
 
@@ -51,7 +51,7 @@ def command(
             raise UserError("excludes --object", field="--grid", hint="leave out one")
     elif (height, spacing, margin) != (None, None, None):
         raise UserError("apply to --object only", field="--height, --spacing, --margin", hint="name it with --object")
-    opened, results, note = Store.open(store), [], lambda text: say(f"note: {text}")
+    opened, results = Store.open(store), []
     with progress_bar() as progress:
         for name in variant or [""]:
             settings = Settings(light=parse_light(light) if light else None, variant=name)

@@ -43,16 +43,10 @@ def command(
         raise UserError("applies to measured tables only", file=file, field="--reconstruction")
     if crease_angle is not None and inspect is not inspect_scene:
         raise UserError("applies to scenes only", file=file, field="--crease-angle")
-    if crease_angle is not None and plot is None:
-        facts = plain(inspect_scene(file, crease_angle))
-    elif inspect is inspect_table:
-        facts = plain(inspect_table(file, plot, reconstruction))
-    elif plot is None:
-        facts = plain(inspect(file))
-    elif inspect in (inspect_material, inspect_luminaire):
-        facts = plain(inspect(file, plot))
-    else:
+    if plot is not None and inspect not in (inspect_table, inspect_material, inspect_luminaire):
         raise UserError("applies to tables, materials and luminaires only", file=file, field="--plot")
+    own = {inspect_table: (plot, reconstruction), inspect_scene: (crease_angle,)}
+    facts = plain(inspect(file, *own.get(inspect, (plot,) if plot is not None else ())))
     prose = ["\n- ".join([f"\n\n{name}", *value]) for name, value in facts.items() if _is_prose(value)]
     show(facts, table(_rows(facts)) + "".join(prose), json)
 

@@ -4,32 +4,23 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from lambent.cli.console import Force, Json, parse_size, progress_bar, say, show
+from lambent.cli.console import LEAST_RECENT, Cache, Force, Json, Memory, note, parse_size, progress_bar, show
 from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
     from lambent.core.light.false_colour import Range
     from lambent.render import Settings
 
+OF_FILMS = "applies to films only", "write to .mp4, or add --path NAME"  # a fault and its hint
+OF_TRACER, NO_VARIANTS = "applies to the path tracer only", "excludes --variants"
 SHEET_SIZE = "640x360"  # of each picture in a sheet
 MEASURED = {"luminance": "full", "illuminance": "light-map"}  # quantity -> value of --show
-SHOWN_BY = (
-    "store",
-    "output",
-    "edit",
-    "surfaces",
-    "exposure",
-    "ev100",
-    "view",
-    "false_range",
-    "linear",
-    "force",
-    "json",
-)  # options of edited views
+SHOWN_BY = ("store", "output", "edit", "surfaces", "exposure", "ev100", "view", "false_range", "linear", "force",
+            "json")  # options of edited views  # fmt: skip
 
 
 def command(
@@ -104,9 +95,7 @@ def command(
             "light_field-choice (shows which point is used)."
         ),
     ] = "auto",
-    light_field_mb: Annotated[
-        float | None, typer.Option(min=0, help="GPU memory for light fields, MB. [default: enough for all]")
-    ] = None,
+    light_field_mb: Memory = None,
     light: Annotated[
         list[str] | None,
         typer.Option(
@@ -114,9 +103,7 @@ def command(
             "@SECONDS makes it a keyframe of a film. Repeatable. [default: as saved with the view, else as baked]"
         ),
     ] = None,
-    light_field_cache: Annotated[
-        str, typer.Option(help="Which maps are dropped first where memory is short: least-recent or adaptive.")
-    ] = "least-recent",
+    light_field_cache: Cache = LEAST_RECENT,
     sky_turn: Annotated[
         float,
         typer.Option(
@@ -231,64 +218,53 @@ def command(
     if edit is not None:
         _check_edit(context, edit)
     settings.check()
-    for option in ("false_range", "linear"):
-        if _is_said(context, option) and not settings.is_false_coloured:
-            name = "--range" if option == "false_range" else "--linear"
-            raise UserError("applies to false colours only", field=name, hint="add --view false-colour")
+    plain = not settings.is_false_coloured
+    for option, is_wrong in (("--range", false_range is not None and plain), ("--linear", linear and plain)):
+        if is_wrong:
+            raise UserError("applies to false colours only", field=option, hint="add --view false-colour")
     if edit is not None:
         check_output(output, WRITABLE, force=force)
         done = render.edited_still(store, edit, output, settings, parse_surfaces(surfaces or "1:99"))
         show(asdict(done), f"{output}: {done.width}x{done.height}, edited, {done.seconds:.1f} s", json)
         return
-    if surfaces is not None:
-        raise UserError("applies to edited views only", field="--surfaces", hint="add --edit SESSION")
-    if scene is not None and integrator != "path":
-        raise UserError("applies to the path tracer only", field="--scene", hint="add --integrator path")
-    if variants and (variant or replace):
-        option = "--variant" if variant else "--replace"
-        raise UserError("excludes --variants", field=option, hint="leave out one")
-    if variants and path is not None:
-        raise UserError("excludes --variants", field="--path", hint="a sheet shows one view: name it with --camera")
     suffix = output.suffix.lower()
     moves = not variants and (suffix == FILM or (path is not None and suffix in SEQUENCES))
+    for option, is_wrong, fault, hint in (
+        ("--surfaces", surfaces is not None, "applies to edited views only", "add --edit SESSION"),
+        ("--scene", scene is not None and integrator != "path", OF_TRACER, "add --integrator path"),
+        ("--variant", variants and bool(variant), NO_VARIANTS, "leave out one"),
+        ("--replace", variants and bool(replace), NO_VARIANTS, "leave out one"),
+        ("--path", variants and path is not None, NO_VARIANTS, "a sheet shows one view: name it with --camera"),
+        ("--keyframes", keyframes is not None and not moves, *OF_FILMS),
+        ("--fps", _is_said(context, "fps") and not moves, *OF_FILMS),
+        ("--camera", camera is not None and moves, "applies to stills only", "a film follows a path: --path NAME"),
+    ):
+        if is_wrong:
+            raise UserError(fault, field=option, hint=hint)
     check_output(output, (".png",) if variants else (*WRITABLE, FILM), force=force or moves)
-    if keyframes is not None and not moves:
-        raise UserError("applies to films only", field="--keyframes", hint="write to .mp4, or add --path NAME")
-    if not moves:
-        _check_still(context, settings)
-    if moves and camera is not None:
-        raise UserError("applies to stills only", field="--camera", hint="a film follows a path: --path NAME")
     if path is not None and not moves:
         raise UserError("applies to films only", field="--path", got=suffix, expected=".mp4, .png or .exr")
     if moves:
         check_pictures(output, force=force)
-
-    def note(text: str) -> None:
-        say(f"note: {text}")
-
+    else:
+        _check_light(settings)
     with progress_bar() as progress:
+        common: dict[str, Any] = {"scene": scene, "note": note, "progress": progress}
         if moves:
-            done = render.film(
-                store, output, path, settings, fps=fps, keyframes=keyframes, scene=scene, note=note, progress=progress
-            )
+            done = render.film(store, output, path, settings, fps=fps, keyframes=keyframes, **common)
         elif variants:
-            done = render.sheet(
-                store, output, camera, settings, exposures=exposures, scene=scene, note=note, progress=progress
-            )
+            done = render.sheet(store, output, camera, settings, exposures=exposures, **common)
         else:
-            done = render.still(store, output, camera, settings, scene=scene, note=note, progress=progress)
-    size = f"{done.width}x{done.height}"
+            done = render.still(store, output, camera, settings, **common)
     exposed = "" if done.ev100 is None else f"EV100 {done.ev100:.1f}, "
     how = done.integrator if done.samples is None else f"{done.integrator}, {done.samples} samples"
     how += "" if done.noise is None else f", noise {100 * done.noise:.1f} %"
-    text = f"{output}: {size}, {done.frames} frame(s), {how}, {exposed}{done.seconds:.1f} s"
+    text = f"{output}: {done.width}x{done.height}, {done.frames} frame(s), {how}, {exposed}{done.seconds:.1f} s"
     show(asdict(done), text, json)
 
 
-def _check_still(context: typer.Context, settings: Settings) -> None:
-    """Raise `UserError` for options that apply to films only."""
-    if _is_said(context, "fps"):
-        raise UserError("applies to films only", field="--fps", hint="write to .mp4, or add --path NAME")
+def _check_light(settings: Settings) -> None:
+    """Raise `UserError` for keyframes of light, which apply to films only."""
     for name, keys in settings.light.groups.items() if settings.light is not None else ():
         if len(keys) > 1 or keys[0][0] > 0:
             got = f"{name} at {keys[-1][0]:g} s"

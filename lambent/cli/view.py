@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from lambent.cli.walk import LEAST_RECENT, SIZE, Cache, Memory, Replace, Size, Store, Turn, show
+from lambent.cli.console import LEAST_RECENT, Cache, Memory
+from lambent.cli.walk import SIZE, Replace, Size, Store, Turn, show
 
 
 def command(

@@ -7,21 +7,16 @@ from typing import Annotated
 
 import typer
 
-from lambent.cli.console import parse_size
+from lambent.cli.console import LEAST_RECENT, Cache, Memory, parse_size
 
 Store = Annotated[Path, typer.Argument(help="Folder of a baked store.")]
 Size = Annotated[str, typer.Option(help="WIDTHxHEIGHT of the window.")]
-Memory = Annotated[float | None, typer.Option(min=0, help="GPU memory for light fields, MB. [default: enough for all]")]
-Cache = Annotated[
-    str, typer.Option(help="Which maps are dropped first where memory is short: least-recent or adaptive.")
-]
 Replace = Annotated[
     list[str] | None,
     typer.Option(help="OBJECT=FILE[,MATERIAL]: show another mesh in place of an object, as in `render`."),
 ]
 Turn = Annotated[float, typer.Option(help="Rotation of the sky about the vertical, degrees; see `render`.")]
 SIZE = "1680x1050"
-LEAST_RECENT = "least-recent"
 
 
 def command(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from lambent.cli.console import Between, Force, Json, progress_bar, say, show, table, words
+from lambent.cli.console import Between, Force, Json, note, progress_bar, show, table, words
 from lambent.core.errors import UserError
 from lambent.materials.fitting.choices import DISTRIBUTION, DistributionChoice
 
@@ -103,7 +103,7 @@ def command(
             page = fit_report.report(measurement, samples, result, source=file, environment=around, progress=bar)
         write_text(report, page)
     for warning in (*samples.info.notes, *result.notes, *below_zero(samples, METRICS[metric]), *result.warnings):
-        say(f"note: {warning}")
+        note(warning)
     figures = ("errors", "lambertian_errors", "seconds", "partial", "warnings")
     facts = {"material": result.material.model_dump(mode="json"), **{key: getattr(result, key) for key in figures}}
     facts |= {"albedos": [one.to_json() for one in result.albedos]}
