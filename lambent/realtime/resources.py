@@ -52,10 +52,13 @@ class ObjectResources:
 
     def __init__(
         self, layouts: Layouts, record: ObjectRecord, light: ProbeLight, unit: float, beyond: Ranges,
-        has_shares: bool = False,
+        has_shares: bool = False, lamp: int = 0,
     ) -> None:  # fmt: skip
-        """`has_shares`: the light map holds the share of the probe's light that arrives, by direction."""
-        self._has_shares = has_shares
+        """`has_shares`: the light map holds the share of the probe's light that arrives, by direction.
+
+        An object that is the opening of a drawn `lamp` has its number, from 1.
+        """
+        self._has_shares, self.lamp = has_shares, lamp
         self.record, self.light, self._layouts, self._unit, self.beyond = record, light, layouts, unit, beyond
         self.emission = record.emission
         self.group = cache(self._new_group)
@@ -77,7 +80,7 @@ class ObjectResources:
         data = np.zeros(1, OBJECT_DTYPE)
         data["centre"][0] = (*probe.centre, self.light.half_log2_texels("box" if shows_change else cube))
         data["sky_change"][0] = (*self.light.sky_change, self._has_shares)
-        data["emission"][0, :3] = np.array(self.emission) / self._unit
+        data["emission"][0] = (*(np.array(self.emission) / self._unit), self.lamp)
         data["irradiance"].reshape(-1)[: len(probe.irradiance)] = np.array(probe.irradiance) / (self._unit * probe.gain)
         data["irradiance"].reshape(-1)[EVEN_NICHES] = probe.even_niches
         data["borders"][0] = [*self.record.borders, *[WITHIN] * (MOST_BORDERS - len(self.record.borders))]
@@ -99,7 +102,8 @@ class SceneResources:
         )  # fmt: skip
         uv = np.zeros_like(scene.uv2) if scene.uv is None else scene.uv
         vertices = np.concatenate([scene.positions, scene.normals, scene.tangents, scene.uv2, uv], axis=1)
-        self.vertices = layouts.buffer("VERTEX", np.nan_to_num(vertices).astype(np.float32))
+        self._vertices = np.nan_to_num(vertices).astype(np.float32)  # as baked
+        self.vertices = layouts.buffer("VERTEX", self._vertices)
         self.indices = layouts.buffer("INDEX", scene.faces.astype(np.uint32))
         layers = light_layers(scene.irradiance, scene.irradiance_back, scene.dominant_direction, scene.probe_share)
         self.light_layers = list(layers)  # (H, W, 4) each, as shown, the direct light of lamps included
@@ -118,12 +122,14 @@ class SceneResources:
         lights = self._as_baked
         beyond = neighbouring_faces(scene)
         self.objects, known = [], look_ups()
+        shining = [lamp.number for lamp in self.lamps.records]
         for record in scene.record.objects:
             probe = scene.probe_of(record)
             if probe not in lights:
                 lights[probe] = ProbeLight(
                     layouts, probe and without_sun(probe, scene.sun, scene.unit), self.sampler, known
                 )
+            place = 1 + shining.index(record.luminaire) if record.luminaire in shining else 0
             self.objects.append(
                 ObjectResources(
                     layouts,
@@ -132,6 +138,7 @@ class SceneResources:
                     scene.unit,
                     beyond.get(record.name, []),
                     record.name in scene.share_objects,
+                    place,
                 )
             )
         textures = TextureCache(device)
@@ -190,6 +197,15 @@ class SceneResources:
     def light_of(self, name: str) -> ProbeLight:
         """The light of the object of this name, shared with other objects."""
         return next(one.light for one in self.objects if one.record.name == name)
+
+    def move(self, record: ObjectRecord, world_from_baked: Floats) -> None:
+        """Show an object at another place: (4, 4), rigid."""
+        faces = self.scene.faces[record.first_face : record.first_face + record.face_count]
+        first, last = int(faces.min()), int(faces.max())
+        rows, turn = self._vertices[first : last + 1].copy(), world_from_baked[:3, :3].T
+        rows[:, :3] = rows[:, :3] @ turn + world_from_baked[:3, 3]
+        rows[:, 3:6], rows[:, 6:9] = rows[:, 3:6] @ turn, rows[:, 6:9] @ turn
+        self._layouts.device.queue.write_buffer(self.vertices, first * rows.strides[0], rows.tobytes())
 
     def sky_group_of(self, texels: NDArray[np.float16]) -> Any:
         """Bind group of an environment (6, N, N, 4)."""

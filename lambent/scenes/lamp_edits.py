@@ -14,8 +14,11 @@ from lambent.core.geometry.directions import normalize
 from lambent.core.light.colour import luminance
 from lambent.core.light.photometry import LM_PER_W
 from lambent.core.plain import Triple, triple
+from lambent.scenes.geometry import transformed
 from lambent.scenes.photometry.distribution import Photometry
 from lambent.scenes.photometry.files import read_luminaire
+from lambent.scenes.photometry.luminous_surfaces import placement, shining
+from lambent.scenes.photometry.opening import POINT
 from lambent.scenes.scene import IesLight, PointLight, Scene
 
 DOWN: Triple = (0.0, -1.0, 0.0)
@@ -48,9 +51,11 @@ class LampEdit:
 
 
 def edited_lamp(lamp: PointLight | IesLight, edit: LampEdit) -> PointLight | IesLight:
-    """A lamp after an edit; `UserError` if its file cannot be read."""
+    """A lamp after an edit, with the same opening; `UserError` if its file cannot be read."""
     if edit.file:
-        return exchanged(edit, lamp.intensity if isinstance(lamp, PointLight) else lamp.scale, lamp.name)
+        found = exchanged(edit, lamp.intensity if isinstance(lamp, PointLight) else lamp.scale, lamp.name)
+        opening = POINT if isinstance(lamp, PointLight) else lamp.photometry.opening
+        return replace(found, photometry=replace(found.photometry, opening=opening))
     if isinstance(lamp, IesLight):
         now, before = (lamp.photometry.tilted(tilt_deg(aim)) for aim in (edit.axis, lamp.aim))
         scale = triple(np.array(lamp.scale) * (now / before if before else 1.0))
@@ -89,10 +94,14 @@ def with_lamp_edits(scene: Scene, edits: Mapping[int, LampEdit]) -> Scene:
     UserError
         If a light is not a lamp at a point, or a file cannot be read.
     """
-    lights = list(scene.lights)
+    lights, objects = list(scene.lights), {o.luminaire: o for o in scene.objects if o.luminaire is not None}
     for number, edit in edits.items():
         lamp = lights[number] if 0 <= number < len(lights) else None
         if not isinstance(lamp, PointLight | IesLight):
             raise UserError("the scene has no such lamp", field="lamps", got=number, hint="reset the edited lamps")
-        lights[number] = edited_lamp(lamp, edit)
-    return replace(scene, lights=tuple(lights))
+        lights[number] = now = edited_lamp(lamp, edit)
+        if isinstance(lamp, IesLight) and isinstance(now, IesLight) and number in objects:
+            moved = transformed(objects[number].mesh, placement(now) @ np.linalg.inv(placement(lamp)))
+            objects[number] = shining(replace(objects[number], mesh=moved), now)
+    of_scene = tuple(o if o.luminaire is None else objects[o.luminaire] for o in scene.objects)
+    return replace(scene, lights=tuple(lights), objects=of_scene)

@@ -64,7 +64,7 @@ def sorted_lights(scene: Scene, suns: Collection[int] = (), *, sun_in_sky: bool 
         _of_light(light, name, number in suns)
         for number, (light, name) in enumerate(zip(scene.lights, names_of_lights(scene.lights), strict=True))
     ]
-    shining = [o for o in scene.objects if any(o.emission)]
+    shining = [o for o in scene.objects if any(o.emission) and o.luminaire is None]
     objects = [
         _Emitter(
             (whole := scene.parts.get(o.name, o.name), o.name), stem(whole),
@@ -82,6 +82,7 @@ def sorted_lights(scene: Scene, suns: Collection[int] = (), *, sun_in_sky: bool 
     first = len(far)
     of_lights = tuple(numbers[first : first + len(lights)])
     of_objects = {o.name: n for o, n in zip(shining, numbers[first + len(lights) :], strict=True)}
+    of_objects |= {name: of_lights[number] for number, name in scene.openings.items()}
     sky = None if scene.environment is None else numbers[len(far) - 1]
     sun = numbers[0] if sun_in_sky else next((of_lights[number] for number in sorted(suns)), None)
     return SortedLights(tuple(map(LightGroup, order, members)), of_lights, of_objects, sun, sky)

@@ -77,7 +77,8 @@ class SceneObject:
     """A named mesh, the name of its material, and the radiance it emits (one-sided, along the normal).
 
     `light_map_scale` multiplies its light map texels per metre: small for surfaces that are never seen. An object with
-    a `luminaire` is its opening: paths see the radiance of its photometry, of which `emission` is the mean.
+    a `luminaire`, the number of a light of the scene, is its opening: paths see the radiance of its photometry, whose
+    mean is `emission`.
     """
 
     name: str
@@ -85,7 +86,7 @@ class SceneObject:
     material: str
     emission: Triple = (0.0, 0.0, 0.0)
     light_map_scale: float = 1.0
-    luminaire: IesLight | None = None
+    luminaire: int | None = None
 
 
 @dataclass(frozen=True)
@@ -156,7 +157,9 @@ class DirectionalLight:
 
 @dataclass(frozen=True)
 class IesLight:
-    """A luminaire at a point; `scale` is W/sr per candela of its photometry.
+    """A luminaire; `scale` is W/sr per candela of its photometry.
+
+    It shines from the object that is its opening (`scenes.photometry.luminous_surfaces`), or else from a point.
 
     Its axis is `aim`, unit; `rotation_deg` rotates it about that, counter-clockwise seen from behind.
     """
@@ -323,8 +326,13 @@ class Scene:
         return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
 
     @property
+    def openings(self) -> dict[int, str]:
+        """Names of the objects that are openings of luminaires, by number of the light."""
+        return {o.luminaire: o.name for o in self.objects if o.luminaire is not None}
+
+    @property
     def lamps(self) -> tuple[int, ...]:
-        """Numbers of the lights that shine from a point: all but directional ones."""
+        """Numbers of the lights that are at a place: all but directional ones."""
         return tuple(number for number, light in enumerate(self.lights) if isinstance(light, PointLight | IesLight))
 
     @property

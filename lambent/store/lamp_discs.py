@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Flags, Floats
 from lambent.core.geometry.directions import basis, normalize
+from lambent.core.plain import triple
+from lambent.scenes.photometry.opening import X, Y, Z
 from lambent.scenes.scene import IesLight, PointLight
 
 SIDE = 1024  # texels along a disc: .16 degrees apart for a hemisphere
@@ -27,6 +32,27 @@ def reach_deg(lamp: PointLight | IesLight) -> float:
     lit = np.flatnonzero(np.array(lamp.photometry.candela).any(axis=0))
     angles = lamp.photometry.vertical_deg
     return float(angles[min(int(lit[-1]) + 1, len(angles) - 1)]) if len(lit) else float(angles[-1])
+
+
+def half_axes_m(lamp: PointLight | IesLight) -> tuple[float, float]:
+    """Half axes, across and down in `axes_of`, of the ellipse that a lamp's opening counts as; 0 without an opening.
+
+    A rectangle counts as an ellipse of the same area.
+    """
+    if isinstance(lamp, PointLight):
+        return 0.0, 0.0
+    opening = lamp.photometry.opening
+    share = 1 / math.sqrt(math.pi) if opening.shape == "box" or opening.axis != Z else 0.5
+    return opening.size_m[X] * share, opening.size_m[Y] * share
+
+
+def opening_of(lamp: PointLight | IesLight) -> dict[str, Any]:
+    """What a `LampRecord` says of a luminaire's opening."""
+    if isinstance(lamp, PointLight):
+        return {}
+    opening = lamp.photometry.opening
+    silhouettes = triple(opening.projected_m2(np.eye(3)))
+    return {"half_axes_m": half_axes_m(lamp), "silhouettes_m2": silhouettes, "is_box": opening.shape == "box"}
 
 
 def profile(lamp: PointLight | IesLight) -> tuple[NDArray[np.float16], Floats]:

@@ -1,4 +1,4 @@
-"""Lamps at points that renderers draw by pixel: light, shadow maps, and what the light map holds of them.
+"""Lamps that renderers draw by pixel: light, shadow maps, and what the light map holds of them.
 
 A direction d from a lamp, in its axes, is at q = d.xy / (2 cos(theta/2)) / sin(reach/2) in the unit disc, which keeps
 areas (Lambert's azimuthal projection): |q| = sin(theta/2) / sin(reach/2).
@@ -31,7 +31,9 @@ LAMPS = tuple(f"light_map/{side.replace('irradiance', 'lamps')}" for side in SID
 class LampRecord(Strict):
     """A lamp: `axes` are unit rows, the last one along its axis; `intensity` is the largest, W/sr.
 
-    `number` is its place among the scene's lights.
+    `number` is its place among the lights. `half_axes_m` are those of its opening, an ellipse, or 0 of a point.
+    `silhouettes_m2` of the opening are those seen along the axes; along others, those of a box add up, and those of
+    other shapes count as an ellipsoid's.
     """
 
     number: int = Field(ge=0)
@@ -39,6 +41,9 @@ class LampRecord(Strict):
     axes: tuple[Triple, Triple, Triple]
     intensity: Triple
     reach_deg: float = Field(gt=0, le=180)
+    half_axes_m: tuple[float, float] = (0.0, 0.0)
+    silhouettes_m2: Triple = (0.0, 0.0, 0.0)
+    is_box: bool = False
     profile: int = Field(ge=0)
     group: int = Field(ge=0)
 
@@ -52,11 +57,14 @@ def drawn_lamps(store: Store) -> tuple[LampRecord, ...]:
         found = tuple(map(LampRecord.model_validate, said if isinstance(said, list) else ()))
     except ValidationError as error:
         raise invalid(error, store.folder / MANIFEST) from error
-    numbers = np.array([[*lamp.position, *lamp.intensity, *np.ravel(lamp.axes)] for lamp in found])
+    numbers = [(*lamp.position, *lamp.intensity, *lamp.half_axes_m, *lamp.silhouettes_m2) for lamp in found]
+    axes = np.array([lamp.axes for lamp in found])
     profiles, groups = store.artefact(PROFILES).shape[0], store.artefact(LAMPS[0]).shape[0]
     whole = all(lamp.profile < profiles and lamp.group < groups for lamp in found)
     count, side, _ = store.artefact(DISTANCES).shape
     whole &= store.artefact(PROFILES).shape[1:] == (side, side)
-    if not (whole and np.isfinite(numbers).all() and len(found) == count <= MOST_LAMPS):
+    if not (
+        whole and np.isfinite(np.array(numbers)).all() and np.isfinite(axes).all() and len(found) == count <= MOST_LAMPS
+    ):
         raise store.broken(f"{DISTANCES}: lamps", got=said, expected=f"{count} lamps of {profiles} profiles")
     return found

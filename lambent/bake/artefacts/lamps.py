@@ -1,4 +1,4 @@
-"""Lamps at points that renderers draw by pixel: see `store.lamps`."""
+"""Lamps that renderers draw by pixel: see `store.lamps`."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from lambent.bake.methods import sorts_light
 from lambent.bake.running.keys import key_of
 from lambent.core.plain import triple
 from lambent.scenes.scene import IesLight, PointLight
-from lambent.store.lamp_discs import axes_of, profile, reach_deg
+from lambent.store.lamp_discs import axes_of, opening_of, profile, reach_deg
 from lambent.store.lamps import DISTANCES, LAMPS, PROFILES, REACHED, LampRecord
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 KIND = "lamps"
 NEEDS = ("geometry", "light_map")
-REVISION = 2
+REVISION = 3
 
 
 def keys(context: BakeContext) -> dict[str, str]:
@@ -47,10 +47,11 @@ def bake(context: BakeContext) -> None:
         of_map = light.drawn if sorts_light(context.methods) else light.drawn.sum(axis=0, keepdims=True)
         context.put(KIND, LAMPS[side], of_map, context.provenance())
         reached |= light.reached
-    whole, maps = traced.whole(diffuse=False), []
+        shaded |= light.shaded
+    bare, maps = traced.bare, []
     for number, lamp in enumerate(lamps):
         context.progress(number, len(lamps), "shadow maps of lamps")
-        distances, behind = shadow_map(whole, lamp, size)
+        distances, behind = shadow_map(bare, lamp, size)
         maps.append(distances)
         shaded |= maximum_filter(behind, 3).astype(np.uint64) << np.uint64(number)
     words = [part >> np.uint64(32 * word) for part in (reached, shaded) for word in (0, 1)]
@@ -71,9 +72,10 @@ def _records(
         if (place := known.setdefault(shape.tobytes(), len(profiles))) == len(profiles):
             profiles.append(shape)
         rows = [triple(axis) for axis in axes_of(lamp)]
+        opening = opening_of(lamp) if number in context.scene.openings else {}
         record = LampRecord(
             number=number, position=lamp.position, axes=(rows[0], rows[1], rows[2]), intensity=triple(intensity),
-            reach_deg=reach_deg(lamp), profile=place, group=groups[number] if grouped else 0,
+            reach_deg=reach_deg(lamp), profile=place, group=groups[number] if grouped else 0, **opening,
         )  # fmt: skip
         records.append(record.model_dump(mode="json"))
     return np.stack(profiles) if profiles else np.zeros((0, 1, 1), np.float16), records

@@ -201,7 +201,7 @@ def _traced(context: BakeContext) -> Traced:
     seen, kind = around(traced, maps if by_map else None, depth), {"diffuse": not by_map}
 
     def without(name: str) -> Surroundings:
-        return replace(seen, scene=traced.builder(**kind).build(leave_out={name}))
+        return replace(seen, scene=traced.builder(**kind).build(leave_out=traced.apart | {name}))
 
     placing = Placing(traced.builder(**kind), traced.whole(**kind))
     return Traced(placing, seen, unit_of(context.scene, maps[0], traced.sun), without)

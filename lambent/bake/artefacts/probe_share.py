@@ -43,7 +43,7 @@ def bake(context: BakeContext) -> None:
         of_probes = np.maximum(of_probes - traced.lamp_light(1.0).drawn.sum(axis=0, dtype=np.float32), 0)
     luminous = luminance(of_probes.reshape(-1, 3)[sides.texels.index].astype(float))
     cache, unseen = traced.cache(*maps), traced.unseen(diffuse=False)
-    tracer = ShareTracer(traced.whole(diffuse=False), cache, sides, owner, luminous, unseen)
+    tracer = ShareTracer(traced.bare, cache, sides, owner, luminous, unseen)
     seed = seed_of(context.seed, KIND)
     values, worth = tracer.shares(list(_shown(context)), labels, seed, context.progress)
     names = [traced.scene.objects[number].name for number in worth]

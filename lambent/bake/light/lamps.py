@@ -1,9 +1,10 @@
-"""Direct light of lamps at points on the light map: exact at each of a texel's points, so that it needs no filter."""
+"""Direct light of lamps on the light map, by shadow rays from each of a texel's points, so that it needs no filter."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -17,9 +18,13 @@ from lambent.bake.surfaces.texels import POINTS, Sides
 from lambent.bake.tracing.lights.lamps import LampRays
 from lambent.bake.tracing.rays import array_of
 from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.geometry.sequences import hammersley
 from lambent.core.light.colour import HALF_MAX, luminance
 from lambent.store.lamps import MOST_LAMPS
 
+OF_OPENING = 4  # rays to an opening from each of a texel's points
+NEAR_FIELD = 16  # likewise, samples without shadows
+MOST_NEAR = 4.0  # times the light as drawn: next to the rim of an opening few samples have most of the light
 AROUND = 1  # texels to each side that count as reached: edges of shadows cross the borders of texels
 
 
@@ -29,15 +34,20 @@ class LampLight:
 
     Attributes
     ----------
-    light, drawn : (G, H, W, 3) float16
-        Irradiance of all lamps and of those that are drawn, by light group, W/m^2.
+    light : (G, H, W, 3) float16
+        Irradiance of all lamps, by light group, W/m^2.
+    drawn : (G, H, W, 3) float16
+        Irradiance of those that are drawn, as they are drawn.
     reached : (H, W) uint64
         Bit k: whether the light of drawn lamp k arrives at the texel or at a neighbour of its chart; 1 in gutters.
+    shaded : (H, W) uint64
+        Bit k: whether a part of drawn lamp k's opening is hidden from a part of the texel.
     """
 
     light: NDArray[np.float16]
     drawn: NDArray[np.float16]
     reached: NDArray[np.uint64]
+    shaded: NDArray[np.uint64]
 
 
 class LampPoints:
@@ -57,22 +67,31 @@ class LampPoints:
     def detail(self) -> Floats:
         """(n,) what texels cannot show of each lamp: its deviation within them, lm/m^2, times their area, summed."""
         area = self._texels.area_m2[self._mine]
-        return np.array([luminance(self._of(lamp)).std(axis=1) @ area for lamp in range(self._lamps.count)])
+        found = (luminance(self._of(lamp).mean(axis=2)).std(axis=1) for lamp in range(self._lamps.count))
+        return np.array([one @ area for one in found])
 
     def light(self, groups: Sequence[int], count: int, drawn: Sequence[int]) -> LampLight:
         """The light of all lamps in `count` groups, those of each in `groups`; `drawn` are numbers of lamps."""
         light = np.zeros((2, count, *self._labels.shape, 3), np.float32)  # of all lamps, of those drawn
-        reached = np.zeros(self._labels.shape, np.uint64)
+        reached, shaded = np.zeros((2, *self._labels.shape), np.uint64)
         for lamp in range(self._lamps.count if len(self._mine) else 0):
-            each, of_map = self._of(lamp), np.zeros((*self._labels.shape, 3), np.float32)
-            of_map.reshape(-1, 3)[self._texels.index[self._mine]] = each.mean(axis=1)
-            light[0, groups[lamp]] += of_map
+            each, sized = self._of(lamp), self._lamps.is_sized(lamp)
+            of_map = self._on_map(each)
+            light[0, groups[lamp]] += of_map * self._near_field(lamp) if sized else of_map
             if lamp in drawn:
                 light[1, groups[lamp]] += of_map
-                reached |= self._near(of_map) << np.uint64(drawn.index(lamp))
+                bit = np.uint64(drawn.index(lamp))
+                reached |= self._near(of_map) << bit
+                shaded |= self._near(self._on_map(_dark(each))) << bit if sized else np.uint64(0)
         filled = [[fill(one, self.known, self._labels) for one in each] for each in light]
         whole, of_drawn = np.minimum(filled, HALF_MAX).astype(np.float16)
-        return LampLight(whole, of_drawn, reached)
+        return LampLight(whole, of_drawn, reached, shaded)
+
+    def _on_map(self, each: Floats) -> Floats:
+        """(H, W, 3) means of samples (K, POINTS, n, 3) of texels."""
+        of_map = np.zeros((*self._labels.shape, 3), np.float32)
+        of_map.reshape(-1, 3)[self._texels.index[self._mine]] = each.mean(axis=(1, 2))
+        return of_map
 
     def _near(self, light: Floats) -> NDArray[np.uint64]:
         """1 where light (H, W, 3) is not black within AROUND texels, 0 elsewhere."""
@@ -82,9 +101,38 @@ class LampPoints:
         return found.astype(np.uint64)
 
     def _of(self, lamp: int) -> Floats:
-        """(K, POINTS, 3) irradiance of a lamp at the points."""
-        found = self._lamps.of(dr.opaque(mi.UInt32, lamp), self._at, mi.Bool(True))
-        return array_of(found).reshape(len(self._mine), POINTS, 3).clip(0, None)
+        """(K, POINTS, n, 3) irradiance of a lamp at the points: by each point of its opening, or its one point."""
+        number = dr.opaque(mi.UInt32, lamp)
+        places = self._places(OF_OPENING) if self._lamps.is_sized(lamp) else [mi.Point2f(0.5)]
+        found = [array_of(self._lamps.of(number, self._at, u, mi.Bool(True))) for u in places]
+        return np.stack([one.reshape(len(self._mine), POINTS, 3).clip(0, None) for one in found], axis=2)
+
+    def _near_field(self, lamp: int) -> Floats:
+        """(H, W, 1) light of all the opening of a lamp over its light as drawn, without shadows; 1 where it is dark."""
+        number, sums = dr.opaque(mi.UInt32, lamp), np.zeros((2, len(self._mine)))
+        for u in self._places(NEAR_FIELD):
+            both = self._lamps.unshadowed(number, self._at, u, mi.Bool(True))
+            sums += [luminance(array_of(one)).reshape(-1, POINTS).sum(axis=1) for one in both]
+        ratio = np.divide(sums[1], sums[0], out=np.ones(len(self._mine)), where=sums[0] > 0)
+        of_map = np.ones((*self._labels.shape, 1), np.float32)
+        of_map.reshape(-1)[self._texels.index[self._mine]] = ratio.clip(0, MOST_NEAR)
+        return of_map
+
+    def _places(self, count: int) -> Iterator[Any]:
+        """Stratified samples (mi.Point2f) of openings, `count` from each of a texel's points; the same for all texels.
+
+        What they miss of a shadow, all light and the drawn light miss alike.
+        """
+        point = dr.arange(mi.UInt32, len(self._mine) * POINTS) % POINTS
+        x, y = (mi.Float(part) for part in hammersley(POINTS * count).T.astype(np.float32))
+        for k in range(count):
+            at = point + dr.opaque(mi.UInt32, POINTS * k)
+            yield mi.Point2f(dr.gather(mi.Float, x, at), dr.gather(mi.Float, y, at))
+
+
+def _dark(light: Floats) -> Floats:
+    """1 where light (..., 3) is 0 in all channels, else 0, likewise (..., 3)."""
+    return np.broadcast_to(np.float32((light == 0).all(axis=-1, keepdims=True)), light.shape)
 
 
 def drawn_of(detail: Floats) -> tuple[int, ...]:

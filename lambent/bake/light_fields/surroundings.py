@@ -22,15 +22,17 @@ Maps = tuple[Floats, Floats | None]  # the light map's irradiance (H, W, 3), and
 def around(traced: TracedScene, maps: Maps | None, depth: int, bare: Collection[str] = ()) -> Surroundings:
     """The whole scene, lit by the light map, or without `maps` by paths that meet `depth` surfaces.
 
-    Objects in `bare` have lost their lobes, so that they show their diffuse light alone.
+    Openings of drawn lamps are left out. Objects in `bare` have lost their lobes, so that they show their diffuse light
+    alone.
     """
     diffuse = maps is None
     if not bare:
-        cache = None if maps is None else traced.cache(*maps)
-        return Surroundings(traced.whole(diffuse=diffuse), cache, depth, traced.sun)
+        cache, whole = None if maps is None else traced.cache(*maps), traced.whole(diffuse=diffuse)
+        seen = traced.builder(diffuse=diffuse).build(traced.apart) if traced.apart else whole
+        return Surroundings(seen, cache, depth, traced.sun)
     usual, scene = traced.builder(diffuse=diffuse), without_lobes(traced.scene, bare)
     builder = SceneBuilder(scene, traced.atlas.uv2, diffuse=diffuse, measured=usual.measured, sampling=usual.sampling())
-    whole = builder.build()
+    whole = builder.build(traced.apart)
     sun = None if traced.sun is None else SunRays(traced.sun, whole)
     return Surroundings(whole, None if maps is None else LightMapCache(builder, *maps, sun), depth, traced.sun)
 

@@ -26,9 +26,10 @@ def stored_scene(store: Store, scene: Scene, replacements: Sequence[Replacement]
     sun too, the scene has no sun of its own.
     """
     record, arrays = scene_record(store), read_geometry(store)
-    luminaires = {o.name: o.luminaire for o in scene.objects}
+    openings = {o.name: o for o in scene.objects if o.luminaire is not None}
     objects, uv2 = _objects(record, arrays)
-    objects = tuple(replace(o, luminaire=luminaires.get(o.name)) for o in objects)
+    objects = tuple(openings.get(o.name, o) for o in objects)  # they are where their lamps are
+    uv2 |= {name: np.zeros((len(o.mesh.positions), 2), np.float32) for name, o in openings.items()}
     scene = replace(scene, objects=objects, parts={o.name: o.part_of for o in record.objects if o.part_of})
     scene, unmapped = with_replacements(scene, replacements), frozenset(one.object for one in replacements)
     uv2 |= {name: np.zeros((len(scene.object(name).mesh.positions), 2), np.float32) for name in unmapped}

@@ -54,6 +54,7 @@ class ProbeSet:
         self._builder, self._whole = traced.builder(diffuse=whole_paths), traced.whole(diffuse=whole_paths)
         self._scene, self._backs, self._held = self._builder.scene, backs, held
         self._left_out: tuple[frozenset[str], Any] | None = None
+        self._seen = self._builder.build(traced.apart) if traced.apart else self._whole
         self._cache = None if irradiance is None else traced.cache(irradiance, irradiance_back)
         self._sorting: tuple[Tally, GroupedCache | None] | None = None
 
@@ -68,12 +69,12 @@ class ProbeSet:
         return SolidTest(self._builder, self._whole)
 
     def _without(self, names: frozenset[str]) -> Any:
-        """The scene without these objects, cached until other ones are left out: parts of one object share it."""
+        """What probes see without these objects, cached until other ones are left out: parts of one object share it."""
         if not names:
-            return self._whole
+            return self._seen
         if self._left_out is None or self._left_out[0] != names:
             self._left_out = None
-            self._left_out = names, self._builder.build(leave_out=names)
+            self._left_out = names, self._builder.build(leave_out=names | self._traced.apart)
         return self._left_out[1]
 
     def _mirrored(self, names: tuple[str, ...], seed: int) -> Mirrored | None:
@@ -99,7 +100,7 @@ class ProbeSet:
             clear,
             r0,
             self._traced.places,
-            self._whole,
+            self._seen,
             self._cache,
             MIRROR_DEPTH,
             self._builder.numbers,
@@ -154,9 +155,9 @@ class ProbeSet:
         centre = self._centre(name, without, rays, seed)
         left_out = name not in self._held and not encloses(self._builder, name, centre, self._whole)
         if left_out and rays is not None and not self._transmits(name) and rays.own.mean() > OWN:
-            alone, held = (self._error(rays, first, centre, seed) for first in (without, self._whole))
+            alone, held = (self._error(rays, first, centre, seed) for first in (without, self._seen))
             left_out = held >= WORTH * alone
-        seen = without if left_out or name in self._held else self._whole
+        seen = without if left_out or name in self._held else self._seen
         around = Surroundings(seen, self._whole, self._cache, self._depth)
         if self._sorting is not None:
             tally, cache = self._sorting

@@ -152,7 +152,7 @@ def object_records(scene: Scene) -> tuple[ObjectRecord, ...]:
     for o, (low, high) in zip(scene.objects, boxes, strict=True):
         records.append(ObjectRecord(
             name=o.name, material=o.material, first_face=first, face_count=len(o.mesh.faces), emission=o.emission,
-            bounds=(triple(low), triple(high)),
+            luminaire=o.luminaire, bounds=(triple(low), triple(high)),
             probe=wants_probe[o.material],
             part_of=scene.parts.get(o.name, ""), borders=scene.borders.get(o.name, ()),
         ))  # fmt: skip

@@ -1,4 +1,4 @@
-"""Emitters without the sun and lamps at points, for sampling at points of the light map: their light is added by rays.
+"""Emitters without the sun and lamps, for sampling at points of the light map: their light is added by rays.
 
 A sky is the same picture without the sun's part, with its own guide: samples aimed at the sun would be wasted. Later
 surfaces on a path see the sun, and sample all emitters.
@@ -30,9 +30,14 @@ class FirstLight:
         without: Collection[int] = (),
     ) -> None:  # fmt: skip
         suns = [number for number, light in enumerate(builder.scene.lights) if found and is_sun(light, found)]
-        lights = [emitter for number, emitter in enumerate(builder.lights) if number not in {*suns, *without}]
+        others = {*suns, *without, *builder.scene.openings}
+        lights = [emitter for number, emitter in enumerate(builder.lights) if number not in others]
         emitters = [*lights, *([] if environment is None else [environment])]
-        meshes = [mesh for mesh in builder.meshes.values() if mesh.is_emitter()]
+        apart = [builder.lights[number] for number in without if number in builder.scene.openings]
+        numbers = [_number(emitter) for emitter in apart]
+        self._apart = mi.Bool(np.isin(np.arange(max(numbers, default=0) + 1), numbers))
+        shining = [mesh for mesh in builder.meshes.values() if mesh.is_emitter()]
+        meshes = [mesh for mesh in shining if _number(mesh.emitter()) not in numbers]
         parts = {f"part_{i}": part for i, part in enumerate([*meshes, *emitters])}
         if not parts:
             parts["darkness"] = {"type": "point", "position": [0.0, 0.0, 0.0], "intensity": 0.0}
@@ -41,12 +46,23 @@ class FirstLight:
         for emitter in emitters:
             emitter.set_scene(whole)  # distant light begins beyond the whole scene
 
-    def pdf(self, si: Any, ds: Any, active: Any) -> Any:
-        """Density (mi.Float) of `scene.sample_emitter_direction`; `ds` describes a ray's hit in the whole scene."""
+    def pdf(self, si: Any, ds: Any, first: Any, active: Any) -> Any:
+        """Density (mi.Float) of `scene.sample_emitter_direction`; `ds` describes a ray's hit in the whole scene.
+
+        Infinite for openings that are left out, if the `first` ray of a path hits them: they get no weight.
+        """
+        number = dr.reinterpret_array(mi.UInt32, ds.emitter)
+        apart = active & (number < dr.width(self._apart)) & dr.gather(mi.Bool, self._apart, number, active)
         if self._environment is not None:
             ds = dr.copy(ds)
             ds.emitter = dr.select(ds.emitter.is_environment(), mi.EmitterPtr(self._environment), ds.emitter)
-        return self.scene.pdf_emitter_direction(si, ds, active)
+        return dr.select(
+            apart, dr.select(first, dr.inf, 0.0), self.scene.pdf_emitter_direction(si, ds, active & ~apart)
+        )
+
+
+def _number(emitter: Any) -> int:
+    return int(dr.reinterpret_array(mi.UInt32, mi.EmitterPtr(emitter))[0])
 
 
 def sky_without(found: FoundSun, builder: SceneBuilder, whole: Any, effort: float = 1.0) -> Any:

@@ -143,7 +143,7 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, un
         emitter = si.emitter(scene)
         pdf_emitter = scene.pdf_emitter_direction(origin, ds, active & ~direct)
         if unseen is not None and unseen.first is not None:
-            pdf_emitter = dr.select(straight, unseen.first.pdf(origin, ds, active & straight), pdf_emitter)
+            pdf_emitter = dr.select(straight, unseen.first.pdf(origin, ds, depth == 0, active & straight), pdf_emitter)
         weight = dr.select(direct, 1.0, _balance(pdf, pdf_emitter))
         light = emitter.eval(si, active)
         if unseen is not None:

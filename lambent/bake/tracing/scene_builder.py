@@ -97,9 +97,14 @@ class SceneBuilder:
             self._tables[name] = mi.load_dict(edited_dict(scene.materials[name], made, scene.textures.get(name)))
         self._known = dict[Look, tuple[Any, MaterialTextures | None]]()
         self._first = self._bsdfs(scene, self._known)
-        self._shapes = Shapes(scene.objects, self._first, uv2 or {})
+        self._shapes = Shapes(scene, self._first, uv2 or {})
         self.meshes = self._shapes.meshes
-        self.lights = [emitter_of(light) for light in scene.lights]
+        sized = scene.openings
+        self.lights = [
+            self.meshes[sized[number]].emitter() if number in sized else emitter_of(light)
+            for number, light in enumerate(scene.lights)
+        ]
+        self._unsized = [emitter for number, emitter in enumerate(self.lights) if number not in sized]
         if sampling is None:
             self.environment: Any = _emitter_of(scene.environment, COARSE if coarse_sky else 1)
         else:
@@ -139,7 +144,7 @@ class SceneBuilder:
         which takes a third more time per ray. Graphics cards are always watertight.
         """
         parts: dict[str, Any] = {f"object_{i}": mesh for i, mesh in enumerate(self._shapes.without(leave_out))}
-        parts |= {f"light_{i}": light for i, light in enumerate(self.lights)}
+        parts |= {f"light_{i}": light for i, light in enumerate(self._unsized)}
         if self.environment is not None:
             parts["environment"] = self.environment
         if not self.lights and self.environment is None and not any(any(o.emission) for o in self.scene.objects):
@@ -152,9 +157,14 @@ class SceneBuilder:
             parts["embree_use_robust_intersections"] = True
         return mi.load_dict({"type": "scene", **parts}, optimize=False)
 
+    def build_bare(self, whole: Any) -> Any:
+        """The scene without openings of luminaires, which block no light of lamps; `whole` if there are none."""
+        openings = self.scene.openings.values()
+        return self.build(frozenset(openings)) if openings else whole
+
     def emitters(self) -> list[Any]:
         """All mi.Emitter: of objects, lights, environment."""
-        found = [mesh.emitter() for mesh in self.meshes.values() if mesh.is_emitter()] + self.lights
+        found = [mesh.emitter() for mesh in self.meshes.values() if mesh.is_emitter()] + self._unsized
         return [*found, self.environment] if self.environment is not None else found
 
     def sampling(self) -> EmitterSampling:

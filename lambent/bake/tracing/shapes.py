@@ -19,14 +19,14 @@ from lambent.bake.bsdfs.material_plugin import TANGENT_ATTRIBUTE
 from lambent.bake.tracing.lights.opening_emitter import opening_emitter
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.scenes.geometry import merge
-from lambent.scenes.scene import SceneObject
+from lambent.scenes.scene import IesLight, Scene, SceneObject
 
 UV2_ATTRIBUTE = "vertex_uv2"
 MOST_ALONE = 1000  # objects
 
 
 class Shapes:
-    """The shapes of objects with these BSDFs (mi.BSDF by object), with light map coordinates `uv2` by object name.
+    """The shapes of a scene's objects with BSDFs (mi.BSDF by object), and light map coordinates `uv2` by object name.
 
     Attributes
     ----------
@@ -35,8 +35,9 @@ class Shapes:
     numbers : ObjectNumbers
     """
 
-    def __init__(self, objects: Sequence[SceneObject], bsdfs: Sequence[Any], uv2: Mapping[str, Floats]) -> None:
-        self._objects, self._bsdfs, self._uv2 = objects, bsdfs, uv2
+    def __init__(self, scene: Scene, bsdfs: Sequence[Any], uv2: Mapping[str, Floats]) -> None:
+        objects = scene.objects
+        self._objects, self._lights, self._bsdfs, self._uv2 = objects, scene.lights, bsdfs, uv2
         alone, groups = len(objects) <= MOST_ALONE, dict[object, list[int]]()
         for i, (o, bsdf) in enumerate(zip(objects, bsdfs, strict=True)):
             groups.setdefault(i if alone or any(o.emission) else (id(bsdf), o.name in uv2), []).append(i)
@@ -77,13 +78,17 @@ class Shapes:
         objects = [self._objects[i] for i in group]
         first, bsdf = objects[0], self._bsdfs[group[0]]
         if len(objects) == 1:
-            return mesh_of(first, bsdf, self._uv2.get(first.name))
+            return mesh_of(first, bsdf, self._uv2.get(first.name), self._luminaire(first))
         mesh = merge(o.mesh for o in objects)
         if kept is not None:
             stays = np.repeat(kept, [len(o.mesh.faces) for o in objects])
             mesh = replace(mesh, faces=np.where(stays[:, None], mesh.faces, mesh.faces[:, :1]))
         uv2 = np.concatenate([self._uv2[o.name] for o in objects]) if first.name in self._uv2 else None
         return mesh_of(replace(first, mesh=mesh), bsdf, uv2)
+
+    def _luminaire(self, o: SceneObject) -> IesLight | None:
+        light = None if o.luminaire is None else self._lights[o.luminaire]
+        return light if isinstance(light, IesLight) else None
 
 
 class ObjectNumbers:
@@ -132,12 +137,15 @@ class ObjectNumbers:
         return dr.gather(mi.UInt32, self._by_shape, dr.reinterpret_array(mi.UInt32, hit.shape), active)
 
 
-def mesh_of(o: SceneObject, bsdf: Any, uv2: Floats | None = None) -> Any:
-    """mi.Mesh of an object with a BSDF, its brushing direction and, if given, its light map coordinates."""
+def mesh_of(o: SceneObject, bsdf: Any, uv2: Floats | None = None, luminaire: IesLight | None = None) -> Any:
+    """mi.Mesh of an object with a BSDF, its brushing direction and, if given, its light map coordinates.
+
+    It emits the light of a `luminaire`, or its own.
+    """
     props = mi.Properties()
     props["mesh_bsdf"] = bsdf
-    if o.luminaire is not None:
-        props["mesh_emitter"] = opening_emitter(o.luminaire)
+    if luminaire is not None:
+        props["mesh_emitter"] = opening_emitter(luminaire)
     elif any(o.emission):
         radiance = {"type": "rgb", "value": list(o.emission)}
         props["mesh_emitter"] = mi.load_dict({"type": "area", "radiance": radiance})

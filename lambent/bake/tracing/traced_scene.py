@@ -44,8 +44,8 @@ class TracedScene:
     """Shared by the artefacts of a bake. `merged` is the concatenated geometry of the atlas, as from `atlas.merged`.
 
     `two_sided` flags each object whose back has a light map too: because light crosses it, or viewers see it. The
-    light map leaves out the scene's sun unless `sun_left_out` is false. If `lamps_apart`, its samples leave out lamps
-    at points, whose light is `lamp_light`. Objects in `unmapped` have no texels in it. The sky is guided with `effort`
+    light map leaves out the scene's sun unless `sun_left_out` is false. If `lamps_apart`, its samples leave out lamps,
+    whose light is `lamp_light`. Objects in `unmapped` have no texels in it. The sky is guided with `effort`
     (`sky.guide.learn`).
     """
 
@@ -60,6 +60,7 @@ class TracedScene:
         self._two_sided, self._crossed = np.repeat(two_sided, counts), np.repeat(crossed_by_light(self.scene), counts)
         self._builder: tuple[tuple[bool, bool], SceneBuilder] | None = None
         self._whole: Any = None
+        self._bare: tuple[Any, Any] | None = None  # whole, and without openings
         self._sampling: EmitterSampling | None = None
         self._sky_without: tuple[Any] | None = None
         self._sides: dict[float, Sides] = {}
@@ -115,7 +116,7 @@ class TracedScene:
     def unseen(self, *, diffuse: bool, lamps: bool = True) -> Unseen | None:
         """That sun with the emitters of `whole(diffuse=diffuse)`, for sampling at points of the light map.
 
-        Emitters do not include lamps at points, whose light is `lamp_light`, unless `lamps` is false.
+        Emitters do not include lamps, whose light is `lamp_light`, unless `lamps` is false.
         """
         without = self.lamps if lamps else ()
         if self._found_sun is None and not without:
@@ -132,11 +133,23 @@ class TracedScene:
         """Numbers of the scene's lights whose light on the light map is `lamp_light`."""
         return self.scene.lamps if self._lamps_apart else ()
 
+    @cached_property
+    def apart(self) -> frozenset[str]:
+        """Names of the openings of these lamps, which probes and light fields leave out."""
+        return frozenset(name for number, name in self.scene.openings.items() if number in self.lamps)
+
     def lamp_rays(self, lamps: Sequence[tuple[int, int]], factors: Floats | None = None) -> LampRays:
         """Shadow rays to some of the scene's lights, by number and light group, times factors (G, 3) by group."""
-        kind = self._at_hand
-        emitters = [self.builder(**kind).lights[number] for number, _ in lamps]
-        return LampRays(self.whole(**kind), emitters, None if factors is None else factors[[g for _, g in lamps]])
+        numbers, of_lamps = [number for number, _ in lamps], None if factors is None else factors[[g for _, g in lamps]]
+        return LampRays(self.builder(**self._at_hand), self.bare, numbers, of_lamps)
+
+    @property
+    def bare(self) -> Any:
+        """mi.Scene of the builder at hand without openings of luminaires."""
+        whole = self.whole(**self._at_hand)
+        if self._bare is None or self._bare[0] is not whole:
+            self._bare = whole, self.builder(**self._at_hand).build_bare(whole)
+        return self._bare[1]
 
     @cached_property
     def drawn_lamps(self) -> tuple[int, ...]:

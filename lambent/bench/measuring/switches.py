@@ -56,7 +56,7 @@ SWITCHES = (
     Switch("lambent.realtime.planar.planar_view._plan", nothing),
     Switch("lambent.realtime.planar.planar_view.MOST_REFLECTORS", 1),
     Switch("lambent.realtime.planar.reflector_faces.MOST_FACES", 0),
-    Switch("lambent.realtime.planar.planar_buffer.BLURS_M", 1e9),
+    Switch("lambent.realtime.objects.draws.BLURS_M", 1e9),
     Switch("planar_interleaved.wgsl:LEAST_PX", 1e9),
     Switch("planar_march.wgsl:hit_behind", "    return Hit(place.q + free * w, free, vec4f(0.0), vec2f(0.0), 0.0);"),
 )

@@ -109,6 +109,8 @@ class ChangedLamps:
                 number = len(self._drawn.profiles) + len(profiles)
                 records[place] = records[place].model_copy(update={"profile": number})
                 profiles.append(shape)
+        for place in {*mine, *self._shadows}:
+            self._move_opening(place, records[place])
         self._edits, lamps = dict(edits), self._resources.lamps
         if lamps.change(replace(self._drawn, records=tuple(records)), profiles, frozenset(mine)):
             self._shadows = {}
@@ -120,6 +122,13 @@ class ChangedLamps:
                 self._shadows[place] = of
                 self._draw(records[place], lamps.disc(place))
         self._resources.light_version += 1
+
+    def _move_opening(self, place: int, now: LampRecord) -> None:
+        assert self._drawn is not None, "there are lamps"
+        moved = _placement(now) @ np.linalg.inv(_placement(self._drawn.records[place]))
+        for item in self._resources.objects:
+            if item.lamp == place + 1:
+                self._resources.move(item.record, moved)
 
     def pairs(self) -> list[tuple[ShadowedLamp, ShadowedLamp]]:
         """The edited lamps as baked and as they are; waits for the GPU."""
@@ -133,7 +142,8 @@ class ChangedLamps:
 
     @cached_property
     def _solid(self) -> SolidDepths:
-        return SolidDepths(self._layouts, self._resources)
+        openings = {item.record.material for item in self._resources.objects if item.record.luminaire is not None}
+        return SolidDepths(self._layouts, self._resources, openings)
 
     @cached_property
     def _pipeline(self) -> Any:
@@ -158,6 +168,13 @@ class ChangedLamps:
         )  # fmt: skip
         cover(encoder, [disc], self._pipeline, [group], {})
         layouts.device.queue.submit([encoder.finish()])
+
+
+def _placement(record: LampRecord) -> Floats:
+    """(4, 4) world from the lamp's axes."""
+    world = np.eye(4)
+    world[:3, :3], world[:3, 3] = np.array(record.axes).T, record.position
+    return world
 
 
 def _shadow_key(record: LampRecord) -> object:

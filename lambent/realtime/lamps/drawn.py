@@ -77,7 +77,8 @@ class ShadowedLamp:
         near = distance[lit] * (1 - NEAR_TEXELS * 4 * scale / side)
         seen = lit[(first >= plane * (1 - BIAS)) | (first >= near)]
         share = self.profile.astype(float)[row, column][np.searchsorted(lit, seen)]
-        found[seen] = (share * cosine[seen] / distance[seen] ** 2)[:, None] * lamp.intensity
+        square = distance[seen] ** 2 + lamp.half_axes_m[0] * lamp.half_axes_m[1]
+        found[seen] = (share * cosine[seen] / square)[:, None] * lamp.intensity
         return found
 
 

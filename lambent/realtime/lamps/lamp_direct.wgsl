@@ -1,10 +1,11 @@
-// Direct light of lamps at points, pixel by pixel, with shadow maps of distances: the light map as shown does not hold it.
+// Direct light of lamps, pixel by pixel, with shadow maps of distances: the light map as shown does not hold it.
 // A loop for each branch: adapters in software skip loops of no turns alone.
 
 #include "lamp_record.wgsl"
 #include "lamp_light.wgsl"
 
 override LAMPS: u32 = 0u;
+override MIRRORS_OPENINGS: bool = false; // the mirrored view that the lobes read shows them
 
 @group(3) @binding(3) var<uniform> point_lamps: array<PointLamp, 64>;
 @group(3) @binding(4) var<storage, read> lamps_reach: array<vec4u>; // by texel of the light map, bits of lamps
@@ -12,6 +13,9 @@ override LAMPS: u32 = 0u;
 
 const LAMP_BIAS = 1e-3; // of a distance: half floats, and facets beside the tangent plane
 const LAMP_NEAR = 1.5;  // texels: what is nearer to a surface is that surface
+const SEARCH_TAPS = 8u;
+const OPENING_TAPS = 16u;
+const WIDEST = 4.0; // (1 - t)/t of occluders next to the lamp
 
 // Sums over lamps: irradiance on the viewer's side of the mesh, on the other, and by the normal of a normal map; and
 // light through lobes.
@@ -50,6 +54,42 @@ fn lamp_visibility(lamp: u32, scale: f32, d: vec3f, distance_m: f32, n: vec3f) -
     return mix(across.x, across.y, f.y);
 }
 
+// Share of a lamp's opening, an ellipse of these half axes in m, that is seen from a point at `away` m, otherwise as
+// above: percentage-closer soft shadows (Fernando 2005). Of occluders at a share t of the way from the lamp, the points
+// of the opening see places that lie (1 - t)/t apart as they do.
+fn opening_visibility(lamp: u32, scale: f32, away: vec3f, half_axes: vec2f, normal: vec3f) -> f32 {
+    let n = select(normal, -normal, dot(normal, away) > 0.0);
+    let plane = dot(n, away);
+    let size = vec2f(textureDimensions(lamp_discs));
+    var t = 0.0;
+    var found = 0.0;
+    for (var k = 0u; k < SEARCH_TAPS; k++) {
+        let towards = away + vec3f(spiral(k, SEARCH_TAPS) * half_axes, 0.0);
+        let per_m = inverseSqrt(dot(towards, towards));
+        let there = in_disc(towards * per_m) / scale * 0.5 + 0.5;
+        let first_m = textureLoad(lamp_discs, vec2u(saturate(there) * (size - 1.0)), lamp, 0).r;
+        let of_plane = first_m * dot(n, towards) * per_m / plane; // share of the way to the tangent plane
+        let blocks = of_plane < 1.0 - LAMP_BIAS && all(there == saturate(there));
+        t += select(0.0, of_plane, blocks);
+        found += select(0.0, 1.0, blocks);
+    }
+    let apart = select(0.0, min(found / max(t, 1e-6) - 1.0, WIDEST), found > 0.0);
+    var sum = 0.0;
+    for (var k = 0u; k < OPENING_TAPS; k++) {
+        let towards = away + vec3f(spiral(k, OPENING_TAPS) * half_axes * apart, 0.0);
+        let square = dot(towards, towards);
+        let d = towards * inverseSqrt(square);
+        sum += lamp_visibility(lamp, scale, d, plane / min(dot(n, d), -1e-4), n);
+    }
+    return sum / f32(OPENING_TAPS);
+}
+
+// Point k of n in the unit disc, of equal area each (Vogel 1979).
+fn spiral(k: u32, n: u32) -> vec2f {
+    let turn = 2.3999632 * f32(k);
+    return sqrt((f32(k) + 0.5) / f32(n)) * vec2f(cos(turn), sin(turn));
+}
+
 // A pixel under lamps: the mesh's normal on the viewer's side, the triangle's, and one bent by a normal map, world space.
 struct UnderLamps {
     p_world: vec3f,
@@ -68,23 +108,45 @@ fn lit_by(lamp: u32, before: OfLamps, at: UnderLamps, s: Surface, in_shadow: boo
     let to_axes = transpose(mat3x3f(it.across.xyz, it.down.xyz, it.along.xyz));
     let d = to_axes * (away * per_m);
     let place = in_disc(d) / it.place.w * 0.5 + 0.5;
+    let half_axes = vec2f(it.across.w, it.down.w);
+    let has_opening = half_axes.x > 0.0;
     var share = textureSampleLevel(lamp_discs, linear_sampler, place, LAMPS + u32(it.along.w), 0.0).r;
-    for (var k = 0u; k < select(0u, 1u, in_shadow && share > 0.0); k++) {
+    for (var k = 0u; k < select(0u, 1u, in_shadow && share > 0.0 && !has_opening); k++) {
         share *= lamp_visibility(lamp, it.place.w, d, square * per_m, to_axes * at.flat_normal);
     }
-    let light = share / square * it.intensity.rgb;
+    for (var k = 0u; k < select(0u, 1u, in_shadow && share > 0.0 && has_opening); k++) {
+        share *= opening_visibility(lamp, it.place.w, to_axes * away, half_axes, to_axes * at.flat_normal);
+    }
+    let light = share / (square + half_axes.x * half_axes.y) * it.intensity.rgb;
     let w = -away * per_m;
     let facing = dot(at.n, w);
     sum.here += max(facing, 0.0) * light;
     sum.beyond += max(-facing, 0.0) * light;
     sum.bent += select(0.0, max(dot(at.bent, w), 0.0), facing > 0.0) * light;
     let wi = vec3f(dot(w, s.t), dot(w, s.b), dot(w, s.n));
-    for (var i = 0u; i < select(0u, LOBES, share > 0.0); i++) {
+    for (var i = 0u; i < select(0u, LOBES, share > 0.0 && !(has_opening && MIRRORS_OPENINGS)); i++) {
         let lobe = lobe_here(i, s).lobe;
-        let response = lambent_lamp_response(lobe, at.wo, on_side(lobe, wi), vec3f(0.0), vec3f(0.0));
+        let sides = on_side(lobe, vec3f(1.0));
+        let to_lobe = transpose(mat3x3f(sides.x * s.t, sides.y * s.b, sides.z * s.n));
+        let along = on_side(lobe, wi);
+        let a = rejection(to_lobe * it.across.xyz * (0.5 * half_axes.x * per_m), along);
+        let b = rejection(to_lobe * it.down.xyz * (0.5 * half_axes.y * per_m), along);
+        let response = lambent_lamp_response(lobe, at.wo, along, a, b);
         sum.specular += select(vec3f(0.0), light * response, lobe_adds(lobe));
     }
     return sum;
+}
+
+// Radiance of the opening of a lamp in a unit direction of world space.
+fn radiance_of_opening(lamp: u32, towards: vec3f) -> vec3f {
+    let it = point_lamps[lamp];
+    let d = transpose(mat3x3f(it.across.xyz, it.down.xyz, it.along.xyz)) * towards;
+    let place = in_disc(d) / it.place.w * 0.5 + 0.5;
+    let share = textureSampleLevel(lamp_discs, linear_sampler, place, LAMPS + u32(it.along.w), 0.0).r;
+    let faces = abs(d) * it.faces.xyz;
+    let silhouette = mix(length(faces), dot(faces, vec3f(1.0)), it.faces.w);
+    let inside = select(0.0, 1.0, all(place == saturate(place)));
+    return inside * share / max(silhouette, 0.01 * length(it.faces.xyz)) * it.intensity.rgb;
 }
 
 fn light_of_lamps(at: UnderLamps, uv2: vec2f, s: Surface) -> OfLamps {

@@ -110,6 +110,9 @@ class PointLamps:
         lamps = self._drawn.records
         for row, lamp, intensity in zip(data, lamps, self._drawn.intensities(factors), strict=False):
             row["place"] = *lamp.position, np.sin(np.radians(lamp.reach_deg) / 2)
-            row["across"][:3], row["down"][:3] = lamp.axes[:2]
+            row["across"], row["down"] = (
+                (*axis, half) for axis, half in zip(lamp.axes[:2], lamp.half_axes_m, strict=True)
+            )
+            row["faces"] = (*lamp.silhouettes_m2, lamp.is_box)
             row["along"], row["intensity"][:3] = (*lamp.axes[2], lamp.profile), intensity
         self._device.queue.write_buffer(self._records, 0, data.tobytes())

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Flags, Floats
 from lambent.store.contract import ObjectRecord
 
+ANYWHERE_M = 1e9
 CLUSTER_FACES = 64
 SLACK = 1e-5  # of the largest term of a plane's equation: the GPU computes in single precision
 SLIVER_PX = 1.5  # slivers up to this width may miss all pixel centres
@@ -60,6 +61,8 @@ class Clusters:
         )
         with np.errstate(invalid="ignore"):
             self._centre, self._half = (high + low) / 2, (high - low) / 2
+        moves = np.array([o.luminaire is not None for o in ordered], bool)  # with its lamp: it is never culled
+        self._half[moves[self._owner]] = ANYWHERE_M
         self._largest = np.maximum(np.abs(low), np.abs(high))
 
     def with_any(self, faces: Flags) -> Flags:

@@ -12,10 +12,11 @@ from lambent.realtime.frame_state import SHOW, FrameState
 from lambent.realtime.incident import LookUp, brings_light
 from lambent.realtime.integrators.integrators import INTEGRATORS, Cube, Integrator
 from lambent.realtime.light.probe_light import ProbeLight
-from lambent.realtime.materials.textures import WIDENING, bits_that_show
+from lambent.realtime.materials.textures import BITS, WIDENING, bits_that_show
 from lambent.realtime.objects.clusters import Ranges
 from lambent.realtime.resources import ObjectResources, SceneResources
 
+BLURS_M = 0.04  # least roughness of lobes that blur what they mirror
 FAINT_N = 5  # samples per lobe that suffice if no lamp's highlight shows
 
 
@@ -68,6 +69,16 @@ class Draw:
         return {"LAYERS": 1 + self.item.light.lamps.mixes(self.material, bool(self.textures & WIDENING))}
 
     @property
+    def blurs(self) -> bool:
+        """Whether each of its lobes is wide enough to blur the view mirrored in it."""
+        narrowest = min((min(lobe.mx, lobe.my) for lobe in self.material.lobes), default=0.0)
+        return bool(self.integrator.lamps) and narrowest >= BLURS_M and not self.textures & BITS["roughness"]
+
+    @property
+    def _openings(self) -> dict[str, float]:
+        return {"MIRRORS_OPENINGS": 1} if self.planar and not self.blurs else {}
+
+    @property
     def _change(self) -> dict[str, float]:
         return {"RELIT": 1} if self.item.light.is_relit and brings_light(self.look_up) else {}
 
@@ -97,6 +108,7 @@ class Draw:
             **self.integrator.constants,
             **self._layers,
             **self._part,
+            **self._openings,
             **({"STRAIGHT": 1, "MASKED": self.has_holes} if self.is_pane else {}),
         }
 

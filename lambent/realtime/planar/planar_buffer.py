@@ -17,7 +17,6 @@ from lambent.realtime.gpu.structs import FRAME_DTYPE, MIRRORED_VIEW_DTYPE, PLAN_
 from lambent.realtime.gpu.targets import DEPTH_FORMAT, Target, target_texture
 from lambent.realtime.gpu.uploads import upload
 from lambent.realtime.integrators.integrators import INTEGRATORS, Integrator
-from lambent.realtime.materials.textures import BITS
 from lambent.realtime.objects.draws import Draw
 from lambent.realtime.passes.context import FrameContext
 from lambent.realtime.passes.depth import DepthPass
@@ -30,7 +29,6 @@ from lambent.store.plans import plan_of
 FORMATS = LIGHT_FORMAT, PLANE_FORMAT = "rgba16float", "rgba32float"
 MIRRORED_N = 3  # samples per lobe of mirrored objects, from their probes
 BLURRED_N = 1  # samples per lobe if the reflector blurs the mirrored view
-BLURS_M = 0.04  # least roughness of a blurring reflector's lobes
 STAGE = Stage("planar_buffer_main", "planar_buffer.wgsl", "cw", mixes_parts=True)  # mirroring reverses the winding
 
 
@@ -112,6 +110,8 @@ class PlanarBufferPass:
 
         for index, view in enumerate(context.views):
             draws, panes = drawn_by(*mirrored_by(context, view))
+            if is_blurred(context, view):
+                draws = [draw for draw in draws if not draw.item.lamp]
             write(self._frame(index), 0, view.frame.tobytes())
             write(self.uniform(index), 0, view.uniform.tobytes())
             group = layouts.group(layouts.frame, self._frame(index), context.resources.sampler)
@@ -143,15 +143,18 @@ class PlanarBufferPass:
             context.cover("mips", [into], self._mips, [group])
 
 
+def is_blurred(context: FrameContext, view: PlanarView) -> bool:
+    """Whether all of a view's reflector blurs it: then it shows no opening of a lamp, whose highlights pixels add."""
+    return all(draw.blurs for draw in context.draws if view.has(draw.item.record) and draw.material.lobes)
+
+
 def mirrored_by(context: FrameContext, view: PlanarView) -> tuple[Integrator, int]:
     """Integrator of the objects in a mirrored view, and its samples per lobe.
 
     One sample suffices if every lobe of the reflector is wide, because the reflector blurs the view's highlights.
     """
     wanted = INTEGRATORS[context.state.integrator]
-    mine = [draw for draw in context.draws if view.has(draw.item.record)]
-    narrowest = min((min(lobe.mx, lobe.my) for draw in mine for lobe in draw.material.lobes), default=0.0)
-    if wanted.lamps and narrowest >= BLURS_M and not any(draw.textures & BITS["roughness"] for draw in mine):
+    if is_blurred(context, view):
         return INTEGRATORS["rings"], BLURRED_N
     # published integrators also draw mirrored objects as published
     return INTEGRATORS["lamps" if wanted.lamps else "rings"], MIRRORED_N

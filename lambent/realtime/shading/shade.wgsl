@@ -113,7 +113,9 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
     e_bent += sun_cos * direct + of_lamps.bent;
     e_here += max(facing, 0.0) * direct + of_lamps.here;
     let diffuse = diffuse_light(wo.z, e_bent, e_beyond + of_lamps.beyond, s.painted);
-    let emitted = select(vec3f(0.0), object.emission.rgb, front);
+    var emitted = object.emission.rgb;
+    if (object.emission.w > 0.5) { emitted = radiance_of_opening(u32(object.emission.w) - 1u, view); }
+    emitted = select(vec3f(0.0), emitted, front);
 
     let specular = specular_light(wo, s) + of_lamps.specular;
     let light = frame.show.x * (diffuse + emitted) + frame.show.y * specular + frame.show.w * e_here;

@@ -28,6 +28,7 @@ from lambent.scenes.loaders.meshes.flush import with_flush_raised
 from lambent.scenes.loaders.meshes.repair import box_mapped
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.document import load_toml
+from lambent.scenes.photometry.luminous_surfaces import with_luminous_surfaces
 from lambent.scenes.scene import MaterialTextures, Mesh, Scene, SceneObject
 from lambent.scenes.validation import size_warnings
 
@@ -55,7 +56,7 @@ def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> 
     """
     scene, text = _load(path_or_builtin, crease_deg), str(path_or_builtin)
     origin = text if text.startswith(BUILTIN_PREFIX) else os.path.abspath(text)
-    scene = with_uv(scene)
+    scene = with_uv(with_luminous_surfaces(scene))
     angle = scene.crease_deg if crease_deg is None else crease_deg
     if angle is not None:
         scene = replace(scene, objects=with_creases(scene.objects, angle), crease_deg=angle)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain, count
 
 import numpy as np
 
+from lambent.core.arrays import Floats
 from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.plain import triple
 from lambent.materials.document import Material
@@ -21,32 +22,35 @@ from lambent.scenes.scene import IesLight, Scene, SceneObject
 
 THIN_M = 0.002  # thickness of a flat opening that shines on both sides
 AROUND = 48  # sides of round openings
-MATERIAL = "luminaire"  # black
+MATERIAL = "luminaire"
+BLACK = Material(name=MATERIAL)
 
 
-def with_luminous_surfaces(scene: Scene, numbers: Collection[int]) -> Scene:
-    """The scene with objects in place of some of its lights, by number: IesLights whose opening has a size.
+def with_luminous_surfaces(scene: Scene) -> Scene:
+    """The scene with an object for each of its lights whose opening has a size, and that has none yet.
 
     An object has the name of its light, or one with a number after it, and as `emission` the mean radiance of its
     surface.
     """
     names, taken = names_of_lights(scene.lights), {o.name for o in scene.objects}
-    objects, sized = list[SceneObject](), list[int]()
+    there = {o.luminaire for o in scene.objects}
+    material = next(n for n in _numbered(MATERIAL) if scene.materials.get(n, BLACK) == BLACK)
+    objects = list[SceneObject]()
     for number, light in enumerate(scene.lights):
-        if number not in numbers or not isinstance(light, IesLight) or not any(light.photometry.opening.size_m):
-            continue
-        name = next(n for n in _numbered(names[number]) if n not in taken)
-        taken.add(name)
-        mesh = surface_of(light)
-        flux_w = light.photometry.lumens * np.array(light.scale)
-        mean = flux_w / (np.pi * triangle_areas(mesh.corners).sum())
-        objects.append(SceneObject(name, mesh, MATERIAL, triple(mean), light_map_scale=0.25, luminaire=light))
-        sized.append(number)
+        if isinstance(light, IesLight) and any(light.photometry.opening.size_m) and number not in there:
+            name = next(n for n in _numbered(names[number]) if n not in taken)
+            taken.add(name)
+            objects.append(shining(SceneObject(name, surface_of(light), material, luminaire=number), light))
     if not objects:
         return scene
-    lights = tuple(light for number, light in enumerate(scene.lights) if number not in sized)
-    materials = {**scene.materials, MATERIAL: Material(name=MATERIAL)}
-    return replace(scene, objects=(*scene.objects, *objects), lights=lights, materials=materials)
+    return replace(scene, objects=(*scene.objects, *objects), materials={**scene.materials, material: BLACK})
+
+
+def shining(o: SceneObject, light: IesLight) -> SceneObject:
+    """The object of a luminaire with the mean radiance of its surface, and few texels."""
+    flux_w = light.photometry.lumens * np.array(light.scale)
+    mean = flux_w / (np.pi * triangle_areas(o.mesh.corners).sum())
+    return replace(o, emission=triple(mean), light_map_scale=0.25)
 
 
 def _numbered(name: str) -> Iterator[str]:
@@ -56,9 +60,14 @@ def _numbered(name: str) -> Iterator[str]:
 def surface_of(light: IesLight) -> Mesh:
     """The opening of a luminaire as a closed mesh in world space; flat, if it shines along its axis alone."""
     opening = light.photometry.opening
+    return transformed(_flat(opening) if is_flat(light) else _solid(opening), placement(light))
+
+
+def placement(light: IesLight) -> Floats:
+    """(4, 4) world from luminaire axes."""
     world = np.eye(4)
     world[:3, :3], world[:3, 3] = light.axes.T, light.position
-    return transformed(_flat(opening) if is_flat(light) else _solid(opening), world)
+    return world
 
 
 def is_flat(light: IesLight) -> bool:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from lambent.bake.bake import bake
 from lambent.bake.engine import engine
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize
@@ -18,6 +20,7 @@ from lambent.scenes.photometry.distribution import Photometry
 from lambent.scenes.photometry.luminous_surfaces import MATERIAL, with_luminous_surfaces
 from lambent.scenes.photometry.opening import Opening
 from lambent.scenes.scene import IesLight, Scene, SceneObject
+from tests.bake.small_scenes import TINY
 
 THETA = np.linspace(0, 90, 19)
 OPENINGS = {
@@ -45,7 +48,7 @@ def luminaire(opening: Opening, power: float = 1.0, at: tuple[float, float, floa
 def lit(light: IesLight, size: float = 4.0) -> Scene:
     floor = SceneObject("floor", patch((-size, 0, size), (2 * size, 0, 0), (0, 0, -2 * size)), "black")
     scene = Scene("lit", (floor,), {"black": Material(name="black")}, lights=(light,))
-    return with_luminous_surfaces(scene, {0})
+    return with_luminous_surfaces(scene)
 
 
 def irradiance(scene: Scene, points: Floats, count: int = 1 << 15) -> Floats:
@@ -98,7 +101,7 @@ def test_emission_is_the_mean_radiance_and_photons_have_the_flux(name: str) -> N
     light = luminaire(OPENINGS[name], 2.0)
     scene = lit(light)
     (shown,) = (o for o in scene.objects if o.luminaire is not None)
-    assert not scene.lights and shown.name == "lamp" and shown.material == MATERIAL
+    assert scene.openings == {0: "lamp"} and shown.name == "lamp" and shown.material == MATERIAL
     flux = light.photometry.lumens * np.array(light.scale)
     area = triangle_areas(shown.mesh.corners).sum()
     np.testing.assert_allclose(np.array(shown.emission) * np.pi * area, flux, rtol=1e-6)
@@ -110,9 +113,38 @@ def test_emission_is_the_mean_radiance_and_photons_have_the_flux(name: str) -> N
     np.testing.assert_allclose(array_of(power).astype(float).mean(axis=0), flux, rtol=0.02)
 
 
-def test_unsized_and_unnamed_luminaires_stay_points() -> None:
+def test_luminaires_without_a_size_shine_from_points() -> None:
     light = luminaire(Opening())
     scene = Scene("s", (), {}, lights=(light, luminaire(OPENINGS["disc"])))
-    assert with_luminous_surfaces(scene, {0}) is scene
-    both = with_luminous_surfaces(scene, {0, 1})
-    assert both.lights == (light,) and [o.name for o in both.objects] == ["lamp"]
+    assert with_luminous_surfaces(replace(scene, lights=(light,))).objects == ()
+    both = with_luminous_surfaces(scene)
+    assert both.lights == scene.lights and both.openings == {1: "lamp"}
+    assert with_luminous_surfaces(both) is both
+
+
+def test_the_material_of_openings_replaces_no_other() -> None:
+    green = Material(name=MATERIAL, kd=(0.0, 0.5, 0.0))
+    scene = with_luminous_surfaces(Scene("s", (), {MATERIAL: green}, lights=(luminaire(OPENINGS["disc"]),)))
+    assert scene.materials[MATERIAL] == green and not any(scene.materials[scene.objects[0].material].kd)
+
+
+@pytest.mark.parametrize("name", ["disc", "box"])
+def test_a_light_map_has_all_the_light_of_an_opening_nearby(tmp_path: Path, name: str) -> None:
+    """Rays to the opening and sampled directions add up to the light that paths bring, .4 m below."""
+    light = replace(luminaire(OPENINGS[name], at=(0.0, 0.4, 0.0)), aim=(0.0, -1.0, 0.0))
+    scene = lit(light, 1.0)
+    store = bake(scene, tmp_path / "s", quality=TINY, only=("lamps",))
+    positions, of_map = store.read("geometry/positions"), store.read("light_map/irradiance").astype(float)
+    uv2 = store.read("geometry/uv2")[:4]
+    corners = positions[:4]
+    height, width = of_map.shape[:2]
+    place = np.linalg.solve(np.column_stack([uv2[1] - uv2[0], uv2[3] - uv2[0]]), np.eye(2))
+    row, column = np.mgrid[0:height, 0:width]
+    at = (np.stack([column, row], axis=-1) + 0.5) / (width, height) - uv2[0]
+    s = at @ place.T
+    p = corners[0] + s[..., :1] * (corners[1] - corners[0]) + s[..., 1:] * (corners[3] - corners[0])
+    inside = ((s > 0.05) & (s < 0.95)).all(axis=-1)
+    chosen = np.flatnonzero(inside & (np.linalg.norm(p, axis=-1) < 0.5))[:: max(1, inside.sum() // 40)]
+    found, expected = of_map.reshape(-1, 3)[chosen], irradiance(scene, p.reshape(-1, 3)[chosen])
+    assert len(chosen) >= 5
+    np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=0.03)

@@ -82,12 +82,12 @@ def test_rays_bring_the_intensity_over_the_square_of_the_distance(number: int) -
     builder = SceneBuilder(scene)
     lamps = scene.lamps
     assert lamps == (0, 2, 3), "the directional light is none"
-    rays = LampRays(builder.build(), [builder.lights[k] for k in lamps], np.array([[1, 1, 1], [2, 1, 0.5], [1, 1, 1]]))
+    rays = LampRays(builder, builder.build(), lamps, np.array([[1, 1, 1], [2, 1, 0.5], [1, 1, 1]]))
     p = np.column_stack([rng.uniform(-1.5, 1.5, 4000), np.zeros(4000), rng.uniform(-1.5, 1.5, 4000)])
     si = dr.zeros(mi.SurfaceInteraction3f, len(p))
     si.p, si.n = vectors(mi.Point3f, p), mi.Normal3f(0, 1, 0)
     si.sh_frame = mi.Frame3f(mi.Normal3f(0, -1, 0))  # turned over: the light is on the back
-    found = array_of(rays.of(dr.opaque(mi.UInt32, number), si, mi.Bool(True)))
+    found = array_of(rays.of(dr.opaque(mi.UInt32, number), si, mi.Point2f(0.5), mi.Bool(True)))
     lamp, position = OF_ROOM[number], np.array(OF_ROOM[number].position)
     away = position - p
     distance = np.linalg.norm(away, axis=1)

@@ -1,4 +1,4 @@
-"""Lamps at points: their direct light by shadow rays, which a light map adds to the light that it samples."""
+"""Lamps: their direct light by shadow rays, which a light map adds to the light that it samples."""
 
 from __future__ import annotations
 
@@ -10,43 +10,118 @@ import mitsuba as mi
 import numpy as np
 
 from lambent.bake.tracing import rays
+from lambent.bake.tracing.lights.candela import Candela
+from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
+from lambent.store.lamp_discs import half_axes_m
+
+ROW = 17  # numbers of an opening: position, axes, scale, half axes
 
 
 class LampRays:
-    """Irradiance of lamps on surfaces of a mi.Scene `whole`, by one shadow ray to each lamp.
+    """Irradiance of lamps on surfaces of a mi.Scene, by shadow rays.
 
     Parameters
     ----------
-    emitters : list of mi.Emitter
-        The lamps.
+    builder : SceneBuilder
+        Of the scene.
+    bare : mi.Scene
+        The scene without the openings of luminaires (`SceneBuilder.build_bare`), which cast no shadows.
+    numbers : list of int
+        The lamps, among the scene's lights.
     factors : (n, 3), optional
         Factors on their light, by lamp and channel; 1 by default.
     """
 
-    def __init__(self, whole: Any, emitters: Sequence[Any], factors: Floats | None = None) -> None:
-        self._scene, self._holes, self.count = whole, rays.has_holes(whole), len(emitters)
-        numbers = [int(dr.reinterpret_array(mi.UInt32, mi.EmitterPtr(emitter))[0]) for emitter in emitters]
-        self._numbers = mi.UInt32(np.array(numbers, np.uint32))
+    def __init__(self, builder: SceneBuilder, bare: Any, numbers: Sequence[int], factors: Floats | None = None) -> None:
+        self._scene, self._holes, self.count = bare, rays.has_holes(bare), len(numbers)
+        emitters = [builder.lights[number] for number in numbers]
+        places = [int(dr.reinterpret_array(mi.UInt32, mi.EmitterPtr(emitter))[0]) for emitter in emitters]
+        self._emitters = mi.UInt32(np.array(places, np.uint32))
         factors = np.ones((self.count, 3)) if factors is None else factors
         self._factors = mi.Color3f(*(mi.Float(channel.astype(np.float32)) for channel in np.asarray(factors).T))
+        names, lights = builder.scene.openings, builder.scene.lights
+        sized = [(k, lights[n], builder.meshes[names[n]]) for k, n in enumerate(numbers) if n in names]
+        self._sized = frozenset(place for place, _, _ in sized)
+        self.openings = Openings(self.count, sized) if sized else None
 
-    def of(self, lamp: Any, si: Any, active: Any) -> Any:
-        """Irradiance (mi.Color3f) of lamp number `lamp` (mi.UInt32), with the cosine of the shading normal.
+    def is_sized(self, lamp: int) -> bool:
+        """Whether a lamp has an opening."""
+        return lamp in self._sized
 
-        It is negative where light comes from behind.
+    def of(self, lamp: Any, si: Any, u: Any, active: Any) -> Any:
+        """Irradiance (mi.Color3f) of lamp number `lamp` (mi.UInt32) as renderers draw it.
+
+        It has the cosine of the shading normal: it is negative where light comes from behind. A luminaire with an
+        opening has the intensity that its photometry has at the centre, and is visible if the point `u` (mi.Point2f)
+        of its opening is.
         """
-        emitter = dr.reinterpret_array(mi.EmitterPtr, dr.gather(mi.UInt32, self._numbers, lamp, active))
-        ds, light = emitter.sample_direction(si, mi.Point2f(0.5), active)
-        cosine = dr.dot(ds.d, si.sh_frame.n)
-        lit = active & (cosine != 0) & (dr.max(light) > 0)
-        lit &= ~rays.hidden(self._scene, si.p, si.n, ds.p, lit, self._holes)
-        return dr.select(lit, light * cosine, 0.0) * dr.gather(mi.Color3f, self._factors, lamp, active)
+        emitter = dr.reinterpret_array(mi.EmitterPtr, dr.gather(mi.UInt32, self._emitters, lamp, active))
+        sized = mi.Bool(False) if self.openings is None else self.openings.has(lamp, active)
+        ds, light = emitter.sample_direction(si, mi.Point2f(0.5), active & ~sized)
+        light, target = light * dr.dot(ds.d, si.sh_frame.n), ds.p
+        if self.openings is not None:
+            of_opening, point = self.openings.drawn(lamp, si, u, active & sized)
+            light, target = dr.select(sized, of_opening, light), dr.select(sized, point, target)
+        lit = active & (dr.max(dr.abs(light)) > 0)
+        lit &= ~rays.hidden(self._scene, si.p, si.n, target, lit, self._holes)
+        return dr.select(lit, light, 0.0) * dr.gather(mi.Color3f, self._factors, lamp, active)
+
+    def unshadowed(self, lamp: Any, si: Any, u: Any, active: Any) -> tuple[Any, Any]:
+        """Irradiances (mi.Color3f) of a lamp with an opening as if nothing were in the way, at least 0.
+
+        One is as drawn, the other one sample of the light of all the opening.
+        """
+        assert self.openings is not None, "the lamp has an opening"
+        emitter = dr.reinterpret_array(mi.EmitterPtr, dr.gather(mi.UInt32, self._emitters, lamp, active))
+        ds, light = emitter.sample_direction(si, u, active)
+        whole = dr.select(ds.pdf > 0, light * dr.dot(ds.d, si.sh_frame.n), 0.0)
+        drawn, _ = self.openings.drawn(lamp, si, u, active)
+        return dr.maximum(drawn, 0.0), dr.maximum(whole, 0.0)
 
     def __call__(self, si: Any, active: Any) -> tuple[Any, Any]:
-        """Irradiance (mi.Color3f) of all lamps on the side of the shading normal, and on the other."""
+        """Irradiance (mi.Color3f) of all lamps as drawn, on the side of the shading normal, and on the other.
+
+        Each place of a surface sees its own random points of openings.
+        """
         both: tuple[Any, Any] = _sums(self, self.count, si, mi.Bool(active))
         return both
+
+
+class Openings:
+    """The lamps with an opening of `count` lamps: their place, IesLight and mi.Mesh."""
+
+    def __init__(self, count: int, sized: Sequence[tuple[int, Any, Any]]) -> None:
+        which, rows = np.full(count, len(sized), np.uint32), np.zeros((count, ROW), np.float32)
+        for k, (place, light, _) in enumerate(sized):
+            half_m = half_axes_m(light)
+            which[place] = k
+            rows[place] = [*light.position, *light.axes.ravel(), *light.scale, *half_m]
+        self._count, self._which, self._rows = len(sized), mi.UInt32(which), mi.Float(rows.ravel())
+        self._candela = Candela([light.photometry for _, light, _ in sized])
+
+    def has(self, lamp: Any, active: Any) -> Any:
+        """Whether a lamp (mi.UInt32) has an opening."""
+        return dr.gather(mi.UInt32, self._which, lamp, active) < self._count
+
+    def drawn(self, lamp: Any, si: Any, u: Any, active: Any) -> tuple[Any, Any]:
+        """Irradiance without shadows, and the point (mi.Point3f) of the opening that decides whether it is seen.
+
+        The opening counts as an ellipse of half axes a, b across its lamp's axis. On its axis at a distance r, a
+        Lambertian disc of radius a has E = I/(r^2 + a^2).
+        """
+        number = dr.gather(mi.UInt32, self._which, lamp, active)
+        row = [dr.gather(mi.Float, self._rows, lamp * ROW + k, active) for k in range(ROW)]
+        centre, axes = mi.Point3f(*row[:3]), [mi.Vector3f(*row[k : k + 3]) for k in (3, 6, 9)]
+        a, b = row[15:]
+        to = centre - si.p
+        square = dr.squared_norm(to)
+        d = to * dr.rsqrt(dr.maximum(square, 1e-12))
+        x, y, z = (-dr.dot(d, axis) for axis in axes)
+        candela = self._candela.towards(number, x, y, z, active)
+        light = mi.Color3f(*row[12:15]) * candela * dr.dot(d, si.sh_frame.n) / dr.maximum(square + a * b, 1e-12)
+        place = mi.warp.square_to_uniform_disk_concentric(u)
+        return light, centre + axes[0] * (a * place.x) + axes[1] * (b * place.y)
 
 
 @dr.syntax
@@ -54,8 +129,11 @@ def _sums(lamps, count, si, active):  # type: ignore[no-untyped-def]
     width = dr.width(si.p)
     front, back = dr.zeros(mi.Color3f, width), dr.zeros(mi.Color3f, width)
     lamp = dr.zeros(mi.UInt32, width)
+    bits = dr.reinterpret_array(mi.UInt32, si.p.x) ^ dr.reinterpret_array(mi.UInt32, si.p.y)
+    bits ^= dr.reinterpret_array(mi.UInt32, si.p.z) * 0x9E3779B9
     while lamp < dr.opaque(mi.UInt32, count):
-        light = lamps.of(lamp, si, active)
+        u = mi.Point2f(mi.sample_tea_float32(bits, 2 * lamp), mi.sample_tea_float32(bits, 2 * lamp + 1))
+        light = lamps.of(lamp, si, u, active)
         front += dr.maximum(light, 0.0)
         back += dr.maximum(-light, 0.0)
         lamp += 1

@@ -21,7 +21,7 @@ class FirstEmitters(Protocol):
 
     scene: Any
 
-    def pdf(self, si: Any, ds: Any, active: Any) -> Any: ...
+    def pdf(self, si: Any, ds: Any, first: Any, active: Any) -> Any: ...
 
 
 class Sun:

@@ -36,7 +36,6 @@ from lambent.scenes.loaders.scene_toml.variants import parse_variants
 from lambent.scenes.loaders.surfaces.surface import UNDESCRIBED
 from lambent.scenes.looks.variants import with_variants
 from lambent.scenes.photometry.files import read_luminaire
-from lambent.scenes.photometry.luminous_surfaces import with_luminous_surfaces
 from lambent.scenes.scene import (
     Environment,
     ImageEnvironment,
@@ -120,9 +119,6 @@ def load_toml(path: Path, read_geometry: ReadGeometry, crease_deg: float | None 
         light_groups=_light_groups(document, objects, lights, path),
         grids=tuple(g.grid(objects, path, f"grids.{g.name}") for g in document.grids),
     )
-    before = len(lights) - len(document.lights)
-    sized = {before + k for k, one in enumerate(document.lights) if isinstance(one, IesSection) and one.has_size}
-    scene = with_luminous_surfaces(scene, sized)
     of_geometry = {name: [o.material for o in changed] for name, changed in by_variant.items()}
     variants = parse_variants(document.variants, of_geometry, scene, LookFiles(path, files))
     return replace(with_variants(scene, variants), sources=tuple(files.sources))

@@ -6,6 +6,7 @@ A photometric light is white, or has a `colour`, whose luminance has no effect.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from lambent.core.light.photometry import LM_PER_W
 from lambent.core.plain import Triple, triple
 from lambent.scenes.loaders.scene_toml.sections import Colour, Finite, NotNegative, Section, Vector, not_zero, unit
 from lambent.scenes.photometry.luminaire import Luminaire
+from lambent.scenes.photometry.opening import POINT
 from lambent.scenes.scene import DirectionalLight, IesLight, PointLight
 
 WHITE: Triple = (1.0, 1.0, 1.0)
@@ -126,7 +128,7 @@ class DirectionalSection(_Coloured):
 class IesSection(_Coloured):
     """A luminaire of an IES or EULUMDAT file, straight down unless aimed; `lumens` scales it to that flux.
 
-    Its light leaves a point, or the `opening` that the file describes.
+    Its light leaves the `opening` that the file describes, or a point.
     """
 
     kind: Literal["ies"]
@@ -136,16 +138,14 @@ class IesSection(_Coloured):
     direction: Vector = (0.0, -1.0, 0.0)
     rotation_deg: Finite = 0.0
     lumens: NotNegative | None = None
-    opening: Literal["point", "file"] = "point"
+    opening: Literal["point", "file"] = "file"
 
     _direction = field_validator("direction")(not_zero)
 
-    @property
-    def has_size(self) -> bool:
-        return self.opening == "file"
-
     def light_of(self, luminaire: Luminaire) -> IesLight:
         photometry = luminaire.photometry(self.lamp_set) if self.lumens is None else luminaire.values
+        if self.opening == "point":
+            photometry = replace(photometry, opening=POINT)
         aim = unit(self.direction)
         tilt_deg = math.degrees(math.acos(min(max(-aim[1], -1.0), 1.0)))
         scale = photometry.tilted(tilt_deg)
