@@ -97,20 +97,21 @@ THROUGH = Lobe(side="transmission", mx=0.1, my=0.1, k=(0.3,) * 3)
 COARSE = replace(ISOTROPIC, step_deg=10.0, fine_deg=2.0)
 
 
-def test_other_tables_draw_no_direction_about_the_light() -> None:
-    glossy = synthesise(Material(name="gloss", kd=(0.1,) * 3, lobes=(GLOSS,)), COARSE)
-    assert [lobe.kind for lobe in proposal_of(glossy).material.lobes] == ["reflection"] * 4
-    sheet = synthesise(Material(name="sheet", kd=(0.1,) * 3, lobes=(GLOSS, THROUGH)), COARSE)
-    kinds = [lobe.kind for lobe in proposal_of(sheet).material.lobes]
-    assert kinds == ["reflection"] * 4 + ["transmission"] * 4
+RETRO_NET = Lobe(retro=True, mx=0.05, my=0.05, r0=(1.0,) * 3, k=(0.4,) * 3)
 
 
-def test_a_retro_reflective_sheet_transmits_by_mirrored_lobes_alone() -> None:
-    retro = Lobe(retro=True, mx=0.05, my=0.05, r0=(1.0,) * 3, k=(0.4,) * 3)
+@pytest.mark.parametrize(
+    ("lobes", "kinds"),
+    [
+        ((GLOSS,), ["reflection"]),
+        ((GLOSS, THROUGH), ["reflection", "transmission"]),
+        ((RETRO_NET, THROUGH), ["reflection", "retro", "transmission"]),
+    ],
+)
+def test_directions_are_drawn_about_the_light_for_retro_reflectors_alone(lobes, kinds) -> None:
     setup = replace(COARSE, about_lamp=True, sector_deg=0.0)
-    table = synthesise(Material(name="net", kd=(0.1,) * 3, lobes=(retro, THROUGH)), setup)
-    kinds = [lobe.kind for lobe in proposal_of(table).material.lobes]
-    assert kinds == ["reflection"] * 4 + ["retro"] * 4 + ["transmission"] * 4
+    proposal = proposal_of(synthesise(Material(name="sheet", kd=(0.1,) * 3, lobes=lobes), setup)).material
+    assert [lobe.kind for lobe in proposal.lobes] == [kind for kind in kinds for _ in range(4)]
 
 
 def test_samples_follow_their_density() -> None:

@@ -36,16 +36,13 @@ def test_options_are_read():
     assert parse_ranges(["alpha=0:.5"]) == {"alpha": (0.0, 0.5)}
 
 
-@pytest.mark.parametrize("option", ["mx", "=1", "mx=", "mx=rough", "kd=1,2"])
-def test_bad_fix_options(option):
-    with pytest.raises(UserError):
-        parse_fix([option])
+BAD = {parse_fix: ["mx", "=1", "mx=", "mx=rough", "kd=1,2"], parse_ranges: ["mx=.1", "mx=.1:.2:.3", "mx=a:b"]}
 
 
-@pytest.mark.parametrize("option", ["mx=.1", "mx=.1:.2:.3", "mx=a:b"])
-def test_bad_range_options(option):
+@pytest.mark.parametrize(("parse", "option"), [(parse, option) for parse, options in BAD.items() for option in options])
+def test_bad_options(parse, option):
     with pytest.raises(UserError):
-        parse_ranges([option])
+        parse([option])
 
 
 @pytest.mark.parametrize(

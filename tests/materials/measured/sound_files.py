@@ -41,7 +41,9 @@ def seeds() -> dict[str, list[bytes]]:
     tuples = np.column_stack([*angles(wi), *angles(wo), np.full((40, 3), 0.2)])
     astm = "SAMPLE_NAME x\nNUM_POINTS 40\nVARS theta_i,phi_i,theta_s,phi_s,R,G,B\n"
     basis = angle_basis("mine", [(0, 30, 1), (30, 60, 4), (60, 90, 4)])
-    matrix = [("Visible", d, words(0.1 + random.random((9, 9)) * 0.2)) for d in ("Reflection Back", "Transmission Front")]
+    matrix = [
+        ("Visible", d, words(0.1 + random.random((9, 9)) * 0.2)) for d in ("Reflection Back", "Transmission Front")
+    ]
     tree = "{" + " ".join(random_tree(random, 3, 1) for _ in range(8)) + "}"
     half = np.stack([np.radians(grid[:, 0]) / 2, np.radians(grid[:, 0]) / 2, np.radians(grid[:, 1])], axis=-1)
     return {

@@ -11,7 +11,7 @@ from lambent.core.geometry.directions import Floats, direction
 from lambent.core.light.colour import WHITE_XYZ, luminance, rgb_to_xyz
 from lambent.materials.measured import load
 from lambent.materials.measured.lbnl_xml import LbnlTable, read
-from lambent.materials.measured.parts.klems import KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER
+from lambent.materials.measured.parts.klems import KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER, AngleBasis
 from tests.materials.measured.lbnl_files import (
     angle_basis,
     angles_away_from_borders,
@@ -77,21 +77,30 @@ def test_check_value_of_t3(shared_data: Path) -> None:
     assert table.info.isotropic and table.info.transmits
 
 
+def numbers_of(structure: str, random: np.random.Generator, patches: int = 145, depth: int = 2) -> str:
+    """A matrix, or a tree that is cut at random."""
+    if not structure.startswith("Tensor"):
+        return words(random.random((patches, patches)) * 0.15)
+    rank = int(structure[-1])
+    return "{" + " ".join(random_tree(random, rank, depth) for _ in range(1 << rank)) + "}"
+
+
 @needs_radiance
 @pytest.mark.parametrize(
     ("structure", "basis"),
-    [("Columns", KLEMS_FULL), ("Rows", KLEMS_FULL), ("Columns", KLEMS_HALF), ("Rows", KLEMS_QUARTER)],
-)
-def test_random_matrices_agree_with_radiance(tmp_path: Path, structure: str, basis) -> None:
+    [("Columns", KLEMS_FULL), ("Rows", KLEMS_FULL), ("Columns", KLEMS_HALF), ("Rows", KLEMS_QUARTER),
+     ("TensorTree3", None), ("TensorTree4", None)],
+)  # fmt: skip
+def test_random_files_agree_with_radiance(tmp_path: Path, structure: str, basis: AngleBasis | None) -> None:
     """Both sides without any symmetry, so that every convention of index, side and order shows."""
-    random = np.random.default_rng(basis.count)
-    directions = ("Transmission Front", "Transmission Back", "Reflection Front", "Reflection Back")
-    blocks = [("Visible", d, words(random.random((basis.count, basis.count)) * 0.15)) for d in directions]
+    random = np.random.default_rng(len(structure) + (basis.count if basis else 0))
+    ways = [f"{way} {side}" for way in ("Transmission", "Reflection") for side in ("Front", "Back")]
+    blocks = [("Visible", way, numbers_of(structure, random, basis.count if basis else 0)) for way in ways]
     path = tmp_path / "m.xml"
-    path.write_text(lbnl_xml(structure, blocks, column=basis.name))
-    table = agree(path, tmp_path, n=800)
-    assert table.info.sizes == {"incident patches": basis.count, "outgoing patches": basis.count}
-    assert not table.info.isotropic
+    path.write_text(lbnl_xml(structure, blocks, column=basis.name if basis else ""))
+    info = agree(path, tmp_path, n=800).info
+    assert info.isotropic == (structure == "TensorTree3")
+    assert basis is None or info.sizes == {"incident patches": basis.count, "outgoing patches": basis.count}
 
 
 @needs_radiance
@@ -112,19 +121,6 @@ def test_custom_bases_agree_with_radiance(tmp_path: Path) -> None:
 
 
 @needs_radiance
-@pytest.mark.parametrize("rank", [3, 4])
-def test_random_trees_agree_with_radiance(tmp_path: Path, rank: int) -> None:
-    random = np.random.default_rng(rank)
-    blocks = [
-        ("Visible", d, "{" + " ".join(random_tree(random, rank, 2) for _ in range(1 << rank)) + "}")
-        for d in ("Transmission Front", "Transmission Back", "Reflection Front", "Reflection Back")
-    ]
-    path = tmp_path / "t.xml"
-    path.write_text(lbnl_xml(f"TensorTree{rank}", blocks))
-    assert agree(path, tmp_path, n=800).info.isotropic == (rank == 3)
-
-
-@needs_radiance
 @pytest.mark.parametrize(
     ("structure", "only", "other"),
     [
@@ -136,11 +132,8 @@ def test_random_trees_agree_with_radiance(tmp_path: Path, rank: int) -> None:
 )
 def test_missing_transmission_follows_by_reciprocity(tmp_path: Path, structure: str, only: str, other: str) -> None:
     random = np.random.default_rng(5)
-    if structure == "Columns":
-        full, zero = words(random.random((145, 145)) * 0.2), words(np.zeros((145, 145)))
-    else:
-        full = "{" + " ".join(random_tree(random, int(structure[-1]), 1) for _ in range(1 << int(structure[-1]))) + "}"
-        zero = "{ 0 }"
+    full, zero = numbers_of(structure, random, depth=1), words(np.zeros((145, 145)))
+    zero = zero if structure == "Columns" else "{ 0 }"
     missing = "Back" if only == "Front" else "Front"
     blocks = [("Visible", f"Transmission {only}", full)]
     blocks += [("Visible", f"Transmission {missing}", zero)] if other == "zero" else []

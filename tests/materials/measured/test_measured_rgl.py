@@ -113,21 +113,15 @@ def test_impossible_tensors(loaded: Loaded, change: dict[str, np.ndarray], expec
         loaded(tensor_bytes(rgl_fields(np.zeros(1)) | change))
 
 
-def _flat(phi_i: np.ndarray, ndf: np.ndarray, vndf: float = 1.0) -> dict[str, np.ndarray]:
+def _flat(phi_i: np.ndarray, ndf: float = 1.0, nodes: int = 9) -> dict[str, np.ndarray]:
     """Tensors of an even warp, u_m = u whatever the density that is stored, sigma 1 and values 1."""
     theta_i = np.array([0.0, 0.4, 0.8], np.float32)
-    incident = (len(phi_i), len(theta_i))
-    return {
-        "description": np.frombuffer(b"flat", dtype=np.uint8),
-        "phi_i": phi_i.astype(np.float32),
-        "theta_i": theta_i,
-        "ndf": ndf.astype(np.float32),
-        "sigma": np.ones((2, 2), np.float32),
-        "vndf": np.full((*incident, 2, 2), vndf, np.float32),
-        "luminance": np.ones((*incident, 9, 9), np.float32),
-        "rgb": np.ones((*incident, 3, 9, 9), np.float32),
-        "jacobian": np.array([1], dtype=np.uint8),
-    }
+    square = (len(phi_i), len(theta_i), nodes, nodes)
+    shapes = {"ndf": (2, 2), "sigma": (2, 2), "vndf": (*square[:2], 2, 2), "luminance": square}
+    shapes |= {"rgb": (*square[:2], 3, nodes, nodes)}
+    fields = {"phi_i": phi_i.astype(np.float32), "theta_i": theta_i, "jacobian": np.array([1], np.uint8)}
+    fields |= {name: np.ones(shape, np.float32) for name, shape in shapes.items()}
+    return fields | {"description": np.frombuffer(b"flat", np.uint8), "ndf": np.full((2, 2), ndf, np.float32)}
 
 
 @pytest.mark.parametrize("phi_i", [np.zeros(1), np.linspace(-np.pi, np.pi, 5)], ids=["isotropic", "whole"])
@@ -138,7 +132,7 @@ def test_nodes_and_weights_of_an_even_warp(loaded: Loaded, phi_i: np.ndarray, nd
     The weight is the node's share of the square, 1/64, half of it at each border, times d_wo/du: sin(theta_m)
     d(theta_m)/du0 d(phi_m)/du1 is 2 pi^2 u0 sin(theta_m), and a turn of the half vector turns wo by 4 (wi.m) more.
     """
-    samples = loaded(tensor_bytes(_flat(phi_i, np.full((2, 2), ndf)))).samples()
+    samples = loaded(tensor_bytes(_flat(phi_i, ndf))).samples()
     expected = []
     for phi in phi_i:
         for theta in (0.0, 0.4, 0.8):
@@ -161,10 +155,8 @@ def test_nodes_and_weights_of_an_even_warp(loaded: Loaded, phi_i: np.ndarray, nd
 
 def test_weights_fill_the_hemisphere_whatever_the_warp(loaded: Loaded) -> None:
     """Projected solid angles from the normal add up to pi sin^2(84 degrees), also where the nodes crowd together."""
-    fields = _flat(np.zeros(1), np.ones((2, 2)))
+    fields = _flat(np.zeros(1), nodes=129)
     fields["vndf"] = np.broadcast_to(np.array([[1.5, 0.3], [0.5, 1.0]], np.float32), (1, 3, 2, 2)).copy()
-    fields["rgb"] = np.ones((1, 3, 3, 129, 129), np.float32)
-    fields["luminance"] = np.ones((1, 3, 129, 129), np.float32)
     samples = loaded(tensor_bytes(fields)).samples()
     normal = samples.wi[:, 2] > 0.999
     total = (samples.wo[normal, 2] * samples.weight[normal]).sum()
@@ -181,20 +173,9 @@ OF_PHI_M = np.array([0.9, 0.3, 0.6, 0.8, 0.9, 0.3, 0.6, 0.8, 0.9])  # at phi_m =
 
 def file_bytes(phi_i: np.ndarray, factors: np.ndarray) -> bytes:
     """An even warp, D = sigma = 1: f cos_o is a quarter of the factor at phi_i times that at phi_m."""
-    theta_i = np.array([0.0, 0.8, 1.5], np.float32)
-    incident = (len(phi_i), len(theta_i))
-    rgb = factors[:, None, None, None, None] * OF_PHI_M[:, None] * np.ones((*incident, 3, 9, 9))
-    ones = {"ndf": (2, 2), "sigma": (2, 2), "vndf": (*incident, 2, 2), "luminance": (*incident, 9, 9)}
-    return tensor_bytes(
-        {
-            "description": np.frombuffer(b"seams", dtype=np.uint8),
-            "phi_i": phi_i.astype(np.float32),
-            "theta_i": theta_i,
-            "rgb": rgb.astype(np.float32),
-            "jacobian": np.array([1], dtype=np.uint8),
-            **{name: np.ones(shape, np.float32) for name, shape in ones.items()},
-        }
-    )
+    fields = _flat(phi_i)
+    rgb = fields["rgb"] * factors[:, None, None, None, None] * OF_PHI_M[:, None]
+    return tensor_bytes(fields | {"rgb": rgb.astype(np.float32)})
 
 
 def mirrored_at(m: np.ndarray, wi: np.ndarray) -> np.ndarray:

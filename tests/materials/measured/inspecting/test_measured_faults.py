@@ -21,7 +21,8 @@ from lambent.materials.measured.inspecting.faults import too_bright
 from lambent.materials.measured.inspecting.inspection import inspect_table
 from lambent.materials.measured.inspecting.metrics import METRICS, metric_named
 from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, record, synthesise
-from lambent.materials.measured.protocol import LeftOut, MeasuredSamples, MeasuredTable, TableInfo, collect
+from lambent.materials.measured.protocol import LeftOut, MeasuredSamples, TableInfo
+from tests.materials.export.formula_table import FormulaTable
 from tests.materials.measured.measured_files import GLOSSY
 
 
@@ -42,24 +43,13 @@ def test_only_more_than_the_tolerance_is_more_than_arrives(excess: float, warned
     """`excess` over 1 in units of the tolerance, but for the first, which is rounding."""
     albedo = 1 + (excess if excess < 1e-6 else excess * ENERGY_TOLERANCE)
 
-    class White(MeasuredTable):
-        info = TableInfo("white", "made up", True, False, 1, "f")
-
-        def eval(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-            return np.full((*np.broadcast_shapes(wi.shape, wo.shape)[:-1], 1), albedo / np.pi)
-
-        def reflectivity(self, wi: np.ndarray) -> np.ndarray:
-            return np.full((*wi.shape[:-1], 1), albedo)
-
-        def samples(self, max_count: int | None = None) -> MeasuredSamples:
-            wi, wo = (direction(np.linspace(0, 1.2, 40), phi) for phi in (0.0, np.pi))
-            f = self.eval(wi, wo)
-            return collect(wi, wo, f, np.ones(len(f)), self.info, np.zeros(len(f), dtype=bool))
-
-    report = inspect_table(White())
+    wi, wo = (direction(np.linspace(0, 1.2, 40), phi) for phi in (0.0, np.pi))
+    white = FormulaTable(lambda i, o: np.full((*i.shape[:-1], 1), albedo / np.pi), isotropic=True, pairs=(wi, wo))
+    white.reflectivity = lambda wi: np.full((*wi.shape[:-1], 1), albedo)
+    report = inspect_table(white)
     assert report["faults"]["energy_above_one"] is warned
     assert any("more than arrives" in line for line in report["findings"]) is warned
-    furnace = albedos(White())
+    furnace = albedos(white)
     assert any("more than arrives" in line or "measured well" in line for line in _warnings(0.0, furnace)) is warned
     document = Material(kd=albedo)
     assert any("more light than it receives" in line for line in _energy(document)) is warned
