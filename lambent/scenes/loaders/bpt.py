@@ -17,13 +17,11 @@ from lambent.core.arrays import Flags, Floats
 from lambent.core.ceilings import BPT_BYTES, TRIANGLES
 from lambent.core.errors import UserError
 from lambent.core.inputs import read_bytes
-from lambent.materials.document import Material
 from lambent.scenes.geometry import bezier
 from lambent.scenes.geometry.bezier import net_areas, oriented_alike, steps_to, tessellated, triangles_of
 from lambent.scenes.geometry.grid import FLAT
-from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
+from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions, grey_thing
 from lambent.scenes.loaders.meshes.repair import ABSURD
-from lambent.scenes.scene import SceneObject
 
 NAME, ENDINGS = "Bezier patches", (".bpt",)
 DEVIATION = 1 / 1000  # of triangles from the patches, of the diagonal of all control points
@@ -54,9 +52,7 @@ def load(path: Path, options: LoadOptions = DEFAULTS) -> Contents:
     notes += _left_out("no area", usable & (net_areas(control) <= FLAT * size**2))
     if not len(mesh.faces):
         raise UserError("holds no patch with an area", file=path, hint="; ".join(notes) or None)
-    grey = Material(name="default", kd=(0.5, 0.5, 0.5))
-    thing = SceneObject(path.stem, mesh, grey.name)
-    return Contents((thing,), {grey.name: grey}, sources=(path,), warnings=tuple(f"{path.stem}: {n}" for n in notes))
+    return grey_thing(path, mesh, [f"{path.stem}: {n}" for n in notes])
 
 
 def _left_out(why: str, patches: Flags) -> list[str]:

@@ -11,7 +11,16 @@ from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
 from lambent.scenes.first_view import first_views
 from lambent.scenes.looks.variants import VariantByObject, looks_as_loaded, with_variants
-from lambent.scenes.scene import DirectionalLight, Environment, Light, MaterialTextures, Scene, SceneObject, SunSky
+from lambent.scenes.scene import (
+    DirectionalLight,
+    Environment,
+    Light,
+    MaterialTextures,
+    Mesh,
+    Scene,
+    SceneObject,
+    SunSky,
+)
 
 DAYLIGHT = SunSky(sun_direction=(0.4558, 0.7597, 0.4637))
 
@@ -78,6 +87,13 @@ class Contents:
         changed = {} if variant is None else self.variants.get(variant, {})
         found = ((o, *changed.get(o.name, (o.material, o.emission))) for o in self.objects)
         return tuple(replace(o, material=material, emission=emission) for o, material, emission in found)
+
+
+def grey_thing(path: Path, mesh: Mesh, notes: Sequence[str]) -> Contents:
+    """The mesh of a file without materials, in grey."""
+    grey = Material(name="default", kd=(0.5, 0.5, 0.5))
+    thing = SceneObject(path.stem, mesh, grey.name)
+    return Contents((thing,), {grey.name: grey}, sources=(path,), warnings=tuple(notes))
 
 
 def daylight_with(lights: Sequence[Light]) -> SunSky:

@@ -13,10 +13,8 @@ from lambent.core.arrays import Floats, Indices
 from lambent.core.ceilings import FACE_CORNERS, PLY_BYTES, TRIANGLES
 from lambent.core.errors import UserError
 from lambent.core.inputs import read_bytes
-from lambent.materials.document import Material
-from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
+from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions, grey_thing
 from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of, ranges, triangulate
-from lambent.scenes.scene import SceneObject
 
 NAME, ENDINGS = "PLY", (".ply",)
 HEADER_MAX = 1 << 16
@@ -54,9 +52,7 @@ def load(path: Path, options: LoadOptions = DEFAULTS) -> Contents:
     notes += ignored
     if mesh is None:
         raise UserError("holds no triangles", file=path, hint="; ".join(notes) or None)
-    grey = Material(name="default", kd=(0.5, 0.5, 0.5))
-    thing = SceneObject(path.stem, mesh, grey.name)
-    return Contents((thing,), {grey.name: grey}, sources=(path,), warnings=tuple(notes))
+    return grey_thing(path, mesh, notes)
 
 
 def read(path: Path, notes: list[str] | None = None) -> MeshArrays:

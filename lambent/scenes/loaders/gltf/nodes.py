@@ -20,10 +20,9 @@ from lambent.scenes.geometry import copies_under
 from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
 from lambent.scenes.loaders.gltf.container import Gltf, read
 from lambent.scenes.loaders.gltf.luminaires import Luminaires
-from lambent.scenes.loaders.gltf.materials import surface_of
+from lambent.scenes.loaders.gltf.materials import Textures, main_uv_set, surface_of
 from lambent.scenes.loaders.gltf.posed import Pose, instances_of, joint_matrices, locals_of, posed
 from lambent.scenes.loaders.gltf.schema import READ_EXTENSIONS, MaterialDocument, Node, Primitive
-from lambent.scenes.loaders.gltf.textures import Textures, main_uv_set
 from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.loaders.surfaces.material_builder import MaterialBuilder
 from lambent.scenes.scene import DirectionalLight, Light, Mesh, PointLight, SceneObject

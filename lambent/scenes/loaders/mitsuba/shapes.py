@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.geometry.directions import Floats, basis, normalize
-from lambent.scenes.geometry import grid, merge, transformed
+from lambent.scenes.geometry import grid, merge, placed, sphere, transformed
 from lambent.scenes.loaders import ply
 from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.loaders.mitsuba import serialized
@@ -19,6 +19,7 @@ from lambent.scenes.loaders.obj import text as obj_text
 from lambent.scenes.scene import Mesh
 
 AROUND, ROWS = 80, 40  # quads of a sphere
+POLES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # turns the axis of our spheres to z
 UNSCALED = 1e-18  # smallest determinant of a transform that is not degenerate
 
 
@@ -142,14 +143,9 @@ def _cube(plugin: Plugin, name: str) -> Made:
 
 
 def _sphere(plugin: Plugin, name: str) -> Made:
+    """A sphere whose poles are along z, u = 0 towards x."""
     centre, radius = plugin.vector("center"), plugin.number("radius", 1.0)
-    theta = np.linspace(0, np.pi, ROWS + 1)[:, None]
-    phi, cos_phi, sin_phi = _circle(AROUND)
-    sin_theta = np.where(np.isin(np.arange(ROWS + 1), (0, ROWS))[:, None], 0.0, np.sin(theta))
-    normals = _stacked(sin_theta * cos_phi, sin_theta * sin_phi, np.cos(theta))
-    uv = np.stack(np.broadcast_arrays(phi / (2 * np.pi), 1 - theta / np.pi), axis=-1)
-    mesh = grid(abs(radius) * normals, normals, _stacked(-sin_phi, cos_phi, 0 * theta), uv)
-    return transformed(mesh, _moved(np.zeros(3) if centre is None else centre)), [], False
+    return placed(sphere(abs(radius), AROUND, ROWS), (0, 0, 0) if centre is None else centre, POLES), [], False
 
 
 def _disk(plugin: Plugin, name: str) -> Made:
