@@ -9,6 +9,7 @@ import pytest
 
 from lambent.core.pictures.images import read_image
 from tests.materials.measured.measured_files import zemax_text
+from tests.scenes.loaders.test_toml import MATERIALS, written
 
 
 @pytest.fixture
@@ -41,11 +42,7 @@ def test_the_picture_shows_curves_and_disks(lambent, bright, tmp_path):
 
 def test_daylight_is_said_in_a_line(lambent, tmp_path):
     """The sun's height, both illuminances, and the ground that the scene does not have."""
-    scene = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n[materials]\n' + "".join(
-        f"{name} = {{ kd = 0.5 }}\n" for name in ("white", "red", "green", "black", "metal")
-    )
     sky = '[environment]\nkind = "sunsky"\nsun_direction = [0.0, 1.0, 1.0]\nalbedo = 0.4\n'
     for more, ground in (("", "a diffuse ground of albedo 0.4"), ('ground = "black"\n', "nothing")):
-        (tmp_path / "scene.toml").write_text(scene + sky + more)
-        said = lambent("inspect", tmp_path / "scene.toml", "--json").json["daylight"]
+        said = lambent("inspect", written(tmp_path, MATERIALS + sky + more), "--json").json["daylight"]
         assert said == f"sun 45 degrees high, 90.1 klx facing it; sky 13.8 klx, turbidity 3; below the horizon {ground}"

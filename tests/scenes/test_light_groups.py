@@ -1,7 +1,6 @@
 """Which emitters of a scene are dimmed together."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +18,8 @@ from lambent.scenes.scene import (
     Scene,
     SceneObject,
     SunSky,
-)
+)  # fmt: skip
+from tests.scenes.loaders.test_toml import MATERIALS, written
 
 UP = (0.0, 1.0, 0.0)
 DOWN = (0.0, -1.0, 0.0)
@@ -83,33 +83,11 @@ def test_before_a_bake_the_sun_of_daylight_is_known():
     assert [g.name for g in groups_before_bake(scene_of(DirectionalLight(DOWN, (1, 1, 1))))] == ["sun"]
 
 
-TOML = """
-format = "lambent-scene"
-version = 1
-geometry = "builtin:box"
-[materials.grey]
-kd = [0.5, 0.5, 0.5]
-[assign]
-"*" = "grey"
-[[lights]]
-kind = "point"
-name = "bulb_1"
-position = [0, 1, 0]
-lumens = 800
-[[light_groups]]
-name = "reading"
-members = [{members}]
-"""
-
-
-def written(tmp_path: Path, members: str) -> Path:
-    (tmp_path / "scene.toml").write_text(TOML.format(members=members))
-    return tmp_path / "scene.toml"
-
-
 def test_a_member_that_fits_nothing_is_an_error(tmp_path):
+    lamp = '[[lights]]\nkind = "point"\nname = "bulb_1"\nposition = [0, 1, 0]\nlumens = 800\n'
+    groups = '[[light_groups]]\nname = "reading"\nmembers = ["blub"]\n'
     with pytest.raises(UserError, match=r"light_groups\.members.*blub"):
-        load_scene(written(tmp_path, '"blub"'))
+        load_scene(written(tmp_path, MATERIALS + lamp + groups))
 
 
 def test_names_do_not_change_the_light():

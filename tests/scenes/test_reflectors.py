@@ -13,8 +13,9 @@ from lambent.scenes import load_scene, reflectors
 from lambent.scenes.geometry import box, merge, patch, placed, sphere, turn
 from lambent.scenes.reflectors import find_reflectors
 from lambent.scenes.scene import ReflectorRule, Scene, SceneObject
+from tests.scenes.loaders.test_toml import MATERIALS, written
 
-MATERIALS = {
+GLOSSY_OR_NOT = {
     "varnish": Material(name="varnish", lobes=(Lobe(mx=0.05, my=0.05),)),
     "satin": Material(name="satin", lobes=(Lobe(mx=0.3, my=0.3),)),
     "paint": Material(name="paint", kd=0.5),
@@ -22,7 +23,7 @@ MATERIALS = {
 
 
 def scene_of(*objects: SceneObject, rules: tuple[ReflectorRule, ...] = ()) -> Scene:
-    return Scene("test", objects, MATERIALS, reflector_rules=rules)
+    return Scene("test", objects, GLOSSY_OR_NOT, reflector_rules=rules)
 
 
 def floor(name: str, x: float, material: str = "varnish", y: float = 0.0) -> SceneObject:
@@ -79,25 +80,18 @@ def test_the_scene_has_the_last_word() -> None:
 
 
 def test_scene_toml_rules(tmp_path: Path) -> None:
-    text = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n[materials]\n'
-    text += "".join(f"{name} = {{ kd = 0.5 }}\n" for name in ("white", "red", "green", "black"))
-    text += "metal = { lobes = [{ mx = 0.1, my = 0.1 }] }\n"
-    text = text.replace("white = { kd = 0.5 }", "white = { lobes = [{ mx = 0.4, my = 0.4 }] }")
-    path = tmp_path / "scene.toml"
-    path.write_text(text, encoding="utf-8")
-    assert find_reflectors(load_scene(path)) == ()
-    path.write_text(text + '[[reflectors]]\nobjects = "floor"\n', encoding="utf-8")
-    (found,) = find_reflectors(load_scene(path))
+    text = MATERIALS.replace("white = { kd = 0.7 }", "white = { lobes = [{ mx = 0.4, my = 0.4 }] }")
+    assert find_reflectors(load_scene(written(tmp_path, text))) == ()
+    (found,) = find_reflectors(load_scene(written(tmp_path, text + '[[reflectors]]\nobjects = "floor"\n')))
     assert found.parts[0].object == "floor"
-    path.write_text(text + '[[reflectors]]\nobjects = "flor"\n', encoding="utf-8")
     with pytest.raises(UserError, match="floor"):
-        load_scene(path)
+        load_scene(written(tmp_path, text + '[[reflectors]]\nobjects = "flor"\n'))
 
 
 def test_a_part_of_something_that_transmits_is_seen_from_both_sides() -> None:
     """Of an object that goes on elsewhere one side is outside, unless light passes it."""
     bent = merge([patch((0, 0, 0), (0, 0, 1), (1, 0, 0)), patch((0, 0, 0), (1, 0, 0), (0, 0.2, 0))])
-    glossy = MATERIALS["varnish"]
+    glossy = GLOSSY_OR_NOT["varnish"]
     through = Lobe(side="transmission", mx=0.05, my=0.05, k=0.5)
     for material, both in ((glossy, False), (glossy.model_copy(update={"lobes": (*glossy.lobes, through)}), True)):
         scene = Scene("test", (SceneObject("bent", bent, "m"),), {"m": material})

@@ -13,15 +13,10 @@ from lambent.core.pictures.images import write_shown
 from lambent.materials.document import Material
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch
-from lambent.scenes.looks.variants import (
-    VariantByObject,
-    textures_in_looks,
-    variant_named,
-    with_variants,
-)
+from lambent.scenes.looks.variants import VariantByObject, textures_in_looks, variant_named, with_variants
 from lambent.scenes.scene import ImageTexture, Look, MaterialTextures, Scene, SceneObject, Texture
+from tests.scenes.loaders.test_toml import written
 
-HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
 PAINTED = """
 [materials.white]
 kd = 0.7
@@ -33,12 +28,6 @@ lobes = [{ mx = 0.1, my = 0.1, r0 = [0.9, 0.7, 0.4] }]
 """
 GREY, GRAIN = Material(name="grey", kd=0.5), Material(name="grain", kd=(0.4, 0.3, 0.2))
 SQUARE = patch((0, 0, 0), (1, 0, 0), (0, 0, -1))
-
-
-def written(folder: Path, text: str) -> Path:
-    file = folder / "scene.toml"
-    file.write_text(HEAD + text)
-    return file
 
 
 def test_a_scene_toml_names_colours_numbers_documents_and_light(tmp_path: Path) -> None:

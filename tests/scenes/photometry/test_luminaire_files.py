@@ -14,27 +14,16 @@ from lambent.scenes import load_scene
 from lambent.scenes.photometry.files import is_luminaire, read_luminaire
 from lambent.scenes.scene import IesLight
 from tests.scenes.loaders.gltf.test_gltf_luminaires import lit, node
+from tests.scenes.loaders.test_toml import MATERIALS, written
 from tests.scenes.photometry.test_ies import ies
 from tests.scenes.photometry.written_files import ldt, ldt_of, lobe
 
-TOML = """format = "lambent-scene"
-version = 1
-geometry = "builtin:box"
-[materials]
-white = { kd = 0.7 }
-red = { kd = 0.5 }
-green = { kd = 0.5 }
-black = { kd = 0.0 }
-metal = { kd = 0.1 }
-"""
 LAMP = '[[lights]]\nkind = "ies"\nposition = [0.0, 2.0, 0.0]\n'
 TWO_SETS = ldt([(200, 0)], sets=((1, 500), (2, 1200)))
 
 
 def lights_of(folder: Path, *sections: str) -> list[IesLight]:
-    path = folder / "scene.toml"
-    path.write_text(TOML + "".join(LAMP + section + "\n" for section in sections))
-    scene = load_scene(path)
+    scene = load_scene(written(folder, MATERIALS + "".join(LAMP + section + "\n" for section in sections)))
     assert all(isinstance(one, IesLight) for one in scene.lights)
     assert all(any(source.name == name for source in scene.sources) for name in _files_in(sections))
     return list(scene.lights)  # type: ignore[arg-type]
@@ -81,18 +70,14 @@ def test_lamp_sets_and_flux_in_a_scene(tmp_path: Path) -> None:
     (tmp_path / "lamp.ldt").write_text(TWO_SETS)
     (tmp_path / "open.ldt").write_text(ldt([(200, 0)], sets=((1, 0),)))
     file = 'file = "lamp.ldt"\n'
-    made = lights_of(
-        tmp_path, file, file + "lamp_set = 1", file + "lumens = 100.0", 'file = "open.ldt"\nlumens = 100.0'
-    )
+    unrated = 'file = "open.ldt"\n'
+    made = lights_of(tmp_path, file, file + "lamp_set = 1", file + "lumens = 100.0", unrated + "lumens = 100.0")
     flux_per_cd = made[0].photometry.lumens / np.max(made[0].photometry.candela)
     assert [peak_cd(one) for one in made] == pytest.approx([100, 240, 100 / flux_per_cd, 100 / flux_per_cd])
     for section, word in (
         (file + "lamp_set = 2", "lamp_set: has no such lamp set; found 2; expected 0 to 1"),
         (file + "lamp_set = -1", "found -1"),
-        (
-            'file = "open.ldt"\n',
-            "lamp_set: has no luminous flux; found 0; write it into the file, or give the light's lumens",
-        ),
+        (unrated, "lamp_set: has no luminous flux; found 0; write it into the file, or give the light's lumens"),
     ):
         with pytest.raises(UserError, match=word):
             lights_of(tmp_path, section)
@@ -133,8 +118,7 @@ def test_a_tilt_file_beside_it(tmp_path: Path) -> None:
     alone = read_luminaire(tmp_path / "lamps" / "a.ies").photometry()
     assert [alone.tilted(deg) for deg in (0.0, 45.0, 90.0)] == pytest.approx([1, 0.9, 0.8])
     assert alone.at(np.array(0.0), np.array(0.0)) == 1000
-    path = tmp_path / "scene.toml"
-    path.write_text(TOML + LAMP + 'file = "lamps/a.ies"\ndirection = [1.0, 0.0, 0.0]\n')
+    path = written(tmp_path, MATERIALS + LAMP + 'file = "lamps/a.ies"\ndirection = [1.0, 0.0, 0.0]\n')
     scene = load_scene(path)
     assert tmp_path / "lamps" / "LAMP.TLT" in scene.sources
     (light,) = scene.lights

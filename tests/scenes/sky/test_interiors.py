@@ -13,8 +13,7 @@ from lambent.core.geometry.latlong import lat_long_directions
 from lambent.scenes import load_scene
 from lambent.scenes.scene import ComputedEnvironment
 from lambent.scenes.sky.computed import COMPUTED, HEIGHT, SUN, lat_long_image
-
-HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
+from tests.scenes.loaders.test_toml import MATERIALS, written
 
 
 @pytest.mark.parametrize("name", ("gallery", "nave", "studio"))
@@ -40,15 +39,10 @@ def test_the_image_is_the_mean_of_the_interior(name: str) -> None:
 
 
 def test_a_scene_names_an_interior(tmp_path: Path) -> None:
-    file = tmp_path / "scene.toml"
-    materials = "[materials]\n" + "".join(
-        f"{n} = {{ kd = 0.5 }}\n" for n in ("white", "red", "green", "black", "metal")
-    )
-    file.write_text(f'{HEAD}[environment]\nkind = "computed"\nname = "nave"\n{materials}')
-    assert load_scene(file).environment == ComputedEnvironment("nave")
-    file.write_text(f'{HEAD}[environment]\nkind = "computed"\nname = "crypt"\n{materials}')
+    said = MATERIALS + '[environment]\nkind = "computed"\nname = "nave"\n'
+    assert load_scene(written(tmp_path, said)).environment == ComputedEnvironment("nave")
     with pytest.raises(UserError, match=r"crypt.*gallery, nave, park"):
-        load_scene(file)
+        load_scene(written(tmp_path, said.replace("nave", "crypt")))
 
 
 def test_the_path_tracer_sees_the_interior(mi: Any) -> None:
