@@ -54,6 +54,22 @@ NUMPY = ArrayOps(
 )  # fmt: skip
 
 
+def clamped(unit: Any, count: int, ops: Any = NUMPY) -> list[tuple[Any, Any]]:
+    """Indices and weights of the two cells whose centres surround a place in [0, 1]; the outermost beyond them."""
+    place = ops.maximum(ops.minimum(unit * count - 0.5, count - 1.0), 0.0)
+    low = ops.minimum(ops.floor(place), count - 2.0)
+    return [(ops.whole(low), 1 - (place - low)), (ops.whole(low) + 1, place - low)]
+
+
+def wrapped(turns: Any, count: int, ops: Any = NUMPY) -> list[tuple[Any, Any]]:
+    """Likewise for a place in turns, in [0, 1], of an axis that wraps around."""
+    place = turns * count - 0.5
+    low = ops.floor(place)
+    first = ops.select(low < 0, count - 1.0, low)
+    second = ops.select(low + 1.5 > count, 0.0, low + 1)
+    return [(ops.whole(first), 1 - (place - low)), (ops.whole(second), place - low)]
+
+
 def dot(a: Vector, b: Vector) -> Any:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 

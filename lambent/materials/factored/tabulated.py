@@ -16,7 +16,7 @@ from lambent.core.geometry.directions import direction, normalize
 from lambent.materials.factored.parametrisations import angle_of
 from lambent.materials.factored.quotients import One
 from lambent.materials.factored.terms import Quotient
-from lambent.materials.lobes import NUMPY, Vector, half_vector
+from lambent.materials.lobes import NUMPY, Vector, clamped, half_vector, wrapped
 
 MOST = 10.0  # largest ratio: 100 changes errors of measured tables by less than a per mille, and magnifies edits
 LOWEST_COSINE = 0.02  # nodes with wi or wo below take the value at this height, which avoids an edge at the horizon
@@ -88,11 +88,12 @@ class Grid:
         along, y = c * wi[0] + s * wi[1], c * wi[1] - s * wi[0]
         phi_d = ops.atan2(y, h[2] * along - sin_h * wi[2]) / (np.pi * self.turns_d)
         theta_h = ops.sqrt(ops.atan2(sin_h, h[2]) * (2 / np.pi))
-        axes = [
-            _wrapped(ops.atan2(s, c) / (2 * np.pi), self.phi_h, ops),
-            _clamped(theta_h, self.theta_h, ops),
-            _clamped(angle_of("theta_d", wi, wo, ops=ops) * (2 / np.pi), self.theta_d, ops),
-            _wrapped(phi_d, self.phi_d, ops),
+        phi_h = ops.atan2(s, c) / (2 * np.pi)
+        axes: list[list[tuple[Any, Any]]] = [
+            [(0, None)] if self.phi_h == 1 else wrapped(phi_h - ops.floor(phi_h), self.phi_h, ops),
+            clamped(theta_h, self.theta_h, ops),
+            clamped(angle_of("theta_d", wi, wo, ops=ops) * (2 / np.pi), self.theta_d, ops),
+            wrapped(phi_d - ops.floor(phi_d), self.phi_d, ops),
         ]
         _, n_h, n_d, n_p = self.shape
         for a, share_a in axes[0]:
@@ -144,20 +145,3 @@ class Tabulated:
 def digest_of(*arrays: Floats) -> str:
     """A string for `repr` that identifies the arrays."""
     return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()[:16]
-
-
-def _clamped(unit: Any, count: int, ops: Any) -> list[tuple[Any, Any]]:
-    place = ops.maximum(ops.minimum(unit * count - 0.5, count - 1.0), 0.0)
-    low = ops.minimum(ops.floor(place), count - 2.0)
-    return [(ops.whole(low), 1 - (place - low)), (ops.whole(low) + 1, place - low)]
-
-
-def _wrapped(turns: Any, count: int, ops: Any) -> list[tuple[Any, Any]]:
-    if count == 1:
-        return [(0, None)]
-    turns = turns - ops.floor(turns)
-    place = turns * count - 0.5
-    low = ops.floor(place)
-    first = ops.select(low < 0, count - 1.0, low)
-    second = ops.select(low + 1.5 > count, 0.0, low + 1)
-    return [(ops.whole(first), 1 - (place - low)), (ops.whole(second), place - low)]

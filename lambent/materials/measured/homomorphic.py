@@ -25,7 +25,7 @@ from lambent.core.geometry.directions import direction
 from lambent.core.geometry.sequences import radical_inverse
 from lambent.core.pictures.images import read_encoded
 from lambent.materials.bsdf import components
-from lambent.materials.lobes import NUMPY, Vector, half_vector
+from lambent.materials.lobes import NUMPY, Vector, clamped, half_vector
 from lambent.materials.measured.parts.text_numbers import head_text, read_text, shown, without_comments
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect
 from lambent.materials.measured.tables.table import ReflectionTable
@@ -76,15 +76,10 @@ class ParabolicMap:
     def at(self, w: Vector, ops: Any = NUMPY) -> Vector:
         """RGB of directions on the upper side."""
         n = self.size
-        axes = []
-        for component in (w[1], w[0]):
-            place = (component / (1 + w[2]) + 1) * (n / 2) - 0.5
-            place = ops.maximum(ops.minimum(place, n - 1.0), 0.0)
-            low = ops.minimum(ops.floor(place), n - 2.0)
-            axes.append([(ops.whole(low), 1 - (place - low)), (ops.whole(low) + 1, place - low)])
+        rows, columns = (clamped((c / (1 + w[2]) + 1) / 2, n, ops) for c in (w[1], w[0]))
         value: list[Any] = [0.0, 0.0, 0.0]
-        for row, along in axes[0]:
-            for column, across in axes[1]:
+        for row, along in rows:
+            for column, across in columns:
                 texel = 3 * (row * n + column)
                 value = [v + along * across * ops.gather(self.texels, texel + c) for c, v in enumerate(value)]
         return value[0], value[1], value[2]

@@ -102,9 +102,9 @@ _PAIRS = 4096
 _REACH_DEG = 60  # of the swapped pairs, so that both directions lie within common incident grids
 _CHANNELS = {1: ("",), 3: (" (red)", " (green)", " (blue)")}
 
-NON_RECIPROCAL = 0.05  # shares of the mean from which a difference is reported
-ASYMMETRIC = 0.05
-EXTRAPOLATED = 0.005  # share of the pairs of directions above which it is reported
+NON_RECIPROCAL = 5.0  # percentages of the mean from which a difference is reported
+ASYMMETRIC = 5.0
+EXTRAPOLATED = 0.5  # percentage of the pairs of directions above which it is reported
 UNDER_SAMPLED = 0.5  # share of the peak that its neighbours must reach
 SATURATED = 2.0  # tuples at the maximum, by tuples in the tenth below it, above which the maximum is a device's limit
 _LEAST_SATURATED, _STANDS_OUT = 10, 2.0  # tuples at the maximum; its ratio to the median, which an even table lacks
@@ -129,20 +129,20 @@ def negative(samples: MeasuredSamples) -> list[str]:
 
 
 def non_reciprocity(table: MeasuredTable) -> tuple[float, list[str]]:
-    """Mean of |f(wi, wo) - f(wo, wi)| over the mean of f, for uniform pairs and pairs near the mirror direction."""
+    """Mean |f(wi, wo) - f(wo, wi)| in percent of the mean f, for uniform pairs and pairs near the mirror direction."""
     u = np.concatenate([r2(_PAIRS), r2(_PAIRS, (0.25, 0.75))], axis=1)
     wi, wo = (_within_reach(u[:, k : k + 2]) for k in (0, 2))
     near = direction(*_mirrored(wi, u[:, 2:]))
     pairs = (np.concatenate([wi, wi]), np.concatenate([wo, near]))
     difference = _difference(table.eval(*pairs), table.eval(*pairs[::-1]))
-    said = f"swapping light and viewer changes f by {percentage(100 * difference)} on average"
+    said = f"swapping light and viewer changes f by {percentage(difference)} on average"
     return difference, [
         f"{said}: a reciprocal model cannot fit closer than that"
     ] if difference > NON_RECIPROCAL else []
 
 
 def asymmetry(table: MeasuredTable, symmetry: Symmetry) -> tuple[float, list[str]]:
-    """Deviation of a table from the symmetry it claims: mean |f - f of the mirrored pair| over the mean of f.
+    """Deviation of a table from the symmetry it claims: mean |f - f of the mirrored pair| in percent of the mean f.
 
     An isotropic material is symmetric about any plane of incidence, a quadrant one about x = 0 and y = 0; a table over
     half a turn can be tested only with light along the normal.
@@ -154,12 +154,12 @@ def asymmetry(table: MeasuredTable, symmetry: Symmetry) -> tuple[float, list[str
     turned = (direction(np.zeros(_PAIRS), 0.0), HALF_TURN)
     pairs = {"isotropic": [across_y], "quadrant": [across_y, across_x], "half": [turned], "none": []}[symmetry]
     off = max((_difference(table.eval(wi, wo), table.eval(wi, wo * flip)) for wi, flip in pairs), default=0.0)
-    said = f"is taken as {symmetry}, but mirrored directions differ by {percentage(100 * off)} of the mean"
+    said = f"is taken as {symmetry}, but mirrored directions differ by {percentage(off)} of the mean"
     return off, [said] if off > ASYMMETRIC else []
 
 
 def extrapolation(table: MeasuredTable) -> tuple[float, list[str]]:
-    """Share of the pairs of directions, uniform in solid angle up to GRAZING_DEG, at which a table extrapolates."""
+    """Percentage of the direction pairs, uniform in solid angle up to GRAZING_DEG, at which a table extrapolates."""
     if not isinstance(table, ScatteredTable):
         return 0.0, []
     u = np.stack([radical_inverse(np.arange(_PAIRS), base) for base in (2, 3, 5)])
@@ -174,8 +174,8 @@ def extrapolation(table: MeasuredTable) -> tuple[float, list[str]]:
         "elsewhere": ~by_light & ~low,
     }
     parts = [f"{percentage(100 * (beyond & there).mean())} {name}" for name, there in places.items()]
-    share = float(beyond.mean())
-    said = f"nothing was measured near {percentage(100 * share)} of the direction pairs ({', '.join(parts)})"
+    share = 100 * float(beyond.mean())
+    said = f"nothing was measured near {percentage(share)} of the direction pairs ({', '.join(parts)})"
     return share, [
         f"{said}: f is extrapolated there, within the range of the 16 nearest"
     ] if share > EXTRAPOLATED else []
@@ -258,7 +258,7 @@ def too_bright(theta_i_deg: Floats, albedo: Floats) -> list[str]:
 
 def _difference(one: Floats, other: Floats) -> float:
     mean = (one.mean() + other.mean()) / 2
-    return float(np.abs(one - other).mean() / mean) if mean > 0 else 0.0
+    return 100 * float(np.abs(one - other).mean() / mean) if mean > 0 else 0.0
 
 
 def _within_reach(u: Floats) -> Floats:

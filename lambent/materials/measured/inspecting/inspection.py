@@ -9,7 +9,6 @@ import numpy as np
 from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import more_than_arrives
 from lambent.materials.measured.inspecting import faults
-from lambent.materials.measured.inspecting.faults import retro
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.tables.gonio import GonioTable, symmetry_of
 
@@ -28,25 +27,23 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
         `albedo`: `theta_i_deg` and, per angle and channel, `reflectivity` and `transmissivity`;
         `tuples`: used, how many of these are below zero in a channel, and left out by reason;
         `faults`: `not_measured_percent`, `not_finite_percent` of the tuples, `negative_percent` of those used,
-        `albedo_max`,
-        `energy_above_one` (`more_than_arrives`), `non_reciprocal_percent`, `asymmetry_percent`, `retro_ratio` (1 where
-        there is no peak towards the light), `under_sampled` (incident directions), `saturated_percent` of the tuples,
-        `extrapolated_percent` (of the pairs of directions, scattered tables alone), see `faults`;
+        `albedo_max`, `energy_above_one` (`more_than_arrives`), `non_reciprocal_percent`, `asymmetry_percent`,
+        `retro_ratio` (1 where there is no peak towards the light), `under_sampled` (incident directions),
+        `saturated_percent` of the tuples, `extrapolated_percent` (of the direction pairs, scattered tables alone);
         `findings`: a sentence for each fault that matters.
     """
     info, samples = table.info, table.samples()
     wi = direction(np.radians(_THETA_I_DEG), 0.0)
     r, t = table.reflectivity(wi), table.transmissivity(wi)
-    symmetry = symmetry_of(table)
-    percent, unusable = faults.left_out(samples)
-    negative = faults.negative(samples)
-    non_reciprocal, not_mutual = faults.non_reciprocity(table)
-    off, asymmetric = faults.asymmetry(table, symmetry)
-    retro_ratio, towards_light = retro(table, samples)
-    isolated, under_sampled = faults.under_sampled(samples)
-    extrapolated, beyond = faults.extrapolation(table)
-    saturated, at_limit = faults.saturated(samples)
-    too_bright = faults.too_bright(np.array(_THETA_I_DEG), r + t)
+    left_out, unusable = faults.left_out(samples)
+    judged = {
+        "non_reciprocal_percent": faults.non_reciprocity(table),
+        "asymmetry_percent": faults.asymmetry(table, symmetry_of(table)),
+        "retro_ratio": faults.retro(table, samples),
+        "under_sampled": faults.under_sampled(samples),
+        "saturated_percent": faults.saturated(samples),
+        "extrapolated_percent": faults.extrapolation(table),
+    }
     return {
         "file": info.file,
         "format": info.format,
@@ -64,29 +61,19 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
         },
         "tuples": samples.counts,
         "faults": {
-            "not_measured_percent": percent["shadowed"],
-            "not_finite_percent": percent["not_finite"],
+            "not_measured_percent": left_out["shadowed"],
+            "not_finite_percent": left_out["not_finite"],
             "negative_percent": 100 * samples.below_zero / len(samples),
             "albedo_max": float((r + t).max()),
             "energy_above_one": bool(more_than_arrives(r + t).any()),
-            "non_reciprocal_percent": 100 * non_reciprocal,
-            "asymmetry_percent": 100 * off,
-            "retro_ratio": retro_ratio,
-            "under_sampled": isolated,
-            "saturated_percent": saturated,
-            "extrapolated_percent": 100 * extrapolated,
+            **{name: value for name, (value, _) in judged.items()},
         },
         "findings": [
             *unusable,
-            *negative,
-            *too_bright,
-            *not_mutual,
-            *asymmetric,
-            *towards_light,
-            *under_sampled,
-            *at_limit,
+            *faults.negative(samples),
+            *faults.too_bright(np.array(_THETA_I_DEG), r + t),
+            *(line for _, lines in judged.values() for line in lines),
             *faults.one_incident_angle(samples),
-            *beyond,
         ],
     }
 

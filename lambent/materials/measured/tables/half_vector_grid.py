@@ -24,7 +24,18 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.materials.lobes import COS_MIN, NUMPY, ArrayOps, Vector, dot, half_vector, reflect, sample_cosine
+from lambent.materials.lobes import (
+    COS_MIN,
+    NUMPY,
+    ArrayOps,
+    Vector,
+    clamped,
+    dot,
+    half_vector,
+    reflect,
+    sample_cosine,
+    wrapped,
+)
 
 DIFFUSE = 0.1  # share of cosine-distributed samples
 LAST_VIEWER_DEG = 89.0  # beyond it, f of the last viewer is used
@@ -132,15 +143,7 @@ class HalfVectorGrid:
         """f in 1/sr per RGB channel, without the cosine; linear between cell centres and between viewers."""
         shape, viewers = self.shape, self._viewers(wo, ops)
         u, v, _ = viewers.half(wi, ops)
-        i = ops.maximum(ops.minimum(u * shape.theta_h - 0.5, shape.theta_h - 1.0), 0.0)
-        i0 = ops.minimum(ops.floor(i), shape.theta_h - 2.0)
-        j = v * shape.phi_h - 0.5
-        j0 = ops.floor(j)
-        columns = [
-            (ops.whole(ops.select(j0 < 0, shape.phi_h - 1.0, j0)), 1 - (j - j0)),
-            (ops.whole(ops.select(j0 + 1.5 > shape.phi_h, 0.0, j0 + 1)), j - j0),
-        ]
-        rows = [(ops.whole(i0), 1 - (i - i0)), (ops.whole(i0) + 1, i - i0)]
+        rows, columns = clamped(u, shape.theta_h, ops), wrapped(v, shape.phi_h, ops)
         page = self._page(viewers, wi[2] * wo[2] < 0, ops)
         value: list[Any] = [0.0, 0.0, 0.0]
         for node, share in viewers.nodes:
