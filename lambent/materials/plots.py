@@ -102,19 +102,22 @@ def white_of(disks: Iterable[Floats]) -> float:
     return max(float(np.percentile(known, WHITE_PERCENTILE)), 1e-12) if len(known) else 1.0
 
 
-def colours_of(disk: Floats) -> Floats:
-    """Colours (pixels, pixels, 3) of a disk's brightness, with white at 1."""
-    return np.where(np.isnan(disk), UNKNOWN, np.clip(disk, 0, 1))
+def draw_disk(axis: Any, image: Floats, theta_deg: float, limit: float = 1.1) -> None:
+    """Draw a disk of brightness (pixels, pixels, 1 or 3), white at 1, with its rim and the source at the top.
 
+    Pixels outside the rim show their inner neighbours, and a circle clips the image smoothly instead of whole pixels.
+    """
+    from matplotlib.patches import Circle
 
-def draw_rim(axis: Any) -> None:
-    """Draw the rim of a disk."""
+    steps = (np.arange(DISK_PIXELS) + 0.5) / DISK_PIXELS * 2 - 1
+    x, y = np.meshgrid(steps, steps)
+    inwards = np.minimum(1, (1 - 2.5 / DISK_PIXELS) / np.hypot(x, y))
+    row, column = (((v * inwards + 1) / 2 * DISK_PIXELS).astype(int) for v in (y, x))
+    colours = np.where(np.isnan(image), UNKNOWN, np.clip(image, 0, 1))[row, column]
+    drawn = axis.imshow(colours, extent=(-1, 1, -1, 1), interpolation="nearest")
+    drawn.set_clip_path(Circle((0, 0), 1, transform=axis.transData))
     rim = np.linspace(0, 2 * np.pi, 128)
     axis.plot(np.cos(rim), np.sin(rim), color="0.5", lw=0.6)
-
-
-def draw_source(axis: Any, theta_deg: float, limit: float) -> None:
-    """Draw the dot of the source at the top of a disk, whose axes reach to `limit`."""
     axis.plot(0, theta_deg / 90, "o", ms=3.2, mfc=SOURCE, mec="black", mew=0.4)
     axis.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
 
@@ -150,7 +153,7 @@ def _draw_matrix(figure: Any, placed: Sequence[Placed], shape: tuple[int, int]) 
     for axis in axes.flat:
         axis.set_axis_off()
     for (entry, far, place), disk in zip(placed, disks, strict=True):
-        _draw_disk(axes[place], disk / white, entry.theta_deg)
+        draw_disk(axes[place], disk / white, entry.theta_deg)
         side = ", transmitted" if far else ""
         axes[place].set_title(f"{entry.theta_deg:g}°, {entry.phi_deg:g}°{side}", fontsize=7, pad=2)
     figure.supxlabel(
@@ -158,15 +161,6 @@ def _draw_matrix(figure: Any, placed: Sequence[Placed], shape: tuple[int, int]) 
         "blue was not measured",
         fontsize=8,
     )
-
-
-def _draw_disk(axis: Any, image: Floats, theta_deg: float) -> None:
-    x = np.linspace(-1, 1, DISK_PIXELS)
-    inside = np.hypot(x, x[:, None]) < 1
-    colours = colours_of(np.broadcast_to(image, (*image.shape[:2], 3)))
-    axis.imshow(np.concatenate([colours, inside[..., None]], axis=-1), extent=(-1, 1, -1, 1), interpolation="nearest")
-    draw_rim(axis)
-    draw_source(axis, theta_deg, 1.1)
 
 
 def _both_sides(entry: Incidence) -> Incidence:

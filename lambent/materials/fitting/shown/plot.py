@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lambent.core.geometry.directions import Floats, direction
 from lambent.materials.bsdf import MaterialBSDF
@@ -24,17 +23,7 @@ from lambent.materials.fitting.shown.incidence import (
 from lambent.materials.fitting.shown.slices import Slice
 from lambent.materials.measured.inspecting.metrics import Metric
 from lambent.materials.measured.protocol import MeasuredSamples
-from lambent.materials.plots import (
-    DISK_PIXELS,
-    SOURCE,
-    colours_of,
-    disk_places,
-    draw_rim,
-    draw_source,
-    new_figure,
-    save_figure,
-    white_of,
-)
+from lambent.materials.plots import DISK_PIXELS, SOURCE, disk_places, draw_disk, new_figure, save_figure, white_of
 
 MEASURED, MODEL = "#1a7f37", "#c62828"
 COLUMNS = 4
@@ -133,29 +122,12 @@ def _disks(entry: Incidence, material: Material, far: bool) -> tuple[Floats, Flo
 
 
 def _show_disk(ax: Any, image: Floats, theta_deg: float, phi_deg: float, brushing_deg: float | None) -> None:
-    from matplotlib.patches import Circle
-
-    drawn = ax.imshow(colours_of(image)[_inside_pixels()], extent=(-1, 1, -1, 1), interpolation="nearest")
-    drawn.set_clip_path(Circle((0, 0), 1, transform=ax.transData))
-    draw_rim(ax)
+    draw_disk(ax, image, theta_deg, 1.22)
     if brushing_deg is not None:
         turned = np.radians(brushing_deg - phi_deg + 90)
         for end in (turned, turned + np.pi):
             ends = np.array([1.02, 1.18])
             ax.plot(ends * np.cos(end), ends * np.sin(end), color="0.4", lw=2)
-    draw_source(ax, theta_deg, 1.22)
-
-
-def _inside_pixels() -> tuple[NDArray[np.integer], NDArray[np.integer]]:
-    """For each pixel of a disk's square, the pixel to show: itself, or its inner neighbour if it is outside the rim.
-
-    The circle then clips the image smoothly instead of whole pixels.
-    """
-    steps = (np.arange(DISK_PIXELS) + 0.5) / DISK_PIXELS * 2 - 1
-    x, y = np.meshgrid(steps, steps)
-    inwards = np.minimum(1, (1 - 2.5 / DISK_PIXELS) / np.hypot(x, y))
-    row, column = (((v * inwards + 1) / 2 * DISK_PIXELS).astype(int) for v in (y, x))
-    return row, column
 
 
 def in_plane(gathered: Sequence[Incidence], material: Material) -> Any:
