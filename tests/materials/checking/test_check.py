@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lambent.core.geometry.directions import direction
-from lambent.materials.bsdf import MaterialBSDF, more_than_arrives
+from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.checking import check as module
 from lambent.materials.checking.check import check, check_sampler, furnace
 from lambent.materials.document import Lobe, Material
@@ -112,11 +112,6 @@ def test_the_check_is_deterministic_and_shows_progress(few_samples):
     first = check(FOIL, seed=3, progress=lambda done, total, what: seen.append((done, total, what)))
     assert first.to_json() == check(FOIL, seed=3).to_json()
     assert seen[0][0] == 0 and seen[-1][0] == seen[-1][1]
-
-
-@pytest.mark.parametrize(("albedo", "warned"), [(0.9, False), (1.0, False), (1.005, False), (1.02, True), (1.5, True)])
-def test_two_per_cent_more_than_arrives_are_too_many(albedo: float, warned: bool) -> None:
-    assert more_than_arrives(np.array([0.2, albedo])).tolist() == [False, warned]
 
 
 @pytest.mark.parametrize(("kd", "warned"), [(0.5, False), (1.0, True)])

@@ -12,11 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.errors import UserError
 from lambent.core.geometry.directions import Floats, direction
 from lambent.core.geometry.sequences import r2
 from lambent.core.light.colour import luminance
-from lambent.core.progress import Cancelled
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import gonio_text, lbnl_xml, merl, rgl
@@ -152,22 +150,6 @@ def test_a_measured_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
         np.testing.assert_allclose(written.reflectivity(wi[:1])[0], table.reflectivity(wi).mean(axis=0), rtol=0.02)
     assert set(cost.share) == set(METRICS) and 0 < cost.share["l1"] < 0.3
     assert any("behind" in lost for lost in cost.lost)
-
-
-def test_nothing_to_write(tmp_path: Path, hasty: None) -> None:
-    with pytest.raises(UserError, match="no light"):
-        lbnl_xml.write(Material(name="hole"), tmp_path / "h.xml")
-    assert not list(tmp_path.iterdir())
-
-
-def test_an_interrupted_write_leaves_no_file(tmp_path: Path) -> None:
-    def stop(done: float, total: float, what: str) -> None:
-        if done > 3:
-            raise Cancelled
-
-    with pytest.raises(Cancelled):
-        lbnl_xml.write(THIN, tmp_path / "f.xml", stop)
-    assert not list(tmp_path.iterdir())
 
 
 GLOSSY = Material(name="glossy", kd=(0.3, 0.2, 0.1), lobes=(Lobe(k=0.4, mx=0.2, my=0.2, r0=0.3),))

@@ -314,18 +314,6 @@ def astm_text(rows: np.ndarray, variables: str = "theta_i,phi_i,theta_s,phi_s,R,
     return table_text(f'LAB_NAME made up\nSAMPLE_NAME "red"\nNUM_POINTS {len(rows)}\nVARS {variables}', rows, ",")
 
 
-def test_astm_of_a_real_measurement(shared_data: Path, loaded: Loaded) -> None:
-    """The Cornell measurement written as tuples comes back unchanged."""
-    source = load(shared_data / "measured" / "cornell" / "garnet_red.brdf").samples()
-    table = loaded(astm_text(np.column_stack([*angles(source.wi), *angles(source.wo), source.f])))
-    samples = table.samples()
-    assert table.info.format == "ASTM E1392" and table.name == "red"
-    assert any("radians" in note for note in table.info.notes)
-    assert len(samples) == len(source) == 1439
-    np.testing.assert_allclose(np.sort(samples.f, axis=0), np.sort(source.f, axis=0), rtol=1e-6)
-    np.testing.assert_allclose(table.eval(samples.wi, samples.wo), samples.f, rtol=1e-5, atol=1e-7)
-
-
 def test_astm_degrees_and_the_standards_phi_i(loaded: Loaded) -> None:
     theta = np.arange(0, 80, 5)
     rows = np.array(
@@ -334,7 +322,7 @@ def test_astm_degrees_and_the_standards_phi_i(loaded: Loaded) -> None:
     table = loaded(astm_text(rows, "theta_i,theta_s,phi_s,BRDF"))
     wi = direction(np.radians(40), np.pi)
     assert table.eval(wi, wi * (-1, 1, 1))[0] == pytest.approx(1.01, rel=1e-6)
-    assert any("degrees" in note for note in table.info.notes)
+    assert table.name == "red" and any("degrees" in note for note in table.info.notes)
     assert any("phi_i not stated, taken as 180" in note for note in table.info.notes)
 
 
@@ -342,7 +330,8 @@ def test_scattered_incident_directions(loaded: Loaded, hemisphere: Callable[...,
     wi, wo = hemisphere(300, 1), hemisphere(300, 2)
     table = loaded(astm_text(np.column_stack([*angles(wi), *angles(wo), MaterialBSDF(GLOSSY).eval(wi, wo)])))
     np.testing.assert_allclose(table.eval(wi, wo), MaterialBSDF(GLOSSY).eval(wi, wo), rtol=1e-4)
-    assert any("isotropic" in note for note in table.info.notes) and len(table.samples()) == 300
+    assert table.info.format == "ASTM E1392" and len(table.samples()) == 300
+    assert all(any(word in note for note in table.info.notes) for word in ("isotropic", "radians"))
 
 
 def test_another_encoding_is_named(tmp_path: Path) -> None:
