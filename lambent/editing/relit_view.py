@@ -18,6 +18,7 @@ from lambent.core.arrays import Floats, Image
 from lambent.core.errors import UserError
 from lambent.core.views.camera import Camera, pixel_rays
 from lambent.editing.products import Halves, Pixels, float_of_half
+from lambent.scenes.geometry import turn
 from lambent.scenes.scene import Environment, ImageEnvironment
 from lambent.scenes.sky.environment_images import environment_picture, orientation, seen_at
 from lambent.scenes.sky.triangle_wavelets import CHILDREN, FACES, TriangleTree, TurningLight
@@ -69,9 +70,7 @@ class RelitView:
 
     def turn(self, rotation_deg: float) -> None:
         """Light the next `draw` by the environment rotated about +y, relative to the bake or to the last `light`."""
-        angle = np.radians(rotation_deg % 360)
-        c, s = np.cos(angle), np.sin(angle)
-        self._turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) @ self._laid
+        self._turn = turn("y", rotation_deg % 360) @ self._laid
 
     def light(self, environment: Environment | None) -> None:
         """Light the next `draw` by another environment, or by that of the bake (None).

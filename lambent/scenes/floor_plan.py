@@ -115,12 +115,8 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CE
     `corners` (F, 3, 3) are the triangles of the scene, `cells` the number of cells per size of the reflector. A wall
     stands on an edge where triangles cross the planes at both HEIGHTS above the reflector, within NEAR of the edge.
     """
-    from lambent.core.geometry.plan_cells import (
-        filled,
-        inner,
-        share_filled,
-        within,
-    )  # compiled, and needed only for scenes with reflectors
+    # Compiled, and needed only for scenes with reflectors.
+    from lambent.core.geometry.plan_cells import filled, inner, share_filled, within
 
     across, along = basis(normal)
     axes = np.stack([across, along], axis=1)

@@ -46,7 +46,7 @@ WRONG = {
     f"{VIEW} above --fixed paint": "--fixed: applies to interreflections only",
     "bake scene.toml -o s --only geometry --view above": "--only: no kind uses the given view; found geometry",
     "bake scene.toml -o s --only transport --edit wool.edits.json": "unknown material; found wool",
-    "bake scene.toml -o s --only transport --edit bad.edits.json": "bad.edits.json: not a JSON document",
+    "bake scene.toml -o s --only transport --edit bad.edits.json": "bad.edits.json: JSON cannot be read",
     "bake scene.toml -o s --only transport --edit half.edits.json": "half.edits.json: scene: is missing",
     "bake scene.toml -o s --only interreflection": "--view: is missing",
     "bake scene.toml -o s --editable paint": "--editable: applies to interreflections only",

@@ -11,9 +11,10 @@ from collections.abc import Iterable
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from lambent.core.arrays import Floats
+from lambent.core.strict import Strict
 from lambent.materials.factored.curve import END_RAD, Curve, angles_rad
 
 STEEPEST = 2.125  # largest slope of `smooth_step`
@@ -21,11 +22,7 @@ Kind = Literal["translate_x", "translate_y", "amplify_x", "amplify_y"]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Region(_Record):
+class Region(Strict):
     """Region of an operator, in radians: a < b <= c < d. The ends may lie outside the curve."""
 
     a: Finite
@@ -45,7 +42,7 @@ class Region(_Record):
         return smooth_step(np.minimum(rise, fall))
 
 
-class Operator(_Record):
+class Operator(Strict):
     """One edit of a curve.
 
     Attributes

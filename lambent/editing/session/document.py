@@ -5,15 +5,15 @@ Angles are in radians, colours linear Rec.709. File names are absolute or relati
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from lambent.core.errors import UserError, invalid
-from lambent.core.inputs import read_bytes
+from lambent.core.inputs import parse_json, read_bytes
+from lambent.core.strict import Strict
 from lambent.core.surroundings import Axis, Layout
 from lambent.core.views.camera import Camera
 from lambent.editing.curves.operators import Operator, Region
@@ -40,18 +40,14 @@ def _spread(value: object) -> object:
 RGB = Annotated[tuple[Value, Value, Value], BeforeValidator(_spread)]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class OfDocument(_Strict):
+class OfDocument(Strict):
     """A material that starts as a material document."""
 
     kind: Literal["document"] = "document"
     material: Material
 
 
-class OfModel(_Strict):
+class OfModel(Strict):
     """A material that starts as a model with its parameters."""
 
     kind: Literal["model"] = "model"
@@ -61,7 +57,7 @@ class OfModel(_Strict):
     )
 
 
-class OfTable(_Strict):
+class OfTable(Strict):
     """A material that starts as the factors of a measured table, or of a file of factors."""
 
     kind: Literal["table"] = "table"
@@ -72,7 +68,7 @@ class OfTable(_Strict):
 Source = Annotated[OfDocument | OfModel | OfTable, Field(discriminator="kind")]
 
 
-class Drawn(_Strict):
+class Drawn(Strict):
     """A curve drawn freehand: linear between points, constant beyond the outermost."""
 
     angle_rad: Annotated[tuple[Annotated[float, Field(ge=0, le=END_RAD)], ...], Field(max_length=KNOTS + 1)]
@@ -96,14 +92,14 @@ class Drawn(_Strict):
         return Curve.through(np.array(self.angle_rad), np.array(self.values))
 
 
-class CurveEdit(_Strict):
+class CurveEdit(Strict):
     """Edits of one curve: an optional freehand curve, then operators in order."""
 
     drawn: Drawn | None = None
     layers: Annotated[tuple[Operator, ...], Field(max_length=MOST_LAYERS)] = ()
 
 
-class EditedMaterial(_Strict):
+class EditedMaterial(Strict):
     """A material's source, the edits of its curves by name, and the colours that multiply its terms."""
 
     source: Source
@@ -111,7 +107,7 @@ class EditedMaterial(_Strict):
     tints: dict[Name, RGB] = Field(default_factory=dict, max_length=MOST_PARAMETERS)
 
 
-class Surroundings(_Strict):
+class Surroundings(Strict):
     """An image that lights the scene instead of its own environment; fields as in `scenes.ImageEnvironment`."""
 
     file: Place
@@ -121,7 +117,7 @@ class Surroundings(_Strict):
     up: Axis = "+y"
 
 
-class SessionDocument(_Strict):
+class SessionDocument(Strict):
     """A whole session.
 
     Attributes
@@ -169,10 +165,7 @@ def load_document(path: Path) -> SessionDocument:
     UserError
         If the file is not JSON, not a session, of another version, too large, or has an unknown or invalid field.
     """
-    try:
-        data = json.loads(read_bytes(path, LIMIT_BYTES).decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise UserError(f"not a JSON document ({error})", file=path) from error
+    data = parse_json(read_bytes(path, LIMIT_BYTES), path)
     if not isinstance(data, dict) or "format" not in data:
         raise UserError("not a session of edits", file=path, expected="an object with a format")
     if (version := data.get("version", VERSION)) != VERSION:

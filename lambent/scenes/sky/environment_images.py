@@ -13,6 +13,7 @@ from lambent.core.geometry.latlong import lat_long_uv
 from lambent.core.pictures.environment_layouts import as_lat_long, layout_of
 from lambent.core.pictures.images import read_image
 from lambent.core.surroundings import Axis, Layout
+from lambent.scenes.geometry import turn
 from lambent.scenes.looks.textures import halved
 from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, Environment, ImageEnvironment
 from lambent.scenes.sky.computed import lat_long_image
@@ -68,9 +69,7 @@ def up_turn(up: Axis) -> Floats:
 
 def orientation(environment: ImageEnvironment) -> Floats:
     """(3, 3) rotation from directions in an environment's picture to those in the world."""
-    angle = np.radians(environment.rotation_deg)
-    c, s = np.cos(angle), np.sin(angle)
-    return np.asarray(up_turn(environment.up) @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))
+    return up_turn(environment.up) @ turn("y", environment.rotation_deg)
 
 
 def environment_picture(environment: Environment) -> Image:
