@@ -1,4 +1,4 @@
-"""Directions and light of lamps at points, in the discs of `store.lamps`."""
+"""Directions and light of lamps, in the discs of `store.lamps`."""
 
 from __future__ import annotations
 

@@ -63,7 +63,8 @@ def photometry(name: str) -> str:
     rows = 1000 * np.array(tables[name])
     phi = np.linspace(0, {"washer": 180, "bay": 0, "bat": 90}[name], len(rows))
     numbers = "\n".join(" ".join(f"{value:.1f}" for value in row) for row in (theta, phi, *rows))
-    head = f"1 -1 1 {len(theta)} {len(phi)} 1 2 0 0 0\n1 1 40\n"
+    opening_m = {"washer": "0.1 0.3 0", "bay": "-0.35 -0.35 0", "bat": "0.2 1.2 0"}[name]  # a disc and two rectangles
+    head = f"1 -1 1 {len(theta)} {len(phi)} 1 2 {opening_m}\n1 1 40\n"
     return f"IESNA:LM-63-2002\n[TEST] generated\nTILT=NONE\n{head}{numbers}\n"
 
 

@@ -295,12 +295,12 @@ def _samples(
 
 
 def lamps_apart(context: BakeContext) -> bool:
-    """Whether light of lamps at points is computed apart from samples, as renderers draw it."""
+    """Whether light of lamps is computed apart from samples, as renderers draw it."""
     return not _by_photons(context) and bool(context.scene.lamps)
 
 
 def lamp_light(context: BakeContext, side: int) -> Floats:
-    """Direct light (G, H, W, 3) of lamps at points on a side, by light group, which samples do not have; 0 if none."""
+    """Direct light (G, H, W, 3) of lamps on a side, by light group, which samples do not have; 0 if none."""
     if not lamps_apart(context):
         return np.zeros((1, 1, 1, 3), np.float16)
     return context.traced.lamp_light(SIGNS[side]).light

@@ -1,4 +1,4 @@
-"""Shadow maps of lamps at points, in the discs of `store.lamps`."""
+"""Shadow maps of lamps, in the discs of `store.lamps`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lamps at points of a baked scene, drawn by pixel: their arrays from a store (`store.lamps`)."""
+"""Lamps of a baked scene, drawn by pixel: their arrays from a store (`store.lamps`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lamps at points on the GPU: their records, shadow maps and profiles, and the texels that they reach."""
+"""Lamps on the GPU: their records, shadow maps and profiles, and the texels that they reach."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ class Sun:
 
 
 class NoSun:
-    """In place of a `Sun` where only lamps at points are left out: all light of other emitters counts."""
+    """In place of a `Sun` where only lamps are left out: all light of other emitters counts."""
 
     passes_panes = False
 
