@@ -224,30 +224,21 @@ def test_a_table_is_made_into_curves_and_must_not_change(tmp_path: Path) -> None
         Session.new("room", CAMERA, {"paint": tmp_path / "none"})
 
 
+def of_phong(curves: dict[str, object] | None = None, **more: object) -> dict[str, object]:
+    return {"materials": {"a": {"source": {"kind": "model", "model": "phong", **more}, "curves": curves or {}}}}
+
+
 REFUSED = {
     "unknown key": ({"lihgts": 5}, "lihgts"),
     "version": ({"version": 2}, "unsupported session version; found 2; expected 1; use the Lambent that wrote it"),
     "pixels": ({"size": [100000, 100000]}, "pixels"),
     "environment": ({"environment": {"file": "a.hdr", "scale": -1}}, "environment.scale"),
     "model": ({"materials": {"a": {"source": {"kind": "model", "model": "fong"}}}}, "materials.a"),
-    "parameter": (
-        {"materials": {"a": {"source": {"kind": "model", "model": "phong", "parameters": {"exponent": -1}}}}},
-        "materials.a.exponent",
-    ),
-    "curve": (
-        {"materials": {"a": {"source": {"kind": "model", "model": "phong"}, "curves": {"fresnel": {}}}}},
-        "materials.a.curves.fresnel",
-    ),
+    "parameter": (of_phong(parameters={"exponent": -1}), "materials.a.exponent"),
+    "curve": (of_phong(curves={"fresnel": {}}), "materials.a.curves.fresnel"),
     "points": (
-        {
-            "materials": {
-                "a": {
-                    "source": {"kind": "model", "model": "phong"},
-                    "curves": {"highlight": {"drawn": {"angle_rad": [0.2, 0.1], "values": [1, 1]}}},
-                }
-            }
-        },
-        "curves.highlight.drawn",
+        of_phong(curves={"highlight": {"drawn": {"angle_rad": [0.2, 0.1], "values": [1, 1]}}}),
+        "highlight.drawn",
     ),
 }
 

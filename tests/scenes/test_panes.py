@@ -29,24 +29,14 @@ IN_MITSUBA = {
     "curtain": (bsdf("principledthin", roughness=0.5, diff_trans=1.0), None),
 }
 PLAIN = {"metallicFactor": 0, "roughnessFactor": 0}
+CLEAR = {"KHR_materials_transmission": {"transmissionFactor": 1}}
 ABSORBING = {"thicknessFactor": 2, "attenuationDistance": 1, "attenuationColor": [0.5, 0.9, 1]}
+BLENDED = PLAIN | {"baseColorFactor": [1, 1, 1, 0.2]}
 IN_GLTF: dict[str, tuple[dict[str, Any], tuple[float, ...] | None]] = {
-    "glass": ({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}}, (0.96,) * 3),
-    "green": (
-        {"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": ABSORBING}},
-        (0.24, 0.78, 0.96),
-    ),
-    "blended": (
-        {"alphaMode": "BLEND", "pbrMetallicRoughness": PLAIN | {"baseColorFactor": [1, 1, 1, 0.2]}},
-        (0.8,) * 3,
-    ),
-    "satin": (
-        {
-            "pbrMetallicRoughness": PLAIN | {"roughnessFactor": 0.3},
-            "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}},
-        },
-        None,
-    ),
+    "glass": ({"extensions": CLEAR}, (0.96,) * 3),
+    "green": ({"extensions": {**CLEAR, "KHR_materials_volume": ABSORBING}}, (0.24, 0.78, 0.96)),
+    "blended": ({"alphaMode": "BLEND", "pbrMetallicRoughness": BLENDED}, (0.8,) * 3),
+    "satin": ({"pbrMetallicRoughness": PLAIN | {"roughnessFactor": 0.3}, "extensions": CLEAR}, None),
 }
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from lambent.scenes import load_scene
-from tests.scenes.loaders.gltf.test_gltf import _png as png
 from tests.scenes.loaders.gltf.test_gltf import loaded, textured
 from tests.scenes.loaders.mitsuba.test_scene_mitsuba import written
+from tests.scenes.loaders.pictures import png
 from tests.scenes.loaders.test_scene_obj import QUAD, parts_of
 
 BYTE = 188

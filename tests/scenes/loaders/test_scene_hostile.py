@@ -12,26 +12,17 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.scenes import load_scene
-from lambent.scenes.loaders import ply
 from lambent.scenes.loaders.mitsuba import load as read_mitsuba
 from lambent.scenes.loaders.mitsuba import serialized
 from lambent.scenes.loaders.ply import UV_NAMES
 from lambent.scenes.loaders.ply import read as read_ply
 
 BALL = '<shape type="sphere"/>'
-
-
 DEEP = "<scene version='3.0.0'>" + "<bsdf type='twosided'>" * 5000 + "</bsdf>" * 5000 + "</scene>"
-
-
 DOUBLING = "".join(
     f'<bsdf type="blendbsdf" id="b{i}"><ref id="b{i + 1}"/><ref id="b{i + 1}"/></bsdf>' for i in range(25)
 )
-
-
 LAUGHS = '<!DOCTYPE scene [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>'
-
-
 HOSTILE = {
     "not XML": ("<scene", r"not XML"),
     "another root": ("<bsdf/>", r"not a Mitsuba scene; found <bsdf>"),
@@ -185,35 +176,38 @@ def test_a_deflated_desert_is_not_unpacked(tmp_path: Path) -> None:
     assert len(serialized.read(path, 0).positions) == 0
 
 
-PLY_HEAD = (
-    "ply\nformat {form} 1.0\ncomment made up\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
-)
+POINTS = np.array([(0, 0, 0, 0.6, 0, 0.8, 0.1, 0.2), (1, 0, 0, 0, 0.6, 0.8, 0.3, 0.4),
+                   (1, 1, 0, 0, 0, 1, 0.5, 0.9), (0, 1, 0, 0.8, 0, 0.6, 0.7, 0.6)])  # fmt: skip
 
 
-PLY_HEAD += "element face {faces}\nproperty uchar flag\nproperty list uchar int vertex_indices\nend_header\n"
-
-
-def ply_of(form: str, sizes: tuple[int, ...] = (3, 3)) -> bytes:
-    """A square of faces with the given numbers of corners."""
-    order = ">" if "big" in form else "<"
-    points, faces = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2, 3)[:n] for n in sizes]
-    head = PLY_HEAD.format(form=form, faces=len(faces)).encode()
+def ply_of(form: str, sizes: tuple[int, ...] = (3, 3), uv: tuple[str, str] | None = None) -> bytes:
+    """A square of faces with the given numbers of corners; with `uv`, its properties stand in an order of their own."""
+    columns = ("x", "y", "z") if uv is None else ("nz", uv[1], "x", "ny", "y", uv[0], "z", "nx")
+    of = dict(zip(("x", "y", "z", "nx", "ny", "nz", *(uv or "uv")), POINTS.T, strict=True))
+    table, faces = np.stack([of[name] for name in columns], axis=-1), [(0, 1, 2, 3)[:n] for n in sizes]
+    head = f"ply\nformat {form} 1.0\ncomment made up\nelement vertex 4\n"
+    head += "".join(f"property float {name}\n" for name in columns)
+    head += f"element face {len(faces)}\nproperty uchar flag\nproperty list uchar int vertex_indices\nend_header\n"
     if form == "ascii":
-        rows = [" ".join(map(str, p)) for p in points] + [" ".join(map(str, (7, len(f), *f))) for f in faces]
-        return head + "\n".join(rows).encode() + b"\n"
-    body = b"".join(struct.pack(f"{order}3f", *p) for p in points)
-    return head + body + b"".join(struct.pack(f"{order}BB{len(f)}i", 7, len(f), *f) for f in faces)
+        rows = [" ".join(f"{value:g}" for value in row) for row in (*table, *((7, len(f), *f) for f in faces))]
+        return (head + "\n".join(rows) + "\n").encode()
+    order = ">" if "big" in form else "<"
+    body = table.astype(f"{order}f4").tobytes()
+    return head.encode() + body + b"".join(struct.pack(f"{order}BB{len(f)}i", 7, len(f), *f) for f in faces)
 
 
 @pytest.mark.parametrize("form", ["ascii", "binary_little_endian", "binary_big_endian"])
 @pytest.mark.parametrize("sizes", [(3, 3), (4,), (3, 4, 2)])
-def test_ply_in_every_form(tmp_path: Path, form: str, sizes: tuple[int, ...]) -> None:
+@pytest.mark.parametrize("uv", [None, *UV_NAMES])
+def test_ply_in_every_form(tmp_path: Path, form: str, sizes: tuple[int, ...], uv: tuple[str, str] | None) -> None:
     path = tmp_path / "a.ply"
-    path.write_bytes(ply_of(form, sizes))
+    path.write_bytes(ply_of(form, sizes, uv))
     arrays = read_ply(path)
-    assert len(arrays.triangles) == sum(max(0, n - 2) for n in sizes) and arrays.uv is None
-    assert np.array_equal(arrays.positions[:, :2], [(0, 0), (1, 0), (1, 1), (0, 1)])
+    assert len(arrays.triangles) == sum(max(0, n - 2) for n in sizes)
     assert arrays.triangles[0].tolist() == [0, 1, 2]
+    assert (arrays.normals is None) == (arrays.uv is None) == (uv is None)
+    found = [part for part in (arrays.positions, arrays.normals, arrays.uv) if part is not None]
+    np.testing.assert_allclose(np.column_stack(found), POINTS[:, : 3 if uv is None else 8], atol=1e-6)
 
 
 def test_ply_that_is_broken(tmp_path: Path) -> None:
@@ -240,33 +234,3 @@ def test_ply_that_is_broken(tmp_path: Path) -> None:
             path.write_bytes(data[:length])
             with pytest.raises(UserError):
                 read_ply(path)
-
-
-ROWS = np.array([(0, 0, 0, 0.6, 0, 0.8, 0.1, 0.2), (1, 0, 0, 0, 0.6, 0.8, 0.3, 0.4), (0, 1, 0, 0, 0, 1, 0.5, 0.9)])
-
-
-def written(path: Path, order: str, names: tuple[str, str]) -> Path:
-    """A triangle whose properties stand in an order of their own."""
-    columns = ("nz", names[1], "x", "ny", "y", names[0], "z", "nx")
-    of = dict(zip(("x", "y", "z", "nx", "ny", "nz", *names), ROWS.T, strict=True))
-    head = f"ply\nformat {order} 1.0\nelement vertex 3\n" + "".join(f"property float {c}\n" for c in columns)
-    head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
-    table = np.stack([of[c] for c in columns], axis=-1)
-    if order == "ascii":
-        body = "\n".join(" ".join(map(str, row)) for row in table) + "\n3 0 1 2\n"
-        path.write_bytes(head.encode() + body.encode())
-    else:
-        end = "<" if order == "binary_little_endian" else ">"
-        face = np.array([0, 1, 2], f"{end}i4").tobytes()
-        path.write_bytes(head.encode() + table.astype(f"{end}f4").tobytes() + b"\x03" + face)
-    return path
-
-
-@pytest.mark.parametrize("names", UV_NAMES)
-@pytest.mark.parametrize("order", ["ascii", "binary_little_endian", "binary_big_endian"])
-def test_columns_are_known_by_their_names(tmp_path: Path, order: str, names: tuple[str, str]) -> None:
-    arrays = ply.read(written(tmp_path / "a.ply", order, names))
-    assert arrays.normals is not None and arrays.uv is not None
-    found = np.column_stack([arrays.positions, arrays.normals, arrays.uv])
-    np.testing.assert_allclose(found, ROWS, atol=1e-6)
-    assert np.asarray(arrays.triangles).tolist() == [[0, 1, 2]]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +16,7 @@ from lambent.scenes.geometry import signed_volume
 from lambent.scenes.loaders.contents import Contents
 from lambent.scenes.loaders.obj import load as read_obj
 from lambent.scenes.loaders.obj import text as obj_text
+from tests.scenes.loaders.pictures import png
 
 QUAD = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n"
 
@@ -96,18 +96,12 @@ def test_smoothing_groups_make_normals(tmp_path: Path) -> None:
     assert np.allclose(np.abs(sharp.mesh.normals[:, 2]), np.sqrt(0.5)) and len(sharp.mesh.positions) > 6
 
 
-def _png(path: Path, texels: Any) -> None:
-    from PIL import Image
-
-    Image.fromarray(np.uint8(texels)).save(path)
-
-
 def test_what_a_library_says(tmp_path: Path) -> None:
     (tmp_path / "maps").mkdir()
-    _png(tmp_path / "maps" / "wood grain.png", [[[255, 255, 255], [0, 0, 0]]])
-    _png(tmp_path / "holes.png", [[255, 0]])
-    _png(tmp_path / "flat.png", np.full((2, 2, 3), (128, 128, 255)))
-    _png(tmp_path / "bumps.png", [[[0, 0, 0], [255, 255, 255]]])
+    png(tmp_path / "maps" / "wood grain.png", [[[255, 255, 255], [0, 0, 0]]])
+    png(tmp_path / "holes.png", [[255, 0]])
+    png(tmp_path / "flat.png", np.full((2, 2, 3), (128, 128, 255)))
+    png(tmp_path / "bumps.png", [[[0, 0, 0], [255, 255, 255]]])
     library = r"""
 newmtl plastic
 Kd 0.8 0.8 0.8
@@ -170,7 +164,7 @@ def test_transparency_is_what_covers_or_what_passes(tmp_path: Path, said: str) -
 
 def test_names_from_another_machine(tmp_path: Path) -> None:
     """A picture named by a path that leads elsewhere is taken from beside the library, and only from there."""
-    _png(tmp_path / "wood.png", [[[255, 0, 0], [0, 0, 0]]])
+    png(tmp_path / "wood.png", [[[255, 0, 0], [0, 0, 0]]])
     library = "newmtl a\nmap_Kd C:\\textures\\wood.png\n"
     parts = parts_of(tmp_path, QUAD + "mtllib thing.mtl\nusemtl a\nf 1/1 2/2 3/3\n", library)
     assert "a" in parts.textures and "was found beside thing.mtl" in " ".join(parts.warnings)
@@ -183,7 +177,7 @@ def test_names_from_another_machine(tmp_path: Path) -> None:
 
 def test_pictures_above_the_geometry_but_within_the_scene(tmp_path: Path) -> None:
     (tmp_path / "models").mkdir()
-    _png(tmp_path / "wood.png", [[[255, 0, 0], [0, 0, 0]]])
+    png(tmp_path / "wood.png", [[[255, 0, 0], [0, 0, 0]]])
     library = "newmtl a\nmap_Kd ../wood.png\n"
     (tmp_path / "models" / "thing.mtl").write_text(library)
     (tmp_path / "models" / "thing.obj").write_text(QUAD + "mtllib thing.mtl\nusemtl a\nf 1/1 2/2 3/3\n")
@@ -240,7 +234,7 @@ def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
 
 def test_what_exporters_write_otherwise(tmp_path: Path) -> None:
     """Small letters, statements nobody knows, pictures that are gone, tinted glass, coats."""
-    _png(tmp_path / "wood.png", np.full((2, 2, 3), 188))
+    png(tmp_path / "wood.png", np.full((2, 2, 3), 188))
     library = """
 newmtl small
 kd 1 1 1

@@ -24,6 +24,7 @@ from lambent.scenes.geometry import signed_volume
 from lambent.scenes.loaders.contents import DAYLIGHT
 from lambent.scenes.loaders.surfaces.material_builder import masking
 from lambent.scenes.scene import DirectionalLight, PointLight, Scene
+from tests.scenes.loaders.pictures import png
 
 TRIANGLE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], np.float32)
 
@@ -98,23 +99,14 @@ def test_materials(tmp_path: Path) -> None:
         materials=[
             {"name": "gold", "pbrMetallicRoughness": {"baseColorFactor": [1, 0.8, 0.3, 1], "roughnessFactor": 0.5}},
             {"name": "plastic", "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.2, 0.1, 1], "metallicFactor": 0}},
-            {
-                "name": "lamp",
-                "emissiveFactor": [1, 0.5, 0.25],
-                "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8}},
-            },
-            {
-                "name": "glass",
-                "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.3},
-                "extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.75}},
-            },
-            {
-                "name": "brushed",
-                "pbrMetallicRoughness": {"roughnessFactor": 0.2},
-                "extensions": {"KHR_materials_anisotropy": {"anisotropyStrength": 0.5}},
-            },
+            {"name": "lamp", "emissiveFactor": [1, 0.5, 0.25],
+             "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8}}},
+            {"name": "glass", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.3},
+             "extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.75}}},
+            {"name": "brushed", "pbrMetallicRoughness": {"roughnessFactor": 0.2},
+             "extensions": {"KHR_materials_anisotropy": {"anisotropyStrength": 0.5}}},
         ],
-    )
+    )  # fmt: skip
     primitive = content["meshes"][0]["primitives"][0]
     content["meshes"] = [{"primitives": [primitive | {"material": i}]} for i in range(5)]
     scene = loaded(tmp_path, content)
@@ -137,13 +129,9 @@ def test_lights_and_cameras(tmp_path: Path) -> None:
     down = [-half, 0, 0, half]
     lights = [
         {"type": "directional", "intensity": 1000, "color": [1, 1, 1]},
-        {
-            "type": "spot",
-            "intensity": 358,
-            "color": [1, 0.5, 0.25],
-            "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.5},
-        },
-    ]
+        {"type": "spot", "intensity": 358, "color": [1, 0.5, 0.25],
+         "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.5}},
+    ]  # fmt: skip
     content = document(
         nodes=[
             {"mesh": 0, "name": "thing"},
@@ -169,12 +157,6 @@ def test_lights_and_cameras(tmp_path: Path) -> None:
     assert scene.cameras[0].fov_y_deg == pytest.approx(40)
 
 
-def _png(path: Path, texels: Any) -> None:
-    from PIL import Image
-
-    Image.fromarray(np.uint8(texels)).save(path)
-
-
 def textured(material: dict[str, Any], images: list[str], **more: Any) -> dict[str, Any]:
     """A document whose triangle has `material`; texture i is picture i."""
     content = document(
@@ -186,7 +168,7 @@ def textured(material: dict[str, Any], images: list[str], **more: Any) -> dict[s
 
 
 def test_a_texture_multiplies_the_mean_that_the_document_holds(tmp_path: Path) -> None:
-    _png(tmp_path / "half.png", [[[255, 0, 0]], [[0, 0, 0]]])
+    png(tmp_path / "half.png", [[[255, 0, 0]], [[0, 0, 0]]])
     look = {"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 1, 1, 1], "metallicFactor": 0}
     content = textured({"name": "cloth", "pbrMetallicRoughness": look}, ["half.png"])
     scene = loaded(tmp_path, content)
@@ -201,24 +183,22 @@ def test_a_texture_multiplies_the_mean_that_the_document_holds(tmp_path: Path) -
 
 
 def test_a_metals_picture_is_its_reflectance_and_never_more_than_arrives(tmp_path: Path) -> None:
-    _png(tmp_path / "base.png", [[[255, 255, 255], [255, 0, 0]]])
-    _png(tmp_path / "packed.png", [[[0, 255, 255], [0, 128, 0]]])  # metal and rough; dielectric and smoother
+    png(tmp_path / "base.png", [[[255, 255, 255], [255, 0, 0]]])
+    png(tmp_path / "packed.png", [[[0, 255, 255], [0, 128, 0]]])  # metal and rough; dielectric and smoother
     look = {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 1}}
     scene = loaded(tmp_path, textured({"name": "m", "pbrMetallicRoughness": look}, ["base.png", "packed.png"]))
     material, textures = scene.materials["m"], scene.textures["m"]
     assert textures.diffuse is not None and textures.specular is not None and textures.roughness is not None
     (lobe,) = material.lobes
     share = masking(0.252, 0.252, "ggx")[1]  # where it is smoothest
-    assert np.array(lobe.k) * np.array(lobe.r0) * textures.specular.texels[0] / share == pytest.approx(
-        np.array([[1, 1, 1], [0.04, 0.04, 0.04]]), abs=2e-3
-    )  # reflectance at normal incidence
+    head_on = np.array(lobe.k) * np.array(lobe.r0) * textures.specular.texels[0] / share
+    assert head_on == pytest.approx(np.array([[1, 1, 1], [0.04, 0.04, 0.04]]), abs=2e-3)
     smooth = lobe.model_copy(update={"mx": 0.252, "my": 0.252, "r0": (1.0,) * 3})
     for theta_deg in (0, 40, 70, 82):
         wo = np.array([np.sin(np.radians(theta_deg)), 0, np.cos(np.radians(theta_deg))])
         assert MaterialBSDF(Material(lobes=(smooth,))).albedo(wo).max() <= 1.001
-    assert np.array(material.kd) * textures.diffuse.texels[0] == pytest.approx(
-        np.array([[0, 0, 0], [0.96, 0, 0]]), abs=2e-3
-    )
+    diffuse = np.array(material.kd) * textures.diffuse.texels[0]
+    assert diffuse == pytest.approx(np.array([[0, 0, 0], [0.96, 0, 0]]), abs=2e-3)
     assert lobe.mx * textures.roughness.texels[0, :, 0] == pytest.approx([1, (128 / 255) ** 2], abs=2e-3)
     assert any("normal incidence only" in w for w in scene.warnings)
 
@@ -232,7 +212,7 @@ def _texel_at(texture: Any, uv: tuple[float, float]) -> Any:
 
 def test_texture_transforms(tmp_path: Path) -> None:
     """A quarter turn with half the scale shows the lower left quarter of the picture, as the extension's example."""
-    _png(tmp_path / "four.png", [[[10] * 3, [80] * 3], [[160] * 3, [250] * 3]])
+    png(tmp_path / "four.png", [[[10] * 3, [80] * 3], [[160] * 3, [250] * 3]])
     moved = {"offset": [0, 1], "rotation": np.pi / 2, "scale": [0.5, 0.5]}
     reference = {"index": 0, "extensions": {"KHR_texture_transform": moved}}
     look = {"name": "m", "normalTexture": {"index": 0}, "pbrMetallicRoughness": {"baseColorTexture": reference}}
@@ -246,7 +226,7 @@ def test_texture_transforms(tmp_path: Path) -> None:
 
 
 def test_holes_and_what_shines_through(tmp_path: Path) -> None:
-    _png(tmp_path / "leaf.png", [[[0, 255, 0, 255], [0, 255, 0, 0]]])
+    png(tmp_path / "leaf.png", [[[0, 255, 0, 255], [0, 255, 0, 0]]])
     pbr = {"baseColorTexture": {"index": 0}, "metallicFactor": 0}
     look = {"name": "m", "pbrMetallicRoughness": pbr, "alphaMode": "MASK", "alphaCutoff": 0.3}
     textures = loaded(tmp_path, textured(look, ["leaf.png"])).textures["m"]
@@ -262,8 +242,8 @@ def test_holes_and_what_shines_through(tmp_path: Path) -> None:
 
 
 def test_normal_maps_and_the_direction_of_anisotropy(tmp_path: Path) -> None:
-    _png(tmp_path / "normal.png", [[[128, 128, 255], [255, 128, 128]]])
-    _png(tmp_path / "way.png", [[[255, 128, 128], [128, 255, 128]]])
+    png(tmp_path / "normal.png", [[[128, 128, 255], [255, 128, 128]]])
+    png(tmp_path / "way.png", [[[255, 128, 128], [128, 255, 128]]])
     brushed = {"anisotropyStrength": 0.8, "anisotropyRotation": np.pi / 2, "anisotropyTexture": {"index": 1}}
     look = {
         "name": "m", "normalTexture": {"index": 0, "scale": 0.5}, "pbrMetallicRoughness": {"roughnessFactor": 0.3},
@@ -457,7 +437,5 @@ def test_a_compressed_primitive_without_its_numbers_is_said(tmp_path: Path) -> N
 def test_a_picture_on_the_network_is_missing(tmp_path: Path) -> None:
     address = "https://pictures.example/wood.png"
     wood = {"name": "wood", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
-    content = document(materials=[wood], images=[{"uri": address}], textures=[{"source": 0}])
-    content["meshes"][0]["primitives"][0]["material"] = 0
-    scene = loaded(tmp_path, content)
+    scene = loaded(tmp_path, textured(wood, [address]))
     assert any(address in w and "only its factor is used" in w for w in scene.warnings)

@@ -12,8 +12,8 @@ from lambent.core.geometry.sequences import cosine_hemisphere, hammersley
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.scenes.loaders.surfaces.material_builder import masking
-from tests.scenes.loaders.gltf.test_gltf import _png as png
 from tests.scenes.loaders.gltf.test_gltf import loaded, textured
+from tests.scenes.loaders.pictures import png
 
 
 def test_specular_has_a_weight_and_a_colour(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from lambent.core.geometry.directions import normalize
 from lambent.scenes.scene import PointLight
 from tests.scenes.loaders.gltf.test_gltf import TRIANGLE, document, loaded, textured
-from tests.scenes.loaders.gltf.test_gltf import _png as png
+from tests.scenes.loaders.pictures import png
 
 OUTER = {"translation": [1, 2, 3], "rotation": [0.5, -0.1, 0.7, 0.5], "scale": [2, 3, 4]}
 INNER = {"translation": [-4, 1, 0.5], "rotation": [0.2, 0.6, -0.3, 0.8], "scale": [0.5, 0.25, 1.5]}

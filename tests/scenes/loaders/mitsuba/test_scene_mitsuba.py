@@ -16,6 +16,7 @@ from lambent.core.views.camera import camera_axes
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.scenes import load_scene, validate
 from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, ImageEnvironment, PointLight, Scene
+from tests.scenes.loaders.pictures import png
 
 BALL = '<shape type="sphere" id="ball"/>'
 
@@ -33,12 +34,6 @@ def both(folder: Path, body: str, version: str = "3.0.0") -> tuple[Any, Scene]:
 
     path = written(folder, body, version)
     return mi.load_file(str(path)), load_scene(path)
-
-
-def _png(path: Path, texels: Any) -> None:
-    from PIL import Image
-
-    Image.fromarray(np.uint8(texels)).save(path)
 
 
 SHAPES = """
@@ -180,7 +175,7 @@ def test_textures_lie_as_mitsubas(tmp_path: Path) -> None:
     import mitsuba as mi
 
     texels = np.random.default_rng(3).integers(0, 255, (4, 2, 3))
-    _png(tmp_path / "eight.png", texels)
+    png(tmp_path / "eight.png", texels)
     moves = [
         ("", {}),
         ('<transform name="to_uv"><scale x="2" y="3"/><translate x="0.25" y="0.125"/></transform>',
@@ -221,7 +216,7 @@ def test_old_scales_and_a_checkerboard(tmp_path: Path) -> None:
 
 
 def test_sheets_masks_and_what_is_lost(tmp_path: Path) -> None:
-    _png(tmp_path / "leaf.png", [[[0, 255, 0, 255], [0, 0, 0, 0]]])
+    png(tmp_path / "leaf.png", [[[0, 255, 0, 255], [0, 0, 0, 0]]])
     body = """
     <bsdf type="dielectric" id="glass"/><bsdf type="thindielectric" id="pane"/>
     <bsdf type="mask" id="leaf">

@@ -10,8 +10,8 @@ import pytest
 from lambent.materials.document import Material
 from lambent.scenes import load_scene
 from lambent.scenes.scene import SUN_RADIUS_DEG, PointLight, SunSky
-from tests.scenes.loaders.gltf.test_gltf import _png as png
 from tests.scenes.loaders.mitsuba.test_scene_mitsuba import written
+from tests.scenes.loaders.pictures import png
 
 BALL = '<shape type="sphere" id="ball"/>'
 
