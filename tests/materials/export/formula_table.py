@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from lambent.core.geometry.directions import FLIP_Z, Floats
+from lambent.core.geometry.directions import FLIP_Z, Floats, direction, normalize
 from lambent.core.geometry.sequences import cosine_hemisphere
 from lambent.materials.measured.protocol import LeftOut, MeasuredSamples, MeasuredTable, TableInfo
 
@@ -44,3 +44,13 @@ def lopsided(wi: Floats, wo: Floats) -> Floats:
     """Different in x and y, in wi and wo, reflected and transmitted, and from both sides; without any symmetry."""
     f = 0.2 + 0.09 * wi[..., 0] + 0.03 * wi[..., 1] - 0.04 * wo[..., 0] + 0.02 * wo[..., 1]
     return np.asarray(f * (1 + 0.5 * (wi[..., 2] > 0)) * (1 + (wo[..., 2] > 0)))[..., None]
+
+
+def pairs_near_the_mirror(count: int = 4000, lowest: float = 0.18, spread: float = 0.08) -> tuple[Floats, Floats]:
+    """wi, wo (count, 3) above the surface, cosines from `lowest`; half of the pairs are near the mirror direction."""
+    rng = np.random.default_rng(1)
+    wi, wo = (direction(np.arccos(rng.uniform(lowest, 1, count)), rng.uniform(0, 2 * np.pi, count)) for _ in range(2))
+    near = count // 2
+    wi[:near] = wo[:near] * [-1, -1, 1] + rng.normal(0, spread, (near, 3))
+    wi[:, 2] = np.maximum(wi[:, 2], lowest)
+    return normalize(wi), wo

@@ -26,6 +26,7 @@ from lambent.materials.fitting import factors
 from lambent.materials.measured.merl import SCALES, MerlTable, bin_centres, directions_of
 from lambent.materials.models import model_named, models
 from lambent.materials.models.model import Model
+from tests.materials.export.formula_table import pairs_near_the_mirror
 
 
 def test_a_diffuse_surface_has_its_colour() -> None:
@@ -242,13 +243,9 @@ VALUES = {
 }
 
 
-def pairs(across: bool = False, count: int = 4000) -> tuple[np.ndarray, np.ndarray]:
-    rng = np.random.default_rng(1)
-    wi, wo = (direction(np.arccos(rng.uniform(0.03, 1, count)), rng.uniform(0, 2 * np.pi, count)) for _ in range(2))
-    near = count // 2  # half of the pairs near the mirror direction
-    wi[:near] = wo[:near] * [-1, -1, 1] + rng.normal(0, 0.1, (near, 3))
-    wi[:, 2] = np.maximum(wi[:, 2], 0.03) * (-1 if across else 1)
-    return wi / np.linalg.norm(wi, axis=1, keepdims=True), wo
+def pairs(across: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    wi, wo = pairs_near_the_mirror(lowest=0.03, spread=0.1)
+    return wi * (1, 1, -1 if across else 1), wo
 
 
 @pytest.mark.parametrize("name", models())

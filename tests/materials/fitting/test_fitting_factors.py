@@ -17,6 +17,7 @@ from lambent.materials.fresnel import conductor
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.models import model_named
 from tests.materials.export.formula_table import Formula, FormulaTable
+from tests.materials.export.formula_table import pairs_near_the_mirror as pairs
 
 DEG = np.pi / 180
 
@@ -42,16 +43,6 @@ def diffuse_and_highlight(wi: Floats, wo: Floats) -> Floats:
     diffuse = 0.2 * np.cos(a["theta_i"]) ** 0.5 * (1 - 0.3 * np.sin(a["theta_o"]) ** 2)
     highlight = 4 * np.exp(-((a["theta_h"] / 0.2) ** 2)) * (0.1 + 0.9 * np.sin(a["theta_d"]) ** 4)
     return np.stack([diffuse + highlight, 0.5 * diffuse + highlight, 0 * diffuse], axis=-1)
-
-
-def pairs(count: int = 4000) -> tuple[Floats, Floats]:
-    """Half of them near the mirror direction, all within 80 degrees of the normal."""
-    rng = np.random.default_rng(1)
-    wi, wo = (direction(np.arccos(rng.uniform(0.18, 1, count)), rng.uniform(0, 2 * np.pi, count)) for _ in range(2))
-    near = count // 2
-    wi[:near] = wo[:near] * [-1, -1, 1] + rng.normal(0, 0.08, (near, 3))
-    wi[:, 2] = np.maximum(wi[:, 2], 0.18)
-    return wi / np.linalg.norm(wi, axis=1, keepdims=True), wo
 
 
 def table_of(formula: Formula, channels: int = 3, **options: bool) -> FormulaTable:

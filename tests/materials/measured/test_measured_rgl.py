@@ -163,11 +163,6 @@ def test_weights_fill_the_hemisphere_whatever_the_warp(loaded: Loaded) -> None:
     assert total == pytest.approx(np.pi * np.sin(np.radians(84)) ** 2, rel=0.02)
 
 
-OF_PHI_I = {  # nodes of phi_i, and the factor at each; the ends of a period are one direction
-    "isotropic": (np.zeros(1), np.ones(1)),
-    "half": (np.linspace(-np.pi, 0, 4), np.array([1.0, 0.4, 0.7, 1.0])),
-    "whole": (np.linspace(-np.pi, np.pi, 6), np.array([1.0, 0.4, 0.7, 0.2, 0.5, 1.0])),
-}
 OF_PHI_M = np.array([0.9, 0.3, 0.6, 0.8, 0.9, 0.3, 0.6, 0.8, 0.9])  # at phi_m = -pi to pi; half a turn changes nothing
 
 
@@ -182,47 +177,35 @@ def mirrored_at(m: np.ndarray, wi: np.ndarray) -> np.ndarray:
     return 2 * (wi * m).sum(axis=1, keepdims=True) * m - wi
 
 
-@pytest.mark.parametrize("kind", OF_PHI_I)
-def test_round_a_whole_turn(tmp_path: Path, kind: str) -> None:
-    """Light and half vector turn round independently, through every seam; every value is interpolated by hand."""
-    nodes, factors = OF_PHI_I[kind]
-    path = tmp_path / "a.bsdf"
-    path.write_bytes(file_bytes(nodes, factors))
-    phi_i, phi_m = (grid.ravel() for grid in np.meshgrid(np.linspace(-3.5, 3.5, 141), np.linspace(-3.3, 3.3, 67)))
-    wi = direction(np.full(len(phi_i), 0.3), phi_i)
-    wo = mirrored_at(direction(np.full(len(phi_m), 0.2), phi_m), wi)
-    turn = {"isotropic": 2 * np.pi, "half": np.pi, "whole": 2 * np.pi}[kind]
-    turned = phi_i if kind == "isotropic" else 0.0
-    at_i = np.interp((phi_i + np.pi) % turn - np.pi, nodes, factors)
-    at_m = np.interp((phi_m - turned + np.pi) % (2 * np.pi), np.linspace(0, 2 * np.pi, 9), OF_PHI_M)
-    found = load(path).eval(wi, wo) * wo[:, 2:] * 4
-    np.testing.assert_allclose(found, np.repeat((at_i * at_m)[:, None], 3, axis=1), atol=2e-5)
-
-
-OPEN = {  # nodes without the closing one; factors at them and at their images
+TURNS = {  # nodes of phi_i, and the period of f over it
+    "isotropic": (np.zeros(1), 2 * np.pi),
+    "whole, closed": (np.linspace(-np.pi, np.pi, 6), 2 * np.pi),
     "whole": (np.radians(np.arange(-180, 180, 45.0)), 2 * np.pi),
     "whole from 0": (np.radians(np.arange(0, 360, 30.0)), 2 * np.pi),
+    "half, closed": (np.linspace(-np.pi, 0, 4), np.pi),
     "half": (np.radians(np.arange(-180, 0, 30.0)), np.pi),
     "half from 0": (np.radians(np.arange(0, 180, 22.5)), np.pi),
     "half, uneven": (np.radians([-180.0, -150.0, -130.0, -100.0, -60.0, -30.0]), np.pi),
 }
 
 
-@pytest.mark.parametrize("kind", OPEN)
-def test_the_closing_node_may_be_left_out(tmp_path: Path, kind: str) -> None:
-    """f goes from the last node to the image of the first in a straight line, as with the node it does."""
-    nodes, period = OPEN[kind]
+@pytest.mark.parametrize("kind", TURNS)
+def test_round_a_whole_turn(tmp_path: Path, kind: str) -> None:
+    """Light and half vector turn round through every seam, with and without the closing node."""
+    nodes, period = TURNS[kind]
     factors = np.linspace(0.2, 1.0, len(nodes))
+    factors[-1] = factors[0] if "closed" in kind else factors[-1]
     path = tmp_path / "a.bsdf"
     path.write_bytes(file_bytes(nodes, factors))
-    phi_i = np.linspace(-3.5, 6.5, 401)
-    wi, m = direction(np.full(401, 0.5), phi_i), direction(np.full(401, 0.2), np.full(401, 1.1))
-    wo = mirrored_at(m, wi)
+    phi_i, phi_m = (grid.ravel() for grid in np.meshgrid(np.linspace(-3.5, 6.5, 201), np.linspace(-3.3, 3.3, 67)))
+    wi = direction(np.full(len(phi_i), 0.3), phi_i)
+    wo = mirrored_at(direction(np.full(len(phi_m), 0.2), phi_m), wi)
     closed = np.append(nodes, nodes[0] + period), np.append(factors, factors[0])
     at_i = np.interp((phi_i - nodes[0]) % period + nodes[0], *closed)
-    at_m = np.interp(1.1 + np.pi, np.linspace(0, 2 * np.pi, 9), OF_PHI_M)
-    found = load(path).eval(wi, wo)[:, 0] * wo[:, 2] * 4
-    np.testing.assert_allclose(found, at_i * at_m, atol=1e-4)
+    turned = phi_i if kind == "isotropic" else 0.0
+    at_m = np.interp((phi_m - turned + np.pi) % (2 * np.pi), np.linspace(0, 2 * np.pi, 9), OF_PHI_M)
+    found = load(path).eval(wi, wo) * wo[:, 2:] * 4
+    np.testing.assert_allclose(found, np.repeat((at_i * at_m)[:, None], 3, axis=1), atol=1e-4)
 
 
 @pytest.mark.parametrize("begin", [-180, -90, 0, 90, 270])
