@@ -18,7 +18,7 @@ from lambent.realtime.integrators import patterns
 from lambent.realtime.integrators.albedo import TABLE_ROWS, albedo_table, normalised_rings_table
 
 # Kinds of MIP levels: smooth_chain or mip_chain of cube_mips.py, or prefiltered by roughness. Integrators from
-# publications keep the published kind. `cleaned` is an array of smooth cube maps without lamps (lamps.py).
+# publications keep the published kind. `cleaned` is an array of smooth cube maps without lamps (probe_lamps.py).
 Cube = Literal["smooth", "box", "prefiltered", "cleaned"]
 
 

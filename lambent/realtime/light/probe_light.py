@@ -18,7 +18,7 @@ from lambent.realtime.incident import LookUp, look_up_of
 from lambent.realtime.integrators.integrators import Cube
 from lambent.realtime.integrators.prefilter import prefiltered_cube
 from lambent.realtime.light.baked import DARK, Probe
-from lambent.realtime.light.lamps import ProbeLamps
+from lambent.realtime.light.probe_lamps import ProbeLamps
 from lambent.realtime.light_fields.resident_maps import ResidentMaps
 
 

@@ -1,5 +1,5 @@
 // `lamps`: like rings.wgsl, but the probe's small lamps are taken out of the cube map, and each is evaluated under the
-// lobe in closed form (lamp_light.wgsl). lamps.py describes the table.
+// lobe in closed form (lamp_light.wgsl). probe_lamps.py describes the table.
 
 #include "surface.wgsl"
 #include "albedo_factor.wgsl"
@@ -15,7 +15,7 @@ const LAMP_ROWS = 4u;
 const FIRST_OUT = 0.47;
 const LAST_OUT = 0.54;
 
-// Number of groups taken out of the cube map for a lobe; a fraction is the share of the last group (lamps.py).
+// Number of groups taken out of the cube map for a lobe; a fraction is the share of the last group (probe_lamps.py).
 fn groups_out(lobe: LambentLobe) -> f32 {
     let share = smoothstep(vec4f(FIRST_OUT), vec4f(LAST_OUT), sqrt(lobe.mx * lobe.my) / lamps[0]);
     return dot(share, vec4f(1.0));

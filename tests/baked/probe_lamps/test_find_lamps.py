@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.baked.lamps.lamps import MOST, find_lamps, neighbours, texel_at
+from lambent.baked.probe_lamps.find import MOST, find_lamps, neighbours, texel_at
 from lambent.core.geometry.cubemap import face_directions, texel_solid_angles
 from lambent.core.geometry.directions import normalize
 

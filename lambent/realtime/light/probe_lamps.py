@@ -22,7 +22,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.baked.lamps.lamps import MOST, Lamp, corners, find_lamps, moments
+from lambent.baked.probe_lamps.find import MOST, Lamp, corners, find_lamps, moments
 from lambent.core.arrays import Floats
 from lambent.core.geometry.cubemap import texel_solid_angles
 from lambent.core.geometry.directions import normalize

@@ -15,7 +15,7 @@ from lambent.materials.document import Lobe
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.shader_source import assemble
 from lambent.realtime.incident import look_ups
-from lambent.realtime.light.lamps import HEAD_ROWS, LAMP_ROWS, ProbeLamps, groups_out
+from lambent.realtime.light.probe_lamps import HEAD_ROWS, LAMP_ROWS, ProbeLamps, groups_out
 from lambent.realtime.objects.draws import draws_of
 from lambent.realtime.objects.unbaked import unbaked_scene
 from lambent.realtime.renderer import Renderer
