@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from functools import reduce
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,17 +12,13 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from lambent.editing.curves.half_table import looked_up
-from lambent.editing.curves.operators import (
-    STEEPEST,
-    Kind,
-    Operator,
-    Region,
-    layered,
-    room_for,
-    smooth_step,
-    translation,
-)  # fmt: skip
+from lambent.editing.curves.operators import STEEPEST, Kind, Operator, Region, room_for, smooth_step, translation
 from lambent.materials.factored.curve import Curve, angles_rad
+
+
+def layered(curve: Curve, operators: Iterable[Operator]) -> Curve:
+    return reduce(lambda before, operator: operator.applied(before), operators, curve)
+
 
 REGION = Region(a=0.3, b=0.5, c=0.7, d=1.0)
 HUMP = Curve.of(lambda x: 1 + np.exp(-(((x - 0.6) / 0.1) ** 2)))

@@ -11,7 +11,7 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.views.camera import Camera
-from lambent.editing.curves.operators import Operator, Region, layered, translation
+from lambent.editing.curves.operators import Operator, Region, translation
 from lambent.editing.session.document import Drawn, Surroundings
 from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material
@@ -19,6 +19,7 @@ from lambent.materials.factored.curve import Curve, angles_rad
 from lambent.materials.factored.of_models import editable
 from lambent.materials.models import model_named
 from lambent.scenes.scene import ImageEnvironment
+from tests.editing.test_operators import layered
 
 CAMERA = Camera("view", (0.0, 1.0, 3.0), (0.0, 0.0, 0.0))
 TRAY = Material(name="tray", kd=(0.3, 0.2, 0.1), lobes=(Lobe(mx=0.1, my=0.1),))

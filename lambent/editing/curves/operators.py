@@ -7,7 +7,6 @@ operators in x move the regions of the others.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Annotated, Literal
 
 import numpy as np
@@ -89,13 +88,6 @@ class Operator(Strict):
             edited = curve.at(np.clip(self.source(x), 0.0, END_RAD))
         chosen = np.isin(range(3), self.channels) & (weight > 0)
         return Curve(np.where(chosen, np.maximum(edited, 0.0), curve.values))
-
-
-def layered(curve: Curve, operators: Iterable[Operator]) -> Curve:
-    """The curve after all operators, in order."""
-    for operator in operators:
-        curve = operator.applied(curve)
-    return curve
 
 
 def translation(region: Region, x: float, y: float, channels: tuple[Literal[0, 1, 2], ...]) -> tuple[Operator, ...]:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from lambent.core.ceilings import TRIANGLES
 from lambent.core.errors import UserError
@@ -26,6 +27,7 @@ from lambent.scenes.loaders.surfaces.material_builder import masking
 from lambent.scenes.scene import DirectionalLight, PointLight, Scene
 from tests.scenes.loaders.pictures import png
 
+TURNS = [0.2, 0.6, -0.3, 0.8], [0.5, -0.1, 0.7, 0.5]
 TRIANGLE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], np.float32)
 
 
@@ -125,6 +127,7 @@ def test_materials(tmp_path: Path) -> None:
 
 
 def test_lights_and_cameras(tmp_path: Path) -> None:
+    """Spots and cameras look along their node's -z; the camera's up is its y. A cone has half angles."""
     half = np.sqrt(0.5)  # a quarter turn about x: -z becomes... -y is looked at with -90 degrees
     down = [-half, 0, 0, half]
     lights = [
@@ -136,8 +139,8 @@ def test_lights_and_cameras(tmp_path: Path) -> None:
         nodes=[
             {"mesh": 0, "name": "thing"},
             {"rotation": down, "extensions": {"KHR_lights_punctual": {"light": 0}}},
-            {"rotation": down, "translation": [0, 3, 0], "extensions": {"KHR_lights_punctual": {"light": 1}}},
-            {"camera": 0, "translation": [0, 1, 5], "name": "view"},
+            {"rotation": TURNS[0], "translation": [0, 3, 0], "extensions": {"KHR_lights_punctual": {"light": 1}}},
+            {"camera": 0, "rotation": TURNS[1], "translation": [0, 1, 5], "name": "view"},
         ],
         scenes=[{"nodes": [0, 1, 2, 3]}],
         cameras=[{"type": "perspective", "perspective": {"yfov": np.radians(40), "znear": 0.1}}],
@@ -151,10 +154,15 @@ def test_lights_and_cameras(tmp_path: Path) -> None:
         np.array(sun.irradiance), ILLUMINANCE
     ) == pytest.approx(1000)
     assert spot.intensity == pytest.approx((2, 1, 0.5)) and spot.position == (0, 3, 0)
-    assert spot.direction == pytest.approx((0, -1, 0)) and spot.outer_deg == pytest.approx(np.degrees(0.5))
+    turn, other = (Rotation.from_quat(turn).as_matrix() for turn in TURNS)
+    assert spot.direction == pytest.approx(-turn[:, 2])
+    assert (spot.inner_deg, spot.outer_deg) == pytest.approx((np.degrees(0.1), np.degrees(0.5)))
     assert [c.name for c in scene.cameras] == ["view"]
-    assert scene.cameras[0].position == (0, 1, 5) and scene.cameras[0].target == pytest.approx((0, 1, 4))
-    assert scene.cameras[0].fov_y_deg == pytest.approx(40)
+    (camera,) = scene.cameras
+    assert camera.position == (0, 1, 5) and camera.fov_y_deg == pytest.approx(40)
+    assert np.subtract(camera.target, camera.position) == pytest.approx(-other[:, 2]) and camera.up == pytest.approx(
+        other[:, 1]
+    )
 
 
 def textured(material: dict[str, Any], images: list[str], **more: Any) -> dict[str, Any]:
@@ -242,7 +250,7 @@ def test_holes_and_what_shines_through(tmp_path: Path) -> None:
 
 
 def test_normal_maps_and_the_direction_of_anisotropy(tmp_path: Path) -> None:
-    png(tmp_path / "normal.png", [[[128, 128, 255], [255, 128, 128]]])
+    png(tmp_path / "normal.png", [[[128, 128, 255], [178, 102, 230]]])
     png(tmp_path / "way.png", [[[255, 128, 128], [128, 255, 128]]])
     brushed = {"anisotropyStrength": 0.8, "anisotropyRotation": np.pi / 2, "anisotropyTexture": {"index": 1}}
     look = {
@@ -252,7 +260,8 @@ def test_normal_maps_and_the_direction_of_anisotropy(tmp_path: Path) -> None:
     scene = loaded(tmp_path, textured(look, ["normal.png", "way.png"]))
     textures = scene.textures["m"]
     assert textures.normal is not None and textures.direction is not None
-    assert np.allclose(textures.normal.texels, [[(0, 0, 1), (1, 0, 0)]], atol=0.02)
+    leaning = (np.array([178, 102, 230]) / 255 * 2 - 1) * (0.5, 0.5, 1)  # scaled across alone
+    assert np.allclose(textures.normal.texels, [[(0, 0, 1), leaning / np.linalg.norm(leaning)]], atol=5e-3)
     assert np.allclose(textures.direction.texels, [[(0, 1), (-1, 0)]], atol=0.02)  # turned by a right angle
     assert validate(scene) == []
     mirrored = replace(scene.objects[0], mesh=replace(scene.objects[0].mesh, uv=scene.objects[0].mesh.uv * (-1, 1)))

@@ -1,4 +1,4 @@
-"""glTF's nodes and primitives: transforms that nest, cameras and spots that turn, strips, fans, second uv sets."""
+"""glTF's nodes and primitives: transforms that nest, strips, fans, second uv sets."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from lambent.core.geometry.directions import normalize
-from lambent.scenes.scene import PointLight
-from tests.scenes.loaders.gltf.test_gltf import TRIANGLE, document, loaded, textured
+from tests.scenes.loaders.gltf.test_gltf import TRIANGLE, TURNS, document, loaded, textured
 from tests.scenes.loaders.pictures import png
 
-OUTER = {"translation": [1, 2, 3], "rotation": [0.5, -0.1, 0.7, 0.5], "scale": [2, 3, 4]}
-INNER = {"translation": [-4, 1, 0.5], "rotation": [0.2, 0.6, -0.3, 0.8], "scale": [0.5, 0.25, 1.5]}
+OUTER = {"translation": [1, 2, 3], "rotation": TURNS[1], "scale": [2, 3, 4]}
+INNER = {"translation": [-4, 1, 0.5], "rotation": TURNS[0], "scale": [0.5, 0.25, 1.5]}
 
 
 def placed(points: np.ndarray, node: dict[str, Any]) -> np.ndarray:
@@ -48,29 +47,6 @@ def test_a_matrix_is_stored_by_columns(tmp_path: Path) -> None:
     positions = scene.object("thing").mesh.positions
     for point in ((7, 8, 9), (7, 8, 7), (7, 11, 9)):
         assert np.linalg.norm(positions - point, axis=1).min() < 1e-6
-
-
-def test_cameras_and_spots_turn_with_their_nodes(tmp_path: Path) -> None:
-    """Both look along the node's -z; the camera's up is its y. The half angles of a spot are its cones'."""
-    spot = {"type": "spot", "intensity": 1, "spot": {"innerConeAngle": 0.2, "outerConeAngle": 0.6}}
-    content = document(
-        nodes=[
-            {"mesh": 0},
-            {"camera": 0, "name": "view", "translation": [1, 2, 3], "rotation": OUTER["rotation"]},
-            {"rotation": INNER["rotation"], "extensions": {"KHR_lights_punctual": {"light": 0}}},
-        ],
-        scenes=[{"nodes": [0, 1, 2]}],
-        cameras=[{"type": "perspective", "perspective": {"yfov": 0.8, "znear": 0.1}}],
-        extensions={"KHR_lights_punctual": {"lights": [spot]}},
-    )  # fmt: skip
-    scene = loaded(tmp_path, content)
-    turn, other = (Rotation.from_quat(node["rotation"]).as_matrix() for node in (OUTER, INNER))
-    camera, lamp = scene.cameras[0], scene.lights[0]
-    np.testing.assert_allclose(normalize(np.subtract(camera.target, camera.position)), -turn[:, 2], atol=1e-6)
-    np.testing.assert_allclose(camera.up, turn[:, 1], atol=1e-6)
-    assert isinstance(lamp, PointLight) and lamp.direction is not None
-    np.testing.assert_allclose(lamp.direction, -other[:, 2], atol=1e-6)
-    assert (lamp.inner_deg, lamp.outer_deg) == pytest.approx((np.degrees(0.2), np.degrees(0.6)))
 
 
 @pytest.mark.parametrize(
@@ -114,15 +90,6 @@ def test_the_uv_set_that_a_texture_names(tmp_path: Path) -> None:
     mesh = loaded(tmp_path, content).object("thing").mesh
     order = [int(np.argmin(np.linalg.norm(mesh.positions - point, axis=1))) for point in TRIANGLE]
     np.testing.assert_allclose(mesh.uv[order], second * (1, -1) + (0, 1), atol=1e-6)
-
-
-def test_normal_maps_are_scaled_across_alone(tmp_path: Path) -> None:
-    png(tmp_path / "lean.png", np.full((1, 1, 3), (178, 102, 230)))
-    look = {"name": "m", "normalTexture": {"index": 0, "scale": 0.5}}
-    texture = loaded(tmp_path, textured(look, ["lean.png"])).textures["m"].normal
-    n = (np.array([178, 102, 230]) / 255 * 2 - 1) * (0.5, 0.5, 1)
-    assert texture is not None
-    np.testing.assert_allclose(texture.texels[0, 0], n / np.linalg.norm(n), atol=1e-3)
 
 
 def test_a_coats_roughness_is_squared_as_the_bases(tmp_path: Path) -> None:
