@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,7 +67,7 @@ class LampPoints:
     def detail(self) -> Floats:
         """(n,) what texels cannot show of each lamp: its deviation within them, lm/m^2, times their area, summed."""
         area = self._texels.area_m2[self._mine]
-        found = (luminance(self._of(lamp).mean(axis=2)).std(axis=1) for lamp in range(self._lamps.count))
+        found = (luminance(self._of(lamp, 1)[:, :, 0]).std(axis=1) for lamp in range(self._lamps.count))
         return np.array([one @ area for one in found])
 
     def light(self, groups: Sequence[int], count: int, drawn: Sequence[int]) -> LampLight:
@@ -100,34 +100,50 @@ class LampPoints:
         found: Flags = (near[..., 0] > 0) | ~self.known
         return found.astype(np.uint64)
 
-    def _of(self, lamp: int) -> Floats:
-        """(K, POINTS, n, 3) irradiance of a lamp at the points: by each point of its opening, or its one point."""
-        number = dr.opaque(mi.UInt32, lamp)
-        places = self._places(OF_OPENING) if self._lamps.is_sized(lamp) else [mi.Point2f(0.5)]
-        found = [array_of(self._lamps.of(number, self._at, u, mi.Bool(True))) for u in places]
-        return np.stack([one.reshape(len(self._mine), POINTS, 3).clip(0, None) for one in found], axis=2)
+    def _of(self, lamp: int, count: int = OF_OPENING) -> Floats:
+        """(K, POINTS, n, 3) irradiance of a lamp at the points: by `count` points of its opening, or its one point."""
+        number, (first, x, y) = dr.opaque(mi.UInt32, lamp), self._points(count)
+        found = []
+        for k in range(count if self._lamps.is_sized(lamp) else 1):
+            at = first + dr.opaque(mi.UInt32, POINTS * k)
+            u = mi.Point2f(dr.gather(mi.Float, x, at), dr.gather(mi.Float, y, at))
+            light = array_of(self._lamps.of(number, self._at, u, mi.Bool(True)))
+            found.append(light.reshape(len(self._mine), POINTS, 3).clip(0, None))
+        return np.stack(found, axis=2)
 
     def _near_field(self, lamp: int) -> Floats:
         """(H, W, 1) light of all the opening of a lamp over its light as drawn, without shadows; 1 where it is dark."""
-        number, sums = dr.opaque(mi.UInt32, lamp), np.zeros((2, len(self._mine)))
-        for u in self._places(NEAR_FIELD):
-            both = self._lamps.unshadowed(number, self._at, u, mi.Bool(True))
-            sums += [luminance(array_of(one)).reshape(-1, POINTS).sum(axis=1) for one in both]
-        ratio = np.divide(sums[1], sums[0], out=np.ones(len(self._mine)), where=sums[0] > 0)
+        both = _unshadowed(self._lamps, dr.opaque(mi.UInt32, lamp), self._at, *self._points(NEAR_FIELD), NEAR_FIELD)
+        drawn, whole = (np.array(dr.block_sum(mi.luminance(light), POINTS)) for light in both)
+        ratio = np.divide(whole, drawn, out=np.ones_like(drawn), where=drawn > 0)
         of_map = np.ones((*self._labels.shape, 1), np.float32)
         of_map.reshape(-1)[self._texels.index[self._mine]] = ratio.clip(0, MOST_NEAR)
         return of_map
 
-    def _places(self, count: int) -> Iterator[Any]:
-        """Stratified samples (mi.Point2f) of openings, `count` from each of a texel's points; the same for all texels.
+    def _points(self, count: int) -> tuple[Any, Any, Any]:
+        """The first of `count` samples of openings for each of the points, and coordinates (mi.Float) of all.
 
-        What they miss of a shadow, all light and the drawn light miss alike.
+        They are stratified within a texel, and the same for all texels. What they miss of a shadow, all light and the
+        drawn light miss alike.
         """
-        point = dr.arange(mi.UInt32, len(self._mine) * POINTS) % POINTS
         x, y = (mi.Float(part) for part in hammersley(POINTS * count).T.astype(np.float32))
-        for k in range(count):
-            at = point + dr.opaque(mi.UInt32, POINTS * k)
-            yield mi.Point2f(dr.gather(mi.Float, x, at), dr.gather(mi.Float, y, at))
+        return dr.arange(mi.UInt32, len(self._mine) * POINTS) % POINTS, x, y
+
+
+@dr.syntax
+def _unshadowed(lamps, lamp, at, point, x, y, count):  # type: ignore[no-untyped-def]
+    """Sums (mi.Color3f) of `count` samples of `LampRays.unshadowed`."""
+    width = dr.width(at.p)
+    drawn, whole = dr.zeros(mi.Color3f, width), dr.zeros(mi.Color3f, width)
+    end = point + dr.opaque(mi.UInt32, POINTS * count)
+    point = mi.UInt32(point)
+    while point < end:
+        u = mi.Point2f(dr.gather(mi.Float, x, point), dr.gather(mi.Float, y, point))
+        one, other = lamps.unshadowed(lamp, at, u, mi.Bool(True))
+        drawn += one
+        whole += other
+        point += POINTS
+    return drawn, whole
 
 
 def _dark(light: Floats) -> Floats:

@@ -32,7 +32,6 @@ from lambent.scenes.scene import (
     ComputedEnvironment,
     ConstantEnvironment,
     DirectionalLight,
-    IesLight,
     ImageEnvironment,
     LightFieldWish,
     LightGroup,
@@ -95,10 +94,7 @@ OBJECT: Answers = {
     "material": ("worn", LOOK),
     "emission": ((0.0, 0.0, 0.1), LIGHTS),
     "light_map_scale": (0.5, SURFACES),
-    "luminaire": (
-        IesLight((0.0, 2.0, 0.0), Photometry((0.0, 90.0), (0.0, 360.0), ((1.0, 0.0),) * 2), (1.0, 1.0, 1.0)),
-        LIGHTS,
-    ),
+    "luminaire": (0, LIGHTS),
 }
 MATERIAL: Answers = {
     "name": ("renamed", NOTHING),
