@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.errors import UserError
 from lambent.core.geometry.directions import angles, direction, half_vector
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.measured import load
@@ -56,21 +55,6 @@ def test_bad_samples_are_counted(loaded: Loaded) -> None:
     assert (len(samples), samples.left_out.shadowed) == (len(rows) - 1, 1)
     assert (samples.f[[3, 4], 1] < 0.1).all()  # their green reading is below zero
     np.testing.assert_allclose(np.delete(samples.f, [3, 4], axis=0), 0.2, rtol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        (lambda text: text[:-12], "wrong number"),
-        (lambda text: text.replace("0.2", "spam", 1), "not a number"),
-        (lambda text: text.replace("\n5\n", "\n500\n"), "wavelengths are missing"),
-        (lambda text: "\n".join(text.split("\n")[:3]), "wrong number"),
-        (lambda text: text.replace(" 0.2 0.2 0.2 0.2 0.2", " -1 nan -1 -1 -1"), "no measured value"),
-    ],
-)
-def test_broken_files(loaded: Loaded, change, expected: str) -> None:
-    with pytest.raises(UserError, match=expected):
-        loaded(change(cornell_text(cornell_rows(), np.linspace(400, 700, 5))))
 
 
 def sheen(wi, wo):
@@ -210,29 +194,6 @@ def test_bivariate_tables_hold_at_every_azimuth(loaded: Loaded) -> None:
         )  # no look-up is above its neighbours
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("#DIM 1 3\n#PARAM_IN COS_TH\n#PARAM_OUT RGB_COLOR\n0.9 .1 .2 .3\n", "slice.*COS_TH.*half vector alone"),
-        ("#DIM 1 1\n#PARAM_IN COS_TLR\n#PARAM_OUT INV_STERADIAN\n0.9 .1\n", "slice.*mirrored view alone"),
-        ("#DIM 1 1\n0.5 2.5\n", "curve over one variable"),
-        ("#PARAM_IN UNKNOWN_PARAMETRIZATION \n#DIM 1 1 \n#VS 2 \n 0.1 1 .5 1.5\n", "curve over one variable"),
-        ("#ALTA FUNC HEADER\n#DIM 3 3\n#PARAM_IN COS_TH\n#ALTA HEADER END\n\n#FUNC lafortune\n1 2\n", "fitted by ALTA"),
-        ("#DIM 3 1\n#PARAM_OUT RGB_COLOR\n0 0 0 1\n", "PARAM_IN: is unknown; found nothing.*STARK_3D"),
-        ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TP_PD\n#PARAM_OUT RGB_COLOR\n0 0 0 1\n", "did you mean 'RUSIN_TH_TD_PD'"),
-        ("#DIM 4 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n0 0 0 0 1\n", "#DIM: .*expected 3 for"),
-        ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n0 0 0 1\n", "PARAM_OUT: quantity.*is not stated.*INV_STERADIAN"),
-        ("#DIM 3 7\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n" + "0 " * 10, "wavelengths"),
-        ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n0 0 0 1 2\n", "wrong number of columns"),
-        ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n30 20 90 1\n", "more than a turn.*radians"),
-        ("#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#PARAM_OUT INV_STERADIAN\n1.5 1.5 3 1\n", "above the horizon"),
-    ],
-)  # fmt: skip
-def test_refusals_say_what_the_file_is(loaded: Loaded, text: str, said: str) -> None:
-    with pytest.raises(UserError, match=said):
-        loaded(text)
-
-
 # of linear Rec. 709 (IEC 61966-2-1)
 D65_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 GRID = np.array(
@@ -332,45 +293,3 @@ def test_scattered_incident_directions(loaded: Loaded, hemisphere: Callable[...,
     np.testing.assert_allclose(table.eval(wi, wo), MaterialBSDF(GLOSSY).eval(wi, wo), rtol=1e-4)
     assert table.info.format == "ASTM E1392" and len(table.samples()) == 300
     assert all(any(word in note for note in table.info.notes) for word in ("isotropic", "radians"))
-
-
-def test_another_encoding_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "a"
-    path.write_text(table_text("theta_in phi_in theta_out phi_out brdf", np.ones((5, 5))), encoding="utf-16")
-    with pytest.raises(UserError, match=r"is UTF-16.*save it again as UTF-8"):
-        load(path)
-
-
-ROWS = "0 0 0 0 1\n0 0 20 0 1\n0 0 20 90 1\n"
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        (ROWS, "is columns without names.*theta_i phi_i theta_o phi_o, then f"),
-        (
-            "theta_in phi_in theta_out phi_out value\n" + ROWS,
-            "quantity of the value columns is not stated; found value",
-        ),
-        ("theta_in phi_in theta_out phi_out r g b\n0 0 0 0 1 1 1\n", "quantity of the value columns is not stated"),
-        ("theta_in phi_in theta_out phi_out a b\n0 0 0 0 1 1\n", "unknown value columns"),
-        ("theta_in phi_in theta_out phi_out brdf\n", "no rows"),
-        ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 1\n0 0 0\n", "one value per column name"),
-        ("theta_in;phi_in;theta_out;phi_out;brdf\n0,5;0;0;0;0,25\n", "decimal commas"),
-        ("0,5;0,0;0,0;0,0;0,25\n0,5;0,0;9,0;0,0;0,25\n", "decimal commas"),
-        ("theta_in theta_inc theta_out brdf\n0 0 0 1\n", "same angle"),
-        ("theta_in phi_in theta_out phi_out brdf\n99 0 0 0 1\n", "outside its range"),
-        ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 nan\n", "no measured value"),
-        ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 1\n0 0 1.2 3.1 1\n", r"seem to be radians.*add \(rad\)"),
-        ("theta_i phi_i theta_o phi_o p\n0 0 200 0 1\n", "outside its range"),
-        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 -3\n", "no measured value"),
-        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 1\n20 40 0 0 1\n", "do not form a grid"),
-        ("# symmetry: isotropc\ntheta_i phi_i theta_o phi_o p\n0 0 0 0 1\n", "did you mean 'isotropic'"),
-        ("# symmetry: quadrant\ntheta_i phi_i theta_o phi_o p\n0 0 0 0 1\n0 100 0 0 1\n", "more than the symmetry"),
-        ("NUM_POINTS 5\nVARS theta_i,phi_i,theta_s,phi_s,BRDF\n0,0,0,0,1\n", "NUM_POINTS: wrong number of tuples"),
-        ("VARS theta_i,phi_i,theta_s,phi_s\n0,0,0,0\n", "unknown value columns; found none"),
-    ],
-)
-def test_refused_columns(loaded: Loaded, text: str, expected: str) -> None:
-    with pytest.raises(UserError, match=expected):
-        loaded(text)

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.errors import UserError
 from lambent.core.geometry.directions import direction
 from lambent.core.light.colour import RGB_TO_XYZ
 from lambent.materials.measured import load
@@ -98,36 +97,6 @@ def test_crlf_commas_in_comments_and_capitals(loaded: Loaded) -> None:
     at_nodes(loaded("\ufeff".encode().decode("latin-1") + text.replace("\n", "\r\n")))
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("Luminance Absolute", "Radiance", "TypeData: quantity of the values is not stated; found radiance"),
-        ("TypeColorModel BW", "TypeColorModel RGB", "channels do not match.*found bw"),
-        ("theta 9", "theta 8", "theta: count differs"),
-        ("sigma 4\n 0 30 60 90", "sigma 4\n 0 30 60 91", "sigma: is not a list of angles"),
-        (" kbdf\n  0.8", " kbdf\n ", "bw kbdf: wrong number of values; found 3; expected 1 x 4"),
-        (" enddef", " 1 enddef", "bw def: wrong number of values"),
-        (" def", " 1,5 def", "not a number; found 1,5"),
-        ("phi 8", "psi 8", "is missing|is not a list"),
-    ],
-)
-def test_refusals(loaded: Loaded, old: str, new: str, said: str) -> None:
-    assert old in ddr()
-    with pytest.raises(UserError, match=said):
-        loaded(ddr().replace(old, new, 1))
-
-
-def test_relative_values_need_their_share(loaded: Loaded) -> None:
-    with pytest.raises(UserError, match="kbdf: is relative"):
-        loaded(ddr(kind="Luminance Relative", kbdf=None))
-
-
-def test_specular_tables_are_refused_as_such(loaded: Loaded) -> None:
-    text = "Source Measured\nTypeColorModel BW\nsigma 3\n 0 30 60\nbw\n def\n 0.04 0.05 0.09\n enddef\n"
-    with pytest.raises(UserError, match=r"specular reflectance.*load the diffuse distribution"):
-        loaded(text, "sheet.sdr")
-
-
 def check_lighttools(table, side=1, scale=1.0) -> None:
     for aoi, radial, azimuth in ((30, 30, 180), (30, 45, 90), (30, 45, 270), (60, 15, 30), (0, 60, 120)):
         wi, wo = direction(np.radians(aoi), 1.0), direction(np.radians(radial), 1.0 + np.radians(azimuth))
@@ -157,24 +126,6 @@ def test_lighttools_in_colour(loaded: Loaded) -> None:
     assert table.info.channels == 3 and float(y) == pytest.approx(0.1, rel=1e-3)
     spectra = loaded(lighttools(channels=((450, ""), (550, ""), (650, ""))))
     assert spectra.info.channels == 3 and any("D65" in note for note in spectra.info.notes)
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        (lighttools(poi=(0, 45)), "several planes of incidence"),
-        (lighttools().replace("Side Front", "Side Top", 1), "block 1: unknown Side; found Top"),
-        (lighttools().replace("ScatterRadial 6", "ScatterRadial 5"), "ScatterRadial: count differs"),
-        (lighttools().replace("TIS 0.3\n", "TIS 0.3\n1 ", 1), "block 1: wrong number of values"),
-        (lighttools().replace("TIS 0.3", "", 1), "is missing|wrong number of blocks"),
-        (lighttools(xyz=True), "TristimulusValue: is missing"),
-        (lighttools().replace("Wavelength 550", "Wavelength 450", 1), "channels are missing"),
-        (lighttools().replace("AOI 30", "AOI 95", 1), "outside its range"),
-    ],
-)
-def test_lighttools_refusals(loaded: Loaded, text: str, said: str) -> None:
-    with pytest.raises(UserError, match=said):
-        loaded(text, "sheet.bsdf")
 
 
 def brushed(wi, wo):
@@ -287,26 +238,6 @@ def test_what_the_next_file_looks_like(loaded: Loaded) -> None:
     np.testing.assert_allclose(table.eval(wi, wo)[0], glossy(wi, wo), rtol=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("#incident_angle 30 0\n#format: theta phi intensity\n0 0 1\n", "format is unknown; found theta phi intensity"),
-        ("#intheta 30\n#format: theta phi DSF\n0 0 1\n", "inphi is not an angle; found nothing"),
-        ("#intheta inf\n#incident_angle 3 0\n#inphi 0\n#format: theta phi DSF\n0 0 1\n", "intheta is not an angle"),
-        ("#incident_angle 30 0\n#format: theta phi DSF\n0 0 1 2\n", "rows do not match"),
-        ("#incident_angle 30 0\n#format: theta phi DSF\n#colorimetry: CIE-XYZ\n0 0 1\n", "5 per row"),
-        ("#incident_angle 30 0\n#format: theta phi DSF\n#colorimetry: RGB\n0 0 1\n", "colorimetry is unknown"),
-        ("#incident_angle 30 0\n#format: theta phi DSF\n0 0 1\n#incident_angle 150 0\n#format: theta phi DSF\n0 0 1\n",
-         "both sides"),
-        ("#incident_angle 30 0\n#format: theta phi DSF\n0 0 1\n#incident_angle 40 0\n#format: theta phi BSDF\n0 0 1\n",
-         "different formats"),
-    ],
-)  # fmt: skip
-def test_pabopto_refusals(loaded: Loaded, text: str, said: str) -> None:
-    with pytest.raises(UserError, match=said):
-        loaded(text)
-
-
 ANO = "AnoBlackEC1onAlum"
 
 
@@ -407,49 +338,6 @@ def test_a_scan_in_the_plane_of_incidence_is_turned_about_the_mirror_direction(l
     mirror, aside = wi * (-1, 1, 1), np.array([0, 1.0, 0])
     tilted = np.cos(np.radians(8)) * mirror + np.sin(np.radians(8)) * aside
     assert table.eval(wi, tilted)[0] == pytest.approx(np.exp(-((8 / 15) ** 2)) + 0.01, rel=0.01)
-
-
-GOOD = zemax_text(tilted_lobe, "PlaneSymmetrical")
-
-
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        (lambda text: text.replace("PlaneSymmetrical", "PlanSymmetrical"), "did you mean 'PlaneSymmetrical'"),
-        (lambda text: text.replace("ScatterType\tBRDF", ""), "ScatterType: unknown ScatterType"),
-        (lambda text: text.replace("ScatterRadial", "Scatterradius"), "ScatterRadial: is missing"),
-        (lambda text: text.replace("AngleOfIncidence\t3", "AngleOfIncidence\t4"), "count differs"),
-        (lambda text: text.replace("10\t40\t70", "40\t10\t70"), "not a list of angles"),
-        (lambda text: text.replace("DataBegin", ""), "has no DataBegin"),
-        (lambda text: text.replace("TIS", "", 1), "wrong number of data blocks"),
-        (lambda text: text[:-200], "wrong number of values"),
-        (lambda text: text.replace("Monochrome\nSca", "XYZ\nSca"), "data sections"),
-        (
-            lambda text: text[: text.index("TIS")] + "TIS 0\n" + "0 " * 133 + "TIS 0\n" + "0 " * 266,
-            "wrong number of data blocks",
-        ),
-    ],
-)
-def test_broken_zemax_files(loaded: Loaded, change, expected: str) -> None:
-    with pytest.raises(UserError, match=expected):
-        loaded(change(GOOD))
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("type bsdf_data\n10 0\n0 0 1\n", "second line must give the format"),
-        ("type bsdf_data\nformat angles=rad bsdf=value scale=1\n10 0\n0 0 1\n", "angles: is unknown"),
-        ("type bsdf_data\nformat angles=deg bsdf=value scale=-1\n10 0\n0 0 1\n", "scale: is not a positive"),
-        ("type bsdf_data\nformat angles=deg bsdf=value scale=1\n", "no block"),
-        ("type bsdf_data\nformat angles=deg bsdf=value scale=1\n0 0 1\n", "no block"),
-        ("type bsdf_data\nformat angles=deg bsdf=value scale=1\n10 0\n0 0 1 2\n", "4 numbers in line 4"),
-        ("type bsdf_data\nformat angles=sin bsdf=value scale=1\n0 0\n2 0 1\n", "direction cosines exceed 1"),
-    ],
-)
-def test_broken_fred_files(loaded: Loaded, text: str, expected: str) -> None:
-    with pytest.raises(UserError, match=expected):
-        loaded(text)
 
 
 @pytest.mark.parametrize("azimuth", [(), (0, 10, 30, 70, 130, 180)])

@@ -177,16 +177,3 @@ def test_holes_in_any_channel_are_counted_and_filled(loaded: Loaded) -> None:
     assert (left_out.shadowed, left_out.not_finite) == (1, 1)
     wi, wo = directions_of(*(a[3, 4, 5] for a in _centres()))
     np.testing.assert_allclose(table.eval(wi, wo), 0.5, rtol=1e-5)
-
-
-def test_broken_files(loaded: Loaded) -> None:
-    good = merl_bytes(np.full((90, 90, 180, 3), 0.1))
-    for content, expected in (
-        (good[:-8], "size does not match"),
-        (good[:5000], "size does not match"),
-        (np.array([90, 90, 180], ">i4").tobytes() + bytes(100), "big-endian"),
-        (merl_bytes(np.full((4, 4, 4, 3), np.nan)), "no measured value"),
-        (np.array([4, 4, 4], "<i4").tobytes() + np.full(192, np.nan).tobytes(), "no measured value"),
-    ):
-        with pytest.raises(UserError, match=expected):
-            loaded(content)

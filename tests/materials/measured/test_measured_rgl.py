@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from lambent.core.errors import UserError
 from lambent.core.geometry.directions import direction
 from lambent.materials.measured import load
 from lambent.materials.measured.rgl import Azimuths
@@ -91,26 +90,6 @@ def test_warp_inverts_itself(seed: int, u: float, v: float) -> None:
     back, again = warp.invert(corners, point)
     np.testing.assert_allclose(back, uv, atol=1e-9)
     np.testing.assert_allclose(again, density, rtol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        ({"vndf": np.zeros((1, 4, 9, 12), np.float32)}, "zero for an incident"),
-        ({"vndf": np.full((1, 4, 9, 12), np.nan, np.float32)}, "not finite"),
-        ({"vndf": np.full((1, 3, 9, 12), 1, np.float32)}, "does not fit"),
-        ({"rgb": np.full((1, 4, 3, 6, 6), np.nan, np.float32)}, "no measured value"),
-        ({"rgb": np.full((1, 4, 3, 6, 6), -1, np.float32)}, "no measured value"),
-        ({"rgb": np.full((1, 4, 2, 6, 6), 1, np.float32)}, "three channels"),
-        ({"theta_i": np.array([0, 1, 0.5, 1.5], np.float32)}, "increasing"),
-        ({"theta_i": np.zeros((4, 1), np.float32)}, "shape or type"),
-        ({"sigma": np.zeros((3, 8), np.float32)}, "sigma: is zero"),
-        ({"ndf": np.zeros((1, 8), np.float32)}, "too small"),
-    ],
-)
-def test_impossible_tensors(loaded: Loaded, change: dict[str, np.ndarray], expected: str) -> None:
-    with pytest.raises(UserError, match=expected):
-        loaded(tensor_bytes(rgl_fields(np.zeros(1)) | change))
 
 
 def _flat(phi_i: np.ndarray, ndf: float = 1.0, nodes: int = 9) -> dict[str, np.ndarray]:

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.geometry.directions import direction
-from lambent.materials.bsdf import ENERGY_TOLERANCE
+from lambent.core.geometry.directions import direction, normalize
+from lambent.materials.bsdf import ENERGY_TOLERANCE, MaterialBSDF
 from lambent.materials.checking.check_table import _warnings, albedos
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.account import _energy
@@ -22,6 +22,7 @@ from lambent.materials.measured.inspecting.inspection import inspect_table
 from lambent.materials.measured.inspecting.metrics import METRICS, metric_named
 from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, record, synthesise
 from lambent.materials.measured.protocol import LeftOut, MeasuredSamples, TableInfo
+from lambent.materials.models import model_named
 from tests.materials.export.formula_table import FormulaTable
 from tests.materials.measured.measured_files import GLOSSY
 
@@ -132,14 +133,8 @@ def test_a_retro_reflector_is_named_though_the_lamp_hides_the_peak(sector_deg: f
 
 
 def oren_nayar(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-    """Sigma = 0.7: brighter on the light's side, but without a peak."""
-    sin_i, sin_o = np.hypot(wi[:, 0], wi[:, 1]), np.hypot(wo[:, 0], wo[:, 1])
-    cos_phi = np.divide(wi[:, 0] * wo[:, 0] + wi[:, 1] * wo[:, 1], sin_i * sin_o, out=np.zeros(len(wi)),
-                        where=sin_i * sin_o > 0)  # fmt: skip
-    tan_low = np.minimum(sin_i / wi[:, 2], sin_o / np.maximum(wo[:, 2], 1e-6))
-    a, b = 1 - 0.5 * 0.49 / (0.49 + 0.33), 0.45 * 0.49 / (0.49 + 0.09)
-    rough = a + b * np.maximum(cos_phi, 0) * np.maximum(sin_i, sin_o) * tan_low
-    return (0.2 / np.pi * rough)[:, None]
+    """Brighter on the light's side, but without a peak."""
+    return model_named("oren-nayar")(rho=0.2, sigma=40).eval(wi, wo)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05])
@@ -186,35 +181,20 @@ def test_half_vector_and_quadrilinear_between_two_incident_directions() -> None:
     """Figures 3.1 and 3.2 of the thesis, at 45 degrees with measurements at 40 and 50.
 
     Aligned on the half vector, the lobe stands at its place and keeps its height; blended as it stands, it falls to two
-    lower lobes where it was measured. Of a retro-reflector it is the other way round.
+    lower lobes where it was measured.
     """
     lobe = Material(name="lobe", lobes=(Lobe(mx=0.04, my=0.04, r0=(1.0,) * 3, k=(1.0,) * 3, alpha=0.5),))
     setup = replace(CLEAN, theta_i_deg=(40, 50), step_deg=1, fine_deg=0.5)
     theta = np.linspace(30, 60, 601)
     wi = np.broadcast_to(direction(np.radians(45), 0.0), (len(theta), 3))
-    ahead, back = direction(np.radians(theta), np.pi), direction(np.radians(theta), 0.0)
-    mirrored, truth = {}, None
-    table = synthesise(lobe, setup)
-    for way in ("half_vector", "quadrilinear"):
-        mirrored[way] = replace(table, reconstruction=way).eval(wi, ahead).mean(axis=1) * ahead[:, 2]
-    from lambent.materials.bsdf import MaterialBSDF
-
-    truth = MaterialBSDF(lobe).eval(wi, ahead).mean(axis=1) * ahead[:, 2]
-    aligned, blended = mirrored["half_vector"], mirrored["quadrilinear"]
+    ahead, table = direction(np.radians(theta), np.pi), synthesise(lobe, setup)
+    ways = (replace(table, reconstruction=way) for way in ("half_vector", "quadrilinear"))
+    aligned, blended, truth = (one.eval(wi, ahead).mean(axis=1) * ahead[:, 2] for one in (*ways, MaterialBSDF(lobe)))
     assert theta[aligned.argmax()] == pytest.approx(theta[truth.argmax()], abs=0.3)
     assert aligned.max() == pytest.approx(truth.max(), rel=0.03)
     assert peaks_of(aligned) == 1 and peaks_of(blended) == 2
     assert blended[np.abs(theta - 45).argmin()] < 0.4 * truth.max()
     assert np.abs(aligned - truth).sum() < 0.05 * truth.sum() < np.abs(blended - truth).sum() / 10
-
-    width = 12.0
-    retro = record(bump_towards_light(5, width), "retro", setup)
-    f = {way: replace(retro, reconstruction=way).eval(wi, back)[:, 0] for way in mirrored}
-    expected = bump_towards_light(5, width)(wi, back)[:, 0]
-    assert np.abs(f["quadrilinear"] - expected).max() < 0.2 * expected.max()
-    assert theta[f["quadrilinear"].argmax()] == pytest.approx(45, abs=1)
-    off = {way: np.abs(f[way] - expected).sum() for way in mirrored}
-    assert off["half_vector"] > 2 * off["quadrilinear"]
 
 
 def peaks_of(curve: np.ndarray) -> int:
@@ -229,9 +209,8 @@ def test_one_channel_that_returns_more_than_arrives_is_said() -> None:
 
 
 def glossy(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-    half = (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
-    slope = np.sqrt(np.maximum(1 / np.maximum(half[:, 2], 1e-3) ** 2 - 1, 0))
-    return (0.1 + 2 * np.exp(-((slope / 0.3) ** 2)))[:, None]
+    half = normalize(wi + wo)
+    return (0.1 + 2 * np.exp(-((np.tan(np.arccos(half[:, 2].clip(1e-3, 1))) / 0.3) ** 2)))[:, None]
 
 
 def test_a_saturated_peak_is_reported() -> None:
