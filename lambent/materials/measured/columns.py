@@ -15,6 +15,8 @@ and the quantity that is meant where nothing states them.
   the files in circulation (Cornell's .astm, and those libbsdf and ALTA read): values are the BRDF unless the name says
   cosine-corrected (CCBRDF, f_cos). The standard does not fix the unit of the angles: they are radians if no theta
   exceeds pi/2. Without a column for phi_i it is 180 degrees, so that phi_s = 0 lies ahead, in the mirror direction.
+- Cornell gonioreflectometer text, as pbrt-v2 reads it, names nothing: the number of wavelengths, these in nm, then per
+  measurement the four angles in radians and f of an isotropic BRDF per wavelength. Rows may be wrapped.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.ceilings import CORNELL_BYTES, MEASURED_BYTES, WAVELENGTHS
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import Floats, direction
 from lambent.materials.measured.parts.gonio_rows import LONGEST_NAME, check_angles, quantity_of, table_of, to_f
@@ -47,7 +50,7 @@ from lambent.materials.measured.tables.table import isotropic_brdf, require_valu
 _OWN = re.compile(r"theta_i phi_i theta_o phi_o (?:(?:f|f_cos|p)|(f|f_cos|p)_r \1_g \1_b)")  # surely degrees on a grid
 _OUT = ("o", "out", "s", "r", "scat", "refl", "v", "view", "e")
 _IN = ("i", "in", "inc", "l", "light", "incident")
-_WAVELENGTH = re.compile(r"(\d+(?:\.\d+)?)_?nm$", re.IGNORECASE)
+_WAVELENGTH = re.compile(r"(\d+\.?\d*)_?nm$", re.IGNORECASE)
 _SEPARATORS = re.compile(r"[\s,;]+")
 _BEFORE_UNIT = re.compile(r"\s+(?=[(\[])")  # "theta_i (deg)" is one name
 _COMMENT_KEY = re.compile(rb"^#[^\S\n]*(\w+):[^\S\n]*(\S[^\n]*?)\s*$", re.MULTILINE)
@@ -124,6 +127,10 @@ class ColumnText:
         Where no name gives it; without one, such a file is refused.
     unit_by_range : bool
         Whether angles are radians if no theta exceeds pi/2.
+    scattered : bool
+        Whether incident directions form no grid.
+    wrapped : bool
+        Whether a row may end on another line.
     """
 
     NAME: str
@@ -133,6 +140,9 @@ class ColumnText:
     phi_i_deg: float = 0.0
     quantity: Quantity | None = None
     unit_by_range: bool = False
+    scattered: bool = False
+    wrapped: bool = False
+    limit_bytes: int = MEASURED_BYTES
 
     def recognise(self, head: bytes, size: int) -> bool:
         """Whether the head of a file names the angles."""
@@ -148,7 +158,7 @@ class ColumnText:
             A column is unknown, no name gives the quantity of the values, a row is broken, an angle is outside its
             range, or the incident directions neither form a grid nor are scattered.
         """
-        heading = self.heading(read_text(path))
+        heading = self.heading(read_text(path, self.limit_bytes))
         if heading is None:
             raise UserError("the columns have no names", file=path, hint=HINT_QUANTITY)
         layout = layout_of(heading.names, path)
@@ -156,7 +166,7 @@ class ColumnText:
         if quantity is None:
             got = ", ".join(heading.names[column] for column in layout.values)
             raise UserError("quantity of the value columns is not stated", file=path, got=got, hint=HINT_QUANTITY)
-        rows = rows_of(heading.body, len(heading.names), path)
+        rows = rows_of(heading.body, len(heading.names), path, wrapped=self.wrapped)
         stated = heading.keys.get(self.count_key)
         if stated is not None and stated.split()[0] != str(len(rows)):
             expected = f"{len(rows)}, the number of rows"
@@ -167,7 +177,8 @@ class ColumnText:
             radians |= bool(theta[np.isfinite(theta)].max(initial=0.0) <= np.pi / 2 + 1e-3)
             notes = (f"angles are taken as {'radians' if radians else 'degrees'}, by their range",)
         name = heading.keys.get(self.name_key, "").strip("\"' ") or Path(path).stem
-        symmetry, gridded = heading.keys.get("symmetry"), _OWN.fullmatch(" ".join(heading.names)) is not None or None
+        symmetry, own = heading.keys.get("symmetry"), _OWN.fullmatch(" ".join(heading.names)) is not None
+        gridded = False if self.scattered else own or None
         layout = replace(layout, quantity=quantity, radians=radians, phi_i_deg=self.phi_i_deg)
         return assemble(rows, replace(layout, symmetry=symmetry, gridded=gridded), path, self.NAME, name, notes)
 
@@ -204,9 +215,29 @@ def _of_astm(text: bytes) -> Heading | None:
     return Heading([name for name in _SEPARATORS.split(shown(found[1])) if name], keys, text[found.end() :])
 
 
+def _of_cornell(text: bytes) -> Heading | None:
+    """The wavelengths as names of columns; None unless the first number counts them and they are those of light."""
+    text = without_comments(text)
+    try:
+        count, *some = (float(word) for word in text.split(maxsplit=4)[:4])
+    except ValueError:
+        return None
+    if not (some and 1 <= count <= WAVELENGTHS.most and count.is_integer()):
+        return None
+    some = some[: int(count)]
+    found = re.match(rb"(?:\s*+\S++){%d}" % (1 + int(count)), text)
+    if found is None or some != sorted(set(some)) or not all(100 <= wavelength <= 5000 for wavelength in some):
+        return None
+    angles = [f"{name}(rad)" for name in ("theta_i", "phi_i", "theta_o", "phi_o")]
+    return Heading([*angles, *(f"{word}nm" for word in shown(found[0]).split()[1:])], {}, text[found.end() :])
+
+
 FORMATS = (
     ColumnText("ASTM E1392", _of_astm, "SAMPLE_NAME", "NUM_POINTS", 180.0, "f", unit_by_range=True),
     ColumnText(FORMAT, _of_gonio_text, "name"),
+    ColumnText(
+        "Cornell / pbrt-v2 text", _of_cornell, "", quantity="f", scattered=True, wrapped=True, limit_bytes=CORNELL_BYTES
+    ),
 )
 
 
@@ -258,8 +289,8 @@ def _angle(name: str) -> str | None:
     return f"{found[1]}_{side}" if side else None
 
 
-def rows_of(body: bytes, columns: int, path: Path) -> Floats:
-    """(N, columns) numbers, separated by blanks, commas or semicolons.
+def rows_of(body: bytes, columns: int, path: Path, *, wrapped: bool = False) -> Floats:
+    """(N, columns) numbers, separated by blanks, commas or semicolons; a row per line unless `wrapped`.
 
     Raises
     ------
@@ -268,7 +299,7 @@ def rows_of(body: bytes, columns: int, path: Path) -> Floats:
     """
     refuse_decimal_commas(body, path)
     flat = numbers(re.sub(rb"[,;]", b" ", body), path)
-    lines = sum(1 for line in body.split(b"\n") if line.strip(b" \t,;"))
+    lines = -(-len(flat) // columns) if wrapped else sum(1 for line in body.split(b"\n") if line.strip(b" \t,;"))
     if lines == 0:
         raise UserError("has no rows", file=path)
     if len(flat) != lines * columns:

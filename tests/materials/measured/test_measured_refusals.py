@@ -76,10 +76,10 @@ REFUSED: dict[str, list[tuple[str | bytes, str]]] = {
         (f"#DIM 3 1\n{RUSIN}{F}1.5 1.5 3 1\n", "above the horizon"),
     ],
     "Cornell": [
-        (CORNELL[:-12], "wrong number"),
+        (CORNELL[:-12], "one value per column name"),
         (but(CORNELL, "0.2", "spam"), "not a number"),
-        (but(CORNELL, "\n5\n", "\n500\n"), "wavelengths are missing"),
-        ("\n".join(CORNELL.split("\n")[:3]), "wrong number"),
+        (but(CORNELL, "\n5\n", "\n500\n"), "one value per column name"),
+        ("\n".join(CORNELL.split("\n")[:3]), "has no rows"),
         (CORNELL.replace(" 0.2 0.2 0.2 0.2 0.2", " -1 nan -1 -1 -1"), "no measured value"),
     ],
     "Integra": [
