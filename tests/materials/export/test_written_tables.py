@@ -1,13 +1,12 @@
-"""The numbers of written MERL, RGL, gonio and Klems files, parsed by hand, are a material's own values.
-
-Written BSDF XML: energy, reciprocity, colour and both sides, by our reader and by Radiance.
-"""
+"""Written MERL, RGL, gonio and Klems files hold a subject's values: by hand, by our readers, Mitsuba and Radiance."""
 
 from __future__ import annotations
 
 import struct
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +20,7 @@ from lambent.materials.export import gonio_text, lbnl_xml, merl, rgl
 from lambent.materials.export.resampling import patch_mean
 from lambent.materials.measured import load
 from lambent.materials.measured.inspecting.metrics import METRICS
+from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, record
 from lambent.materials.measured.lbnl_xml import LbnlTable, read
 from lambent.materials.measured.merl import directions_of
 from lambent.materials.measured.parts.klems import KLEMS_FULL
@@ -31,6 +31,81 @@ from tests.materials.export.formula_table import FormulaTable, lopsided
 from tests.materials.measured.lbnl_files import angles_away_from_borders, ask_radiance, needs_radiance, words
 from tests.materials.measured.lbnl_files import lbnl_xml as file_of
 from tests.materials.measured.measured_files import merl_bytes
+from tests.tools.in_mitsuba import f_cos
+
+BRUSHED = Material(name="brushed", kd=(0.05,) * 3, lobes=(Lobe(mx=0.25, my=0.12, r0=(0.9,) * 3, k=(0.8, 0.7, 0.6)),))
+GLOSSY = Material(name="glossy", kd=(0.3, 0.2, 0.1), lobes=(Lobe(k=0.4, mx=0.2, my=0.2, r0=0.3),))
+SHEET = Material(name="foil", kd=(0.3,) * 3, kt_d=(0.2,) * 3)
+COARSE = replace(ISOTROPIC, noise=0.0, floor=0.0, step_deg=10, fine_deg=5, sector_deg=0)
+
+
+@pytest.fixture
+def small_rgl(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A quarter of the nodes, for speed."""
+    monkeypatch.setattr(rgl, "NODES", {"isotropic": 32, "other": 32})
+    monkeypatch.setattr(rgl, "THETA_I_DEG", np.array([0, 7, 14, 22, 30, 38, 46, 53, 60, 66, 71, 76, 80, 83, 86.0]))
+
+
+@pytest.fixture
+def small_merl(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fewer bins, for a fortieth of the time."""
+    monkeypatch.setattr(merl, "SHAPE", (40, 20, 30))
+    monkeypatch.setattr(merl, "TURNS", 8)
+
+
+def test_merl_is_written_once_more_as_it_was(tmp_path: Path, small_merl: None) -> None:
+    cost = merl.write(GLOSSY, tmp_path / "a.binary")
+    assert cost.lost == () and set(cost.errors) == set(METRICS) and 0 < cost.share["cuberoot"] < 0.02
+    assert merl.write(load(tmp_path / "a.binary"), tmp_path / "b.binary").share["l1"] < 1e-9
+
+
+def test_merl_reports_its_losses(tmp_path: Path, small_merl: None) -> None:
+    """An anisotropic material becomes the mean over its azimuths, a non-reciprocal one the mean of both orders."""
+    cost = merl.write(BRUSHED, tmp_path / "a.binary")
+    assert any("anisotropy" in line for line in cost.lost) and cost.share["cuberoot"] > 0.05
+    table, wi = load(tmp_path / "a.binary"), direction(0.4, 0.0)
+    turns = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+    wi, wo = direction(0.4, turns), direction(0.5, turns + 2.8)
+    np.testing.assert_allclose(table.eval(wi[0], wo[0]), MaterialBSDF(BRUSHED).eval(wi, wo).mean(axis=0), rtol=0.02)
+    assert any("transmission" in line for line in merl.write(SHEET, tmp_path / "a.binary").lost)
+
+    def lopsided(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+        return (0.2 + wi[:, 2:]) * np.ones(1)
+
+    cost = merl.write(record(lopsided, "lopsided", COARSE), tmp_path / "a.binary")
+    assert any("order of wi and wo" in line for line in cost.lost)
+    wi, wo = direction(np.array([0.2, 1.0]), 0.0), direction(np.array([1.0, 0.2]), 2.0)
+    f = load(tmp_path / "a.binary").eval(wi, wo)[:, 0]
+    assert f == pytest.approx(0.2 + (np.cos(0.2) + np.cos(1.0)) / 2, rel=0.03)
+
+
+@pytest.mark.parametrize("material", [GLOSSY, BRUSHED], ids=["isotropic", "anisotropic"])
+def test_rgl_is_what_mitsuba_reads(tmp_path: Path, small_rgl: None, mi: Any, material: Material) -> None:
+    """The written file in our reader and in Mitsuba's `measured` plugin: the same, and close to the material."""
+    path = tmp_path / "a.bsdf"
+    cost = rgl.write(material, path)
+    assert cost.lost == () and cost.share["l1"] < 0.03 and cost.share["cuberoot"] < 0.06
+    table = load(path)
+    assert table.info.isotropic == (material is GLOSSY) and table.info.format == "RGL tensor file"
+    u = np.random.default_rng(1).random((4000, 4))
+    wi, wo = (direction(np.arccos(1 - 0.85 * u[:, k]), 2 * np.pi * u[:, k + 1]) for k in (0, 2))
+    plugin = f_cos({"type": "measured", "filename": str(path)}, wo, wi)
+    mine = table.eval(wi, wo) * wo[:, 2:]
+    off = np.abs(mine - plugin) / (np.abs(plugin) + 1e-3)
+    assert np.quantile(off, 0.99) < 5e-3 and np.median(off) < 1e-4
+
+
+def test_rgl_keeps_a_narrow_lobe_and_reports_lost_transmission(tmp_path: Path, small_rgl: None, monkeypatch) -> None:
+    monkeypatch.setitem(rgl.NODES, "isotropic", 64)
+    mirrorlike = Material(name="mirror", lobes=(Lobe(mx=0.01, my=0.01, r0=(0.9,) * 3, k=(1.0,) * 3),))
+    cost = rgl.write(mirrorlike, tmp_path / "a.bsdf")
+    wi = direction(np.radians([0.0, 33.0, 61.0]), 0.0)
+    np.testing.assert_allclose(
+        load(tmp_path / "a.bsdf").reflectivity(wi), MaterialBSDF(mirrorlike).albedo(wi), rtol=0.03
+    )
+    assert cost.share["l1"] < 0.1
+    assert any("transmission" in line for line in rgl.write(SHEET, tmp_path / "a.bsdf").lost)
+
 
 GREY = (0.4, 0.4, 0.4)
 MIRROR = Material(name="mirror", lobes=(Lobe(k=(0.98,) * 3, mx=0.0068, my=0.0297, r0=0.84, alpha=0.49),))
@@ -152,7 +227,6 @@ def test_a_measured_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     assert any("behind" in lost for lost in cost.lost)
 
 
-GLOSSY = Material(name="glossy", kd=(0.3, 0.2, 0.1), lobes=(Lobe(k=0.4, mx=0.2, my=0.2, r0=0.3),))
 SPACE = "{http://windows.lbl.gov}"
 KLEMS_EDGES_DEG = (0, 5, 15, 25, 35, 45, 55, 65, 75, 90)
 KLEMS_COUNTS = (1, 8, 16, 20, 24, 24, 24, 16, 12)
