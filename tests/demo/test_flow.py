@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import imageio_ffmpeg
@@ -12,7 +13,7 @@ import pytest
 
 from lambent.bake.quality import quality_named
 from lambent.core.pictures.images import read_encoded
-from lambent.core.progress import Cancelled
+from lambent.core.progress import Cancelled, silent
 from lambent.demo.flow import PACE_M_S, SPECIMEN_OF, STILLS, Effort, Flow, walked
 from lambent.materials.document import load_material
 from lambent.scenes import load_scene
@@ -43,6 +44,16 @@ def test_the_film_walks_at_a_persons_pace() -> None:
     steps_m = np.linalg.norm(np.diff(eyes, axis=0), axis=1)
     assert np.allclose(20 * steps_m, PACE_M_S, rtol=0.02)
     assert 0.8 <= PACE_M_S <= 1.5
+
+
+def test_steps_with_one_name_are_timed_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    times_s = iter((100.0, 102.0, 200.0, 203.0))
+    monkeypatch.setattr("lambent.demo.flow.time", SimpleNamespace(perf_counter=lambda: next(times_s)))
+    flow = Flow(tmp_path, TINY, silent)
+    for _ in range(2):
+        with flow._timed("fit"):
+            pass
+    assert flow.finish()["seconds"] == {"fit": 5.0, "total": 5.0}
 
 
 class Interrupt:

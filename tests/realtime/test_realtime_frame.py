@@ -14,6 +14,7 @@ from lambent.core.views.camera import Camera, clip_from_world, pixel_rays
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.targets import pixels
 from lambent.realtime.light.baked import BakedScene
 from lambent.realtime.objects.unbaked import CAMERA
 from lambent.realtime.objects.unbaked import unbaked_scene as baked_scene
@@ -211,6 +212,19 @@ def test_a_still_is_the_mean_of_what_a_display_emits(device) -> None:
     assert renderer.still_radiance(state)[..., 0].sum() == pytest.approx(500 * area, rel=0.01)
     with pytest.raises(UserError, match="supersamples"):
         renderer.still(state, 0)
+
+
+def test_given_radiance_is_shown_as_frames_show_theirs(device) -> None:
+    """The same picture to a step of 8 bits, under every view transform."""
+    gloss = Material(name="m", kd=0.2, lobes=(Lobe(mx=0.15, my=0.15, r0=0.5),))
+    renderer = Renderer(device, wall_scene(gloss, cube_of(smooth_light)))
+    given = renderer.uploaded_picture()
+    for view in ("filmic", "neutral", "linear", "false-colour"):
+        frame = FrameState(CAMERA, 48, 32, view_transform=view, antialias=False, exposure_ev=-1.0)
+        given.take(renderer.image(frame))
+        given.show(frame)
+        shown = pixels(device, given.view.texture)[..., :3].astype(int)
+        assert np.abs(shown - renderer.display_image(frame)).max() <= 1 and shown.std() > 3
 
 
 def test_broken_normals_and_tangents_make_no_nan(device) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
+from lambent.core.progress import silent
 from lambent.core.views.camera import Camera, pixel_rays
 from lambent.core.views.projections import Projection, View
 from lambent.render.images import Images, Settings
@@ -17,7 +18,8 @@ EYE = Camera("eye", (0.3, 1.0, -2.0), (1.3, 0.7, -4.0))
 class Directions(Images):
     """A world whose light is its direction: red and green and blue grow along x, y and z."""
 
-    def radiance(self, camera, progress=None):
+    def radiance(self, camera, progress=silent):
+        progress(1, 1, "drawn")
         return (pixel_rays(camera, self.settings.width, self.settings.height) * 0.5 + 0.5).astype(np.float32)
 
 
@@ -28,7 +30,9 @@ class Directions(Images):
 )  # fmt: skip
 def test_every_pixel_shows_its_direction(projection, size, field_deg):
     settings = Settings(*size, projection=projection, field_deg=field_deg)
-    image = Projected(Directions(faces_settings(settings)), settings).radiance(EYE)
+    told = []
+    image = Projected(Directions(faces_settings(settings)), settings).radiance(EYE, lambda *done: told.append(done))
+    assert [done / total for done, total, _ in told] == pytest.approx((np.arange(len(told)) + 1) / len(told))
     rays, _ = View.of(EYE, projection, *size, field_deg).directions(*size)
     fine, _ = View.of(EYE, projection, *size, field_deg).directions(2 * size[0], 2 * size[1])
     whole = fine.any(axis=-1).reshape(size[1], 2, size[0], 2).all(axis=(1, 3))  # no part outside of the circle

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lambent.baked.answering.albedos import edited_albedos
 from lambent.baked.answering.answer import (
+    MOST_ALBEDO,
     MOST_EXCESS,
     MOST_SHARES,
     Albedos,
@@ -22,6 +24,7 @@ from lambent.baked.answering.answer import (
 )
 from lambent.baked.answering.probes import change
 from lambent.baked.answering.rays import MOST_POINTS, Rays, gathered, last_points, packed_rays
+from lambent.materials.document import Material
 
 
 def patches(groups: int = 2, count: int = 30, paired: bool = False) -> Patches:
@@ -273,3 +276,10 @@ def test_a_probe_sees_both_states_of_both_sides() -> None:
     expected = np.zeros_like(found)
     expected[:, places] = exitance(*states[1]) - exitance(*states[0])
     assert np.allclose(found, expected, atol=1e-5)
+
+
+def test_albedos_of_edited_materials_are_their_diffuse_ones_below_a_bound() -> None:
+    before, sheet = [Material(kd=0.1)] * 2, Material(kd=(0.1, 0.2, 0.3), kt_d=0.4)
+    found = edited_albedos(before, [sheet, Material(kd=0.8, kt_d=0.8)])
+    assert np.allclose(found.reflected, [[0.1, 0.2, 0.3], [MOST_ALBEDO / 2] * 3])
+    assert np.allclose(found.transmitted, [[0.4] * 3, [MOST_ALBEDO / 2] * 3])

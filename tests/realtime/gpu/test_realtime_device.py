@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import wgpu
 
+import lambent
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.device import WEBGPU_LIMITS, choose_adapter
 from lambent.realtime.gpu.shader_source import PACKAGE, shader_files
+from lambent.realtime.gpu.targets import Targets
 from lambent.realtime.objects.unbaked import CAMERA
 from lambent.realtime.renderer import Renderer
 from tests.realtime.lit_wall import wall_scene
@@ -57,4 +60,11 @@ def test_opengl_is_not_started() -> None:
 
 def test_no_two_shaders_have_one_name() -> None:
     """They are included by name, from any room."""
-    assert len(shader_files()) == len(list(PACKAGE.rglob("*.wgsl")))
+    assert len(shader_files()) == len(list(PACKAGE.rglob("*.wgsl"))) and Path(lambent.__file__).parent == PACKAGE
+
+
+def test_a_target_stays_until_the_size_changes(device) -> None:
+    targets = Targets(device)
+    first = targets.display("a", (8, 4))
+    assert targets.display("a", (8, 4)) is first
+    assert targets.display("a", (4, 8)).size[:2] == (4, 8)

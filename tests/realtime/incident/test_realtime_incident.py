@@ -35,6 +35,7 @@ def test_the_preferred_look_up_that_serves_a_probe() -> None:
     assert [chosen(bare, name) for name in ("auto", *known)] == ["plain"] * (1 + len(known))
     assert [chosen(rich, name) for name in ("auto", *OF_PROBES)] == ["planes", "plain", "planes", "distance"]
     assert chosen(replace(bare, distance=DISTANCE), "planes") == "distance"
+    assert chosen(replace(bare, planes=PLANES[:1]), "auto") == "planes"
     with pytest.raises(UserError, match="look-up"):
         look_up_of(bare, "plane", known)
 

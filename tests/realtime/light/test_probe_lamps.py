@@ -136,16 +136,17 @@ def test_numpy_and_the_shader_take_out_as_many_groups() -> None:
 
 def test_faint_highlights_need_neither_lamps_nor_many_samples(device) -> None:
     """A window on rough varnish adds little to what is lit; a lamp on it, or the window on metal, is seen."""
-    rough = Lobe(mx=0.2, my=0.2, r0=0.04)
+    rough, metal = (Lobe(mx=0.2, my=0.2, r0=r0) for r0 in (0.04, 0.9))
     window, lamp = (np.array([-0.7, -0.3, 1.0]), 0.15, 4.0), (np.array([-0.7, -0.3, 1.0]), 0.05, 200.0)
     for lobe, light, is_faint in (
-        (rough, window, True), (rough, lamp, False), (rough.model_copy(update={"r0": (0.9,) * 3}), window, False),
+        (rough, window, True), (rough, lamp, False), (metal, window, False),
     ):  # fmt: skip
         renderer = Renderer(device, wall_scene(material((lobe,)), lit(light, rest=0.5)))
         (draw,) = draws_of(replace(STATE, n=None), renderer.resources)
         assert draw.takes_lamps != is_faint
         (many,) = draws_of(replace(STATE, integrator="rings", n=None), renderer.resources)
         assert many.n == 11 and draw.n == (5 if is_faint else 3)
+    assert not ProbeLamps(lit(window, rest=0.5)).are_faint(material((rough, metal)), False), "one of two lobes shows it"
     faint, exact = (
         renderer_of.image(replace(STATE, n=n, integrator=how))
         for renderer_of in [Renderer(device, wall_scene(material((rough,)), lit(window, rest=0.5)))]

@@ -13,7 +13,7 @@ from lambent.core.progress import Cancelled, silent
 from lambent.core.views.camera import Camera
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.light.baked import Probe
-from lambent.viewer.modes.walk.comparison import Comparison, difference, flip_in_process
+from lambent.viewer.modes.walk.comparison import Comparison, _shrunk, difference, flip_in_process
 from lambent.viewer.modes.walk.light.glare import GlareDrawing, GlareMeter
 from lambent.viewer.modes.walk.light.metering import read
 from lambent.viewer.modes.walk.markers import Marks, mirror_ball, outline, projected
@@ -62,6 +62,12 @@ def test_flip_can_be_cancelled():
 
     with pytest.raises(Cancelled):
         flip_in_process(np.zeros((64, 64, 3)), np.zeros((64, 64, 3)), stop)
+
+
+def test_large_pictures_are_compared_by_means_of_squares():
+    blocks = np.random.default_rng(2).random((3, 5, 3))
+    picture = np.pad(blocks.repeat(2, axis=0).repeat(2, axis=1), ((0, 1), (0, 0), (0, 0)))
+    np.testing.assert_allclose(_shrunk(picture, 2), blocks)
 
 
 def test_figures_and_maps():

@@ -316,23 +316,6 @@ def test_a_film_is_traced_frame_by_frame(pictures, state, tmp_path):
     assert first.shape == (360, 640, 3) and np.abs(first - last).mean() > 0.02 * first.mean()
 
 
-def test_given_radiance_is_shown_as_frames_show_theirs(renderer, state):
-    """The same picture to a step of 8 bits, under every view transform."""
-    given = renderer.uploaded_picture()
-    for view in ("filmic", "neutral", "linear", "false-colour"):
-        frame = replace(
-            state.look.frame(state.navigation.camera, SIZE, {}), view_transform=view, antialias=False, exposure_ev=-1.0
-        )
-        given.take(renderer.image(frame))
-        given.show(frame)
-        data = renderer.device.queue.read_texture(
-            {"texture": given.view.texture}, {"bytes_per_row": 4 * SIZE[0]}, (*SIZE, 1)
-        )
-        shown = np.frombuffer(data, np.uint8).reshape(SIZE[1], SIZE[0], 4)[..., :3].astype(int)
-        assert np.abs(shown - renderer.display_image(frame)).max() <= 1
-    assert shown.std() > 3
-
-
 def test_the_end_of_the_process_is_a_line_and_the_picture_is_drawn(pictures, state, workers):
     """Last, because it ends the process of the tests before."""
     traced(pictures, state)

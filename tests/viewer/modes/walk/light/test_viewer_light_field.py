@@ -15,7 +15,8 @@ from lambent.viewer.cameras.picking import Geometry
 from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.light.light_fields import FieldView, colours_of, map_image
 from lambent.viewer.modes.walk.markers import projected
-from lambent.viewer.modes.walk.panels.light_field import without
+from lambent.viewer.modes.walk.panels import light_field as light_field_panel
+from lambent.viewer.modes.walk.panels.light_field import warn_of_look_up, without
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.screen import Rect
@@ -160,6 +161,19 @@ def test_the_panel_picks_a_point_and_says_what_bakes_a_light_field(monkeypatch, 
     assert "--light-fields floor" in without("floor", ("table",), "room.store") and "table" in without(
         None, ("table",), ""
     )
+
+
+def test_an_object_without_a_light_field_is_warned_of_unless_one_of_its_parts_has_one(
+    monkeypatch, scene, screen, field
+):
+    parts = tuple(scene.objects[1].model_copy(update={"name": f"table {k}", "part_of": "table"}) for k in range(2))
+    state = WalkState.of(scene.model_copy(update={"objects": parts}), "walk", screen)
+    state.selection.name, state.look.lookup, said = "table", "light_field", []
+    monkeypatch.setattr(light_field_panel, "wrapped", said.extend)
+    for fields, warned in ({}, 1), ({"table 1": field}, 1):
+        state.fields.fields = fields
+        warn_of_look_up(state)
+        assert len(said) == warned and "table has no light field" in said[0]
 
 
 def test_a_click_on_a_disc_keeps_the_selection(state, geometry, field):
