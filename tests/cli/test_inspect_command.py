@@ -9,6 +9,7 @@ import pytest
 
 from lambent.core.pictures.images import read_image
 from tests.materials.measured.measured_files import zemax_text
+from tests.scenes.loaders.test_creases import shared_box
 from tests.scenes.loaders.test_toml import MATERIALS, written
 
 
@@ -46,3 +47,9 @@ def test_daylight_is_said_in_a_line(lambent, tmp_path):
     for more, ground in (("", "a diffuse ground of albedo 0.4"), ('ground = "black"\n', "nothing")):
         said = lambent("inspect", written(tmp_path, MATERIALS + sky + more), "--json").json["daylight"]
         assert said == f"sun 45 degrees high, 90.1 klx facing it; sky 13.8 klx, turbidity 3; below the horizon {ground}"
+
+
+def test_a_scene_is_described_with_the_hard_edges_that_are_asked_for(lambent, tmp_path):
+    box, lean = shared_box(tmp_path), "have normals over 40 degrees from the face"
+    for options, is_told in (((), True), (("--crease-angle", "40"), False)):
+        assert (lean in " ".join(lambent("inspect", box, *options, "--json").json["warnings"])) == is_told
