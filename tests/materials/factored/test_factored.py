@@ -15,14 +15,15 @@ from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo, term_albedo
 from lambent.materials.factored.curve import END_RAD, KNOTS, Curve, angles_rad
-from lambent.materials.factored.of_lobes import of_material
+from lambent.materials.factored.of_lobes import lobe_terms, of_material
 from lambent.materials.factored.of_models import editable, same_quotients
 from lambent.materials.factored.opening import editable_of
 from lambent.materials.factored.parametrisations import PARAMETRISATIONS, angle_of
 from lambent.materials.factored.quotients import CoupledDiffuse, Microfacets, One
 from lambent.materials.factored.tabulated import Grid
-from lambent.materials.factored.terms import Factor, Term
+from lambent.materials.factored.terms import Factor, Term, narrowed, thinned
 from lambent.materials.fitting import factors
+from lambent.materials.lobes import NUMPY
 from lambent.materials.measured.merl import SCALES, MerlTable, bin_centres, directions_of
 from lambent.materials.models import model_named, models
 from lambent.materials.models.model import Model
@@ -271,6 +272,20 @@ def test_documents_are_the_sum_of_their_parts() -> None:
             wi, wo = pairs(across)
             expected = MaterialBSDF(material).eval(wi, wo)
             assert np.allclose(of_material(material).eval(wi, wo), expected, rtol=3e-3, atol=3e-4 * expected.max())
+
+
+@pytest.mark.parametrize(("mx", "my"), [(0.1, 0.1), (0.08, 0.2)])
+def test_wider_slopes_are_looked_up_in_the_same_curves(mx: float, my: float) -> None:
+    """With slopes 1.7 times as wide, the terms are the lobe of those slopes."""
+    lobe, wider = (Lobe(mx=r * mx, my=r * my, r0=1.0, alpha=0.3) for r in (1.0, 1.7))
+    (term, *_), curves = lobe_terms(lobe)
+    wi, wo = pairs()
+    pair = components(wi), components(wo)
+    found = np.asarray(term.scale) * (term.quotient.evaluate(*pair, NUMPY) * thinned(term, *pair, 1.7, NUMPY))[:, None]
+    for factor in term.factors:
+        found = found * curves[factor.curve].at(narrowed(factor.over, angle_of(factor.over, *pair), 1.7, NUMPY))
+    expected = MaterialBSDF(Material(lobes=(wider,))).eval(wi, wo)
+    assert np.allclose(found, expected, rtol=3e-3, atol=3e-4 * expected.max())
 
 
 def test_colours_and_curves_change_no_quotient() -> None:

@@ -11,7 +11,7 @@ from PIL import Image
 from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.fitting.shown.incidence import incidences
+from lambent.materials.fitting.shown.incidence import incidences, measured_disk
 from lambent.materials.fitting.shown.plot import error_slices, save_plots
 from lambent.materials.fitting.shown.slices import slices
 from lambent.materials.measured.inspecting.metrics import METRICS
@@ -22,6 +22,7 @@ from tests.materials.fitting.known_answers import FEW, FOIL, PAINT, grey
 
 def test_incidences_follow_the_grid():
     gathered = incidences(grey(PAINT, FEW))
+    assert np.isfinite(measured_disk(gathered[3], False, 32)).mean() > 0.5
     assert [entry.theta_deg for entry in gathered] == [0, 5, 19, 33, 47, 61, 75]
     assert {entry.phi_deg for entry in gathered} == {0}
 

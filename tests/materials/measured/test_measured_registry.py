@@ -146,7 +146,8 @@ DIGITS = b"9" * 5000
 
 
 @pytest.mark.parametrize(
-    "content", [b"inf 400 500 600\n", b"inf\n", b"-inf 1 2\n", b"nan 400\n", DIGITS, b"1e999 400 500"]
+    "content",
+    [b"inf 400 500 600\n", b"inf\n", b"-inf 1 2\n", b"nan 400\n", DIGITS, b"3 500 400 600\n"],
 )
 def test_numbers_that_no_reader_claims(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.txt").write_bytes(content)

@@ -163,7 +163,10 @@ def test_an_asymmetric_table_is_reported() -> None:
 
 
 def test_non_reciprocal_and_left_out() -> None:
-    found = findings(lambda wi, wo: (0.02 + wi[:, 2:]) * np.ones(1) * 0.1, sector_deg=10.0, floor=0.05)
+    setup = replace(CLEAN, sector_deg=10.0, floor=0.05)
+    report = inspect_table(record(lambda wi, wo: (0.02 + wi[:, 2:]) * np.ones(1) * 0.1, "made up", setup))
+    found, percent = report["findings"], report["faults"]
+    assert percent["not_measured_percent"] > 0 == percent["not_finite_percent"] < percent["negative_percent"]
     assert any("swapping light and viewer" in line for line in found)
     assert any("not measured" in line for line in found) and any("are below zero: f in" in line for line in found)
 
