@@ -1,7 +1,8 @@
-"""`lambent inspect` of measurements: facts, faults in words, one picture with curves and disks."""
+"""`lambent inspect` of measurements, scenes and photometric files: facts, faults in words, curves."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ from lambent.core.pictures.images import read_image
 from tests.materials.measured.measured_files import zemax_text
 from tests.scenes.loaders.test_creases import shared_box
 from tests.scenes.loaders.test_toml import MATERIALS, written
+from tests.scenes.photometry.test_ies import ies
+from tests.scenes.photometry.written_files import ies_of, ldt, ldt_of, lobe
 
 
 @pytest.fixture
@@ -53,3 +56,81 @@ def test_a_scene_is_described_with_the_hard_edges_that_are_asked_for(lambent, tm
     box, lean = shared_box(tmp_path), "have normals over 40 degrees from the face"
     for options, is_told in (((), True), (("--crease-angle", "40"), False)):
         assert (lean in " ".join(lambent("inspect", box, *options, "--json").json["warnings"])) == is_told
+
+
+GAMMA = np.linspace(0, 90, 181).tolist()
+
+
+@pytest.fixture
+def downlight(tmp_path: Path) -> Path:
+    path = tmp_path / "downlight.ldt"
+    scale = 1000 * 3 / (2 * np.pi)  # of cos^2, so that 1000 lm leave the luminaire
+    path.write_text(ldt_of(lobe(2, scale), [0], GAMMA, 1))
+    return path
+
+
+def test_the_figures_of_a_downlight(lambent, downlight):
+    """cos^2: half of the peak at 45 degrees, a tenth at arccos sqrt .1 = 71.6."""
+    facts = lambent("inspect", downlight, "--json").json
+    assert (facts["is"], facts["format"], facts["name"], facts["maker"]) == ("luminaire", "EULUMDAT", "Dummy", "Maker")
+    assert facts["flux_lm"] == pytest.approx(1000, rel=1e-3) and facts["most_cd"] == pytest.approx(477.46, rel=1e-4)
+    assert facts["light_output_ratio"] == {"stated": 1.0, "found": pytest.approx(1, rel=1e-3)}
+    assert facts["downward_share"] == {"stated": 1.0, "found": pytest.approx(1)}
+    assert facts["most_at_deg"] == {"gamma": 0, "C": 0}
+    for name, angle in (("beam_angle_deg", 90), ("field_angle_deg", 143.13)):
+        assert facts[name] == {"C0-C180": pytest.approx(angle, abs=0.11), "C90-C270": pytest.approx(angle, abs=0.11)}
+    assert facts["lamp_sets"] == {"0": "1 x lamp of 1000 lm, 1000 lm, 20 W, 3000 K"}
+    assert (facts["symmetry"], facts["opening"], facts["findings"]) == ("about the axis", "point", ["no faults found"])
+
+
+def test_faults_are_sentences(lambent, tmp_path):
+    wrong = tmp_path / "wrong.ldt"
+    wrong.write_text(ldt([(100, 100, 100)], gamma_deg=(0, 90, 180), percent=(80, 90), tilt=15))
+    said = lambent("inspect", wrong).out
+    assert "intensities add up to 1257 lm; the file states 900 lm" in said
+    assert "50.0% of the light goes down; the file states 80.0%" in said
+    assert "measured_tilt_deg" in said and max(map(len, said.splitlines())) < 100
+    bright = tmp_path / "bright.ies"
+    bright.write_text(ies(numbers="2 100 1"))
+    assert "more than the 200 lm of the lamps" in lambent("inspect", bright).out
+    rounded = tmp_path / "rounded.ldt"
+    rounded.write_text(ldt([(79, 79, 79)], gamma_deg=(0, 90, 180), percent=(50, 98)))
+    assert lambent("inspect", rounded, "--json").json["findings"] == ["no faults found"], "within 2 %"
+
+
+def test_a_floodlight_of_type_b(lambent, tmp_path):
+    path = tmp_path / "flood.IES"
+    path.write_text(
+        ies_of(lobe(40), "B", range(0, 91, 2), range(-90, 91, 2)).replace("[MANUFAC] none", "[MANUFAC] A & B")
+    )
+    facts = lambent("inspect", path, "--json").json
+    assert (facts["format"], facts["symmetry"]) == ("IESNA:LM-63-2002, type B", "left to right")
+    assert (facts["maker"], facts["report"], facts["photometry"]) == ("A & B", "by hand", "absolute")
+    assert facts["opening"] == "rectangle, 0.25 x 0.5 x 0 m"
+    wide = 2 * np.degrees(np.arccos(0.5 ** (1 / 40)))
+    assert list(facts["beam_angle_deg"].values()) == pytest.approx([wide, wide], rel=0.02)
+
+
+def test_the_polar_curve(lambent, downlight, tmp_path):
+    """Solid and dashed curves below the centre, nothing of them above."""
+    assert lambent("inspect", downlight, "--plot", tmp_path / "p.png").code == 0
+    image = read_image(tmp_path / "p.png")[: int(0.85 * 720)]  # without the legend
+    coloured = np.ptp(image, axis=-1) > 0.2
+    rows = np.flatnonzero(coloured.any(axis=1))
+    assert coloured[int(0.55 * 720) :].sum() > 300 and rows.min() > 0.45 * 720
+    columns = np.flatnonzero(coloured[int(0.6 * 720) :].any(axis=0))
+    assert columns.min() < 300 and columns.max() > 420, "both halves of the planes"
+
+
+def test_the_unit_of_the_polar_curve(lambent, downlight, tmp_path):
+    """cd/klm where the file relates to a flux, of which the numbers are then independent; else cd."""
+    (tmp_path / "relative.ies").write_text(ies(numbers="1 2500 1"))
+    (tmp_path / "absolute.ies").write_text(ies())
+    for path, unit, most in (
+        (downlight, "cd/klm", "500"),
+        (tmp_path / "relative.ies", "cd/klm", "400"),
+        (tmp_path / "absolute.ies", "cd", "1000"),
+    ):
+        assert lambent("inspect", path, "--plot", tmp_path / "p.svg").code == 0
+        words = re.findall(r"<!-- (.*?) -->", (tmp_path / "p.svg").read_text())  # of which the outlines follow
+        assert unit in words and max((word for word in words if word.isdigit()), key=int) == most, words

@@ -11,7 +11,7 @@ from lambent.core.errors import UserError
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import signed_volume, teapot
 from lambent.scenes.loaders import bpt
-from tests.scenes.geometry.test_bezier import TEAPOT, sheet
+from tests.scenes.geometry.test_geometry import TEAPOT, sheet
 
 
 def text_of(*patches: np.ndarray, count: int | None = None) -> str:

@@ -15,7 +15,7 @@ from lambent.scenes.geometry import box, cylinder, sphere
 from lambent.scenes.loaders.meshes.creases import creased, deviating_faces
 from lambent.scenes.scene import Mesh
 from tests.scenes.loaders.gltf.test_gltf import document
-from tests.scenes.loaders.gltf.test_gltf_posed import FLOAT, with_arrays
+from tests.scenes.loaders.gltf.test_gltf_details import FLOAT, with_arrays
 
 CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 SIDES = [(1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 4, 8, 6)]  # the last turned
