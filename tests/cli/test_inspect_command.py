@@ -10,10 +10,9 @@ import pytest
 
 from lambent.core.pictures.images import read_image
 from tests.materials.measured.measured_files import zemax_text
-from tests.scenes.loaders.test_creases import shared_box
+from tests.scenes.loaders.test_meshes import shared_box
 from tests.scenes.loaders.test_toml import MATERIALS, written
-from tests.scenes.photometry.test_ies import ies
-from tests.scenes.photometry.written_files import ies_of, ldt, ldt_of, lobe
+from tests.scenes.photometry.written_files import ies, ies_of, ldt, ldt_of, lobe
 
 
 @pytest.fixture

@@ -15,8 +15,7 @@ from lambent.scenes.photometry.files import is_luminaire, read_luminaire
 from lambent.scenes.scene import IesLight
 from tests.scenes.loaders.gltf.test_gltf_luminaires import lit, node
 from tests.scenes.loaders.test_toml import MATERIALS, written
-from tests.scenes.photometry.test_ies import ies
-from tests.scenes.photometry.written_files import ldt, ldt_of, lobe
+from tests.scenes.photometry.written_files import ies, ldt, ldt_of, lobe
 
 LAMP = '[[lights]]\nkind = "ies"\nposition = [0.0, 2.0, 0.0]\n'
 TWO_SETS = ldt([(200, 0)], sets=((1, 500), (2, 1200)))

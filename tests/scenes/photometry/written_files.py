@@ -6,7 +6,27 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tests.scenes.photometry.test_ies import ies
+HEADS = {1986: "", 1991: "IESNA91\n", 1995: "IESNA:LM-63-1995\n", 2002: "IESNA:LM-63-2002\n"}
+
+
+def ies(
+    vertical: str = "0 45 90",
+    horizontal: str = "0",
+    candela: str = "1000 500 0",
+    *,
+    head: str = HEADS[2002],
+    tilt: str = "TILT=NONE",
+    numbers: str = "1 -1 1",
+    kind: int = 1,
+    units: int = 2,
+    factors: str = "1 1 50",
+) -> str:
+    counts = f"{len(vertical.split())} {len(horizontal.split())}"
+    return (
+        f"{head}[TEST] by hand\n[MANUFAC] none\n{tilt}\n{numbers} {counts} {kind} {units} .5 .25 0\n{factors}\n"
+        f"{vertical}\n{horizontal}\n{candela}\n"
+    )
+
 
 Light = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]  # candela by x (C0), y (C90), z (axis)
 

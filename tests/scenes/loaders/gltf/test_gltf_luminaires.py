@@ -12,7 +12,7 @@ import pytest
 from lambent.core.light.photometry import photometric
 from lambent.scenes.scene import IesLight, PointLight, Scene
 from tests.scenes.loaders.gltf.test_gltf import document, loaded
-from tests.scenes.photometry.test_ies import ies
+from tests.scenes.photometry.written_files import ies
 
 UNEVEN = ies("0 45 90", "0 90 180 270 360", "100 80 0 100 60 0 100 40 0 100 20 0 100 80 0")
 DATA = "data:application/x-ies-lm-63;base64," + base64.b64encode(UNEVEN.encode()).decode()
