@@ -20,7 +20,7 @@ from lambent.materials.checking.check import PHI_DEG, THETA_DEG, Furnace, Report
 from lambent.materials.measured.inspecting.faults import extrapolation
 from lambent.materials.measured.protocol import MeasuredTable, negative_readings
 from lambent.materials.measured.tables.half_vector_grid import GridShape
-from lambent.materials.measured.tables.table_bsdf import TableBSDF
+from lambent.materials.measured.tables.patch_sheet import TableBSDF
 
 PAIRS = 60_000
 RECIPROCITY_LIMIT = 0.5  # share of the light; the worst published file has .22, swapped columns have 1 and more

@@ -15,7 +15,7 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import MaterialBSDF, specular_only
 from lambent.materials.checking.check import furnace
 from lambent.materials.document import Material
-from lambent.materials.export.resampling.pairs import CHECK_LOG2, pairs_of
+from lambent.materials.export.resampling.resampled import CHECK_LOG2, pairs_of
 from lambent.materials.measured.inspecting.metrics import errors_and_shares
 
 MARGIN = 0.999  # allowance for the furnace's own error

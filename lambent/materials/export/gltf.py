@@ -24,10 +24,10 @@ from lambent.core.files import atomic_path
 from lambent.core.geometry.directions import Floats
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
+from lambent.materials.export import matching
 from lambent.materials.export.contract import Cost, Kind, Subject
-from lambent.materials.export.matching import match
-from lambent.materials.export.matching.match import ALPHA_MAX, ALPHA_MIN, three
-from lambent.materials.export.resampling.pairs import CHECK_LOG2, FIT_LOG2, Pairs, is_isotropic, pairs_of
+from lambent.materials.export.matching import ALPHA_MAX, ALPHA_MIN, three
+from lambent.materials.export.resampling.resampled import CHECK_LOG2, FIT_LOG2, Pairs, is_isotropic, pairs_of
 from lambent.materials.fresnel import ior_of, r0_of
 
 NAME = "glTF 2.0"
@@ -121,7 +121,7 @@ class GltfMaterial:
 
 def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     """Write a .gltf with embedded buffers, or a .glb, of a sphere with the material."""
-    material = match.material_of(subject)
+    material = matching.material_of(subject)
     fitted, cost = likeness(material, progress)
     document, buffer = _sphere(fitted, material)
     with atomic_path(path) as temporary:
@@ -136,21 +136,22 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
 
 def likeness(material: Material, progress: Progress = silent) -> tuple[GltfMaterial, Cost]:
     """The glTF material closest to `material`, rounded as in the file, and its cost."""
-    check, lost = pairs_of(material, CHECK_LOG2, seed=1), match.shape_losses(material)
-    towards_light = match.kept_towards_light(material)
-    material = match.without_retro(material)
+    check, lost = pairs_of(material, CHECK_LOG2, seed=1), matching.shape_losses(material)
+    towards_light = matching.kept_towards_light(material)
+    material = matching.without_retro(material)
     pairs = pairs_of(material, FIT_LOG2, seed=0)
     space = _Space(material, pairs.samples.f.shape[1])
 
     def best(metallic: float | None, starts: list[Floats]) -> tuple[Floats, float]:
-        return match.match(pairs, lambda x: space.read(x).eval(pairs), starts, space.bounds(metallic), progress, NAME)
+        bounds = space.bounds(metallic)
+        return matching.match(pairs, lambda x: space.read(x).eval(pairs), starts, bounds, progress, NAME)
 
     ends = [best(metallic, space.starts(metallic)) for metallic in (1.0, 0.0)]
     if not material.transmits:
         x, total = best(None, [np.where(np.arange(len(x)) == 0, 0.5, x) for x, _ in ends])
         ends.append((x, total / SIMPLER**2))
     fitted = space.read(min(ends, key=lambda end: end[1])[0], rounded=True)
-    return fitted, match.cost_of(check, fitted.eval(check), [*lost, *_lost(material, fitted)], towards_light)
+    return fitted, matching.cost_of(check, fitted.eval(check), [*lost, *_lost(material, fitted)], towards_light)
 
 
 class _Space:
@@ -159,7 +160,7 @@ class _Space:
     def __init__(self, material: Material, channels: int) -> None:
         self.material, self.channels = material, channels
         self.isotropic = is_isotropic(material)
-        ranked = sorted(material.lobes, key=match.brightness, reverse=True)
+        ranked = sorted(material.lobes, key=matching.brightness, reverse=True)
         self.axis: Literal["t", "b"] = "b" if ranked and ranked[0].my > ranked[0].mx else "t"
         grey = all(len({k * r for k, r in zip(lobe.k, lobe.r0, strict=True)}) == 1 for lobe in ranked)
         self.f0 = slice(6 + channels, 6 + channels + (1 if grey else channels))
@@ -192,7 +193,7 @@ class _Space:
         c = self.channels
         starts = []
         for lobe in self.material.lobes or (None,):
-            mx, my = match.slope_start(lobe, "ggx") if lobe else (ALPHA_MAX, ALPHA_MAX)
+            mx, my = matching.slope_start(lobe, "ggx") if lobe else (ALPHA_MAX, ALPHA_MAX)
             narrow, wide = min(mx, my), max(mx, my)
             strength = np.sqrt((wide - narrow) / max(1 - narrow, 1e-6))
             peak = np.array(lobe.k)[:c] * np.array(lobe.r0)[:c] if lobe else np.zeros(c)

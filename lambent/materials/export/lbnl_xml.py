@@ -18,10 +18,10 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
 from lambent.materials.export.contract import Cost, Kind, Subject
 from lambent.materials.export.resampling.lbnl_layout import END, END_OF_BLOCK, block_head, head, losses
-from lambent.materials.export.resampling.pairs import is_grey
 from lambent.materials.export.resampling.patch_mean import patch_means
 from lambent.materials.export.resampling.resampled import (
     Scatterer,
+    is_grey,
     knows_the_back,
     proposal_of,
     read_back,

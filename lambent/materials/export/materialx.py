@@ -18,11 +18,10 @@ from lambent.core.arrays import Floats
 from lambent.core.files import write_text
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
+from lambent.materials.export import matching
 from lambent.materials.export.contract import Cost, Kind, Subject
-from lambent.materials.export.matching import sums
-from lambent.materials.export.matching.match import material_of, rounded, shape_losses, three
-from lambent.materials.export.matching.sums import Likeness, Part, Tool
-from lambent.materials.export.resampling.pairs import Pairs
+from lambent.materials.export.matching import Likeness, Part, Tool, material_of, rounded, shape_losses, three
+from lambent.materials.export.resampling.resampled import Pairs
 from lambent.materials.fresnel import ior_of, r0_of
 
 NAME = "MaterialX"
@@ -49,7 +48,7 @@ def likeness(material: Material, progress: Progress = silent) -> tuple[Likeness,
         )
     if material.transmission_lobes:
         lost.append("lobes of transmission are those of a thin wall; a renderer without thin walls bends the light")
-    return sums.likeness(material, TOOL, lost, progress)
+    return matching.likeness(material, TOOL, lost, progress)
 
 
 def _eval(pairs: Pairs, part: Part) -> Floats:

@@ -25,11 +25,10 @@ from lambent.core.arrays import Floats
 from lambent.core.files import write_text
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
+from lambent.materials.export import matching
 from lambent.materials.export.contract import Cost, Kind, Subject
-from lambent.materials.export.matching import sums
-from lambent.materials.export.matching.match import brightness, material_of, rounded, shape_losses
-from lambent.materials.export.matching.sums import Likeness, Part, Tool
-from lambent.materials.export.resampling.pairs import Pairs
+from lambent.materials.export.matching import Likeness, Part, Tool, brightness, material_of, rounded, shape_losses
+from lambent.materials.export.resampling.resampled import Pairs
 from lambent.materials.fresnel import conductor, ior_of
 
 NAME = "Mitsuba 3 scene"
@@ -55,7 +54,7 @@ def likeness(material: Material, progress: Progress = silent) -> tuple[Likeness,
     lost = [line.replace(masking, with_fresnel) for line in shape_losses(material, beckmann_kept=True)]
     if any(lobe.distribution == "beckmann" for lobe in material.transmission_lobes):
         lost.append("Beckmann lobes of transmission became GGX lobes, whose tails are longer")
-    return sums.likeness(material, TOOL, lost, progress)
+    return matching.likeness(material, TOOL, lost, progress)
 
 
 def _eval(pairs: Pairs, part: Part) -> Floats:

@@ -20,8 +20,7 @@ from lambent.core.progress import Progress, silent, tracked
 from lambent.materials.export.contract import Cost, Kind, Subject
 from lambent.materials.export.resampling.resampled import LOST_TRANSMISSION, Scatterer, read_back, scatterer_of
 from lambent.materials.measured.parts.tensor_file import Tensors, tensor_bytes
-from lambent.materials.measured.rgl import d_wo_d_um, half_vectors_at
-from lambent.materials.measured.tables.marginal import Corners, Warp
+from lambent.materials.measured.rgl import Corners, Warp, d_wo_d_um, half_vectors_at
 
 NAME = "RGL tensor file"
 ENDINGS = (".bsdf",)

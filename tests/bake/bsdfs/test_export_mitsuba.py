@@ -9,7 +9,7 @@ import pytest
 
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.export import mitsuba
-from lambent.materials.export.resampling.pairs import pairs_of
+from lambent.materials.export.resampling.resampled import pairs_of
 from tests.materials.export.export_materials import ALL, BRUSHED, FOIL, GOLD, PAPER
 from tests.tools.in_mitsuba import f_cos
 

@@ -17,7 +17,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material, material_from
 from lambent.materials.export import gltf, gonio_text, lbnl_xml, materialx, merl, mitsuba
 from lambent.materials.export.contract import LIGHT_LIMITS, LIMITS, RETRO_LIMITS, Cost, verdict_of, writers
-from lambent.materials.export.matching.match import without_retro
+from lambent.materials.export.matching import without_retro
 from lambent.materials.export.resampling import patch_mean
 from lambent.materials.export.resampling.resampled import proposal_of, read_back
 from lambent.materials.measured import load

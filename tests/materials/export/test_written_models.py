@@ -24,7 +24,7 @@ from lambent.core.geometry.directions import Floats, normalize
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import gltf, materialx, mitsuba
-from lambent.materials.export.resampling.pairs import CHECK_LOG2, pairs_of
+from lambent.materials.export.resampling.resampled import CHECK_LOG2, pairs_of
 from lambent.materials.measured.inspecting.metrics import errors_and_shares
 from lambent.materials.measured.inspecting.synthetic import Setup, synthesise
 from lambent.materials.measured.protocol import MeasuredSamples

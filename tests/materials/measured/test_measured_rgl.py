@@ -12,8 +12,7 @@ from scipy.spatial import cKDTree
 
 from lambent.core.geometry.directions import direction
 from lambent.materials.measured import load
-from lambent.materials.measured.rgl import Azimuths
-from lambent.materials.measured.tables.marginal import Corners, Warp
+from lambent.materials.measured.rgl import Azimuths, Corners, Warp
 from tests.materials.measured.measured_files import Loaded, rgl_fields, tensor_bytes
 from tests.tools.in_mitsuba import f_cos
 

@@ -24,8 +24,7 @@ from lambent.materials.measured.parts.klems import KLEMS_FULL, KLEMS_HALF, Angle
 from lambent.materials.measured.tables import half_vector_resampling
 from lambent.materials.measured.tables.half_vector_grid import GridShape
 from lambent.materials.measured.tables.half_vector_resampling import RetroGrid, grid_of, retro_grid_of
-from lambent.materials.measured.tables.patch_sheet import lookup_of, patch_sheet_of
-from lambent.materials.measured.tables.table_bsdf import TableBSDF
+from lambent.materials.measured.tables.patch_sheet import TableBSDF, lookup_of, patch_sheet_of
 from tests.materials.export.formula_table import FormulaTable
 from tests.materials.measured.measured_files import about_n
 
