@@ -17,7 +17,7 @@ from lambent.core.progress import Progress, silent, stepper
 from lambent.materials.bsdf import more_than_arrives
 from lambent.materials.checking import check
 from lambent.materials.checking.check import PHI_DEG, THETA_DEG, Furnace, Report, mean_albedo
-from lambent.materials.measured.inspecting.faults import extrapolation
+from lambent.materials.measured.inspecting.inspection import extrapolation
 from lambent.materials.measured.protocol import MeasuredTable, negative_readings
 from lambent.materials.measured.tables.half_vector_grid import GridShape
 from lambent.materials.measured.tables.patch_sheet import TableBSDF

@@ -1,24 +1,29 @@
 """LBNL BSDF XML on the Klems full basis: 145 x 145 patches, both sides, reflection and transmission.
 
-Every pair of patches holds the mean of f over both, so that each patch receives the same light as from the subject.
-Colour follows Radiance's tools: Visible is the luminance; CIE-X and CIE-Z are added.
+Every pair of patches holds the mean of f over the projected solid angle of both, so that each patch receives the same
+light as from the subject. A lobe can be far narrower than a patch, and lobes rarely reach a dim patch; directions are
+therefore drawn both uniformly within every patch and from a BSDF's lobes, and weighted by the sum of both densities
+(Veach & Guibas 1995, the balance heuristic). The smallest value of each pair is subtracted first, so that a constant
+comes out exactly. Colour follows Radiance's tools: Visible is the luminance; CIE-X and CIE-Z are added.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from lambent.core.arrays import Floats, Indices
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
-from lambent.core.geometry.directions import Floats
-from lambent.core.progress import Progress, silent
+from lambent.core.geometry.directions import FLIP_Z, HALF_TURN, raised
+from lambent.core.progress import Progress, silent, tracked
+from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.materials.export.contract import Cost, Kind, Subject
 from lambent.materials.export.resampling.lbnl_layout import END, END_OF_BLOCK, block_head, head, losses
-from lambent.materials.export.resampling.patch_mean import patch_means
 from lambent.materials.export.resampling.resampled import (
     Scatterer,
     is_grey,
@@ -27,8 +32,62 @@ from lambent.materials.export.resampling.resampled import (
     read_back,
     scatterer_of,
 )
-from lambent.materials.measured.parts.klems import KLEMS_FULL
+from lambent.materials.lobes import COS_MIN
+from lambent.materials.measured.parts.klems import KLEMS_FULL, OUTSIDE, AngleBasis
 from lambent.materials.measured.parts.spectral import equal_energy_of_rgb
+
+EVEN_LOG2, LOBES_LOG2 = 3, 13  # log2 of directions per pair of patches, and per incident patch from lobes
+
+Evaluate = Callable[[Floats, Floats], Floats]
+
+
+def patch_means(evaluate: Evaluate, basis: AngleBasis, proposal: MaterialBSDF, side: int, progress: Progress) -> Floats:
+    """Mean f (2, outgoing patches, incident patches, C) in 1/sr of light from one side: reflected, then transmitted.
+
+    Parameters
+    ----------
+    evaluate : callable
+        f (N, C) of wi and wo (N, 3), on any side.
+    proposal : MaterialBSDF
+        BSDF to draw directions from; the closer its lobes are to f, the less noise.
+    side : +1 or -1
+        The side of wi.
+    """
+    patches = tracked(range(basis.count), progress, "averaging over patches")
+    whole = np.stack([_column(evaluate, basis, proposal, side, i) for i in patches], axis=1)
+    return whole.reshape(2, basis.count, *whole.shape[1:])
+
+
+def _column(evaluate: Evaluate, basis: AngleBasis, proposal: MaterialBSDF, side: int, i: int) -> Floats:
+    """(2 outgoing patches, C) means of one incident patch: all patches of reflection, then all of transmission."""
+    wi, wo, patch = _directions(basis, proposal, i)
+    cosine = np.abs(wo[:, 2])
+    density = (1 << EVEN_LOG2) / basis.projected_sr[patch] + (1 << LOBES_LOG2) * proposal.pdf(wo, wi) / cosine
+    f = np.maximum(evaluate(wi * (1, 1, side), wo * (1, 1, side)), 0)
+    bin_of = patch + np.where(wo[:, 2] < 0, basis.count, 0)
+    order = np.argsort(bin_of, kind="stable")
+    starts = np.searchsorted(bin_of[order], np.arange(2 * basis.count))
+    lowest = np.minimum.reduceat(f[order], starts)
+    excess = np.add.reduceat(((f - lowest[bin_of]) / density[:, None])[order], starts)
+    return np.asarray(lowest + excess / np.tile(basis.projected_sr, 2)[:, None])
+
+
+def _directions(basis: AngleBasis, proposal: MaterialBSDF, i: int) -> tuple[Floats, Floats, Indices]:
+    """wi (N, 3) in patch i of the upper side, wo (N, 3) on both sides, and the outgoing patch (N,) of each."""
+    from scipy.stats import qmc
+
+    patch = np.repeat(np.tile(np.arange(basis.count), 2), 1 << EVEN_LOG2)
+    u = qmc.Sobol(4, rng=2 * i).random_base2(int(len(patch) - 1).bit_length())[: len(patch)]
+    v = qmc.Sobol(5, rng=2 * i + 1).random_base2(LOBES_LOG2)
+    wi = basis.points(np.full(len(u) + len(v), i), np.concatenate([u, v[:, :4]])[:, :2]) * HALF_TURN
+    even = basis.points(patch, u[:, 2:])
+    even[len(even) // 2 :] *= FLIP_Z
+    lobes = proposal.sample(wi[len(u) :], v[:, 2:])
+    wo = np.concatenate([even, lobes])
+    patch = np.concatenate([patch, basis.index(raised(lobes))])
+    scattered = (np.abs(wo[:, 2]) > COS_MIN) & (patch != OUTSIDE)  # lobe samples can end at the horizon
+    return wi[scattered], wo[scattered], patch[scattered]
+
 
 NAME = "LBNL BSDF XML"
 ENDINGS = (".xml",)

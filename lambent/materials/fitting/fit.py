@@ -24,7 +24,7 @@ from lambent.materials.fitting.gradient import Bounds
 from lambent.materials.fitting.parameters import BOUNDS, RETRO_BOUNDS, SHAPE, Box, Fixed, Ranges, parameter
 from lambent.materials.fitting.problem import Candidate, Found, Mixture, Problem, problem_of
 from lambent.materials.fitting.scale import diffuse_mode
-from lambent.materials.measured.inspecting.faults import towards_light
+from lambent.materials.measured.inspecting.inspection import towards_light
 from lambent.materials.measured.inspecting.metrics import Metric, errors_of, metric_named
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 

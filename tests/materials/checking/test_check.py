@@ -18,7 +18,6 @@ from lambent.materials.checking.check_table import check_table
 from lambent.materials.checking.normalise import NOTE, change, normalisation, normalised, with_less_alpha, with_less_k
 from lambent.materials.document import Lobe, Material, Provenance
 from lambent.materials.export import lbnl_xml
-from lambent.materials.export.resampling import patch_mean
 from lambent.materials.fitting.fit import fit
 from lambent.materials.measured import load
 from lambent.materials.measured.protocol import TableInfo
@@ -88,7 +87,7 @@ def film(tmp_path_factory):
     """A BSDF file of a diffusing film, with transmission alone; the same with any number of directions."""
     path = tmp_path_factory.mktemp("film") / "film.xml"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(patch_mean, "LOBES_LOG2", 5)
+        patch.setattr(lbnl_xml, "LOBES_LOG2", 5)
         lbnl_xml.write(Material(name="film", kt_d=0.6), path)
     return path
 

@@ -17,7 +17,7 @@ from lambent.core.progress import Cancelled
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import lbnl_xml, tensor_tree
-from lambent.materials.export.resampling import patch_mean, tree_growth
+from lambent.materials.export.resampling import tree_growth
 from lambent.materials.measured.lbnl_xml import read
 from lambent.materials.measured.parts.tensor_tree import Rank, disk_of
 from lambent.materials.measured.parts.tree_part import on_sphere
@@ -39,7 +39,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
     def limit(log2_cells: int, scouts_log2: int = 15) -> None:
         monkeypatch.setattr(tree_growth, "MOST_CELLS", {3: 1 << log2_cells, 4: 1 << log2_cells})
         monkeypatch.setattr(tensor_tree, "SCOUTS_LOG2", scouts_log2)
-        monkeypatch.setattr(patch_mean, "LOBES_LOG2", 5)
+        monkeypatch.setattr(lbnl_xml, "LOBES_LOG2", 5)
 
     limit(15)
     return limit

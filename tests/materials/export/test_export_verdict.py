@@ -18,7 +18,6 @@ from lambent.materials.document import Lobe, Material, material_from
 from lambent.materials.export import gltf, gonio_text, lbnl_xml, materialx, merl, mitsuba
 from lambent.materials.export.contract import LIGHT_LIMITS, LIMITS, RETRO_LIMITS, Cost, verdict_of, writers
 from lambent.materials.export.matching import without_retro
-from lambent.materials.export.resampling import patch_mean
 from lambent.materials.export.resampling.resampled import proposal_of, read_back
 from lambent.materials.measured import load
 from lambent.materials.measured.inspecting.metrics import METRICS
@@ -83,7 +82,7 @@ def test_gonio_text_keeps_the_peak(tmp_path: Path):
 @pytest.mark.parametrize("writer", [merl, lbnl_xml], ids=lambda writer: writer.NAME)
 def test_coarser_formats_say_what_becomes_of_the_peak(writer, tmp_path: Path, monkeypatch):
     monkeypatch.setattr(merl, "SHAPE", (60, 30, 60))
-    monkeypatch.setattr(patch_mean, "LOBES_LOG2", 7)
+    monkeypatch.setattr(lbnl_xml, "LOBES_LOG2", 7)
     table, path = TAPES[0].measured(10.0), tmp_path / f"tape{writer.ENDINGS[0]}"
     cost = writer.write(table, path)
     if not cost.errors:

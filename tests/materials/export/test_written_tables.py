@@ -17,7 +17,6 @@ from lambent.core.light.colour import luminance
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import gonio_text, lbnl_xml, merl, rgl
-from lambent.materials.export.resampling import patch_mean
 from lambent.materials.measured import load
 from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, record
@@ -124,14 +123,14 @@ BACK = np.array((-1, -1, 1))
 @pytest.fixture
 def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
     """Few directions, for results that are exact with any number of them."""
-    monkeypatch.setattr(patch_mean, "LOBES_LOG2", 5)
+    monkeypatch.setattr(lbnl_xml, "LOBES_LOG2", 5)
 
 
 @pytest.fixture(scope="module")
 def foil(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, LbnlTable]:
     path = tmp_path_factory.mktemp("foil") / "foil.xml"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(patch_mean, "LOBES_LOG2", 11)  # its lobes are wide
+        patch.setattr(lbnl_xml, "LOBES_LOG2", 11)  # its lobes are wide
         lbnl_xml.write(THIN, path)
     return path, read(path)
 
@@ -216,7 +215,7 @@ def test_a_measured_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     f = np.where((wi[..., 2:] > 0) & (wo[..., 2:] > 0), MaterialBSDF(glossy).eval(wi, wo), np.nan)
     (tmp_path / "g.binary").write_bytes(merl_bytes(f))
     table = load(tmp_path / "g.binary")
-    monkeypatch.setattr(patch_mean, "LOBES_LOG2", 11)
+    monkeypatch.setattr(lbnl_xml, "LOBES_LOG2", 11)
     cost = lbnl_xml.write(table, tmp_path / "g.xml")
     written = read(tmp_path / "g.xml")
     for patch in (0, 20, 80):
@@ -303,7 +302,7 @@ def test_rgl(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_klems_rings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The angle basis in the file is Klems's, and matt colour is XYZ of the equal-energy white."""
-    monkeypatch.setattr(patch_mean, "LOBES_LOG2", 4)
+    monkeypatch.setattr(lbnl_xml, "LOBES_LOG2", 4)
     lbnl_xml.write(Material(name="red", kd=(0.6, 0.2, 0.1), kt_d=(0.1, 0.1, 0.2)), tmp_path / "a.xml")
     rings = list(ET.parse(tmp_path / "a.xml").getroot().iter(f"{SPACE}AngleBasisBlock"))
     assert [int(ring.findtext(f"{SPACE}nPhis")) for ring in rings] == list(KLEMS_COUNTS)
@@ -322,7 +321,7 @@ def test_klems_rings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_klems_order_and_sides(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A formula without symmetry: each patch holds its value near the patch's middle, incident ones from phi + 180."""
-    monkeypatch.setattr(patch_mean, "LOBES_LOG2", 8)
+    monkeypatch.setattr(lbnl_xml, "LOBES_LOG2", 8)
     lbnl_xml.write(FormulaTable(lopsided, transmits=True), tmp_path / "a.xml")
     theta = np.repeat([0, *np.convolve(KLEMS_EDGES_DEG[1:], [0.5, 0.5], "valid")], KLEMS_COUNTS)
     phi = np.concatenate([360 * np.arange(n) / n for n in KLEMS_COUNTS])

@@ -20,7 +20,7 @@ from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.gradient import Bounds, _add_albedos, _moved, _unknowns
 from lambent.materials.fitting.parameters import box_of, check, to_search
 from lambent.materials.fitting.problem import Candidate, Mixture, problem_of
-from lambent.materials.measured.inspecting.faults import towards_light
+from lambent.materials.measured.inspecting.inspection import towards_light
 from lambent.materials.measured.inspecting.metrics import METRICS, errors_of
 from lambent.materials.measured.inspecting.synthetic import synthesise
 from lambent.materials.measured.protocol import MeasuredTable, TableInfo, collect

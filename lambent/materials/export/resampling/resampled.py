@@ -25,7 +25,7 @@ from lambent.materials.document import BLACK, Distribution, Lobe, Material
 from lambent.materials.export.contract import Cost, Subject
 from lambent.materials.fresnel import schlick_weight
 from lambent.materials.lobes import Vector
-from lambent.materials.measured.inspecting.faults import retro, towards_light
+from lambent.materials.measured.inspecting.inspection import retro, towards_light
 from lambent.materials.measured.inspecting.metrics import errors_and_shares, light_ratios
 from lambent.materials.measured.protocol import GRAZING_DEG, LeftOut, MeasuredSamples, TableInfo, negative_readings
 from lambent.materials.measured.registry import load

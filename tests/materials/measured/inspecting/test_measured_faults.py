@@ -17,8 +17,7 @@ from lambent.materials.checking.check_table import _warnings, albedos
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.account import _energy
 from lambent.materials.measured import load
-from lambent.materials.measured.inspecting.faults import too_bright
-from lambent.materials.measured.inspecting.inspection import inspect_table
+from lambent.materials.measured.inspecting.inspection import inspect_table, too_bright
 from lambent.materials.measured.inspecting.metrics import METRICS, metric_named
 from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, record, synthesise
 from lambent.materials.measured.protocol import LeftOut, MeasuredSamples, TableInfo

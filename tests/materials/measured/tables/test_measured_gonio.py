@@ -13,8 +13,7 @@ from lambent.core.geometry.directions import direction, normalize
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured import load
-from lambent.materials.measured.inspecting.faults import extrapolation
-from lambent.materials.measured.inspecting.inspection import inspect_table
+from lambent.materials.measured.inspecting.inspection import extrapolation, inspect_table
 from lambent.materials.measured.inspecting.synthetic import ANISOTROPIC, ISOTROPIC, synthesise
 from lambent.materials.measured.lbnl_xml import read as read_xml
 from lambent.materials.measured.parts.gonio_text import write_gonio
