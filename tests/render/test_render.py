@@ -15,12 +15,17 @@ from lambent.core.light.false_colour import fitting_range
 from lambent.core.light.photometry import photometric
 from lambent.core.pictures.images import read_encoded, read_image, to_bytes
 from lambent.core.views.camera import CameraPath
+from lambent.editing.interreflection.whole import whole_picture
+from lambent.editing.session.session import Session
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.render import Settings, film, images, still
-from lambent.store.contract import scene_record, write_scene_record
+from lambent.render.edited import edited_still
+from lambent.store.contract import SceneRecord, scene_record, write_scene_record
 from lambent.store.store import Store
+from tests.editing.written_view import SIZE
+from tests.viewer.edited_view import CAMERA, TRAY, WALL, write_light
 from tests.viewer.small_store import FRONT, SIDE, write_small_store
 
 pytestmark = pytest.mark.usefixtures("adapter")
@@ -188,3 +193,18 @@ def test_a_view_without_light_is_said(store: Path, level: float, said: str, capl
     drawn.exposure_ev = None
     drawn.exposed(np.full((8, 8, 3), level))
     assert said in caplog.text and bool(said) == bool(caplog.text)
+
+
+def test_an_edited_view_is_drawn_as_its_session_says(tmp_path: Path) -> None:
+    session = Session.new("small room", CAMERA, {"tray": TRAY, "wall": WALL}, size=SIZE)
+    write_light(tmp_path / "s", session, 20)
+    materials, bounds = {"tray": TRAY, "wall": WALL}, ((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
+    record = SceneRecord(name="small room", objects=(), materials=materials, cameras=(CAMERA,), bounds=bounds)
+    with Store.open(tmp_path / "s") as store:
+        write_scene_record(store, record)
+    session.tint("wall", "diffuse", 0.5)
+    session.save(tmp_path / "s.edits.json")
+    done = edited_still(tmp_path / "s", tmp_path / "s.edits.json", tmp_path / "a.exr", replace(SMALL, exposure_ev=0.0))
+    picture = whole_picture(Store.open(tmp_path / "s"), session)
+    np.testing.assert_allclose(read_image(done.file), np.maximum(picture.image(), 0), rtol=2e-3)
+    assert (done.width, done.height) == SIZE

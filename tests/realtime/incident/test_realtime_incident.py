@@ -59,8 +59,8 @@ def inverse_depth(w: np.ndarray) -> np.ndarray:
     return ((np.abs(w) / ROOM).max(axis=-1) / np.abs(w).max(axis=-1))[:, None]
 
 
-def in_shader(name: str, x: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """The same by the shader, with the planes and the depth of the room in the place of its bindings."""
+def in_shader(name: str, call: str, x: np.ndarray, w: np.ndarray, components: int = 1) -> np.ndarray:
+    """A call of the shader, with the planes and the depth of the room in the place of its bindings."""
     source = assemble("incident.wgsl", "look_up.wgsl", given={"look_up.wgsl": shader_of(look_ups()[name])})
     for old, new in (
         ("override PLANES: u32 = 0u;", f"const PLANES = {len(PLANES)}u;"),
@@ -73,20 +73,30 @@ def in_shader(name: str, x: np.ndarray, w: np.ndarray) -> np.ndarray:
     ):
         source = source.replace(old, new)
     tables = {"planes": PLANES} if name == "planes" else {}
-    call = "normalize(incident_look_up(x, w).direction)"
-    return run_wgsl(source, call, {"x": x, "w": w}, components=3, tables=tables)
+    return run_wgsl(source, call, {"x": x, "w": w}, components=components, tables=tables)
+
+
+def walls_m(x: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """(n,) distances to the walls of the room."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(((np.sign(w) * ROOM - x) / w).min(axis=-1))
 
 
 @pytest.mark.parametrize("name", ["planes", "distance"])
 def test_shaders_look_up_as_the_bake_does(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The bake chooses between look-ups by numpy's versions of them."""
     x, w = places()
-    got, expected = in_shader(name, x, w), looked_up(name, monkeypatch, x, w)
+    got = in_shader(name, "normalize(incident_look_up(x, w).direction)", x, w, 3)
+    expected = looked_up(name, monkeypatch, x, w)
     assert_parity(got, expected.astype(np.float32), atol=2e-4)
-    with np.errstate(divide="ignore"):
-        t = ((np.sign(w) * ROOM - x) / w).min(axis=-1)
-    error = np.linalg.norm(got - normalize(x + t[:, None] * w), axis=-1)
+    error = np.linalg.norm(got - normalize(x + walls_m(x, w)[:, None] * w), axis=-1)
     assert np.quantile(error, 1 if name == "planes" else 0.5) < 2e-3, "steps of the march may skip an edge of the room"
+
+
+def test_planes_bound_a_ray_and_a_plain_probe_knows_no_wall() -> None:
+    x, w = places()
+    np.testing.assert_allclose(in_shader("planes", "incident_bound(x, w)", x, w), 1 / walls_m(x, w), rtol=1e-3)
+    assert not in_shader("plain", "incident_bound(x, w)", x, w).any()
 
 
 def test_constants_of_look_ups_stand_in_both() -> None:

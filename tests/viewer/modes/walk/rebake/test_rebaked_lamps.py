@@ -118,6 +118,7 @@ def test_the_picture_at_rest_has_the_edited_lamps(stores, rebaked):
     rooms = Rooms(store, 0.0, ())
     wish = Wish(1, ("traced",), CAMERA, (SIZE, SIZE), lamps=edits, rebaked=rebaked)
     found = traced(rooms.of("traced", wish), 64, camera=CAMERA).mean()
+    assert (rooms._rebaked is not None) == rebaked
     scene = with_lamp_edits(scene_of(Store.open(store)), edits)
     assert scene.lights[0].position == MOVED[0].position
     exact = traced(
