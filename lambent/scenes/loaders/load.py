@@ -23,9 +23,8 @@ from lambent.core.inputs import foreign_bytes
 from lambent.materials.document import Material
 from lambent.scenes import builtin, loaders
 from lambent.scenes.loaders.contents import Contents, LoadOptions
-from lambent.scenes.loaders.meshes.creases import deviation_warnings, with_creases
 from lambent.scenes.loaders.meshes.flush import with_flush_raised
-from lambent.scenes.loaders.meshes.repair import box_mapped
+from lambent.scenes.loaders.meshes.repair import box_mapped, deviation_warnings, with_creases
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.document import load_toml
 from lambent.scenes.photometry.luminous_surfaces import with_luminous_surfaces

@@ -11,7 +11,7 @@ import numpy as np
 
 from lambent.core.errors import UserError
 from lambent.core.plain import Triple, triple
-from lambent.scenes.loaders.surfaces.texture_images import read_texture_image
+from lambent.scenes.loaders.surfaces.material_builder import read_texture_image
 from lambent.scenes.loaders.surfaces.textured import Textured, relative
 from lambent.scenes.scene import IDENTITY, ImageTexture, MaterialTextures, Texture
 

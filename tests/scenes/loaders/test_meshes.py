@@ -16,8 +16,8 @@ from lambent.core.geometry.triangles import triangle_normals
 from lambent.materials.document import Lobe, Material
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import box, cylinder, merge, placed, signed_volume, sphere, turn
-from lambent.scenes.loaders.meshes.creases import creased, deviating_faces
 from lambent.scenes.loaders.meshes.flush import RAISED, with_flush_raised
+from lambent.scenes.loaders.meshes.repair import creased, deviating_faces
 from lambent.scenes.scene import Mesh, Scene, SceneObject
 from tests.scenes.loaders.gltf.test_gltf import document
 from tests.scenes.loaders.gltf.test_gltf_details import FLOAT, with_arrays

@@ -18,8 +18,8 @@ from lambent.core.plain import Triple
 from lambent.materials.fresnel import r0_of
 from lambent.scenes.loaders.gltf.container import Gltf, is_remote
 from lambent.scenes.loaders.gltf.schema import READ_EXTENSIONS, MaterialDocument, SpecularGlossiness, TextureReference
+from lambent.scenes.loaders.surfaces.material_builder import TextureImage, TextureImages
 from lambent.scenes.loaders.surfaces.surface import ROUGHNESS_MIN, SpecularLobe, Surface, metallic_roughness, rgb
-from lambent.scenes.loaders.surfaces.texture_images import TextureImage, TextureImages
 from lambent.scenes.loaders.surfaces.textured import Textured, absolute, combined, constant, flipped_uv, scaled
 from lambent.scenes.scene import IDENTITY, Texture, UvTransform
 

@@ -16,8 +16,8 @@ from lambent.core.plain import triple
 from lambent.core.views.camera import FARTHEST_M, Camera, camera_axes
 from lambent.scenes.loaders.mitsuba.colours import colour_of
 from lambent.scenes.loaders.mitsuba.document import Document, Element
+from lambent.scenes.loaders.surfaces.material_builder import TextureImage, TextureImages
 from lambent.scenes.loaders.surfaces.surface import GREY, Surface
-from lambent.scenes.loaders.surfaces.texture_images import TextureImage, TextureImages
 from lambent.scenes.loaders.surfaces.textured import Textured, combined, constant, flipped_uv
 from lambent.scenes.scene import UvTransform
 

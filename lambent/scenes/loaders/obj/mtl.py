@@ -21,7 +21,7 @@ from lambent.core.inputs import decoded, read_bytes
 from lambent.core.plain import Triple, is_number
 from lambent.materials.fresnel import r0_of
 from lambent.scenes.loaders.scene_files import SceneFiles
-from lambent.scenes.loaders.surfaces.material_builder import MaterialBuilder
+from lambent.scenes.loaders.surfaces.material_builder import MaterialBuilder, TextureImage, TextureImages
 from lambent.scenes.loaders.surfaces.surface import (
     GREY,
     ROUGHNESS_MIN,
@@ -31,7 +31,6 @@ from lambent.scenes.loaders.surfaces.surface import (
     metallic_roughness,
     rgb,
 )
-from lambent.scenes.loaders.surfaces.texture_images import TextureImage, TextureImages
 from lambent.scenes.loaders.surfaces.textured import Textured, absolute, combined, constant, scaled
 from lambent.scenes.scene import Texture, UvTransform
 

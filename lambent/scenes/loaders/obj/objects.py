@@ -13,8 +13,7 @@ from lambent.core.ceilings import MATERIALS, TRIANGLES
 from lambent.core.errors import UserError
 from lambent.core.plain import UniqueNames
 from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions
-from lambent.scenes.loaders.meshes.creases import DEVIATION_DEG
-from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of, smooth_normals, triangulate
+from lambent.scenes.loaders.meshes.repair import DEVIATION_DEG, MeshArrays, mesh_of, smooth_normals, triangulate
 from lambent.scenes.loaders.obj.mtl import Library
 from lambent.scenes.loaders.obj.text import ObjText, read
 from lambent.scenes.loaders.scene_files import SceneFiles
