@@ -46,6 +46,14 @@ def adapter() -> None:
 
 
 @pytest.fixture(scope="session")
+def device(adapter: None) -> Any:
+    """One device for all tests that draw."""
+    from lambent.realtime.gpu.device import open_device
+
+    return open_device()
+
+
+@pytest.fixture(scope="session")
 def mi() -> Any:
     """Mitsuba with its variant set and our BSDFs registered; tests that need it skip where no variant works."""
     from lambent.bake.engine import engine

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lambent.baked.light_fields.blocks.blocks import blocks_of, distance_blocks_of
 from lambent.baked.light_fields.light_field import CANDIDATES, NO_POINT, LightField
 from lambent.baked.light_fields.stored import BLOCKS, DISTANCES
+from lambent.core.arrays import Flags, Floats
 from lambent.core.geometry.directions import normalize, reflect
 from lambent.core.geometry.octahedral import texel_directions
 from lambent.core.geometry.sequences import hammersley
@@ -24,7 +25,6 @@ from lambent.store.contract import light_field_name, write_scene_record
 from lambent.store.store import Store
 from tests.realtime.lit_wall import cube_of
 
-Floats = NDArray[np.floating]
 MIRROR = Material(name="mirror", lobes=(Lobe(mx=0.001, my=0.001, r0=1.0, alpha=0.5),))
 HALF = np.array([1.0, 0.7, 0.9])  # half sizes of the room, m
 RADIUS, OFFSET = 0.4, 0.03
@@ -86,7 +86,7 @@ def ball_scene(material: Material = MIRROR, field: LightField | None = None) -> 
     return replace(scene, uv2=np.asarray(mesh.uv, np.float32), light_fields=fields, environment=None)
 
 
-def mirrored(width: int, height: int) -> tuple[Floats, NDArray[np.bool_]]:
+def mirrored(width: int, height: int) -> tuple[Floats, Flags]:
     """(height, width, 3) light that a perfectly mirroring ball shows the camera, and where the ball is."""
     across, up, forward = image_plane(CAMERA, width, height)
     x, y = np.meshgrid((np.arange(width) + 0.5) / width * 2 - 1, 1 - (np.arange(height) + 0.5) / height * 2)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lambent.baked.light_fields.light_field import CANDIDATES, NO_POINT, LightField
 from lambent.baked.light_fields.lookup import Place
+from lambent.core.arrays import Flags, Floats
 from lambent.core.geometry.directions import normalize, reflect
 from lambent.core.geometry.octahedral import texel_directions
 from lambent.core.views.camera import Camera, image_plane
@@ -19,7 +19,6 @@ from lambent.scenes.geometry import patch
 from tests.realtime.lit_ball import HALF, MIRROR, seen
 from tests.realtime.lit_wall import cube_of, smooth_light
 
-Floats = NDArray[np.floating]
 HEIGHT, EDGE, OFFSET = -0.55, 0.5, 0.04
 CAMERA = Camera(name="plate", position=(0.1, 0.25, 0.8), target=(0.0, HEIGHT, 0.0), fov_y_deg=40.0)
 GRID = (40, 40)  # of the sample map
@@ -62,7 +61,7 @@ def plate_scene(field: LightField, material: Material = MIRROR) -> BakedScene:
     return replace(scene, uv2=uv2.astype(np.float32), light_fields={"plate": field})
 
 
-def mirrored(field: LightField, size: int) -> tuple[Place, Floats, NDArray[np.bool_]]:
+def mirrored(field: LightField, size: int) -> tuple[Place, Floats, Flags]:
     """Places of all pixels on the plate's plane, the directions they mirror, and which pixels are well on the plate."""
     across, up, forward = image_plane(CAMERA, size, size)
     clip = (np.arange(size) + 0.5) / size * 2 - 1

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.geometry.cubemap import face_directions
 from lambent.core.geometry.directions import normalize
 from lambent.core.views.camera import Camera
@@ -15,7 +15,6 @@ from lambent.realtime.light.baked import BakedScene
 from lambent.realtime.objects.unbaked import unbaked_scene
 from lambent.scenes.geometry import patch
 
-Floats = NDArray[np.floating]
 OBLIQUE = Camera(name="oblique", position=(1.5, 0.8, 2.0), target=(0.2, 0.1, 0.0), fov_y_deg=30.0)
 
 

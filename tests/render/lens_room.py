@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lambent.baked.light_fields.thin_glass import refracted
+from lambent.core.arrays import Flags, Floats
 from lambent.core.geometry.directions import normalize
 from lambent.core.views.camera import Camera, image_plane
 from lambent.materials.bsdf import under_fresnel
@@ -15,7 +15,6 @@ from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import lathe, merge, patch, placed, turn
 from lambent.scenes.scene import LightFieldWish, Scene, SceneObject
 
-Floats = NDArray[np.floating]
 HALF_M, TILES = 1.5, 6  # half the room's side; tiles along a side
 COLOURS = np.array([[0.9, 0.2, 0.15], [0.2, 0.7, 0.3], [0.2, 0.35, 0.95], [0.85, 0.8, 0.3], [0.7] * 3, [0.1] * 3])
 ETA, R0, APERTURE_M = 1.5, 0.04, 0.25
@@ -48,7 +47,7 @@ class Lens:
         materials = {"black": Material(), "glass": GLASS}
         return Scene("lens", objects, materials, light_fields={"lens": LightFieldWish(refracts=True)})
 
-    def seen(self, camera: Camera, pixels: int, within: int = 4) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    def seen(self, camera: Camera, pixels: int, within: int = 4) -> tuple[Floats, Floats, Flags]:
         """What a square picture shows (pixels, pixels, 3): through the lens, and without it.
 
         Also where all rays enter by the front face and leave by the back one. Weights of light as in
@@ -76,7 +75,7 @@ class Lens:
 
         return image(light), image(straight), image(through.astype(float))[..., 0] == 1
 
-    def _face(self, x: Floats, w: Floats, side: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    def _face(self, x: Floats, w: Floats, side: int) -> tuple[Floats, Floats, Flags]:
         """Where rays meet the face on one side of z = 0: places and normals out of the glass (k, 3), and whether."""
         centre = np.array([0.0, 0.0, -side * self.centre_m])
         along, away = np.sum(w * (x - centre), axis=1), np.sum((x - centre) ** 2, axis=1)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from lambent.bake.bake import bake
@@ -14,12 +13,12 @@ from lambent.bake.light.sampling import cleaned
 from lambent.bake.light.stitching import Cuts, cuts_of, stitched
 from lambent.bake.surfaces.atlas import merged, unwrap
 from lambent.bake.surfaces.texels import BEYOND, chart_labels, texels_of
+from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize
 from lambent.scenes.geometry import box, grid, merge, patch, placed, sphere
 from lambent.scenes.scene import ConstantEnvironment, Mesh, Scene, SceneObject
 from tests.bake.small_scenes import BLACK, GREY, TINY
 
-Floats = NDArray[np.floating]
 TOWARDS = normalize(np.array([0.3, 0.8, 0.5]))
 
 

@@ -7,9 +7,7 @@ from pathlib import Path
 import mitsuba as mi
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from lambent.bake.engine import engine
 from lambent.bake.photons.shooting import shoot
 from lambent.bake.sky.daylight import lone_emitter, radiance_from
 from lambent.bake.sky.sun import FoundSun, sun_in, sun_of
@@ -17,6 +15,7 @@ from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.lights.sun import Sun, SunRays
 from lambent.bake.tracing.rays import array_of, independent, vectors
 from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
+from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.latlong import lat_long_direction
 from lambent.core.pictures.images import write_image
@@ -24,16 +23,11 @@ from lambent.scenes.geometry import box, patch, placed
 from lambent.scenes.scene import DirectionalLight, ImageEnvironment, Scene, SceneObject, SunSky
 from tests.bake.small_scenes import GREY
 
-Floats = NDArray[np.floating]
+pytestmark = pytest.mark.usefixtures("mi")
 H, W = 256, 512
 SKY = (0.2, 0.3, 0.5)
 TOWARDS = normalize(np.array([0.4, 0.8, -0.3]))
 NONE = np.eye(3)
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _path_tracer() -> None:
-    engine()
 
 
 def disc(towards: Floats, radius_deg: float, radiance: float, height: int = H) -> Floats:

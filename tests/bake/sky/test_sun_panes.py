@@ -9,22 +9,21 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from lambent.bake.engine import engine
 from lambent.bake.photons.shooting import shoot
 from lambent.bake.sky.sun import sun_of
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.lights.sun import Sun, SunRays
 from lambent.bake.tracing.rays import array_of, independent, vectors
 from lambent.bake.tracing.scene_builder import SceneBuilder
+from lambent.core.arrays import Floats
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import DirectionalLight, MaterialTextures, Mesh, Scene, SceneObject, Texture
 from tests.bake.sky.test_sun import TOWARDS, disc, environment_file
 from tests.bake.small_scenes import BLACK, GREY
 
-Floats = NDArray[np.floating]
+pytestmark = pytest.mark.usefixtures("mi")
 IRRADIANCE = np.array([3.0, 2.0, 1.0])
 
 
@@ -38,11 +37,6 @@ MATERIALS = {
     "grey": GREY, "black": BLACK, "clear": glass(0.8, 0.8, 0.8), "red": glass(0.9, 0.3, 0.0),
     "frosted": glass(0.8, 0.8, 0.8, m=0.07), "sheer": glass(0.5, 0.5, 0.5, kt_d=0.2),
 }  # fmt: skip
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _path_tracer() -> None:
-    engine()
 
 
 def passing(cosine: float) -> float:

@@ -8,9 +8,7 @@ from pathlib import Path
 import mitsuba as mi
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from lambent.bake.engine import engine
 from lambent.bake.sky.daylight import radiance_from
 from lambent.bake.sky.sun import sun_of
 from lambent.bake.tracing import path_tracer
@@ -19,18 +17,14 @@ from lambent.bake.tracing.lights.emitters import balance_emitters
 from lambent.bake.tracing.lights.sun import Sun
 from lambent.bake.tracing.rays import array_of, independent, vectors
 from lambent.bake.tracing.scene_builder import SceneBuilder
+from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import DirectionalLight, PointLight, Scene, SceneObject
 from tests.bake.sky.test_sun import SKY, TOWARDS, disc, environment_file, suns, wall_with_an_opening
 from tests.bake.small_scenes import BLACK, GREY
 
-Floats = NDArray[np.floating]
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _path_tracer() -> None:
-    engine()
+pytestmark = pytest.mark.usefixtures("mi")
 
 
 def traced_scene(scene: Scene) -> tuple[mi.Scene, Sun, Sun]:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame_state import FrameState
@@ -21,7 +21,6 @@ from tests.realtime.sun.test_realtime_panes import CLEAR, RED, glazed, passed
 from tests.realtime.sun.test_realtime_panes import pane as pane_at
 from tests.realtime.sun.test_realtime_sun import DOWN, SIZE
 
-Floats = NDArray[np.floating]
 SLANTED = replace(DOWN, position=(0.0, 4.0, 4.0), target=(0.0, 0.0, 0.0))
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Flags, Floats
 from lambent.core.views.camera import Camera
 from lambent.materials.clear import clear_terms, transmittance
 from lambent.materials.document import Lobe, Material
@@ -19,7 +19,6 @@ from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import MaterialTextures, Mesh, Texture
 from tests.realtime.sun.test_realtime_sun import DOWN, IRRADIANCE, SIZE, TOWARDS, floor, places, scene
 
-Floats = NDArray[np.floating]
 GREY = Material(name="grey", kd=0.5)
 
 
@@ -117,7 +116,7 @@ def striped(part: str, values: tuple[float, ...], **more: Any) -> MaterialTextur
     return MaterialTextures(**{part: Texture(texels)}, **more)
 
 
-def stripes_at(height: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def stripes_at(height: float) -> tuple[Flags, Flags]:
     """(SIZE, SIZE) whether floor sees the sun through a left stripe of a pane, and whether surely not between two."""
     turn = 2 * ((places(DOWN)[..., 0] - where(-2.0, height)) % 1)
     return turn < 1, np.abs(turn % 1 - 0.5) < 0.3

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
+from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import basis, normalize
 from lambent.core.geometry.sequences import hammersley
 from lambent.core.views.camera import Camera, pixel_rays
@@ -24,7 +24,6 @@ from lambent.scenes.scene import Mesh
 from lambent.store.contract import SunRecord
 from tests.realtime.planar import test_realtime_planar as planar
 
-Floats = NDArray[np.floating]
 TOWARDS = normalize(np.array([0.3, 0.9, 0.2]))
 IRRADIANCE = (3.0, 2.0, 1.0)
 HEIGHT, HALF = 2.0, 0.5  # of the plate, and half the side of its opening, metres

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
 from lambent.baked.probes.irradiance import basis_of
+from lambent.core.arrays import Floats
 from lambent.core.geometry.cubemap import face_directions, texel_solid_angles
 from lambent.core.geometry.directions import basis, normalize
 from lambent.core.geometry.sequences import hammersley
@@ -28,7 +28,6 @@ from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import DirectionalLight, Scene, SceneObject
 from lambent.store.contract import SunRecord
 
-Floats = NDArray[np.floating]
 TOWARDS = normalize(np.array([0.3, 0.9, 0.4]))
 IRRADIANCE = (3.0, 2.5, 2.0)
 GLOSSY = Material(name="m", lobes=(Lobe(mx=0.5, my=0.3, r0=(0.9, 0.6, 0.5), alpha=0.4),))

@@ -16,18 +16,12 @@ from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_models import editable
 from lambent.materials.factored.terms import Editable
 from lambent.materials.models import model_named
-from lambent.realtime.gpu.device import open_device
 from lambent.viewer.edits.edited import ShadedCanvas
 from tests.editing.dense_rows import DensePairs, rows_of
 from tests.editing.test_folding import sparse
 
 PIXEL = np.sort(np.random.default_rng(0).permutation(200)[:71])
 BACKGROUND = np.random.default_rng(1).random((10, 20, 3)).astype(np.float32)
-
-
-@pytest.fixture(scope="module")
-def device(adapter: None) -> Any:
-    return open_device()
 
 
 def part_of(start: Editable, seed: int, *, stored: bool = True) -> Part:

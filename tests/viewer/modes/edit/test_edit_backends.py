@@ -11,7 +11,7 @@ from lambent.core.light.false_colour import Range
 from lambent.editing.curves.operators import Region
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.of_lobes import of_material
-from lambent.realtime.gpu.device import AdapterInfo, open_device
+from lambent.realtime.gpu.device import AdapterInfo
 from lambent.realtime.gpu.targets import pixels
 from lambent.viewer.edits import edited
 from lambent.viewer.modes.edit import painter
@@ -23,11 +23,6 @@ from tests.editing.test_frozen_pictures import DIFFUSE, SIZE, START, dark_parts,
 from tests.viewer.edited_view import LIGHTS, new_state, settled, until
 
 VIEWS = ("filmic", "neutral", "linear", "false-colour")
-
-
-@pytest.fixture(scope="module")
-def device(adapter):
-    return open_device()
 
 
 @pytest.fixture(autouse=True)

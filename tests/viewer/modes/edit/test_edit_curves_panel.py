@@ -52,25 +52,6 @@ def test_pixels_are_those_of_the_plot(monkeypatch, panel, log):
         assert panel.editor.axes.pixel(x, y) == pytest.approx(place, abs=1.0)
 
 
-def test_a_drag_pulls_the_curve_and_is_one_step(panel):
-    axes = panel.editor.axes
-    panel.move(*axes.pixel(2.0, 20.0))
-    panel.button(True)
-    assert panel.editor.state.active_curve == "highlight" and not panel.edit.curves
-    for k in range(1, 9):
-        panel.move(*axes.pixel(2.0 + k / 8, 20.0 + k))
-    up, across = panel.layers()
-    assert up.kind == "translate_y" and up.size == pytest.approx(8, abs=0.2)
-    assert across.kind == "translate_x" and np.degrees(across.size) == pytest.approx(1, abs=0.05)
-    panel.button(False)
-    assert panel.editor.state.active_curve is None
-    panel.frame(2)
-    panel.undo()
-    assert not panel.edit.curves and not panel.session.history.can_undo
-    panel.redo()
-    assert panel.layers() == (up, across)
-
-
 def test_a_modifier_key_answers_while_the_mouse_rests(panel):
     axes = panel.editor.axes
     panel.move(*axes.pixel(2.0, 20.0))

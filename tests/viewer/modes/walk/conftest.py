@@ -1,10 +1,11 @@
-"""A small baked room, for tests that need light of a bake."""
+"""A small baked room, and panels of the mode, unfolded."""
 
 import pytest
 
 from lambent.bake.bake import bake
 from lambent.scenes import load_scene
 from tests.bake.small_scenes import TINY
+from tests.viewer.panel_driver import PanelDriver, walk_mode
 
 
 @pytest.fixture(scope="session")
@@ -13,3 +14,20 @@ def baked_box(mi, tmp_path_factory):
     folder = tmp_path_factory.mktemp("baked") / "box.store"
     bake(load_scene("builtin:box"), folder, quality=TINY).close()
     return folder
+
+
+@pytest.fixture
+def unfolded(monkeypatch, state, geometry):
+    """Function that opens the panels of the mode with some headers unfolded, and those above them folded."""
+    drivers = []
+
+    def opened(*headers):
+        drivers.append(PanelDriver(monkeypatch, walk_mode(state, geometry)))
+        for header in ("Material", "View", "Scene", *headers):
+            drivers[-1].click(header, 0.3)
+        drivers[-1].frame(2)
+        return drivers[-1]
+
+    yield opened
+    for driver in drivers:
+        driver.close()

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.realtime.gpu.device import open_device
 from lambent.realtime.light.baked import read_baked
 from lambent.realtime.renderer import Renderer
 from lambent.store.store import Store
@@ -20,11 +19,6 @@ PLACE = Rect(0, 0, 96, 64)
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     return read_baked(Store.open(write_small_store(tmp_path_factory.mktemp("sharp") / "small")))
-
-
-@pytest.fixture(scope="module")
-def device(adapter):
-    return open_device()
 
 
 @pytest.fixture

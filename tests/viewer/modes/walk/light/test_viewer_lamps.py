@@ -9,26 +9,19 @@ from lambent.store.lamps import LampRecord
 from lambent.viewer.modes.walk.light.lamps import aim_of, tilt_and_bearing_deg
 from lambent.viewer.modes.walk.markers import projected
 from tests.realtime.lamps.test_changed_lamps import IES
-from tests.viewer.panel_driver import PanelDriver, walk_mode
 
 PLACE = (0.5, 1.4, 0.0)
 SIZE = (1000, 800)
 
 
 @pytest.fixture
-def panels(monkeypatch, state, geometry):
+def panels(unfolded, state):
     record = LampRecord(
         number=3, position=PLACE, axes=((1, 0, 0), (0, 0, -1), (0, -1, 0)), intensity=(1, 1, 1), reach_deg=60,
         profile=0, group=0,
     )  # fmt: skip
     state.lamps.records = (record,)
-    driver = PanelDriver(monkeypatch, walk_mode(state, geometry))
-    for header in ("Material", "View", "Scene"):
-        driver.click(header, 0.3)
-    driver.click("Lamps", 0.3)
-    driver.frame(2)
-    yield driver
-    driver.close()
+    return unfolded("Lamps")
 
 
 def mark(state):

@@ -11,7 +11,6 @@ from lambent.viewer.cameras.navigation import PathPlay
 from lambent.viewer.modes.walk.light.light_keys import key_times, mix_at, with_key, without_key
 from lambent.viewer.modes.walk.light.lights import RecordedLight
 from lambent.viewer.modes.walk.views.views import SavedViews
-from tests.viewer.panel_driver import PanelDriver, walk_mode
 
 GROUPS = (
     LightGroupRecord(name="lamp", members=("bulb_1", "bulb_2"), share=0.25),
@@ -21,15 +20,9 @@ HALF, OFF = LightMix({"lamp": GroupMix(intensity=0.5)}), LightMix({"lamp": Group
 
 
 @pytest.fixture
-def panels(monkeypatch, state, geometry):
+def panels(unfolded, state):
     state.lights.groups = GROUPS
-    driver = PanelDriver(monkeypatch, walk_mode(state, geometry))
-    for header in ("Material", "View", "Scene"):
-        driver.click(header, 0.3)
-    driver.click("Light", 0.3)
-    driver.frame(2)
-    yield driver
-    driver.close()
+    return unfolded("Light")
 
 
 def test_each_group_is_switched_dimmed_and_tinted(panels, state):

@@ -73,16 +73,9 @@ def test_undo_of_what_is_beside_ends_the_split(state):
 
 
 @pytest.fixture
-def panels(monkeypatch, state, geometry):
+def panels(unfolded, state):
     state.lights.groups = (LightGroupRecord(name="lamp", members=("bulb",), share=1.0),)
-    driver = PanelDriver(monkeypatch, walk_mode(state, geometry))
-    for header in ("Material", "View", "Scene"):
-        driver.click(header, 0.3)
-    for header in ("States", "Light"):
-        driver.click(header, 0.3)
-    driver.frame(2)
-    yield driver
-    driver.close()
+    return unfolded("States", "Light")
 
 
 def test_the_panel_stores_takes_and_compares(panels, state):
