@@ -1,7 +1,16 @@
-// A lobe lit by one small lamp, in closed form: lamp_light.py is the reference; tests compare the two. Needs lobes.wgsl.
+// A lobe lit by one small lamp, in closed form; tests compare it with quadrature over the lamp. Needs lobes.wgsl.
+//
+// A lamp is a mean direction w and two vectors a, b, the principal deviations of its directions. f cos_i is a smooth
+// factor g times the density P = D h_z^4 of slopes s = (h_x, h_y)/h_z. With H = w + o not normalised,
+//     s = H_xy/H_z,  J a = (a_xy - s a_z)/H_z,  g = tint |H|^3/(2 H_z^4) cos_i^(1 - alpha)/cos_o^alpha.
+// A Gaussian P of the matrix diag(mx^2, my^2), averaged over a Gaussian lamp, is a Gaussian of the matrix
+//     M = diag(mx^2, my^2) + 2 sum (J a)(J a)^T:
+// the lobe is widened and keeps its integral. GGX has no variance; widening it GGX_WIDER times as much is closest. If
+// log g changes by q_a and q_b along a and b, completing the square gives the mean of g P: its value at w with
+// s + q_a J a + q_b J b, times exp((q_a^2 + q_b^2)/2). For a lamp that sets, the part above the horizon counts.
 
 const LAMBENT_GGX_WIDER = 1.7;
-const LAMBENT_HORIZON = 1.2;
+const LAMBENT_HORIZON = 1.2;  // times the summed heights of a and b: reach of a lamp above and below its centre
 const LAMBENT_LAMP_COS_MIN = 1e-3;
 const LAMBENT_REACH_MIN = 1e-5;
 
@@ -19,14 +28,14 @@ fn lambent_lamp_response(lobe: LambentLobe, wo: vec3f, wi: vec3f, a: vec3f, b: v
     let per_length2 = per_pair.x * cos_i * inverse;
     let per_cos_i = per_pair.x * length2 * inverse;
     let per_z = per_pair.y * reach * inverse;
-    let up = clamp(0.5 + 0.5 * wi.z * per_pair.y * total.z * inverse, 0.0, 1.0);
+    let up = clamp(0.5 + 0.5 * wi.z * per_pair.y * total.z * inverse, 0.0, 1.0);  // share above the horizon
     let rise = up * vec2f(a.z, b.z);
     let middle = total.xy * per_z;
     let ja = (a.xy - middle * rise.x) * per_z;
     let jb = (b.xy - middle * rise.y) * per_z;
     let along = vec2f(dot(a.xy, total.xy), dot(b.xy, total.xy)) + rise * total.z;
     let bent = along * (3.0 * per_length2) - rise * (4.0 * per_z - (1.0 - lobe.alpha) * per_cos_i);
-    let tilt = clamp(bent, vec2f(-1.0), vec2f(1.0));
+    let tilt = clamp(bent, vec2f(-1.0), vec2f(1.0));  // beyond, g is not log-linear
     let slope = middle + tilt.x * ja + tilt.y * jb;
     let is_ggx = lobe.distribution == LAMBENT_GGX;
     let wider = select(2.0, 2.0 * LAMBENT_GGX_WIDER, is_ggx);

@@ -13,8 +13,8 @@ from lambent.bake.bake import bake
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize
 from lambent.core.views.camera import Camera, pixel_rays
+from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.lamp_light import lamp_response
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.light.baked import read_baked
 from lambent.realtime.renderer import Renderer
@@ -86,11 +86,11 @@ def test_highlights_are_the_closed_form(device: Any, store: Store) -> None:
     p, wo, open_floor = floor_seen()
     direct = arriving(p)
     frame = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])  # t, b, n of the floor
-    lobe = GLOSSY.lobes[0]
+    gloss = MaterialBSDF(Material(lobes=GLOSSY.lobes))
     expected = np.zeros_like(p)
     for lamp, of_lamp in zip((SPOT, BULB, WASHER), direct, strict=True):
         wi = normalize(np.array(lamp.position) - p) @ frame.T
-        expected += of_lamp * lamp_response(lobe, wo @ frame.T, wi, np.zeros((len(p), 2, 3)))
+        expected += of_lamp * gloss.eval(wi, wo @ frame.T) * wi[:, 2:]
     known = open_floor & ~np.isnan(expected).any(axis=1)
     assert expected[known].max() > 0.05
     np.testing.assert_allclose(found[known], expected[known], rtol=0.03, atol=0.003)
