@@ -16,24 +16,16 @@ from lambent.bake.tracing.solids import closed
 from lambent.core.geometry.triangles import triangle_areas
 from lambent.scenes.geometry import box, merge, patch, placed, signed_volume, sphere
 from lambent.scenes.scene import Mesh, Scene, SceneObject
-from tests.bake.small_scenes import BLACK, GREY, MIRROR, turned_inwards
+from tests.bake.probes.test_probe_division import two_rooms
+from tests.bake.small_scenes import GREY, MIRROR, turned_inwards
 
 
 def rooms(doors: int = 1) -> Scene:
     """A ball in the middle of a room, and bars that reach through the wall to the room beside it."""
-    bar = sphere(1.0, 24, 24)
-    bar = replace(bar, positions=(bar.positions * np.float32([2.5, 0.15, 0.15])).astype(np.float32))
-    bars = (SceneObject(f"bar{i}", placed(bar, (0, 0.5 * i, 0)), "mirror") for i in range(doors))
-    return Scene(
-        "rooms",
-        (
-            SceneObject("shell", turned_inwards(box((6.2, 4, 4))), "grey"),
-            SceneObject("wall", placed(box((0.1, 4, 4)), (1.0, 0, 0)), "grey"),
-            SceneObject("ball", placed(sphere(0.3, 24, 24), (-1.5, 1.2, 0)), "mirror"),
-            *bars,
-        ),
-        {"grey": GREY, "black": BLACK, "mirror": MIRROR},
-    )
+    both = two_rooms()
+    shell, wall, bar, ball = (both.object(name) for name in ("shell", "wall", "bar", "ball"))
+    bars = (replace(bar, name=f"bar{i}", mesh=placed(bar.mesh, (0, 0.5 * i, 0))) for i in range(doors))
+    return replace(both, objects=(shell, wall, ball, *bars))
 
 
 def screened(scene: Scene, names: list[str]) -> np.ndarray:

@@ -27,7 +27,6 @@ from lambent.materials.models.phong import Phong
 from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.grids import Grid
 from lambent.scenes.looks.textures import CHANNELS
-from lambent.scenes.photometry.distribution import Photometry
 from lambent.scenes.scene import (
     ComputedEnvironment,
     ConstantEnvironment,
@@ -78,8 +77,6 @@ def of_terms(*terms: str) -> tuple[str, ...]:
 Keys = Callable[..., dict[str, str]]
 Answers = dict[str, tuple[Any, tuple[str, ...]]]  # by field: a value that it has not yet, and prefixes of stale arrays
 VIEW = Camera("view", (0.0, 1.0, 3.0), (0.0, 1.0, 0.0))
-
-DOWNLIGHT = Photometry((0.0, 90.0), (0.0, 360.0), ((1.0, 0.0), (1.0, 0.0)))
 
 MESH: Answers = {
     "positions": (lambda a: a + np.float32(0.001), SURFACES),

@@ -27,18 +27,7 @@ def brass_file(tmp_path_factory):
 @pytest.fixture
 def said(screen):
     """Messages so far."""
-    return Said(screen)
-
-
-class Said:
-    def __init__(self, screen):
-        self._screen = screen
-
-    def __len__(self):
-        return len(self._screen.messages)
-
-    def __getitem__(self, index):
-        return self._screen.messages[index].text
+    return screen.messages
 
 
 @pytest.fixture
@@ -148,7 +137,7 @@ def test_a_fit_comes_as_one_step_and_keeps_what_is_fixed(editor, brass_file, sai
     found = editor.subject.material
     assert found.lobes[0].mx == pytest.approx(0.15, rel=0.05) and found.lobes[0].alpha == 0
     assert found.name == "brass" and found.provenance.source == "brass.txt"
-    assert said[-1].startswith("fitted in")
+    assert said[-1].text.startswith("fitted in")
     editor.subject.edits.undo()
     assert editor.subject.material.lobes[0].mx == 0.5
 
@@ -160,7 +149,7 @@ def test_a_cancelled_fit_leaves_the_material(editor, brass_file, said):
     editor.fit.stop(keep=False)
     until(editor, lambda: editor.fit.work is None)
     assert editor.subject.material == BRASS and not editor.subject.edits.can_undo
-    assert "cancelled" in said[-1]
+    assert "cancelled" in said[-1].text
 
 
 def test_a_fit_that_cannot_be_is_said(editor, brass_file, said):
@@ -169,7 +158,7 @@ def test_a_fit_that_cannot_be_is_said(editor, brass_file, said):
     editor.subject.restrictions.fix("t_mx", True)
     editor.fit.start(editor.measurement, editor.metric)
     until(editor, lambda: editor.fit.work is None)
-    assert "not fitted" in said[-1] and "does not transmit" in said[-1]
+    assert "not fitted" in said[-1].text and "does not transmit" in said[-1].text
 
 
 def test_what_is_saved_says_that_it_was_edited(editor, brass_file, tmp_path):
@@ -198,7 +187,9 @@ def test_a_bad_file_name_is_said_and_nothing_lost(editor, said, name):
     editor.subject.step(moved(BRASS, mx=0.3))
     editor.files.name = name
     editor.save()
-    assert said[-1].startswith("not saved") and editor.subject.unsaved and editor.subject.material.lobes[0].mx == 0.3
+    assert (
+        said[-1].text.startswith("not saved") and editor.subject.unsaved and editor.subject.material.lobes[0].mx == 0.3
+    )
 
 
 def test_wrong_files_are_said_and_nothing_lost(editor, brass_file, tmp_path, said):
@@ -210,10 +201,10 @@ def test_wrong_files_are_said_and_nothing_lost(editor, brass_file, tmp_path, sai
         count = len(said)
         editor.files.open(text)
         until(editor, lambda count=count: len(said) > count)
-        assert said[-1].startswith("not loaded"), text
+        assert said[-1].text.startswith("not loaded"), text
     assert editor.measurement is before and editor.subject.material == BRASS
     editor.files.open_compared(str(broken))
-    assert editor.subject.document is None and said[-1].startswith("not loaded")
+    assert editor.subject.document is None and said[-1].text.startswith("not loaded")
 
 
 def test_files_are_taken_for_what_they_hold(editor, brass_file, tmp_path):
