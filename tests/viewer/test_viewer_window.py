@@ -9,7 +9,6 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.pictures.images import read_image
-from lambent.store.kept.views import read_views
 from tests.viewer.small_store import FRONT, write_small_store
 from tests.viewer.window_session import ROOT, WindowSession
 
@@ -88,25 +87,6 @@ def test_resize_and_picture(session):
     assert exr.shape == png.shape == (500, 467, 3)
     assert exr.mean() > 0.05 and png.std() > 0.02
     assert png[400:].mean() > png[:100].mean(), "the floor is lit, the sky above the wall is dark: upside down?"
-
-
-def test_views_and_walks_are_saved_with_keys(session, store):
-    session.tool("key", "v")
-    session.wait_for(lambda state: any(m == "saved the view view 1" for m in state["messages"]))
-    session.tool("key", "1", "r")
-    session.hold("w", lambda state: state["camera"]["position"][2] < FRONT.position[2] - 0.3)
-    session.tool("key", "r")
-    session.wait_for(lambda state: any(m.startswith("recorded ") for m in state["messages"]))
-    for header in ("Material", "View"):  # what is below them comes into the window
-        session.click(*session.point(header, 0.3))
-    session.click(*session.point("save path##path name"))
-    session.wait_for(lambda state: "saved the path walk 1" in state["messages"])
-    views = read_views(store)
-    assert [c.name for c in views.cameras] == ["view 1"] and views.cameras[0].position == FRONT.position
-    (walk,) = views.paths
-    assert walk.keys[-1].position[2] < FRONT.position[2] - 0.2
-    for header in ("View", "Material"):
-        session.click(*session.point(header, 0.3))
 
 
 def test_close(window):

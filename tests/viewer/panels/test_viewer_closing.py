@@ -21,11 +21,13 @@ def change(state, kd=0.3):
     state.materials.edits.end_stroke()
 
 
-def record(state):
+def record(panels):
+    state = panels.state
     state.recordings.record()
     for k in range(10):
-        moved = replace(state.navigation.camera, position=(0.1 * k, 1.6, 3.0))
-        state.recordings.recorder.take(moved, 0.1 * k)
+        state.navigation.camera = replace(state.navigation.camera, position=(0.1 * k, 1.6, 3.0))
+        state.screen.clock.now_s = 0.1 * k
+        panels.mode.advance(0.0)
 
 
 def ask(panels):
@@ -37,7 +39,7 @@ def test_what_is_unsaved_is_named(panels, state):
     assert panels.mode.unsaved == ()
     change(state)
     assert panels.mode.unsaved == ("brass",)
-    record(state)
+    record(panels)
     assert panels.mode.unsaved == ("brass", "the recorded walk")
     state.recordings.record()
     assert panels.mode.unsaved == ("brass", "the recorded walk")
@@ -50,12 +52,21 @@ def test_a_recording_without_a_step_is_nothing(panels, state):
 
 def test_saving_keeps_all_of_it_and_closes(panels, state, tmp_path):
     change(state)
-    record(state)
+    record(panels)
     ask(panels)
     panels.click("save##closing")
     assert state.screen.closes and not state.screen.asks_to_close and panels.mode.unsaved == ()
     assert load_material(tmp_path / "brass.json").kd == (0.3, 0.3, 0.3)
     assert [path.name for path in read_views(tmp_path).paths] == ["walk 1"]
+
+
+def test_a_recorded_walk_is_saved_from_the_panel(panels, state, tmp_path):
+    record(panels)
+    state.recordings.record()
+    for label in ("Material", "View", "save path##path name"):
+        panels.click(label, 0.3)
+        panels.frame(2)
+    assert [path.name for path in read_views(tmp_path).paths] == ["walk 1"] and panels.mode.unsaved == ()
 
 
 def test_a_file_that_is_there_is_replaced_when_save_is_pressed_again(panels, state, tmp_path):
@@ -72,7 +83,7 @@ def test_a_file_that_is_there_is_replaced_when_save_is_pressed_again(panels, sta
 
 def test_discarding_writes_nothing(panels, state, tmp_path, capsys):
     change(state)
-    record(state)
+    record(panels)
     ask(panels)
     panels.click("discard##closing")
     assert state.screen.closes
