@@ -17,7 +17,7 @@ from lambent.core.files import atomic_path, inside
 from lambent.core.inputs import read_bytes
 from lambent.core.plain import plain_name
 from lambent.scenes.looks.image_textures import mean_and_detail
-from lambent.scenes.scene import ImageTexture, Variant
+from lambent.scenes.scene import ImageTexture, Look, Variant
 
 IMAGES = "images"
 Textures = Mapping[str, str | ImageTexture]  # by material, as of `session.RoomState.textures`
@@ -43,25 +43,19 @@ def kept_image(folder: Path, file: Path) -> str:
 
 def with_kept_images(folder: Path, variants: Sequence[Variant]) -> tuple[Variant, ...]:
     """Variants of a scene as a store keeps them: with copies of their images; raises as `kept_image`."""
-
-    def kept(of: str | ImageTexture) -> str | ImageTexture:
-        return replace(of, file=kept_image(folder, Path(of.file))) if isinstance(of, ImageTexture) else of
-
-    return tuple(_with_textures(variant, kept) for variant in variants)
+    return _changed(variants, lambda image: replace(image, file=kept_image(folder, Path(image.file))))
 
 
 def with_located_images(variants: Sequence[Variant], folder: Path) -> tuple[Variant, ...]:
     """Variants of a store with absolute paths of their images; raises as `located`."""
-
-    def found(of: str | ImageTexture) -> str | ImageTexture:
-        return located(of, folder) if isinstance(of, ImageTexture) else of
-
-    return tuple(_with_textures(variant, found) for variant in variants)
+    return _changed(variants, lambda image: located(image, folder))
 
 
-def _with_textures(variant: Variant, change: Callable[[str | ImageTexture], str | ImageTexture]) -> Variant:
-    looks = {name: replace(look, textures=change(look.textures)) for name, look in variant.looks.items()}
-    return replace(variant, looks=looks)
+def _changed(variants: Sequence[Variant], change: Callable[[ImageTexture], ImageTexture]) -> tuple[Variant, ...]:
+    def look_of(look: Look) -> Look:
+        return replace(look, textures=change(look.textures)) if isinstance(look.textures, ImageTexture) else look
+
+    return tuple(replace(one, looks={name: look_of(look) for name, look in one.looks.items()}) for one in variants)
 
 
 def located(image: ImageTexture, folder: Path | None) -> ImageTexture:
