@@ -9,7 +9,10 @@ areas (Lambert's azimuthal projection): |q| = sin(theta/2) / sin(reach/2).
                            LampRecords
     light_map/lamps, lamps_back  (G, H, W, 3) float16, W/m^2, their direct light in the light map, by light group
     light_map/lamps_reach  (H, W, 4) uint32, bit k % 32 of word k // 32: whether the light of lamp k arrives; of word
-                           2 + k // 32: whether a part of the texel, or of a neighbour, may be in its shadow
+                           2 + k // 32: whether pixels look its shadow up, because a part of the texel, or of a
+                           neighbour, may be in it
+    light_map/lamps_seen   (m, H, W) uint8, for the lamps with an opening in their order, the visible share of it (255:
+                           all), for texels whose shadow is not looked up
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ from lambent.store.store import MANIFEST, Store
 
 MOST_LAMPS = 64
 PROFILES, DISTANCES, REACHED = "lamps/profiles", "lamps/distances", "light_map/lamps_reach"
+SEEN = "light_map/lamps_seen"
 LAMPS = tuple(f"light_map/{side.replace('irradiance', 'lamps')}" for side in SIDES)  # by side
 
 
@@ -46,6 +50,10 @@ class LampRecord(Strict):
     is_box: bool = False
     profile: int = Field(ge=0)
     group: int = Field(ge=0)
+
+    @property
+    def has_opening(self) -> bool:
+        return self.half_axes_m[0] > 0
 
 
 def drawn_lamps(store: Store) -> tuple[LampRecord, ...]:

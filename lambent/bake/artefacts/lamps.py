@@ -15,7 +15,7 @@ from lambent.bake.running.keys import key_of
 from lambent.core.plain import triple
 from lambent.scenes.scene import IesLight, PointLight
 from lambent.store.lamp_discs import axes_of, opening_of, profile, reach_deg
-from lambent.store.lamps import DISTANCES, LAMPS, PROFILES, REACHED, LampRecord
+from lambent.store.lamps import DISTANCES, LAMPS, PROFILES, REACHED, SEEN, LampRecord
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,7 +28,7 @@ def keys(context: BakeContext) -> dict[str, str]:
     if not lamps_apart(context):
         return {}
     key = key_of(KIND, REVISION, context.keys("light_map")[IRRADIANCE[0]], sorts_light(context.methods))
-    return dict.fromkeys((PROFILES, DISTANCES, REACHED, *LAMPS[: side_count(context)]), key)
+    return dict.fromkeys((PROFILES, DISTANCES, REACHED, SEEN, *LAMPS[: side_count(context)]), key)
 
 
 def bake(context: BakeContext) -> None:
@@ -42,18 +42,22 @@ def bake(context: BakeContext) -> None:
     context.put(KIND, PROFILES, profiles, context.provenance())
     size = traced.texels.height, traced.texels.width
     reached, shaded = np.zeros(size, np.uint64), np.zeros(size, np.uint64)
+    seen = np.zeros(1, np.uint8)
     for side in range(side_count(context)):
         light = traced.lamp_light(SIGNS[side])
         of_map = light.drawn if sorts_light(context.methods) else light.drawn.sum(axis=0, keepdims=True)
         context.put(KIND, LAMPS[side], of_map, context.provenance())
         reached |= light.reached
-        shaded |= light.shaded
+        shaded |= light.sharp
+        seen = np.maximum(seen, light.seen)
     bare, maps = traced.bare, []
     for number, lamp in enumerate(lamps):
         context.progress(number, len(lamps), "shadow maps of lamps")
         distances, behind = shadow_map(bare, lamp, size)
         maps.append(distances)
-        shaded |= maximum_filter(behind, 3).astype(np.uint64) << np.uint64(number)
+        if drawn[number] not in scene.openings:
+            shaded |= maximum_filter(behind, 3).astype(np.uint64) << np.uint64(number)
+    context.put(KIND, SEEN, seen, context.provenance())
     words = [part >> np.uint64(32 * word) for part in (reached, shaded) for word in (0, 1)]
     context.put(KIND, REACHED, np.stack(words, axis=-1).astype(np.uint32), context.provenance())
     stacked = np.stack(maps) if maps else np.zeros((0, 1, 1), np.float16)

@@ -24,7 +24,7 @@ from lambent.store.lamps import MOST_LAMPS
 
 OF_OPENING = 4  # rays to an opening from each of a texel's points
 NEAR_FIELD = 16  # likewise, samples without shadows
-MOST_NEAR = 4.0  # times the light as drawn: next to the rim of an opening few samples have most of the light
+SHARP = 0.3  # deviation of visible shares around a texel: a penumbra of 2.7 texels
 AROUND = 1  # texels to each side that count as reached: edges of shadows cross the borders of texels
 
 
@@ -40,14 +40,17 @@ class LampLight:
         Irradiance of those that are drawn, as they are drawn.
     reached : (H, W) uint64
         Bit k: whether the light of drawn lamp k arrives at the texel or at a neighbour of its chart; 1 in gutters.
-    shaded : (H, W) uint64
-        Bit k: whether a part of drawn lamp k's opening is hidden from a part of the texel.
+    sharp : (H, W) uint64
+        Bit k: whether the visible share of drawn lamp k's opening changes too much from texel to texel for `seen`.
+    seen : (n, H, W) uint8
+        Visible share of the opening of each drawn lamp that has one, in the order of these; 255 is all.
     """
 
     light: NDArray[np.float16]
     drawn: NDArray[np.float16]
     reached: NDArray[np.uint64]
-    shaded: NDArray[np.uint64]
+    sharp: NDArray[np.uint64]
+    seen: NDArray[np.uint8]
 
 
 class LampPoints:
@@ -67,30 +70,49 @@ class LampPoints:
     def detail(self) -> Floats:
         """(n,) what texels cannot show of each lamp: its deviation within them, lm/m^2, times their area, summed."""
         area = self._texels.area_m2[self._mine]
-        found = (luminance(self._of(lamp, 1)[:, :, 0]).std(axis=1) for lamp in range(self._lamps.count))
+        found = (luminance(self._of(lamp)).std(axis=1) for lamp in range(self._lamps.count))
         return np.array([one @ area for one in found])
 
     def light(self, groups: Sequence[int], count: int, drawn: Sequence[int]) -> LampLight:
         """The light of all lamps in `count` groups, those of each in `groups`; `drawn` are numbers of lamps."""
         light = np.zeros((2, count, *self._labels.shape, 3), np.float32)  # of all lamps, of those drawn
-        reached, shaded = np.zeros((2, *self._labels.shape), np.uint64)
+        reached, sharp = np.zeros((2, *self._labels.shape), np.uint64)
+        seen = dict[int, Floats]()
+        of_map: Floats
+        whole: Floats
         for lamp in range(self._lamps.count if len(self._mine) else 0):
-            each, sized = self._of(lamp), self._lamps.is_sized(lamp)
-            of_map = self._on_map(each)
-            light[0, groups[lamp]] += of_map * self._near_field(lamp) if sized else of_map
+            if sized := self._lamps.is_sized(lamp):
+                share, is_sharp = self._shares(lamp)
+                of_map, whole = (share * one for one in self._unshadowed(lamp))
+            else:
+                of_map = whole = self._on_map(self._of(lamp).mean(axis=1))
+            light[0, groups[lamp]] += whole
             if lamp in drawn:
                 light[1, groups[lamp]] += of_map
                 bit = np.uint64(drawn.index(lamp))
                 reached |= self._near(of_map) << bit
-                shaded |= self._near(self._on_map(_dark(each))) << bit if sized else np.uint64(0)
+                if sized:
+                    sharp |= self._near(is_sharp) << bit
+                    seen[drawn.index(lamp)] = np.rint(255 * fill(share, self.known, self._labels)[..., 0])
         filled = [[fill(one, self.known, self._labels) for one in each] for each in light]
-        whole, of_drawn = np.minimum(filled, HALF_MAX).astype(np.float16)
-        return LampLight(whole, of_drawn, reached, shaded)
+        total, of_drawn = np.minimum(filled, HALF_MAX).astype(np.float16)
+        shares = np.array([seen[k] for k in sorted(seen)], np.uint8).reshape(-1, *self._labels.shape)
+        return LampLight(total, of_drawn, reached, sharp, shares)
 
-    def _on_map(self, each: Floats) -> Floats:
-        """(H, W, 3) means of samples (K, POINTS, n, 3) of texels."""
-        of_map = np.zeros((*self._labels.shape, 3), np.float32)
-        of_map.reshape(-1, 3)[self._texels.index[self._mine]] = each.mean(axis=(1, 2))
+    def _shares(self, lamp: int) -> tuple[Floats, Floats]:
+        """Visible share (H, W, 1) of an opening, and 1 where it is not smooth; elsewhere it is averaged."""
+        seen = _seen(self._lamps, dr.opaque(mi.UInt32, lamp), self._at, *self._points(OF_OPENING), OF_OPENING)
+        part, whole = (np.array(one).reshape(-1, POINTS).sum(axis=1) for one in seen)
+        share = self._on_map((part / whole)[:, None])
+        both = np.concatenate([share, share**2], axis=-1)
+        mean, square = np.split(chart_means(both, self.known, self._labels, AROUND)[0], 2, axis=-1)
+        is_sharp = np.asarray(square - mean**2 > SHARP**2, np.float32)
+        return np.where(self._near(is_sharp)[..., None] > 0, share, mean), is_sharp
+
+    def _on_map(self, values: Floats) -> Floats:
+        """(H, W, C) of values (K, C) of texels."""
+        of_map = np.zeros((*self._labels.shape, values.shape[-1]), np.float32)
+        of_map.reshape(-1, values.shape[-1])[self._texels.index[self._mine]] = values
         return of_map
 
     def _near(self, light: Floats) -> NDArray[np.uint64]:
@@ -100,34 +122,41 @@ class LampPoints:
         found: Flags = (near[..., 0] > 0) | ~self.known
         return found.astype(np.uint64)
 
-    def _of(self, lamp: int, count: int = OF_OPENING) -> Floats:
-        """(K, POINTS, n, 3) irradiance of a lamp at the points: by `count` points of its opening, or its one point."""
-        number, (first, x, y) = dr.opaque(mi.UInt32, lamp), self._points(count)
-        found = []
-        for k in range(count if self._lamps.is_sized(lamp) else 1):
-            at = first + dr.opaque(mi.UInt32, POINTS * k)
-            u = mi.Point2f(dr.gather(mi.Float, x, at), dr.gather(mi.Float, y, at))
-            light = array_of(self._lamps.of(number, self._at, u, mi.Bool(True)))
-            found.append(light.reshape(len(self._mine), POINTS, 3).clip(0, None))
-        return np.stack(found, axis=2)
+    def _of(self, lamp: int) -> Floats:
+        """(K, POINTS, 3) irradiance of a lamp at the points, each by a ray to a point of its opening, if it has one."""
+        first, x, y = self._points(1)
+        u = mi.Point2f(dr.gather(mi.Float, x, first), dr.gather(mi.Float, y, first))
+        light = self._lamps.of(dr.opaque(mi.UInt32, lamp), self._at, u, mi.Bool(True))
+        return array_of(light).reshape(len(self._mine), POINTS, 3).clip(0, None)
 
-    def _near_field(self, lamp: int) -> Floats:
-        """(H, W, 1) light of all the opening of a lamp over its light as drawn, without shadows; 1 where it is dark."""
+    def _unshadowed(self, lamp: int) -> tuple[Floats, Floats]:
+        """Light (H, W, 3) of a lamp without shadows: as drawn, and of all the opening."""
         both = _unshadowed(self._lamps, dr.opaque(mi.UInt32, lamp), self._at, *self._points(NEAR_FIELD), NEAR_FIELD)
-        drawn, whole = (np.array(dr.block_sum(mi.luminance(light), POINTS)) for light in both)
-        ratio = np.divide(whole, drawn, out=np.ones_like(drawn), where=drawn > 0)
-        of_map = np.ones((*self._labels.shape, 1), np.float32)
-        of_map.reshape(-1)[self._texels.index[self._mine]] = ratio.clip(0, MOST_NEAR)
-        return of_map
+        drawn, whole = (array_of(light).reshape(-1, POINTS, 3).mean(axis=1) / NEAR_FIELD for light in both)
+        return self._on_map(drawn), self._on_map(whole)
 
     def _points(self, count: int) -> tuple[Any, Any, Any]:
         """The first of `count` samples of openings for each of the points, and coordinates (mi.Float) of all.
 
-        They are stratified within a texel, and the same for all texels. What they miss of a shadow, all light and the
-        drawn light miss alike.
+        They are stratified within a texel, and the same for all texels.
         """
         x, y = (mi.Float(part) for part in hammersley(POINTS * count).T.astype(np.float32))
         return dr.arange(mi.UInt32, len(self._mine) * POINTS) % POINTS, x, y
+
+
+@dr.syntax
+def _seen(lamps, lamp, at, point, x, y, count):  # type: ignore[no-untyped-def]
+    """Sums (mi.Float) of the weights of `count` samples of `LampRays.seen` that are seen, and of all."""
+    part, whole = dr.zeros(mi.Float, dr.width(at.p)), dr.zeros(mi.Float, dr.width(at.p))
+    end = point + dr.opaque(mi.UInt32, POINTS * count)
+    point = mi.UInt32(point)
+    while point < end:
+        u = mi.Point2f(dr.gather(mi.Float, x, point), dr.gather(mi.Float, y, point))
+        is_seen, weight = lamps.seen(lamp, at, u, mi.Bool(True))
+        part += dr.select(is_seen, weight, 0.0)
+        whole += weight
+        point += POINTS
+    return part, whole
 
 
 @dr.syntax
@@ -144,11 +173,6 @@ def _unshadowed(lamps, lamp, at, point, x, y, count):  # type: ignore[no-untyped
         whole += other
         point += POINTS
     return drawn, whole
-
-
-def _dark(light: Floats) -> Floats:
-    """1 where light (..., 3) is 0 in all channels, else 0, likewise (..., 3)."""
-    return np.broadcast_to(np.float32((light == 0).all(axis=-1, keepdims=True)), light.shape)
 
 
 def drawn_of(detail: Floats) -> tuple[int, ...]:

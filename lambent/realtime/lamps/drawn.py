@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
-from lambent.store.lamps import DISTANCES, LAMPS, PROFILES, REACHED, LampRecord, drawn_lamps
+from lambent.store.lamps import DISTANCES, LAMPS, PROFILES, REACHED, SEEN, LampRecord, drawn_lamps
 from lambent.store.store import Store
 
 BIAS, NEAR_TEXELS = 2e-3, 1.5  # as LAMP_BIAS and LAMP_NEAR of lamp_direct.wgsl, for the nearest texel alone
@@ -26,7 +26,9 @@ class DrawnLamps:
     distances : (n, S, S) float16
         m.
     reached : (H, W, 4) uint32
-        Bits of the lamps whose light arrives at texels, and of those whose shadows may.
+        Bits of the lamps whose light arrives at texels, and of those whose shadows pixels look up.
+    seen : (m, H, W) uint8
+        Visible share of the openings of lamps that have one, where pixels do not look it up.
     light : list of (G, H, W, 3) float32
         Direct light in the light map, by side and light group.
     """
@@ -35,6 +37,7 @@ class DrawnLamps:
     profiles: NDArray[np.float16]
     distances: NDArray[np.float16]
     reached: NDArray[np.uint32]
+    seen: NDArray[np.uint8]
     light: list[Floats]
 
     def intensities(self, factors: Floats | None = None) -> Floats:
@@ -94,4 +97,8 @@ def read_lamps(store: Store, unit: float) -> DrawnLamps | None:
     for name in (REACHED, LAMPS[0]):
         if store.artefact(name).shape[-3:-1] != (of_map := store.artefact("light_map/irradiance").shape[:2]):
             raise store.broken(name, got=store.artefact(name).shape, expected=f"{of_map}, as the light map")
-    return DrawnLamps(scaled, store.read(PROFILES), store.read(DISTANCES), store.read(REACHED), light)
+    sized = sum(lamp.has_opening for lamp in records)
+    seen = store.read(SEEN) if sized else np.zeros((0, 1, 1), np.uint8)
+    if sized and seen.shape != (sized, *store.artefact(REACHED).shape[:2]):
+        raise store.broken(SEEN, got=seen.shape, expected=f"{sized} openings on the light map")
+    return DrawnLamps(scaled, store.read(PROFILES), store.read(DISTANCES), store.read(REACHED), seen, light)

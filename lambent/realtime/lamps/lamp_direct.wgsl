@@ -5,16 +5,17 @@
 #include "lamp_light.wgsl"
 
 override LAMPS: u32 = 0u;
+override LAMP_WORDS: u32 = 1u; // rows of lamps_reach by texel
 override MIRRORS_OPENINGS: bool = false; // the mirrored view that the lobes read shows them
 
 @group(3) @binding(3) var<uniform> point_lamps: array<PointLamp, 64>;
-@group(3) @binding(4) var<storage, read> lamps_reach: array<vec4u>; // by texel of the light map, bits of lamps
+@group(3) @binding(4) var<storage, read> lamps_reach: array<vec4u>; // by texel of the light map: bits of lamps, then shares
 @group(3) @binding(5) var lamp_discs: texture_2d_array<f32>; // distances by lamp, then profiles
 
 const LAMP_BIAS = 1e-3; // of a distance: half floats, and facets beside the tangent plane
 const LAMP_NEAR = 1.5;  // texels: what is nearer to a surface is that surface
-const SEARCH_TAPS = 8u;
-const OPENING_TAPS = 16u;
+const SEARCH_TAPS = 4u;
+const OPENING_TAPS = 8u;
 const WIDEST = 4.0; // (1 - t)/t of occluders next to the lamp
 
 // Sums over lamps: irradiance on the viewer's side of the mesh, on the other, and by the normal of a normal map; and
@@ -99,7 +100,37 @@ struct UnderLamps {
     wo: vec3f,
 }
 
-fn lit_by(lamp: u32, before: OfLamps, at: UnderLamps, s: Surface, in_shadow: bool) -> OfLamps {
+// The four texels around a pixel: rows of lamps_reach, and their weights.
+struct Corners {
+    rows: vec4u,
+    weights: vec4f,
+}
+
+fn corners_at(uv2: vec2f) -> Corners {
+    let size = vec2f(textureDimensions(light_maps));
+    let place = uv2 * size - 0.5;
+    let low = vec2u(clamp(floor(place), vec2f(0.0), size - 1.0));
+    let high = vec2u(clamp(floor(place) + 1.0, vec2f(0.0), size - 1.0));
+    let f = fract(place);
+    let width = u32(size.x);
+    let texels = vec4u(low.y, low.y, high.y, high.y) * width + vec4u(low.x, high.x, low.x, high.x);
+    let g = 1.0 - f;
+    return Corners(texels * LAMP_WORDS, vec4f(g.x * g.y, f.x * g.y, g.x * f.y, f.x * f.y));
+}
+
+// Visible share of opening `number`.
+fn seen_at(number: u32, around: Corners) -> f32 {
+    let row = 1u + number / 16u;
+    let word = number / 4u % 4u;
+    let bytes = vec4u(
+        lamps_reach[around.rows.x + row][word], lamps_reach[around.rows.y + row][word],
+        lamps_reach[around.rows.z + row][word], lamps_reach[around.rows.w + row][word],
+    );
+    let shares = (bytes >> vec4u(8u * (number % 4u))) & vec4u(255u);
+    return dot(vec4f(shares), around.weights) / 255.0;
+}
+
+fn lit_by(lamp: u32, before: OfLamps, at: UnderLamps, around: Corners, s: Surface, in_shadow: bool) -> OfLamps {
     var sum = before;
     let it = point_lamps[lamp];
     let away = at.p_world - it.place.xyz;
@@ -116,6 +147,9 @@ fn lit_by(lamp: u32, before: OfLamps, at: UnderLamps, s: Surface, in_shadow: boo
     }
     for (var k = 0u; k < select(0u, 1u, in_shadow && share > 0.0 && has_opening); k++) {
         share *= opening_visibility(lamp, it.place.w, to_axes * away, half_axes, to_axes * at.flat_normal);
+    }
+    for (var k = 0u; k < select(0u, 1u, !in_shadow && has_opening); k++) {
+        share *= seen_at(u32(it.intensity.w), around);
     }
     let light = share / (square + half_axes.x * half_axes.y) * it.intensity.rgb;
     let w = -away * per_m;
@@ -154,13 +188,14 @@ fn light_of_lamps(at: UnderLamps, uv2: vec2f, s: Surface) -> OfLamps {
     let size = vec2f(textureDimensions(light_maps));
     let texel = vec2u(clamp(uv2 * size, vec2f(0.0), size - 1.0));
     let words = (LAMPS + 31u) / 32u;
+    let around = corners_at(uv2);
     for (var word = 0u; word < words; word++) {
-        let reach = lamps_reach[texel.y * u32(size.x) + texel.x];
+        let reach = lamps_reach[(texel.y * u32(size.x) + texel.x) * LAMP_WORDS];
         var left = reach[word];
         while (left != 0u) {
             let bit = firstTrailingBit(left);
             left &= left - 1u;
-            sum = lit_by(32u * word + bit, sum, at, s, ((reach[2u + word] >> bit) & 1u) != 0u);
+            sum = lit_by(32u * word + bit, sum, at, around, s, ((reach[2u + word] >> bit) & 1u) != 0u);
         }
     }
     return sum;

@@ -24,8 +24,9 @@ class PointLamps:
         self._factors: Floats | None = None
         self._records = layouts.uniform(MOST_LAMPS * LAMP_DTYPE.itemsize)
         self.constants = {"LAMPS": 0 if drawn is None else len(drawn.records)}
-        self._reached = np.zeros(4, np.uint32) if drawn is None else drawn.reached
-        self._stored = layouts.buffer("STORAGE", self._reached)
+        self._of_texels = np.zeros((1, 1, 1, 4), np.uint32) if drawn is None else of_texels(drawn)
+        self._stored = layouts.buffer("STORAGE", self._of_texels)
+        self.constants["LAMP_WORDS"] = self._of_texels.shape[2]
         self._changed: frozenset[int] = frozenset()
         self._profiles: list[NDArray[np.float16]] = []  # beyond those of `drawn`
         self._discs = self._uploaded_discs()
@@ -67,7 +68,9 @@ class PointLamps:
             bits = np.zeros(4, np.uint32)
             for place in places:
                 bits[[place // 32, 2 + place // 32]] |= np.uint32(1 << place % 32)
-            self._device.queue.write_buffer(self._stored, 0, self._reached | bits)
+            changed = self._of_texels.copy()
+            changed[:, :, 0] |= bits
+            self._device.queue.write_buffer(self._stored, 0, changed)
         self.shine(self._factors, self._in_map)
         return lost
 
@@ -108,11 +111,22 @@ class PointLamps:
         self._factors, self._in_map = factors, in_map
         data = np.zeros(MOST_LAMPS, LAMP_DTYPE)
         lamps = self._drawn.records
-        for row, lamp, intensity in zip(data, lamps, self._drawn.intensities(factors), strict=False):
+        places = np.cumsum([lamp.has_opening for lamp in lamps]) - 1  # in `DrawnLamps.seen`
+        each = zip(data, lamps, places, self._drawn.intensities(factors), strict=False)
+        for row, lamp, place, intensity in each:
             row["place"] = *lamp.position, np.sin(np.radians(lamp.reach_deg) / 2)
-            row["across"], row["down"] = (
-                (*axis, half) for axis, half in zip(lamp.axes[:2], lamp.half_axes_m, strict=True)
-            )
+            halves = zip(lamp.axes[:2], lamp.half_axes_m, strict=True)
+            row["across"], row["down"] = ((*axis, half_m) for axis, half_m in halves)
+            row["along"], row["intensity"] = (*lamp.axes[2], lamp.profile), (*intensity, place)
             row["faces"] = (*lamp.silhouettes_m2, lamp.is_box)
-            row["along"], row["intensity"][:3] = (*lamp.axes[2], lamp.profile), intensity
         self._device.queue.write_buffer(self._records, 0, data.tobytes())
+
+
+def of_texels(drawn: DrawnLamps) -> NDArray[np.uint32]:
+    """(H, W, 1 + k, 4) by texel: `DrawnLamps.reached`, and visible shares of 16 openings in each further row."""
+    count, height, width = drawn.seen.shape
+    if not count:
+        return drawn.reached[:, :, None]
+    shares = np.zeros((height, width, -(-count // 16) * 16), np.uint8)
+    shares[..., :count] = np.moveaxis(drawn.seen, 0, -1)
+    return np.concatenate([drawn.reached[:, :, None], shares.view("<u4").reshape(height, width, -1, 4)], axis=2)

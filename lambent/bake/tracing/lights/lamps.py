@@ -15,6 +15,8 @@ from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
 from lambent.store.lamp_discs import half_axes_m
 
+NEAREST = 1 / 16  # share of an opening that one of its points stands for
+DARK = 1e-9  # weight of points without light, where no other is
 ROW = 17  # numbers of an opening: position, axes, scale, half axes
 
 
@@ -61,11 +63,21 @@ class LampRays:
         ds, light = emitter.sample_direction(si, mi.Point2f(0.5), active & ~sized)
         light, target = light * dr.dot(ds.d, si.sh_frame.n), ds.p
         if self.openings is not None:
-            of_opening, point = self.openings.drawn(lamp, si, u, active & sized)
-            light, target = dr.select(sized, of_opening, light), dr.select(sized, point, target)
+            light = dr.select(sized, self.openings.drawn(lamp, si, active & sized), light)
+            target = dr.select(sized, self.openings.point(lamp, u, active & sized), target)
         lit = active & (dr.max(dr.abs(light)) > 0)
         lit &= ~rays.hidden(self._scene, si.p, si.n, target, lit, self._holes)
         return dr.select(lit, light, 0.0) * dr.gather(mi.Color3f, self._factors, lamp, active)
+
+    def seen(self, lamp: Any, si: Any, u: Any, active: Any) -> tuple[Any, Any]:
+        """A sample of the visible share of an opening: whether a point of it is seen (mi.Bool), and its weight.
+
+        Points weigh as much as the luminance that they would have at `si` with the photometry's intensity.
+        """
+        assert self.openings is not None, "the lamp has an opening"
+        point = self.openings.point(lamp, u, active)
+        weight = mi.luminance(dr.maximum(self.openings.light(lamp, si, point, NEAREST, active), 0.0)) + DARK
+        return active & ~rays.hidden(self._scene, si.p, si.n, point, active, self._holes), weight
 
     def unshadowed(self, lamp: Any, si: Any, u: Any, active: Any) -> tuple[Any, Any]:
         """Irradiances (mi.Color3f) of a lamp with an opening as if nothing were in the way, at least 0.
@@ -76,8 +88,7 @@ class LampRays:
         emitter = dr.reinterpret_array(mi.EmitterPtr, dr.gather(mi.UInt32, self._emitters, lamp, active))
         ds, light = emitter.sample_direction(si, u, active)
         whole = dr.select(ds.pdf > 0, light * dr.dot(ds.d, si.sh_frame.n), 0.0)
-        drawn, _ = self.openings.drawn(lamp, si, u, active)
-        return dr.maximum(drawn, 0.0), dr.maximum(whole, 0.0)
+        return dr.maximum(self.openings.drawn(lamp, si, active), 0.0), dr.maximum(whole, 0.0)
 
     def __call__(self, si: Any, active: Any) -> tuple[Any, Any]:
         """Irradiance (mi.Color3f) of all lamps as drawn, on the side of the shading normal, and on the other.
@@ -104,24 +115,33 @@ class Openings:
         """Whether a lamp (mi.UInt32) has an opening."""
         return dr.gather(mi.UInt32, self._which, lamp, active) < self._count
 
-    def drawn(self, lamp: Any, si: Any, u: Any, active: Any) -> tuple[Any, Any]:
-        """Irradiance without shadows, and the point (mi.Point3f) of the opening that decides whether it is seen.
+    def drawn(self, lamp: Any, si: Any, active: Any) -> Any:
+        """Irradiance (mi.Color3f) without shadows, of the intensity at the centre.
 
         The opening counts as an ellipse of half axes a, b across its lamp's axis. On its axis at a distance r, a
         Lambertian disc of radius a has E = I/(r^2 + a^2).
         """
-        number = dr.gather(mi.UInt32, self._which, lamp, active)
-        row = [dr.gather(mi.Float, self._rows, lamp * ROW + k, active) for k in range(ROW)]
-        centre, axes = mi.Point3f(*row[:3]), [mi.Vector3f(*row[k : k + 3]) for k in (3, 6, 9)]
-        a, b = row[15:]
-        to = centre - si.p
+        return self.light(lamp, si, mi.Point3f(*self._row(lamp, 0, 3, active)), 1.0, active)
+
+    def point(self, lamp: Any, u: Any, active: Any) -> Any:
+        """A point (mi.Point3f) of that ellipse by u (mi.Point2f) in the unit square."""
+        across, down = (mi.Vector3f(*self._row(lamp, k, 3, active)) for k in (3, 6))
+        (a, b), place = self._row(lamp, 15, 2, active), mi.warp.square_to_uniform_disk_concentric(u)
+        return mi.Point3f(*self._row(lamp, 0, 3, active)) + across * (a * place.x) + down * (b * place.y)
+
+    def light(self, lamp: Any, si: Any, p: Any, share: float, active: Any) -> Any:
+        """Irradiance (mi.Color3f) without shadows, if all light leaves a `share` of the ellipse around a point."""
+        axes = [mi.Vector3f(*self._row(lamp, k, 3, active)) for k in (3, 6, 9)]
+        scale, (a, b) = mi.Color3f(*self._row(lamp, 12, 3, active)), self._row(lamp, 15, 2, active)
+        to = p - si.p
         square = dr.squared_norm(to)
         d = to * dr.rsqrt(dr.maximum(square, 1e-12))
         x, y, z = (-dr.dot(d, axis) for axis in axes)
-        candela = self._candela.towards(number, x, y, z, active)
-        light = mi.Color3f(*row[12:15]) * candela * dr.dot(d, si.sh_frame.n) / dr.maximum(square + a * b, 1e-12)
-        place = mi.warp.square_to_uniform_disk_concentric(u)
-        return light, centre + axes[0] * (a * place.x) + axes[1] * (b * place.y)
+        candela = self._candela.towards(dr.gather(mi.UInt32, self._which, lamp, active), x, y, z, active)
+        return scale * candela * dr.dot(d, si.sh_frame.n) / dr.maximum(square + share * a * b, 1e-12)
+
+    def _row(self, lamp: Any, first: int, count: int, active: Any) -> list[Any]:
+        return [dr.gather(mi.Float, self._rows, lamp * ROW + first + k, active) for k in range(count)]
 
 
 @dr.syntax
