@@ -17,6 +17,7 @@ from lambent.viewer.modes.edit import painter
 from lambent.viewer.modes.edit.state import EditState
 from lambent.viewer.modes.edit.subject import Subject
 from tests.editing.written_view import OBJECTS, SHOWN, SIZE, write_view
+from tests.viewer import waiting
 
 CAMERA = Camera("front", (0.0, 1.0, 3.0), (0.0, 0.0, 0.0))
 TRAY = Material(name="tray", kd=(0.3, 0.2, 0.1), lobes=(Lobe(mx=0.3, my=0.3),))
@@ -86,11 +87,7 @@ def new_state(screen, folder, backend=None, **materials):
 
 def until(state, condition):
     """Let the state go on until it meets a condition."""
-    end = time.monotonic() + 180  # never reached but by a machine at a standstill
-    while not condition():
-        assert time.monotonic() < end, "not in time"
-        state.tick()
-        time.sleep(0.005)
+    waiting.until(condition, state.tick)
 
 
 def settled(state):

@@ -14,9 +14,8 @@ from lambent.viewer.editor.measurement import read_measurement, start_material
 from lambent.viewer.editor.restrictions import Restrictions, lobe_names
 from lambent.viewer.editor.subject import same_numbers
 from lambent.viewer.edits.edits import MaterialEdits
+from tests.viewer import waiting
 from tests.viewer.editor.measured_specimens import BRASS, FROSTED, write_measurement
-
-PATIENCE_S = 180.0
 
 
 @pytest.fixture(scope="module")
@@ -40,11 +39,7 @@ def moved(material, **changes):
 
 
 def until(editor, condition):
-    end = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < end, "it never happened"
-        editor.tick()
-        time.sleep(0.005)
+    waiting.until(condition, editor.tick)
 
 
 def test_a_drag_is_one_step_and_is_shown_at_once(editor, brass_file):

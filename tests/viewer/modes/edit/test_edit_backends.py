@@ -20,6 +20,7 @@ from lambent.viewer.modes.edit.painter import Painter, Wish, checked
 from lambent.viewer.modes.edit.shown import OnGpu, OnHost, backend_of
 from lambent.viewer.screen import Rect
 from tests.editing.test_frozen_pictures import DIFFUSE, SIZE, START, dark_parts, expected, light
+from tests.viewer import waiting
 from tests.viewer.edited_view import LIGHTS, new_state, settled, until
 
 VIEWS = ("filmic", "neutral", "linear", "false-colour")
@@ -146,12 +147,7 @@ def test_interreflections_are_the_whole_sum_while_materials_are_edited_in_turn(d
         )
         painter.want(Wish(dict(now)))
         time.sleep(0.01)
-    end = time.monotonic() + 180
-    while painter.busy:
-        checked(painter)
-        assert time.monotonic() < end, "it never settles"
-        painter.take()
-        time.sleep(0.001)
+    waiting.until(lambda: not painter.busy, lambda: (checked(painter), painter.take()))
     reference = expected(source, now)
     assert np.abs(painter.frame.radiance - reference).max() < 2e-3 * reference.max()
     painter.close()

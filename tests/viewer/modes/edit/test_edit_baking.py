@@ -12,6 +12,7 @@ from lambent.editing.session.session import Session
 from lambent.viewer.modes.edit import baking
 from lambent.viewer.modes.edit.baking import Baking, Passes, Stage
 from tests.viewer.edited_view import CAMERA, SIZE, TRAY
+from tests.viewer.waiting import until
 
 TALKS = """
 import json, sys, time
@@ -36,16 +37,9 @@ def begun(tmp_path, monkeypatch):
     return begin
 
 
-def ended(bake):
-    end = time.monotonic() + 180  # never reached but by a machine at a standstill
-    while bake.running:
-        assert time.monotonic() < end
-        time.sleep(0.01)
-
-
 def test_what_arrives_is_told_and_a_good_end_has_no_error(begun):
     bake = begun("")
-    ended(bake)
+    until(lambda: not bake.running)
     assert (bake.arrived, bake.has_view, bake.error) == ([20], True, "")
 
 
@@ -59,14 +53,13 @@ def test_what_arrives_is_told_and_a_good_end_has_no_error(begun):
 )
 def test_errors_are_one_line(begun, end, line):
     bake = begun(end)
-    ended(bake)
+    until(lambda: not bake.running)
     assert bake.error == line
 
 
 def test_closing_ends_the_process(begun):
     bake = begun("time.sleep(600)")
-    while not bake.arrived:
-        time.sleep(0.01)
+    until(lambda: bake.arrived)
     process = bake._process._process
     began = time.monotonic()
     bake.close()

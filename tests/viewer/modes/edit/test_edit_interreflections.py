@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,7 +17,7 @@ from lambent.editing.session.session import Session
 from lambent.materials.document import Material
 from lambent.viewer.modes.edit import interreflections
 from lambent.viewer.modes.edit.interreflections import Bounced
-from tests.viewer.drawn_frames import LONGEST_S
+from tests.viewer.waiting import until
 
 NAMES = [f"material {k}" for k in range(8)]
 SMALL = frozenset(NAMES[6:])
@@ -75,12 +74,8 @@ def made(monkeypatch, tmp_path):
 
 def tick(made, idle=True):
     """Until nothing is read."""
-    end = time.monotonic() + LONGEST_S
     made.bounced.tick(made.session, made.folder, idle)
-    while made.bounced._reading is not None:
-        assert time.monotonic() < end
-        time.sleep(0.001)
-        made.bounced.tick(made.session, made.folder, idle)
+    until(lambda: made.bounced._reading is None, lambda: made.bounced.tick(made.session, made.folder, idle))
 
 
 def answer(made):

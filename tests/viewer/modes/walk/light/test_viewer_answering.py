@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,6 +26,7 @@ from lambent.viewer.modes.walk.light.answering import WITHOUT, Answering, Answer
 from tests.bake.small_scenes import GREY, TINY, room_with_step
 from tests.realtime.answering.answered_scene import answered_scene
 from tests.viewer.small_store import write_small_store
+from tests.viewer.waiting import until
 
 VIEW = FrameState(Camera(name="in", position=(1.4, 1.2, -1.4), target=(-0.8, 0.5, 0.0), fov_y_deg=70), 96, 64)
 BLUE = {"grey": GREY.model_copy(update={"kd": (0.05, 0.05, 0.5)})}
@@ -35,12 +35,8 @@ RED = {"grey": GREY.model_copy(update={"kd": (0.5, 0.05, 0.05)})}
 
 def settled(light: AnsweringLight, edited: dict) -> None:
     """Frames until nothing is computed any more."""
-    end = time.monotonic() + 180
     light.update(edited)
-    while light.busy:
-        assert time.monotonic() < end
-        time.sleep(0.005)
-        light.update(edited)
+    until(lambda: not light.busy, lambda: light.update(edited))
 
 
 @pytest.fixture(scope="module")
@@ -84,11 +80,7 @@ def test_an_edit_drops_the_probes_of_the_one_before(store: Store, monkeypatch: p
         return answered(*given)
 
     monkeypatch.setattr(answering, "answered", slow)
-    end = time.monotonic() + 180
-    while not made:
-        light.update(RED)
-        assert time.monotonic() < end
-        time.sleep(0.005)
+    until(lambda: made, lambda: light.update(RED))
     light.update(BLUE)
     go_on.set()
     settled(light, RED)
