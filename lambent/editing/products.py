@@ -27,6 +27,9 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 BLOCK = 8192  # pixels whose sums stay in the first-level cache
 Halves = NDArray[np.float16]
 Pixels = NDArray[np.float32]
+CHANNELS = 4
+WORD = ir.IntType(32)
+WHOLE, REAL = ir.VectorType(WORD, CHANNELS), ir.VectorType(ir.FloatType(), CHANNELS)
 
 
 @intrinsic
@@ -130,11 +133,6 @@ class HostProducts:
         if anew:
             self.picture[:, part] = 0
         add_rows(self.picture, self._transport, rows, weights, part)
-
-
-CHANNELS = 4
-WORD = ir.IntType(32)
-WHOLE, REAL = ir.VectorType(WORD, CHANNELS), ir.VectorType(ir.FloatType(), CHANNELS)
 
 
 @intrinsic

@@ -26,6 +26,8 @@ Entries = tuple[NDArray[np.integer], NDArray[np.unsignedinteger[Any]], NDArray[n
 """Entries of each of a tile's points: counts; their numbers, ascending within a point; their values."""
 WIDTHS: tuple[type[np.unsignedinteger[Any]], ...] = np.uint8, np.uint16  # of a difference
 BYTES = 4  # of a value
+AT_ONCE = 32 * TOGETHER  # points that a thread processes with the same sums
+APART = 4  # accumulators used in turn, so that no addition waits for the previous one
 
 
 @dataclass(frozen=True)
@@ -164,11 +166,6 @@ def _largest(ends, values, units):  # type: ignore[no-untyped-def]
 def _mark(met, codes, bands):  # type: ignore[no-untyped-def]
     for n in numba.prange(len(codes)):
         met[codes[n] // bands] = True
-
-
-AT_ONCE = 32 * TOGETHER  # points that a thread processes with the same sums
-
-APART = 4  # accumulators used in turn, so that no addition waits for the previous one
 
 
 @dataclass(frozen=True)

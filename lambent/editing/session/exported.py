@@ -32,6 +32,11 @@ from lambent.materials.models.lambert import Lambert
 SAME = 1e-9  # relative difference up to which curves count as multiples of each other
 COMPARED = 60_000  # tuples, at most
 METRIC = "cuberoot"  # that lobes are fitted by
+FORMAT = "edited curves"
+THETA_I_DEG = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0)
+PHI_I_DEG = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)  # of an anisotropic material
+RINGS, SECTORS = 96, 24  # of half vectors
+PER_HALF_VECTOR = {"theta_h": 1.0, "slope_t": 1.0, "slope_b": 1.0, "gamma_t": 1.0, "gamma_b": 1.0, "theta_r": 0.5}
 
 
 @dataclass(frozen=True)
@@ -202,13 +207,6 @@ def _origin(source: OfDocument | OfModel | OfTable) -> tuple[str, str | None, st
     if isinstance(source, OfModel):
         return source.model, None, "model"
     return source.file.rpartition("/")[2], source.sha256, "measured table"
-
-
-FORMAT = "edited curves"
-THETA_I_DEG = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0)
-PHI_I_DEG = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)  # of an anisotropic material
-RINGS, SECTORS = 96, 24  # of half vectors
-PER_HALF_VECTOR = {"theta_h": 1.0, "slope_t": 1.0, "slope_b": 1.0, "gamma_t": 1.0, "gamma_b": 1.0, "theta_r": 0.5}
 
 
 class EditedTable(MeasuredTable):

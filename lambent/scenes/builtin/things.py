@@ -14,6 +14,7 @@ from lambent.scenes.geometry import box, merge, placed
 from lambent.scenes.scene import IDENTITY, MaterialTextures, Mesh, SceneObject, Texture, UvTransform
 
 POLISHED_SCALE = 0.2  # light map density of bare metal, which has no diffuse term
+EARLY, LATE = np.array([0.46, 0.26, 0.115]), np.array([0.185, 0.078, 0.028])  # reflectance within a year's ring
 
 
 def thing(name: str, material: str, *meshes: Mesh, light_map_scale: float = 1.0) -> SceneObject:
@@ -43,9 +44,6 @@ def painted(
 def of_one_colour(mesh: Mesh, u: float, v: float) -> Mesh:
     """`mesh` in the colour that its texture has at one point."""
     return replace(mesh, uv=np.tile(np.array([u, v], np.float32), (len(mesh.positions), 1)))
-
-
-EARLY, LATE = np.array([0.46, 0.26, 0.115]), np.array([0.185, 0.078, 0.028])  # reflectance within a year's ring
 
 
 def wood(height: int = 256, width: int = 512, boards: int = 4) -> Floats:

@@ -20,6 +20,12 @@ from lambent.scenes.mesh import Mesh
 
 INWARDS = 1e-3  # share of the way to the middle of a patch where derivatives at a pole are taken instead
 NO_NORMAL = 1e-7  # of |S_u x S_v|, relative to the squared size of a patch: below it, the limit from inside
+MOST_STEPS = 64  # along a side; a power of two, at which shared edges are bitwise equal
+POINTS_AT_ONCE = 1 << 18
+COINCIDENT = 1e-9  # of the box of all patches, within which control points are one
+SIDES = "v = 0", "v = 1", "u = 0", "u = 1"  # the order of edges below
+_MIXING = np.random.default_rng(0).integers(-(2**63), 2**63, 12) | 1
+Steps = NDArray[np.int64]  # (n, 6): inner steps along u and v, then those of the four edges
 
 
 def bernstein(t: Floats) -> Floats:
@@ -142,14 +148,6 @@ def steps_for(control: Floats, tolerance: float) -> tuple[Floats, Floats]:
     along_u, along_v = np.maximum(along_u, 1.0), np.maximum(along_v, 1.0)
     more = np.sqrt(np.maximum(twist / (2 * tolerance) / (along_u * along_v), 1.0))
     return along_u * more, along_v * more
-
-
-MOST_STEPS = 64  # along a side; a power of two, at which shared edges are bitwise equal
-POINTS_AT_ONCE = 1 << 18
-COINCIDENT = 1e-9  # of the box of all patches, within which control points are one
-SIDES = "v = 0", "v = 1", "u = 0", "u = 1"  # the order of edges below
-_MIXING = np.random.default_rng(0).integers(-(2**63), 2**63, 12) | 1
-Steps = NDArray[np.int64]  # (n, 6): inner steps along u and v, then those of the four edges
 
 
 def steps_to(control: Floats, tolerance: float) -> Steps:

@@ -51,6 +51,13 @@ MIRRORS = {  # by the first and last horizontal angle: the symmetry, and its pla
 }
 _TILT = re.compile(r"^[ \t]*TILT[ \t]*=", re.IGNORECASE | re.MULTILINE)
 _KEYWORD = re.compile(r"^[ \t]*\[(\w+)\][ \t]*(.*?)[ \t]*$", re.MULTILINE)
+# Rows, in luminaire axes: towards H = V = 0, towards a growing angle of planes, and the axis that planes share.
+FRAMES = {"A": [[0, 0, 1], [0, -1, 0], [1, 0, 0]], "B": [[0, 0, 1], [1, 0, 0], [0, -1, 0]]}
+FINENESS = (1, 2, 4, 8, 16)
+PLANES = 72  # of type C at fineness 1
+MOST_NODES = 1 << 20
+TOLERANCE = 0.005  # of the largest intensity, at the file's own angles, and of the flux
+HALF_TURN = 180.0  # so that angles of planes, from -90 to 90 degrees, are positive
 
 
 def is_ies(content: bytes) -> bool:
@@ -162,15 +169,6 @@ class _Reading:
 
     def _numbers_of(self, text: str) -> Sequence[float]:
         return list(numbers_of(text.replace(",", " ").split(), self._path))
-
-
-# Rows, in luminaire axes: towards H = V = 0, towards a growing angle of planes, and the axis that planes share.
-FRAMES = {"A": [[0, 0, 1], [0, -1, 0], [1, 0, 0]], "B": [[0, 0, 1], [1, 0, 0], [0, -1, 0]]}
-FINENESS = (1, 2, 4, 8, 16)
-PLANES = 72  # of type C at fineness 1
-MOST_NODES = 1 << 20
-TOLERANCE = 0.005  # of the largest intensity, at the file's own angles, and of the flux
-HALF_TURN = 180.0  # so that angles of planes, from -90 to 90 degrees, are positive
 
 
 def type_c(kind: str, vertical_deg: Floats, horizontal_deg: Floats, candela: Floats, file: Path) -> Photometry:

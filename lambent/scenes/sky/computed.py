@@ -22,6 +22,10 @@ HEIGHT, SAMPLES = 384, 2  # rows of an image; samples per texel and axis
 Mask = NDArray[np.bool_]
 
 _WINDOWS = (-5.2, -1.6, 2.0)  # z of those in the gallery
+SUN = normalize(np.array([0.62, 0.5, 0.52]))
+SUN_RADIUS_DEG, SUN_RADIANCE = 1.3, np.array([16_000.0, 13_000.0, 9_200.0])  # larger than real, with the same light
+EYE_M = 1.2  # height of the point over the lawn
+LEAVES = np.array([[0.10, 0.22, 0.03], [0.30, 0.34, 0.04], [0.62, 0.24, 0.02], [0.52, 0.07, 0.02], [0.06, 0.13, 0.05]])
 
 
 def gallery(w: Floats) -> Floats:
@@ -114,12 +118,6 @@ def _lamps(light: Floats, w: Floats, towards: ArrayLike, radius_deg: float, radi
     """`light` with round lamps in the directions `towards`."""
     closest = (w @ normalize(np.array(towards, float)).T).max(axis=-1)
     return np.where((closest > np.cos(np.radians(radius_deg)))[..., None], np.asarray(radiance, float), light)
-
-
-SUN = normalize(np.array([0.62, 0.5, 0.52]))
-SUN_RADIUS_DEG, SUN_RADIANCE = 1.3, np.array([16_000.0, 13_000.0, 9_200.0])  # larger than real, with the same light
-EYE_M = 1.2  # height of the point over the lawn
-LEAVES = np.array([[0.10, 0.22, 0.03], [0.30, 0.34, 0.04], [0.62, 0.24, 0.02], [0.52, 0.07, 0.02], [0.06, 0.13, 0.05]])
 
 
 def park(w: Floats) -> Floats:

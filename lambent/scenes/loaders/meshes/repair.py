@@ -23,6 +23,11 @@ from lambent.scenes.mesh import batches_of, corners_of, vertices_at_corners
 from lambent.scenes.scene import Mesh, SceneObject
 
 ABSURD = 1e15
+DEVIATION_DEG = 40.0  # of a normal from its face's, above which it is reported; a smooth prism of 10 sides has 18
+DEVIATION_SHARE = 0.2  # of an object's area: the normals of fillets deviate, and are meant to
+NAMED = 2
+MEETING = 256  # faces in one place, of which normals are the mean
+CORNERS_AT_ONCE = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -256,13 +261,6 @@ def smooth_normals(positions: Floats, triangles: NDArray[np.integer], shared: ND
             for axis in range(3):
                 total[:, axis] += np.bincount(shared[:, i], angles[:, i] * normal[:, axis], minlength=len(total))
     return normalize(total)
-
-
-DEVIATION_DEG = 40.0  # of a normal from its face's, above which it is reported; a smooth prism of 10 sides has 18
-DEVIATION_SHARE = 0.2  # of an object's area: the normals of fillets deviate, and are meant to
-NAMED = 2
-MEETING = 256  # faces in one place, of which normals are the mean
-CORNERS_AT_ONCE = 1 << 20
 
 
 def deviating_faces(meshes: Sequence[Mesh]) -> Indices:

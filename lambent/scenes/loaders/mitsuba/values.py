@@ -30,6 +30,8 @@ MACHINERY = {
     "filter_type", "max_anisotropy", "cache", "sample_visible", "format", "accel", "sampling_weight", "variant",
     "component_format", "shutter_open", "shutter_close", "near_clip", "far_clip",
 }  # fmt: skip
+CHECKS = 128  # texels along a checkerboard of 2 x 2 fields
+LUMINANCE = np.array([0.212671, 0.715160, 0.072169], np.float32)  # Mitsuba's own weights, for agreement with it
 
 
 class Reading:
@@ -218,10 +220,6 @@ def children_of(reading: Reading, tag: str) -> Iterator[Plugin]:
     for element in reading.document.elements:
         if element.tag == tag:
             yield Plugin(element, reading)
-
-
-CHECKS = 128  # texels along a checkerboard of 2 x 2 fields
-LUMINANCE = np.array([0.212671, 0.715160, 0.072169], np.float32)  # Mitsuba's own weights, for agreement with it
 
 
 def colour(plugin: Plugin, name: str, default: float | Floats, *, emitted: bool = False) -> Textured:

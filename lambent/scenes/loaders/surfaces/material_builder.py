@@ -43,6 +43,9 @@ MASKED = {
         (1.0, 1.001, 1.002, 1.011, 1.022, 1.038, 1.061, 1.135, 1.215, 1.261, 1.305, 1.349, 1.361, 1.255, 1.077),
     ),
 }  # fmt: skip
+SIDE_MAX = 2048  # texels; larger images are reduced, with a note
+FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "WEBP", "GIF")
+_LINEAR_OF_BYTE = srgb_decode(np.arange(256, dtype=np.float32) / 255)
 
 
 class MaterialBuilder:
@@ -144,11 +147,6 @@ def _same(a: Texture, b: Texture) -> bool:
     if a.uv_transform != b.uv_transform or a.texels.shape != b.texels.shape:
         return False
     return a.texels is b.texels or bool(np.array_equal(a.texels, b.texels))
-
-
-SIDE_MAX = 2048  # texels; larger images are reduced, with a note
-FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "WEBP", "GIF")
-_LINEAR_OF_BYTE = srgb_decode(np.arange(256, dtype=np.float32) / 255)
 
 
 @dataclass(frozen=True)
