@@ -10,17 +10,11 @@ import pytest
 
 from lambent.materials.document import Lobe
 from lambent.published.planar_thesis import multi_ring_table, offered
-from lambent.realtime.gpu.device import open_device
 from lambent.realtime.integrators.patterns import radius
 from lambent.realtime.light.baked import Probe
 from lambent.realtime.planar.planar_integrators import PLANAR
 from lambent.realtime.renderer import Renderer
 from tests.realtime.planar.test_realtime_planar import HEIGHT, mirror, scene_of, state
-
-
-@pytest.fixture(scope="module")
-def device(adapter: None) -> Any:
-    return open_device()
 
 
 def test_a_sharp_mirror_is_as_in_motion(device: Any) -> None:
@@ -33,13 +27,16 @@ def test_a_sharp_mirror_is_as_in_motion(device: Any) -> None:
     assert "lobe-4.25" not in PLANAR and np.abs(renderer.image(state(n=3, integrator="lobe-4.25")) - ours).max() > 0.5
 
 
-def test_uniform_light_stays_uniform(device: Any) -> None:
-    scene = scene_of(mirror(0.05))
+@pytest.mark.parametrize(("m", "most"), [(0.05, 1.01), (0.2, 1.2)])
+def test_uniform_light_stays_uniform(device: Any, m: float, most: float) -> None:
+    """Of a rough lobe many samples lie beyond the buffer; what they add may be too much, as published."""
+    scene = scene_of(mirror(m))
     record = scene.record.model_copy(update={"objects": scene.record.objects[-1:]})
     sky = np.ones((6, 4, 4, 3), np.float32)
     renderer = Renderer(device, replace(scene, record=record, environment=sky, probes={"floor": Probe((0, 0, 0), sky)}))
     with offered():
-        np.testing.assert_allclose(renderer.image(state(n=7, integrator="lobe-4.25"))[HEIGHT // 2 :], 1.0, rtol=0.03)
+        image = renderer.image(state(n=7, integrator="lobe-4.25"))[HEIGHT // 2 :]
+    assert image.min() > 0.96 and image.max() < most
 
 
 def test_multi_rings_of_ten_are_three_of_three() -> None:
