@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import mitsuba as mi
@@ -12,7 +13,8 @@ from lambent.bake.sky.daylight import radiance_from
 from lambent.core.arrays import Floats
 from lambent.core.geometry.latlong import lat_long_directions
 from lambent.core.geometry.triangles import triangle_areas
-from lambent.scenes.scene import DirectionalLight, Scene
+from lambent.core.plain import triple
+from lambent.scenes.scene import DirectionalLight, IesLight, Light, Scene
 from lambent.scenes.sky.triangle_lights import (
     TriangleLights,
     environment_triangles,
@@ -20,7 +22,10 @@ from lambent.scenes.sky.triangle_lights import (
     small_lights,
     surface_triangles,
 )
+from lambent.store.lamp_discs import half_axes_m
 
+GOLDEN = np.pi * (3 - np.sqrt(5))
+MOST_POINTS = 16  # of an opening
 ROWS = 256  # of samples of the environment; bright samples are replaced by finer ones
 LEAST_FINE, MOST_FINE = 4, 32  # fine rows per coarse row: the resolution of the environment's picture
 BRIGHT = 1 / 4000  # of all light: share above which samples are bright
@@ -32,10 +37,12 @@ LAMPS = 0.5  # share of all lights, if there are both an environment and glowing
 def scene_lights(scene: Scene, samples: Samples | None, count: int) -> TriangleLights:
     """The lights of a scene: about `count` triangles, plus its point and directional lights.
 
+    Openings of luminaires are points of their photometry, evenly distributed over them.
+
     `samples` are those of the environment, if there is one.
     """
     parts = []
-    glowing = [o for o in scene.objects if any(o.emission)]
+    glowing = [o for o in scene.objects if any(o.emission) and o.luminaire is None]
     share = LAMPS if glowing and samples is not None else 1.0
     if samples is not None:
         parts.append(environment_triangles(*samples, round(count * (share if glowing else 1.0))))
@@ -43,8 +50,24 @@ def scene_lights(scene: Scene, samples: Samples | None, count: int) -> TriangleL
         corners = np.concatenate([o.mesh.corners for o in glowing])
         radiance = np.concatenate([np.broadcast_to(o.emission, (len(o.mesh.faces), 3)) for o in glowing])
         parts.append(lamp_triangles(corners, radiance, max(1, round(count * share))))
-    found = joined([*parts, small_lights(scene.lights)] if scene.lights else parts)
+    of_each = min(MOST_POINTS, max(1, count // (4 * max(len(scene.openings), 1))))
+    small = [
+        one for number, light in enumerate(scene.lights)
+        for one in (points_of(light, of_each) if number in scene.openings else [light])
+    ]  # fmt: skip
+    found = joined([*parts, small_lights(small)] if small else parts)
     return found if len(found) else small_lights([DARK])
+
+
+def points_of(light: Light, count: int) -> list[Light]:
+    """A luminaire as `count` equal ones at points of its opening, an ellipse across its axis."""
+    if not isinstance(light, IesLight):
+        return [light]
+    a, b = half_axes_m(light)
+    radius, turn = np.sqrt((np.arange(count) + 0.5) / count), GOLDEN * np.arange(count)
+    across = np.column_stack([a * radius * np.cos(turn), b * radius * np.sin(turn)]) @ light.axes[:2]
+    scale = triple(np.array(light.scale) / count)
+    return [replace(light, position=triple(light.position + one), scale=scale) for one in across]
 
 
 def environment_samples(environment: Any) -> Samples:

@@ -148,3 +148,17 @@ def test_a_light_map_has_all_the_light_of_an_opening_nearby(tmp_path: Path, name
     found, expected = of_map.reshape(-1, 3)[chosen], irradiance(scene, p.reshape(-1, 3)[chosen])
     assert len(chosen) >= 5
     np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=0.03)
+
+
+@pytest.mark.parametrize("count", [4, 400])
+def test_edited_views_have_points_of_the_photometry(count: int) -> None:
+    from lambent.bake.transport.lights import scene_lights
+
+    scene = lit(luminaire(OPENINGS["disc"]))
+    lights = scene_lights(scene, None, count)
+    light, centres = luminaire(OPENINGS["disc"]), lights.centres
+    assert len(lights) == len(lights.luminaires) == (1 if count == 4 else 16)
+    np.testing.assert_allclose(lights.light.sum(axis=0), light.scale, rtol=1e-12)
+    local = (centres - light.position) @ light.axes.T
+    assert np.abs(local[:, 2]).max() < 1e-9 and np.linalg.norm(local, axis=1).max() <= 0.15
+    assert count == 4 or np.allclose((local[:, :2] ** 2).mean(axis=0), 0.15**2 / 4, rtol=0.1)
