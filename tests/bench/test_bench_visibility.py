@@ -60,6 +60,8 @@ def test_rows_are_counted_by_hand(mi: Any, monkeypatch: pytest.MonkeyPatch) -> N
 
     rows = {row["variant"]: row for row in report["rows"]}
     assert len(results) == len(predicted.VARIANTS) and len(rows) == 1 + len(results)
+    (exact,) = (row for name, row in rows.items() if name not in predicted.VARIANTS)
+    assert (exact["traced_percent"], exact["wrong_percent"]) == (100, 0)
     most_wrong = 0.0
     for variant, found, traced in results:
         row = rows[next(name for name, which in predicted.VARIANTS.items() if which is variant)]
