@@ -18,12 +18,12 @@ from lambent.bake.surfaces.texels import POINTS, Sides
 from lambent.bake.tracing.lights.lamps import LampRays
 from lambent.bake.tracing.rays import array_of
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.geometry.sequences import hammersley
+from lambent.core.geometry.sequences import r2
 from lambent.core.light.colour import HALF_MAX, luminance
 from lambent.store.lamps import MOST_LAMPS
 
 OF_OPENING = 4  # rays to an opening from each of a texel's points
-NEAR_FIELD = 16  # likewise, samples without shadows
+NEAR_FIELD = 32  # likewise, samples without shadows: under a sphere half of them face away
 SHARP = 0.3  # deviation of visible shares around a texel: a penumbra of 2.7 texels
 AROUND = 1  # texels to each side that count as reached: edges of shadows cross the borders of texels
 
@@ -138,9 +138,10 @@ class LampPoints:
     def _points(self, count: int) -> tuple[Any, Any, Any]:
         """The first of `count` samples of openings for each of the points, and coordinates (mi.Float) of all.
 
-        They are stratified within a texel, and the same for all texels.
+        They are evenly distributed for each texel, and the same for all: R2, because a lattice meets the order of the
+        faces of round openings.
         """
-        x, y = (mi.Float(part) for part in hammersley(POINTS * count).T.astype(np.float32))
+        x, y = (mi.Float(part) for part in r2(POINTS * count).T.astype(np.float32))
         return dr.arange(mi.UInt32, len(self._mine) * POINTS) % POINTS, x, y
 
 
