@@ -37,7 +37,9 @@ def test_attributes_items_and_several_places_change() -> None:
         assert INTEGRATORS["lamps"].lamps is None
     assert INTEGRATORS["lamps"].lamps == before
     with switched(
-        Switch("lambent.realtime.light.lamps.FIRST lambent.realtime.light.lamps.LAST", lambda value: 2 * value)
+        Switch(
+            "lambent.realtime.light.probe_lamps.FIRST lambent.realtime.light.probe_lamps.LAST", lambda value: 2 * value
+        )
     ):
         assert (lamps.FIRST, lamps.LAST) == (0.94, 1.08)
     with pytest.raises(ZeroDivisionError), switched(Switch("lambent.realtime.incident.planes.PREFERENCE", -1)):
@@ -57,7 +59,7 @@ def test_shaders_change_where_they_include_the_file() -> None:
 
 
 @pytest.mark.parametrize(
-    "place", ["lambent.realtime.light.lamps.FIRSTS", "lambent.nowhere.X", "smooth.wgsl:DETAILS", "nowhere.wgsl:X"]
+    "place", ["lambent.realtime.light.probe_lamps.FIRSTS", "lambent.nowhere.X", "smooth.wgsl:DETAILS", "nowhere.wgsl:X"]
 )
 def test_a_place_that_is_not_there_is_named(place: str) -> None:
     with pytest.raises(UserError, match="no such constant or function"), switched(Switch(place, 0)):
