@@ -15,7 +15,7 @@ from lambent.core.errors import UserError
 from lambent.realtime.gpu import cube_mips, shader_source
 from lambent.realtime.incident import planes
 from lambent.realtime.integrators.integrators import INTEGRATORS
-from lambent.realtime.light import lamps, probe_light
+from lambent.realtime.light import probe_lamps, probe_light
 from lambent.scenes import load_scene
 
 COARSE = quality_named("preview").changed("coarse", geometry={"texels": 64}, environment={"texels": 32})
@@ -27,8 +27,8 @@ FROZEN = Switch("lambent.bake.surfaces.clusters.MIXED", 0.0)
 def test_a_name_changes_wherever_it_was_imported() -> None:
     before = cube_mips.smooth_chain
     with switched(Switch("lambent.realtime.gpu.cube_mips.smooth_chain", cube_mips.mip_chain)):
-        assert cube_mips.smooth_chain is lamps.smooth_chain is probe_light.smooth_chain is cube_mips.mip_chain
-    assert cube_mips.smooth_chain is lamps.smooth_chain is probe_light.smooth_chain is before
+        assert cube_mips.smooth_chain is probe_lamps.smooth_chain is probe_light.smooth_chain is cube_mips.mip_chain
+    assert cube_mips.smooth_chain is probe_lamps.smooth_chain is probe_light.smooth_chain is before
 
 
 def test_attributes_items_and_several_places_change() -> None:
@@ -41,11 +41,11 @@ def test_attributes_items_and_several_places_change() -> None:
             "lambent.realtime.light.probe_lamps.FIRST lambent.realtime.light.probe_lamps.LAST", lambda value: 2 * value
         )
     ):
-        assert (lamps.FIRST, lamps.LAST) == (0.94, 1.08)
+        assert (probe_lamps.FIRST, probe_lamps.LAST) == (0.94, 1.08)
     with pytest.raises(ZeroDivisionError), switched(Switch("lambent.realtime.incident.planes.PREFERENCE", -1)):
         assert planes.PREFERENCE == -1
         raise ZeroDivisionError
-    assert (lamps.FIRST, lamps.LAST, planes.PREFERENCE) == (0.47, 0.54, 2)
+    assert (probe_lamps.FIRST, probe_lamps.LAST, planes.PREFERENCE) == (0.47, 0.54, 2)
 
 
 def test_shaders_change_where_they_include_the_file() -> None:
