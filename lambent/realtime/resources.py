@@ -144,6 +144,7 @@ class SceneResources:
                     place,
                 )
             )
+        self._place_openings()
         textures = TextureCache(device)
         self._textured = {
             name: MaterialBuffers(layouts, textures.sampler, textures.of_material(scene.textures.get(name)))
@@ -200,6 +201,12 @@ class SceneResources:
     def light_of(self, name: str) -> ProbeLight:
         """The light of the object of this name, shared with other objects."""
         return next(one.light for one in self.objects if one.record.name == name)
+
+    def _place_openings(self) -> None:
+        """Show openings of lamps that a bake moved where it has them."""
+        for item in self.objects:
+            if item.lamp and (moved := self.lamps.records[item.lamp - 1].moved) is not None:
+                self.move(item.record, np.array(moved))
 
     def move(self, record: ObjectRecord, world_from_baked: Floats) -> None:
         """Show an object at another place: (4, 4), rigid."""

@@ -14,7 +14,6 @@ from lambent.core.geometry.directions import normalize
 from lambent.core.light.colour import luminance
 from lambent.core.light.photometry import LM_PER_W
 from lambent.core.plain import Triple, triple
-from lambent.scenes.geometry import transformed
 from lambent.scenes.photometry.distribution import Photometry
 from lambent.scenes.photometry.files import read_luminaire
 from lambent.scenes.photometry.luminous_surfaces import placement, shining
@@ -87,7 +86,7 @@ def tilt_deg(aim: Triple) -> float:
 
 
 def with_lamp_edits(scene: Scene, edits: Mapping[int, LampEdit]) -> Scene:
-    """The scene with edited lamps, by their place among its lights.
+    """The scene with edited lamps, by their place among its lights; their openings keep their meshes, but `moved`.
 
     Raises
     ------
@@ -101,7 +100,7 @@ def with_lamp_edits(scene: Scene, edits: Mapping[int, LampEdit]) -> Scene:
             raise UserError("the scene has no such lamp", field="lamps", got=number, hint="reset the edited lamps")
         lights[number] = now = edited_lamp(lamp, edit)
         if isinstance(lamp, IesLight) and isinstance(now, IesLight) and number in objects:
-            moved = transformed(objects[number].mesh, placement(now) @ np.linalg.inv(placement(lamp)))
-            objects[number] = shining(replace(objects[number], mesh=moved), now)
+            moved = placement(now) @ np.linalg.inv(placement(lamp))
+            objects[number] = shining(replace(objects[number], moved=tuple(map(tuple, moved.tolist()))), now)
     of_scene = tuple(o if o.luminaire is None else objects[o.luminaire] for o in scene.objects)
     return replace(scene, lights=tuple(lights), objects=of_scene)

@@ -87,6 +87,9 @@ class SceneObject:
     emission: Triple = (0.0, 0.0, 0.0)
     light_map_scale: float = 1.0
     luminaire: int | None = None
+    moved: tuple[tuple[float, ...], ...] | None = (
+        None  # rows of a rigid (4, 4): where paths see it, with its edited lamp
+    )
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ class LampRecord(Strict):
 
     `number` is its place among the lights. `half_axes_m` are those of its opening, an ellipse, or 0 of a point.
     `silhouettes_m2` of the opening are those seen along the axes; along others, those of a box add up, and those of
-    other shapes count as an ellipsoid's.
+    other shapes count as an ellipsoid's. `moved` is as in `scenes.scene.SceneObject`.
     """
 
     number: int = Field(ge=0)
@@ -48,6 +48,7 @@ class LampRecord(Strict):
     half_axes_m: tuple[float, float] = (0.0, 0.0)
     silhouettes_m2: Triple = (0.0, 0.0, 0.0)
     is_box: bool = False
+    moved: tuple[tuple[float, float, float, float], ...] | None = Field(default=None, min_length=4, max_length=4)
     profile: int = Field(ge=0)
     group: int = Field(ge=0)
 
@@ -65,7 +66,16 @@ def drawn_lamps(store: Store) -> tuple[LampRecord, ...]:
         found = tuple(map(LampRecord.model_validate, said if isinstance(said, list) else ()))
     except ValidationError as error:
         raise invalid(error, store.folder / MANIFEST) from error
-    numbers = [(*lamp.position, *lamp.intensity, *lamp.half_axes_m, *lamp.silhouettes_m2) for lamp in found]
+    numbers = [
+        (
+            *lamp.position,
+            *lamp.intensity,
+            *lamp.half_axes_m,
+            *lamp.silhouettes_m2,
+            *np.ravel(lamp.moved or ()).sum(keepdims=True),
+        )
+        for lamp in found
+    ]
     axes = np.array([lamp.axes for lamp in found])
     profiles, groups = store.artefact(PROFILES).shape[0], store.artefact(LAMPS[0]).shape[0]
     whole = all(lamp.profile < profiles and lamp.group < groups for lamp in found)

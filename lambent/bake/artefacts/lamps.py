@@ -76,7 +76,8 @@ def _records(
         if (place := known.setdefault(shape.tobytes(), len(profiles))) == len(profiles):
             profiles.append(shape)
         rows = [triple(axis) for axis in axes_of(lamp)]
-        opening = opening_of(lamp) if number in context.scene.openings else {}
+        shown = next((o for o in context.scene.objects if o.luminaire == number), None)
+        opening = {} if shown is None else opening_of(lamp) | {"moved": shown.moved}
         record = LampRecord(
             number=number, position=lamp.position, axes=(rows[0], rows[1], rows[2]), intensity=triple(intensity),
             reach_deg=reach_deg(lamp), profile=place, group=groups[number] if grouped else 0, **opening,

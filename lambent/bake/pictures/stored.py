@@ -28,8 +28,7 @@ def stored_scene(store: Store, scene: Scene, replacements: Sequence[Replacement]
     record, arrays = scene_record(store), read_geometry(store)
     openings = {o.name: o for o in scene.objects if o.luminaire is not None}
     objects, uv2 = _objects(record, arrays)
-    objects = tuple(openings.get(o.name, o) for o in objects)  # they are where their lamps are
-    uv2 |= {name: np.zeros((len(o.mesh.positions), 2), np.float32) for name, o in openings.items()}
+    objects = tuple(replace(openings[o.name], mesh=o.mesh) if o.name in openings else o for o in objects)
     scene = replace(scene, objects=objects, parts={o.name: o.part_of for o in record.objects if o.part_of})
     scene, unmapped = with_replacements(scene, replacements), frozenset(one.object for one in replacements)
     uv2 |= {name: np.zeros((len(scene.object(name).mesh.positions), 2), np.float32) for name in unmapped}

@@ -112,8 +112,8 @@ def light_inputs(scene: Scene) -> object:
     """All emitters; names of lights only affect groups."""
     emissions = [(o.name, o.emission) for o in scene.objects]
     lights = [(type(x).__name__, {k: v for k, v in asdict(x).items() if k != "name"}) for x in scene.lights]
-    openings = [scene.openings] if scene.openings else []
-    return [emissions, lights, environment_inputs(scene.environment), *openings]
+    openings = [[(o.luminaire, o.name, o.moved) for o in scene.objects if o.luminaire is not None]]
+    return [emissions, lights, environment_inputs(scene.environment), *(openings if scene.openings else [])]
 
 
 def group_inputs(scene: Scene) -> object:

@@ -18,7 +18,7 @@ import numpy as np
 from lambent.bake.bsdfs.material_plugin import TANGENT_ATTRIBUTE
 from lambent.bake.tracing.lights.opening_emitter import opening_emitter
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.scenes.geometry import merge
+from lambent.scenes.geometry import merge, transformed
 from lambent.scenes.scene import IesLight, Scene, SceneObject
 
 UV2_ATTRIBUTE = "vertex_uv2"
@@ -40,7 +40,9 @@ class Shapes:
         self._objects, self._lights, self._bsdfs, self._uv2 = objects, scene.lights, bsdfs, uv2
         alone, groups = len(objects) <= MOST_ALONE, dict[object, list[int]]()
         for i, (o, bsdf) in enumerate(zip(objects, bsdfs, strict=True)):
-            groups.setdefault(i if alone or any(o.emission) else (id(bsdf), o.name in uv2), []).append(i)
+            groups.setdefault(
+                i if alone or any(o.emission) or o.luminaire is not None else (id(bsdf), o.name in uv2), []
+            ).append(i)
         self._groups = [np.array(group) for group in groups.values()]
         self._shapes = [self._shape(group) for group in self._groups]
         of_object = {i: mesh for mesh, group in zip(self._shapes, self._groups, strict=True) for i in group.tolist()}
@@ -151,8 +153,8 @@ def mesh_of(o: SceneObject, bsdf: Any, uv2: Floats | None = None, luminaire: Ies
         props["mesh_emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
     vertices, faces = len(o.mesh.positions), len(o.mesh.faces)
     mesh = mi.Mesh(o.name, vertices, faces, props=props, has_vertex_normals=True, has_vertex_texcoords=True)
-    parameters = mi.traverse(mesh)
-    for name, values in (("positions", o.mesh.positions), ("normals", o.mesh.normals), ("texcoords", o.mesh.uv)):
+    parameters, shape = mi.traverse(mesh), o.mesh if o.moved is None else transformed(o.mesh, np.array(o.moved))
+    for name, values in (("positions", shape.positions), ("normals", shape.normals), ("texcoords", shape.uv)):
         parameters[f"vertex_{name}"] = mi.Float(values.astype(np.float32).ravel())
     parameters["faces"] = mi.UInt32(o.mesh.faces.astype(np.uint32).ravel())
     parameters.update()

@@ -125,7 +125,8 @@ class ChangedLamps:
 
     def _move_opening(self, place: int, now: LampRecord) -> None:
         assert self._drawn is not None, "there are lamps"
-        moved = _placement(now) @ np.linalg.inv(_placement(self._drawn.records[place]))
+        baked = self._drawn.records[place]
+        moved = _placement(now) @ np.linalg.inv(_placement(baked)) @ np.array(baked.moved or np.eye(4))
         for item in self._resources.objects:
             if item.lamp == place + 1:
                 self._resources.move(item.record, moved)

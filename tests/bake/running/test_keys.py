@@ -92,6 +92,7 @@ OBJECT: Answers = {
     "emission": ((0.0, 0.0, 0.1), LIGHTS),
     "light_map_scale": (0.5, SURFACES),
     "luminaire": (0, LIGHTS),
+    "moved": (tuple(map(tuple, np.eye(4).tolist())), NOTHING),
 }
 MATERIAL: Answers = {
     "name": ("renamed", NOTHING),

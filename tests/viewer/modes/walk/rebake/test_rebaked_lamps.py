@@ -36,18 +36,18 @@ kd = 0.5
 [assign]
 "*" = "grey"
 [[lights]]
-kind = "spot"
 name = "spot"
 position = [0.8, 2.4, 0.2]
 direction = [-0.3, -1, 0]
-outer_deg = 40
-candela = 300
+{first}
 [[lights]]
 kind = "point"
 name = "bulb"
 position = [-0.9, 1.8, -0.5]
 candela = 60
 """
+SPOT = 'kind = "spot"\nouter_deg = 40\ncandela = 300'
+DISC = 'kind = "ies"\nfile = "disc.ies"\nlumens = 300'
 FACES = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))  # of a box, outwards
 MOVED = {0: LampEdit((-0.6, 2.0, 0.7), (0.5, -1.0, -0.6), 20.0)}
 
@@ -60,18 +60,20 @@ def box_obj(name, low, high, first, inwards):
     return vertices + f"o {name}\n" + "".join(f"f {' '.join(str(first + face[k]) for k in order)}\n" for face in FACES)
 
 
-@pytest.fixture(scope="module", params=["none", "scene"])
+@pytest.fixture(scope="module", params=[("none", SPOT), ("scene", DISC)], ids=["spot", "opening, by group"])
 def stores(request, mi, tmp_path_factory):
     """The store, its copy with edited lamps, and the edits: a move and an exchange."""
+    groups, first = request.param
     folder = tmp_path_factory.mktemp("lamps")
     (folder / "wide.ies").write_text(IES)
-    (folder / "scene.toml").write_text(SCENE)
+    (folder / "disc.ies").write_text(IES.replace("2 0 0 0", "2 -0.2 -0.2 0"))
+    (folder / "scene.toml").write_text(SCENE.format(first=first))
     room = box_obj("room", (-2, 0, -2), (2, 3, 2), 1, True) + box_obj(
         "block", (-0.2, 0.05, -0.2), (0.2, 0.6, 0.2), 9, False
     )
     (folder / "room.obj").write_text(room)
     store = folder / "room.store"
-    bake(load_scene(folder / "scene.toml"), store, quality=TINY, light_groups=request.param).close()
+    bake(load_scene(folder / "scene.toml"), store, quality=TINY, light_groups=groups).close()
     edits = {**MOVED, 1: LampEdit((-0.9, 1.8, -0.5), (0.2, -1.0, 0.0), 0.0, str(folder / "wide.ies"))}
     bake_again(store, rebaked_copy(store), {}, lamps=edits, quality=TINY).close()
     return store, rebaked_copy(store), edits
