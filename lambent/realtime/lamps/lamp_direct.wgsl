@@ -118,8 +118,8 @@ fn corners_at(uv2: vec2f) -> Corners {
     return Corners(texels * LAMP_WORDS, vec4f(g.x * g.y, f.x * g.y, g.x * f.y, f.x * f.y));
 }
 
-// Visible share of opening `number`.
-fn seen_at(number: u32, around: Corners) -> f32 {
+// Visible shares of opening `number` at these texels.
+fn shares_at(number: u32, around: Corners) -> vec4f {
     let row = 1u + number / 16u;
     let word = number / 4u % 4u;
     let bytes = vec4u(
@@ -127,7 +127,7 @@ fn seen_at(number: u32, around: Corners) -> f32 {
         lamps_reach[around.rows.z + row][word], lamps_reach[around.rows.w + row][word],
     );
     let shares = (bytes >> vec4u(8u * (number % 4u))) & vec4u(255u);
-    return dot(vec4f(shares), around.weights) / 255.0;
+    return vec4f(shares) / 255.0;
 }
 
 fn lit_by(lamp: u32, before: OfLamps, at: UnderLamps, around: Corners, s: Surface, in_shadow: bool) -> OfLamps {
@@ -145,11 +145,14 @@ fn lit_by(lamp: u32, before: OfLamps, at: UnderLamps, around: Corners, s: Surfac
     for (var k = 0u; k < select(0u, 1u, in_shadow && share > 0.0 && !has_opening); k++) {
         share *= lamp_visibility(lamp, it.place.w, d, square * per_m, to_axes * at.flat_normal);
     }
-    for (var k = 0u; k < select(0u, 1u, in_shadow && share > 0.0 && has_opening); k++) {
-        share *= opening_visibility(lamp, it.place.w, to_axes * away, half_axes, to_axes * at.flat_normal);
+    var looks_up = in_shadow && has_opening && share > 0.0;
+    for (var k = 0u; k < select(0u, 1u, has_opening && it.intensity.w >= 0.0); k++) {
+        let shares = shares_at(u32(it.intensity.w), around);
+        looks_up = looks_up && any(shares != shares.xxxx);
+        share *= select(dot(shares, around.weights), 1.0, looks_up);
     }
-    for (var k = 0u; k < select(0u, 1u, !in_shadow && has_opening); k++) {
-        share *= seen_at(u32(it.intensity.w), around);
+    for (var k = 0u; k < select(0u, 1u, looks_up); k++) {
+        share *= opening_visibility(lamp, it.place.w, to_axes * away, half_axes, to_axes * at.flat_normal);
     }
     let light = share / (square + half_axes.x * half_axes.y) * it.intensity.rgb;
     let w = -away * per_m;

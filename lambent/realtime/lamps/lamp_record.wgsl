@@ -5,6 +5,6 @@ struct PointLamp {
     across: vec4f,    // unit axes, the third along the lamp's; w: half axes of its opening across and down, 0 for a point
     down: vec4f,
     along: vec4f,     // w: number of its profile
-    intensity: vec4f, // the largest, W/sr; w: number of its opening among the visible shares of texels
+    intensity: vec4f, // the largest, W/sr; w: number of its opening among the shares of texels, -1 if none
     faces: vec4f,     // m2, silhouettes of its opening along the axes; w: 1 for a box, along others their sum
 }

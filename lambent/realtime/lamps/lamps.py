@@ -112,6 +112,7 @@ class PointLamps:
         data = np.zeros(MOST_LAMPS, LAMP_DTYPE)
         lamps = self._drawn.records
         places = np.cumsum([lamp.has_opening for lamp in lamps]) - 1  # in `DrawnLamps.seen`
+        places[list(self._changed)] = -1
         each = zip(data, lamps, places, self._drawn.intensities(factors), strict=False)
         for row, lamp, place, intensity in each:
             row["place"] = *lamp.position, np.sin(np.radians(lamp.reach_deg) / 2)
