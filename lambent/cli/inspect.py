@@ -142,7 +142,7 @@ def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:
         "materials": sorted(scene.materials),
         "environment": type(scene.environment).__name__ if scene.environment else "none",
         **({"daylight": daylight_in_words(scene.environment)} if isinstance(scene.environment, SunSky) else {}),
-        "lights": len(scene.lights) + sum(any(o.emission) for o in scene.objects),
+        "lights": len(scene.lights) + sum(any(o.emission) and o.luminaire is None for o in scene.objects),
         "light_groups": {group.name: ", ".join(group.members) for group in groups_before_bake(scene)},
         "variants": _variants(scene.variants),
         "cameras": [camera.name for camera in scene.cameras],
