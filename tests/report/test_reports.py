@@ -91,9 +91,10 @@ def test_nothing_a_user_wrote_becomes_markup():
     assert sum(HOSTILE in text for text in read.text) >= 12
 
 
-def test_pictures_have_their_size():
-    (image,) = [attributes for tag, attributes in Reader(page.picture(png(), "x", density=1.5)).tags if tag == "img"]
-    assert (image["width"], image["height"]) == ("40", "20")
+@pytest.mark.parametrize(("density", "size"), [({}, ("60", "30")), ({"density": 1.5}, ("40", "20"))])
+def test_pictures_have_their_size(density, size):
+    (image,) = [attributes for tag, attributes in Reader(page.picture(png(), "x", **density)).tags if tag == "img"]
+    assert (image["width"], image["height"]) == size
 
 
 FEW = {"step_deg": 9.0, "fine_deg": 4.5, "fine_reach_deg": 9.0}

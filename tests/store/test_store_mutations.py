@@ -25,6 +25,7 @@ from lambent.scenes.floor_plan import FloorPlan
 from lambent.scenes.scene import MaterialTextures, Texture
 from lambent.store.chunk_files import content_size
 from lambent.store.contract import (
+    SIDES,
     ObjectRecord,
     ReflectorPart,
     ReflectorRecord,
@@ -36,6 +37,8 @@ from lambent.store.contract import (
     write_scene_record,
 )  # fmt: skip
 from lambent.store.kept.views import Views, change_views, read_views, with_views
+from lambent.store.light_groups import group_name, light_groups
+from lambent.store.occlusion import PROBE_SHARE, probe_shares
 from lambent.store.plans import plan_of, plan_record
 from lambent.store.store import Store
 from lambent.store.textures import texture_records, write_textures
@@ -253,3 +256,22 @@ def test_a_chunk_that_is_a_link_out_of_the_store(sound: Path, tmp_path: Path) ->
             store.begin("light_map/raw", "raw", (4, 4), (2, 4), "float32", key="k").write((0, 0), np.float32(1))
         path.unlink()
     assert (tmp_path / "mine").read_text() == "mine"
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_notes_of_groups_and_shares_must_fit_their_arrays(tmp_path: Path, count: int) -> None:
+    """Neither another axis of an array nor one name among others makes them valid."""
+    store = Store.create(tmp_path / "s", {})
+    named = [{"name": f"g{k}", "members": [], "share": 0.2} for k in range(count)]
+    light = np.zeros((2, 4, 5, 3), np.float16)
+    store.put(group_name(SIDES[0]), "light_map", light, key="k", meta={"groups": named})
+    store.put("light_map/irradiance", "light_map", light[0], key="k")
+    names = ["floor", 1] if count == 1 else ["floor"]
+    store.put(PROBE_SHARE, "probe_share", np.zeros((4, 5, 4), np.float16), key="k", meta={"objects": names})
+    with pytest.raises(UserError, match="2 groups with names of their own"):
+        light_groups(store)
+    if count == 1:
+        with pytest.raises(UserError, match="a list of names"):
+            probe_shares(store)
+    else:
+        assert probe_shares(store)[1] == {"floor"}
