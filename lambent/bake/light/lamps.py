@@ -77,11 +77,12 @@ class LampPoints:
         """The light of all lamps in `count` groups, those of each in `groups`; `drawn` are numbers of lamps."""
         light = np.zeros((2, count, *self._labels.shape, 3), np.float32)  # of all lamps, of those drawn
         reached, sharp = np.zeros((2, *self._labels.shape), np.uint64)
-        seen = dict[int, Floats]()
+        sized = [place for place in drawn if self._lamps.is_sized(place)]
+        seen = np.zeros((len(sized), *self._labels.shape), np.uint8)
         of_map: Floats
         whole: Floats
         for lamp in range(self._lamps.count if len(self._mine) else 0):
-            if sized := self._lamps.is_sized(lamp):
+            if self._lamps.is_sized(lamp):
                 share, is_sharp = self._shares(lamp)
                 of_map, whole = (share * one for one in self._unshadowed(lamp))
             else:
@@ -91,13 +92,12 @@ class LampPoints:
                 light[1, groups[lamp]] += of_map
                 bit = np.uint64(drawn.index(lamp))
                 reached |= self._near(of_map) << bit
-                if sized:
+                if lamp in sized:
                     sharp |= self._near(is_sharp) << bit
-                    seen[drawn.index(lamp)] = np.rint(255 * fill(share, self.known, self._labels)[..., 0])
+                    seen[sized.index(lamp)] = np.rint(255 * fill(share, self.known, self._labels)[..., 0])
         filled = [[fill(one, self.known, self._labels) for one in each] for each in light]
         total, of_drawn = np.minimum(filled, HALF_MAX).astype(np.float16)
-        shares = np.array([seen[k] for k in sorted(seen)], np.uint8).reshape(-1, *self._labels.shape)
-        return LampLight(total, of_drawn, reached, sharp, shares)
+        return LampLight(total, of_drawn, reached, sharp, seen)
 
     def _shares(self, lamp: int) -> tuple[Floats, Floats]:
         """Visible share (H, W, 1) of an opening, and 1 where it is not smooth; elsewhere it is averaged."""

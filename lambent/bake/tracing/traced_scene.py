@@ -135,8 +135,9 @@ class TracedScene:
 
     @cached_property
     def apart(self) -> frozenset[str]:
-        """Names of the openings of these lamps, which probes and light fields leave out."""
-        return frozenset(name for number, name in self.scene.openings.items() if number in self.lamps)
+        """Names of the openings that renderers draw as lamps, which probes and light fields leave out."""
+        drawn = {self.lamps[place] for place in self.drawn_lamps} if self.scene.openings else set()
+        return frozenset(name for number, name in self.scene.openings.items() if number in drawn)
 
     def lamp_rays(self, lamps: Sequence[tuple[int, int]], factors: Floats | None = None) -> LampRays:
         """Shadow rays to some of the scene's lights, by number and light group, times factors (G, 3) by group."""

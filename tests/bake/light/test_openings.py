@@ -162,3 +162,20 @@ def test_edited_views_have_points_of_the_photometry(count: int) -> None:
     local = (centres - light.position) @ light.axes.T
     assert np.abs(local[:, 2]).max() < 1e-9 and np.linalg.norm(local, axis=1).max() <= 0.15
     assert count == 4 or np.allclose((local[:, :2] ** 2).mean(axis=0), 0.15**2 / 4, rtol=0.1)
+
+
+def test_a_side_without_light_has_shares_too() -> None:
+    """A two-sided map whose far side no point can reach: its arrays have the shapes of the near side's."""
+    from lambent.bake.light.lamps import LampPoints
+    from lambent.bake.surfaces.texels import POINTS, Sides, Texels
+    from lambent.bake.tracing.lights.lamps import LampRays
+    from lambent.bake.tracing.scene_builder import SceneBuilder
+
+    builder = SceneBuilder(lit(luminaire(OPENINGS["disc"])))
+    none = np.zeros((0, POINTS, 3))
+    texels = Texels(4, 3, np.zeros(0, int), np.zeros((0, POINTS), int), none, none, none, np.zeros(0), np.zeros(0))
+    points = LampPoints(
+        LampRays(builder, builder.build(), [0]), Sides(texels, -1.0, np.zeros((0, POINTS), bool)), np.zeros((3, 4), int)
+    )
+    light = points.light([0], 1, [0])
+    assert light.seen.shape == (1, 3, 4) and not light.seen.any() and light.light.shape == (1, 3, 4, 3)
