@@ -20,7 +20,7 @@ from lambent.realtime.gpu.uploads import half, upload, upload_layer, with_alpha
 from lambent.realtime.incident import LookUp, brings_light, look_ups
 from lambent.realtime.integrators.integrators import Cube
 from lambent.realtime.lamps.changed import ChangedLamps
-from lambent.realtime.lamps.lamps import PointLamps, of_texels
+from lambent.realtime.lamps.lamps import PointLamps
 from lambent.realtime.light.baked import DARK, BakedScene, Probe
 from lambent.realtime.light.probe_light import ProbeLight, kind_of
 from lambent.realtime.materials.material_buffers import MaterialBuffers
@@ -42,7 +42,7 @@ def device_needs(scene: BakedScene) -> dict[str, int]:
     if scene.irradiance is not None:
         needs["max-texture-dimension-2d"] = max(scene.irradiance.shape[:2])
     if scene.lamps is not None:
-        needs["max-storage-buffer-binding-size"] = stored = of_texels(scene.lamps).nbytes
+        needs["max-storage-buffer-binding-size"] = stored = scene.lamps.rows * scene.lamps.reached.nbytes
         needs["max-buffer-size"] = max(needs["max-buffer-size"], stored)
     return {name: value for name, value in needs.items() if value > WEBGPU_LIMITS[name]}
 

@@ -100,7 +100,8 @@ def with_lamp_edits(scene: Scene, edits: Mapping[int, LampEdit]) -> Scene:
             raise UserError("the scene has no such lamp", field="lamps", got=number, hint="reset the edited lamps")
         lights[number] = now = edited_lamp(lamp, edit)
         if isinstance(lamp, IesLight) and isinstance(now, IesLight) and number in objects:
-            moved = placement(now) @ np.linalg.inv(placement(lamp))
+            before = placement(lamp.axes, lamp.position)
+            moved = placement(now.axes, now.position) @ np.linalg.inv(before)
             objects[number] = shining(replace(objects[number], moved=tuple(map(tuple, moved.tolist()))), now)
     of_scene = tuple(o if o.luminaire is None else objects[o.luminaire] for o in scene.objects)
     return replace(scene, lights=tuple(lights), objects=of_scene)

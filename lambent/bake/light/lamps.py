@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -101,7 +101,7 @@ class LampPoints:
 
     def _shares(self, lamp: int) -> tuple[Floats, Floats]:
         """Visible share (H, W, 1) of an opening, and 1 where it is not smooth; elsewhere it is averaged."""
-        seen = _seen(self._lamps, dr.opaque(mi.UInt32, lamp), self._at, *self._points(OF_OPENING), OF_OPENING)
+        seen = self._sums(self._lamps.seen, mi.Float, lamp, OF_OPENING)
         part, whole = (np.array(one).reshape(-1, POINTS).sum(axis=1) for one in seen)
         share = self._on_map((part / whole)[:, None])
         both = np.concatenate([share, share**2], axis=-1)
@@ -131,9 +131,15 @@ class LampPoints:
 
     def _unshadowed(self, lamp: int) -> tuple[Floats, Floats]:
         """Light (H, W, 3) of a lamp without shadows: as drawn, and of all the opening."""
-        both = _unshadowed(self._lamps, dr.opaque(mi.UInt32, lamp), self._at, *self._points(NEAR_FIELD), NEAR_FIELD)
+        both = self._sums(self._lamps.unshadowed, mi.Color3f, lamp, NEAR_FIELD)
         drawn, whole = (array_of(light).reshape(-1, POINTS, 3).mean(axis=1) / NEAR_FIELD for light in both)
         return self._on_map(drawn), self._on_map(whole)
+
+    def _sums(self, estimate: Callable[..., Any], kind: Any, lamp: int, count: int) -> tuple[Any, Any]:
+        """Sums of both results of an estimate by `count` samples of an opening from each point."""
+        zero = dr.zeros(kind, dr.width(self._at.p))
+        found = _sums(estimate, zero, dr.opaque(mi.UInt32, lamp), self._at, *self._points(count), count)
+        return found[0], found[1]
 
     def _points(self, count: int) -> tuple[Any, Any, Any]:
         """The first of `count` samples of openings for each of the points, and coordinates (mi.Float) of all.
@@ -146,34 +152,18 @@ class LampPoints:
 
 
 @dr.syntax
-def _seen(lamps, lamp, at, point, x, y, count):  # type: ignore[no-untyped-def]
-    """Sums (mi.Float) of the weights of `count` samples of `LampRays.seen` that are seen, and of all."""
-    part, whole = dr.zeros(mi.Float, dr.width(at.p)), dr.zeros(mi.Float, dr.width(at.p))
+def _sums(estimate, zero, lamp, at, point, x, y, count):  # type: ignore[no-untyped-def]
+    """Sums of `count` samples of both results of an estimate of `LampRays`, from `zero`."""
+    one, other = zero + 0.0, zero + 0.0
     end = point + dr.opaque(mi.UInt32, POINTS * count)
     point = mi.UInt32(point)
     while point < end:
         u = mi.Point2f(dr.gather(mi.Float, x, point), dr.gather(mi.Float, y, point))
-        is_seen, weight = lamps.seen(lamp, at, u, mi.Bool(True))
-        part += dr.select(is_seen, weight, 0.0)
-        whole += weight
+        found, as_well = estimate(lamp, at, u, mi.Bool(True))
+        one += found
+        other += as_well
         point += POINTS
-    return part, whole
-
-
-@dr.syntax
-def _unshadowed(lamps, lamp, at, point, x, y, count):  # type: ignore[no-untyped-def]
-    """Sums (mi.Color3f) of `count` samples of `LampRays.unshadowed`."""
-    width = dr.width(at.p)
-    drawn, whole = dr.zeros(mi.Color3f, width), dr.zeros(mi.Color3f, width)
-    end = point + dr.opaque(mi.UInt32, POINTS * count)
-    point = mi.UInt32(point)
-    while point < end:
-        u = mi.Point2f(dr.gather(mi.Float, x, point), dr.gather(mi.Float, y, point))
-        one, other = lamps.unshadowed(lamp, at, u, mi.Bool(True))
-        drawn += one
-        whole += other
-        point += POINTS
-    return drawn, whole
+    return one, other
 
 
 def drawn_of(detail: Floats) -> tuple[int, ...]:

@@ -28,7 +28,7 @@ def around(traced: TracedScene, maps: Maps | None, depth: int, bare: Collection[
     diffuse = maps is None
     if not bare:
         cache, whole = None if maps is None else traced.cache(*maps), traced.whole(diffuse=diffuse)
-        seen = traced.builder(diffuse=diffuse).build(traced.apart) if traced.apart else whole
+        seen = traced.builder(diffuse=diffuse).without(traced.apart, whole)
         return Surroundings(seen, cache, depth, traced.sun)
     usual, scene = traced.builder(diffuse=diffuse), without_lobes(traced.scene, bare)
     builder = SceneBuilder(scene, traced.atlas.uv2, diffuse=diffuse, measured=usual.measured, sampling=usual.sampling())

@@ -54,7 +54,7 @@ class ProbeSet:
         self._builder, self._whole = traced.builder(diffuse=whole_paths), traced.whole(diffuse=whole_paths)
         self._scene, self._backs, self._held = self._builder.scene, backs, held
         self._left_out: tuple[frozenset[str], Any] | None = None
-        self._seen = self._builder.build(traced.apart) if traced.apart else self._whole
+        self._seen = self._builder.without(traced.apart, self._whole)
         self._cache = None if irradiance is None else traced.cache(irradiance, irradiance_back)
         self._sorting: tuple[Tally, GroupedCache | None] | None = None
 

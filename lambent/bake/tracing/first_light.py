@@ -15,7 +15,7 @@ import numpy as np
 
 from lambent.bake.sky.guide import guided_sky, learn
 from lambent.bake.sky.sun import FoundSun, SunPicture, is_sun
-from lambent.bake.tracing.lights.emitters import brought_by
+from lambent.bake.tracing.lights.emitters import brought_by, number_of
 from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
 
 
@@ -34,10 +34,10 @@ class FirstLight:
         lights = [emitter for number, emitter in enumerate(builder.lights) if number not in others]
         emitters = [*lights, *([] if environment is None else [environment])]
         apart = [builder.lights[number] for number in without if number in builder.scene.openings]
-        numbers = [_number(emitter) for emitter in apart]
+        numbers = [number_of(emitter) for emitter in apart]
         self._apart = mi.Bool(np.isin(np.arange(max(numbers, default=0) + 1), numbers))
         shining = [mesh for mesh in builder.meshes.values() if mesh.is_emitter()]
-        meshes = [mesh for mesh in shining if _number(mesh.emitter()) not in numbers]
+        meshes = [mesh for mesh in shining if number_of(mesh.emitter()) not in numbers]
         parts = {f"part_{i}": part for i, part in enumerate([*meshes, *emitters])}
         if not parts:
             parts["darkness"] = {"type": "point", "position": [0.0, 0.0, 0.0], "intensity": 0.0}
@@ -59,10 +59,6 @@ class FirstLight:
         return dr.select(
             apart, dr.select(first, dr.inf, 0.0), self.scene.pdf_emitter_direction(si, ds, active & ~apart)
         )
-
-
-def _number(emitter: Any) -> int:
-    return int(dr.reinterpret_array(mi.UInt32, mi.EmitterPtr(emitter))[0])
 
 
 def sky_without(found: FoundSun, builder: SceneBuilder, whole: Any, effort: float = 1.0) -> Any:

@@ -12,6 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lambent.bake.tracing.lights.emitters import number_of
 from lambent.bake.tracing.lights.sun import Sun
 from lambent.bake.tracing.path_tracer import AllLight
 from lambent.bake.tracing.scene_builder import SceneBuilder
@@ -33,7 +34,7 @@ class Sorting:
         self.count, self.of_sun, self._of_sky, self._sun = len(lights.groups), lights.sun, lights.sky, sun
         known = [(builder.meshes[name].emitter(), group) for name, group in lights.of_objects.items()]
         known += list(zip(builder.lights, lights.of_lights, strict=True))
-        numbers = [int(dr.reinterpret_array(mi.UInt32, mi.EmitterPtr(emitter))[0]) for emitter, _ in known]
+        numbers = [number_of(emitter) for emitter, _ in known]
         table = np.zeros(max(numbers, default=0) + 1, np.uint32)
         table[numbers] = [group for _, group in known]
         self._groups, self._size = mi.UInt32(table), len(table)

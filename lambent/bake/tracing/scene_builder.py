@@ -157,10 +157,9 @@ class SceneBuilder:
             parts["embree_use_robust_intersections"] = True
         return mi.load_dict({"type": "scene", **parts}, optimize=False)
 
-    def build_bare(self, whole: Any) -> Any:
-        """The scene without openings of luminaires, which block no light of lamps; `whole` if there are none."""
-        openings = self.scene.openings.values()
-        return self.build(frozenset(openings)) if openings else whole
+    def without(self, names: Collection[str], whole: Any) -> Any:
+        """The scene without the named objects; `whole`, which has all, if none is named."""
+        return self.build(names) if names else whole
 
     def emitters(self) -> list[Any]:
         """All mi.Emitter: of objects, lights, environment."""

@@ -147,9 +147,9 @@ class TracedScene:
     @property
     def bare(self) -> Any:
         """mi.Scene of the builder at hand without openings of luminaires."""
-        whole = self.whole(**self._at_hand)
+        builder, whole = self.builder(**self._at_hand), self.whole(**self._at_hand)
         if self._bare is None or self._bare[0] is not whole:
-            self._bare = whole, self.builder(**self._at_hand).build_bare(whole)
+            self._bare = whole, builder.without(builder.scene.openings.values(), whole)
         return self._bare[1]
 
     @cached_property

@@ -19,6 +19,7 @@ from lambent.realtime.lamps.drawn import DrawnLamps, ShadowedLamp
 from lambent.realtime.sun.solid_depths import SolidDepths, depth_texture
 from lambent.scenes.lamp_edits import LampEdit, exchanged
 from lambent.scenes.photometry.distribution import Photometry
+from lambent.scenes.photometry.luminous_surfaces import placement
 from lambent.scenes.scene import IesLight
 from lambent.store.lamp_discs import profile, reach_deg
 from lambent.store.lamps import LampRecord
@@ -126,7 +127,8 @@ class ChangedLamps:
     def _move_opening(self, place: int, now: LampRecord) -> None:
         assert self._drawn is not None, "there are lamps"
         baked = self._drawn.records[place]
-        moved = _placement(now) @ np.linalg.inv(_placement(baked)) @ np.array(baked.moved or np.eye(4))
+        before = placement(baked.axes, baked.position)
+        moved = placement(now.axes, now.position) @ np.linalg.inv(before) @ np.array(baked.moved or np.eye(4))
         for item in self._resources.objects:
             if item.lamp == place + 1:
                 self._resources.move(item.record, moved)
@@ -169,13 +171,6 @@ class ChangedLamps:
         )  # fmt: skip
         cover(encoder, [disc], self._pipeline, [group], {})
         layouts.device.queue.submit([encoder.finish()])
-
-
-def _placement(record: LampRecord) -> Floats:
-    """(4, 4) world from the lamp's axes."""
-    world = np.eye(4)
-    world[:3, :3], world[:3, 3] = np.array(record.axes).T, record.position
-    return world
 
 
 def _shadow_key(record: LampRecord) -> object:

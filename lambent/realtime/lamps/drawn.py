@@ -40,6 +40,11 @@ class DrawnLamps:
     seen: NDArray[np.uint8]
     light: list[Floats]
 
+    @property
+    def rows(self) -> int:
+        """Rows of four words by texel that pixels read: `reached`, and one for each 16 of `seen`."""
+        return 1 + -(-len(self.seen) // 16)
+
     def intensities(self, factors: Floats | None = None) -> Floats:
         """(n, 3) largest intensities, in a mix of light groups with factors (G, 3)."""
         found = np.array([lamp.intensity for lamp in self.records]).reshape(-1, 3)

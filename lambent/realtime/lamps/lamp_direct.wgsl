@@ -100,6 +100,11 @@ struct UnderLamps {
     wo: vec3f,
 }
 
+// Intensity over a lamp's largest, at a place of its disc in the unit square.
+fn profile_at(it: PointLamp, place: vec2f) -> f32 {
+    return textureSampleLevel(lamp_discs, linear_sampler, place, LAMPS + u32(it.along.w), 0.0).r;
+}
+
 // The four texels around a pixel: rows of lamps_reach, and their weights.
 struct Corners {
     rows: vec4u,
@@ -138,10 +143,9 @@ fn lit_by(lamp: u32, before: OfLamps, at: UnderLamps, around: Corners, s: Surfac
     let per_m = inverseSqrt(square);
     let to_axes = transpose(mat3x3f(it.across.xyz, it.down.xyz, it.along.xyz));
     let d = to_axes * (away * per_m);
-    let place = in_disc(d) / it.place.w * 0.5 + 0.5;
     let half_axes = vec2f(it.across.w, it.down.w);
     let has_opening = half_axes.x > 0.0;
-    var share = textureSampleLevel(lamp_discs, linear_sampler, place, LAMPS + u32(it.along.w), 0.0).r;
+    var share = profile_at(it, in_disc(d) / it.place.w * 0.5 + 0.5);
     for (var k = 0u; k < select(0u, 1u, in_shadow && share > 0.0 && !has_opening); k++) {
         share *= lamp_visibility(lamp, it.place.w, d, square * per_m, to_axes * at.flat_normal);
     }
@@ -179,7 +183,7 @@ fn radiance_of_opening(lamp: u32, towards: vec3f) -> vec3f {
     let it = point_lamps[lamp];
     let d = transpose(mat3x3f(it.across.xyz, it.down.xyz, it.along.xyz)) * towards;
     let place = in_disc(d) / it.place.w * 0.5 + 0.5;
-    let share = textureSampleLevel(lamp_discs, linear_sampler, place, LAMPS + u32(it.along.w), 0.0).r;
+    let share = profile_at(it, place);
     let faces = abs(d) * it.faces.xyz;
     let silhouette = mix(length(faces), dot(faces, vec3f(1.0)), it.faces.w);
     let inside = select(0.0, 1.0, all(place == saturate(place)));

@@ -124,10 +124,10 @@ class PointLamps:
 
 
 def of_texels(drawn: DrawnLamps) -> NDArray[np.uint32]:
-    """(H, W, 1 + k, 4) by texel: `DrawnLamps.reached`, and visible shares of 16 openings in each further row."""
+    """(H, W, rows, 4) by texel: `DrawnLamps.reached`, and visible shares of 16 openings in each further row."""
     count, height, width = drawn.seen.shape
     if not count:
         return drawn.reached[:, :, None]
-    shares = np.zeros((height, width, -(-count // 16) * 16), np.uint8)
+    shares = np.zeros((height, width, 16 * (drawn.rows - 1)), np.uint8)
     shares[..., :count] = np.moveaxis(drawn.seen, 0, -1)
     return np.concatenate([drawn.reached[:, :, None], shares.view("<u4").reshape(height, width, -1, 4)], axis=2)

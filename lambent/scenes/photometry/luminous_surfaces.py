@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import chain, count
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from lambent.core.arrays import Floats
 from lambent.core.geometry.triangles import triangle_areas
@@ -60,13 +61,13 @@ def _numbered(name: str) -> Iterator[str]:
 def surface_of(light: IesLight) -> Mesh:
     """The opening of a luminaire as a closed mesh in world space; flat, if it shines along its axis alone."""
     opening = light.photometry.opening
-    return transformed(_flat(opening) if is_flat(light) else _solid(opening), placement(light))
+    return transformed(_flat(opening) if is_flat(light) else _solid(opening), placement(light.axes, light.position))
 
 
-def placement(light: IesLight) -> Floats:
-    """(4, 4) world from luminaire axes."""
+def placement(axes: ArrayLike, position: ArrayLike) -> Floats:
+    """(4, 4) world from the axes of a luminaire, unit rows."""
     world = np.eye(4)
-    world[:3, :3], world[:3, 3] = light.axes.T, light.position
+    world[:3, :3], world[:3, 3] = np.transpose(axes), position
     return world
 
 

@@ -80,3 +80,8 @@ def _points_and_normals(scene: Scene, count: int) -> tuple[Floats, Floats]:
     area = triangle_areas(corners) * scale**2
     face = rng.choice(len(area), size=count, p=area / area.sum())
     return points_on_triangles(corners, face, rng), triangle_normals(corners[face])
+
+
+def number_of(emitter: Any) -> int:
+    """The number of a mi.Emitter among all, as of mi.EmitterPtr on the device."""
+    return int(dr.reinterpret_array(mi.UInt32, mi.EmitterPtr(emitter))[0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import drjit as dr
@@ -11,6 +11,7 @@ import numpy as np
 
 from lambent.bake.tracing import rays
 from lambent.bake.tracing.lights.candela import Candela
+from lambent.bake.tracing.lights.emitters import number_of
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
 from lambent.store.lamp_discs import half_axes_m
@@ -28,7 +29,7 @@ class LampRays:
     builder : SceneBuilder
         Of the scene.
     bare : mi.Scene
-        The scene without the openings of luminaires (`SceneBuilder.build_bare`), which cast no shadows.
+        The scene without the openings of luminaires, which cast no shadows.
     numbers : list of int
         The lamps, among the scene's lights.
     factors : (n, 3), optional
@@ -37,15 +38,12 @@ class LampRays:
 
     def __init__(self, builder: SceneBuilder, bare: Any, numbers: Sequence[int], factors: Floats | None = None) -> None:
         self._scene, self._holes, self.count = bare, rays.has_holes(bare), len(numbers)
-        emitters = [builder.lights[number] for number in numbers]
-        places = [int(dr.reinterpret_array(mi.UInt32, mi.EmitterPtr(emitter))[0]) for emitter in emitters]
-        self._emitters = mi.UInt32(np.array(places, np.uint32))
+        self._emitters = mi.UInt32(np.array([number_of(builder.lights[number]) for number in numbers], np.uint32))
         factors = np.ones((self.count, 3)) if factors is None else factors
         self._factors = mi.Color3f(*(mi.Float(channel.astype(np.float32)) for channel in np.asarray(factors).T))
         names, lights = builder.scene.openings, builder.scene.lights
-        sized = [(k, lights[n], builder.meshes[names[n]]) for k, n in enumerate(numbers) if n in names]
-        self._sized = frozenset(place for place, _, _ in sized)
-        self.openings = Openings(self.count, sized) if sized else None
+        self._sized = {k: lights[number] for k, number in enumerate(numbers) if number in names}
+        self.openings = Openings(self.count, self._sized) if self._sized else None
 
     def is_sized(self, lamp: int) -> bool:
         """Whether a lamp has an opening."""
@@ -70,14 +68,14 @@ class LampRays:
         return dr.select(lit, light, 0.0) * dr.gather(mi.Color3f, self._factors, lamp, active)
 
     def seen(self, lamp: Any, si: Any, u: Any, active: Any) -> tuple[Any, Any]:
-        """A sample of the visible share of an opening: whether a point of it is seen (mi.Bool), and its weight.
+        """A sample of the visible share of an opening: the weight (mi.Float) of a point of it, 0 if hidden, and as is.
 
         Points weigh as much as the luminance that they would have at `si` with the photometry's intensity.
         """
         assert self.openings is not None, "the lamp has an opening"
         point = self.openings.point(lamp, u, active)
         weight = mi.luminance(dr.maximum(self.openings.light(lamp, si, point, NEAREST, active), 0.0)) + DARK
-        return active & ~rays.hidden(self._scene, si.p, si.n, point, active, self._holes), weight
+        return dr.select(rays.hidden(self._scene, si.p, si.n, point, active, self._holes), 0.0, weight), weight
 
     def unshadowed(self, lamp: Any, si: Any, u: Any, active: Any) -> tuple[Any, Any]:
         """Irradiances (mi.Color3f) of a lamp with an opening as if nothing were in the way, at least 0.
@@ -100,16 +98,16 @@ class LampRays:
 
 
 class Openings:
-    """The lamps with an opening of `count` lamps: their place, IesLight and mi.Mesh."""
+    """The lamps with an opening of `count` lamps, IesLights by place."""
 
-    def __init__(self, count: int, sized: Sequence[tuple[int, Any, Any]]) -> None:
+    def __init__(self, count: int, sized: Mapping[int, Any]) -> None:
         which, rows = np.full(count, len(sized), np.uint32), np.zeros((count, ROW), np.float32)
-        for k, (place, light, _) in enumerate(sized):
+        for k, (place, light) in enumerate(sized.items()):
             half_m = half_axes_m(light)
             which[place] = k
             rows[place] = [*light.position, *light.axes.ravel(), *light.scale, *half_m]
         self._count, self._which, self._rows = len(sized), mi.UInt32(which), mi.Float(rows.ravel())
-        self._candela = Candela([light.photometry for _, light, _ in sized])
+        self._candela = Candela([light.photometry for light in sized.values()])
 
     def has(self, lamp: Any, active: Any) -> Any:
         """Whether a lamp (mi.UInt32) has an opening."""
