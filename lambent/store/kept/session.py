@@ -1,7 +1,7 @@
-"""The session of a store: the user's changes while viewing it, `session.json` in its folder.
+"""The session of a store: what the window shows, and the user's changes: `session.json` in its folder.
 
-Bakes never touch the file. `session-unsaved.json` beside it has the same form: the window keeps unsaved changes there,
-so that they survive the end of the process. Saved cameras and paths are elsewhere: see `store.kept.views`.
+Bakes never touch the file. Version 1 had no view; its window kept unsaved changes in `session-unsaved.json`, which is
+read once. Saved cameras and paths are elsewhere: see `store.kept.views`.
 """
 
 from __future__ import annotations
@@ -10,25 +10,32 @@ import json
 import os
 from collections.abc import Collection
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from lambent.core.ceilings import SESSION_BYTES
 from lambent.core.errors import UserError, invalid
 from lambent.core.files import write_text
 from lambent.core.inputs import parse_json, read_bytes
+from lambent.core.light.false_colour import Range
 from lambent.core.light.light_mix import LightMix
 from lambent.core.strict import Strict
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
 from lambent.scenes.lamp_edits import LampEdit
 from lambent.scenes.scene import ImageTexture
+from lambent.store.consistency import is_usable
 from lambent.store.lock import lock
 
 LOCK_FILE = ".session.lock"  # the file stays in the folder; its existence means nothing
-FILE, UNSAVED_FILE = "session.json", "session-unsaved.json"
+FILE, FORMER_BACKUP = "session.json", "session-unsaved.json"
 FORMAT: Literal["lambent-walk-session"] = "lambent-walk-session"
-VERSION: Literal[1] = 1
+VERSION: Literal[2] = 2
+READABLE = (1, VERSION)
+
+Length = Annotated[float, Field(gt=0, le=1e9)]
+Pixels = Annotated[int, Field(ge=1, le=1 << 14)]
 
 
 class SessionLock:
@@ -86,14 +93,68 @@ class RoomState(Strict):
         return RoomState(materials=known, textures=textures, light=self.light, lamps=self.lamps)
 
 
+class KeptLook(Strict):
+    """Exposure, view transform and method of a picture, by the names of `realtime.frame_state.FrameState`.
+
+    Without `exposure_ev`, the picture was not metered yet. Names are checked by who shows the picture.
+    """
+
+    exposure_ev: Annotated[float, Field(ge=-64, le=64)] | None = None
+    view_transform: str = "filmic"
+    integrator: str = "lamps"
+    show: str = "full"
+    lookup: str = "auto"
+    lookups: dict[str, str] = Field(default={}, exclude_if=lambda one: not one)  # by object, in place of `lookup`
+    planar: str = "auto"
+    n: Annotated[int, Field(ge=1, le=64)] | None = None
+    near_m: Length | None = None
+    scale: Range = Range()
+    noise_scale: Range = Range(0.5, 50.0)
+
+    @model_validator(mode="after")
+    def _has_ranges(self) -> KeptLook:
+        self.scale.check()
+        self.noise_scale.check()
+        return self
+
+
+class KeptView(Strict):
+    """Where the window looks, and how it shows that.
+
+    `size` is that of the picture, logical pixels; `traces`: whether it is traced at rest; `light_follows`: whether
+    light of other surfaces follows edits; `rebaked`: whether it is that of the copy in which edits were baked again;
+    `split`: whether the state beside is shown, too.
+    """
+
+    camera: Camera
+    movement: Literal["orbit", "walk"] = "walk"
+    flying: bool = False
+    speed_m_s: Length | None = None
+    eye_height_m: Length | None = None
+    size: tuple[Pixels, Pixels] = (1280, 720)
+    look: KeptLook = KeptLook()
+    traces: bool = True
+    light_follows: bool = True
+    rebaked: bool = False
+    split: bool = False
+    selected: str | None = None
+
+    @model_validator(mode="after")
+    def _can_be_seen(self) -> KeptView:
+        if not is_usable(self.camera):
+            raise ValueError("the camera is beyond 1e9 m, or has an impossible field of view")
+        return self
+
+
 class WalkSession(Strict):
-    """Content of a session file: the current state, the state compared with it, and stored states by name."""
+    """Content of a session file: the current state, the one compared with it, stored states by name, and the view."""
 
     format: Literal["lambent-walk-session"] = FORMAT
-    version: Literal[1] = VERSION
+    version: Literal[2] = VERSION
     now: RoomState = RoomState()
     beside: RoomState | None = None
     states: dict[str, RoomState] = Field(default_factory=dict)
+    view: KeptView | None = None
 
     @property
     def rooms(self) -> list[RoomState]:
@@ -122,13 +183,13 @@ def session_from(said: Any, file: Path) -> WalkSession:
     """The session of a parsed document; errors name `file`."""
     if not isinstance(said, dict) or said.get("format") != FORMAT:
         raise UserError("is not a session of a store", file=file, field="format", expected=FORMAT)
-    if said.get("version") != VERSION:
+    if said.get("version") not in READABLE:
         hint = "open it with the version of Lambent that wrote it"
         raise UserError(
             "unknown version", file=file, field="version", got=said.get("version"), expected=VERSION, hint=hint
         )
     try:
-        return WalkSession.model_validate(said)
+        return WalkSession.model_validate({**said, "version": VERSION})
     except ValidationError as error:
         raise invalid(error, file) from error
     except UserError as error:  # an invalid mix

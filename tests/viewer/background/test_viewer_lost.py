@@ -10,7 +10,7 @@ import pytest
 
 from lambent.core.views.camera import Camera
 from lambent.materials.document import load_material
-from lambent.store.kept.session import UNSAVED_FILE, read_session
+from lambent.store.kept.session import FILE, read_session
 from lambent.store.kept.views import Views
 from lambent.viewer.background.lost import kept
 from lambent.viewer.mode import Drawing
@@ -97,9 +97,9 @@ def test_a_window_that_loses_its_display_keeps_its_material(virtual_screen, tmp_
         session.kill()
         screen.close()
     assert code == 1, session.log()
-    rescued = read_session(tmp_path / "store" / UNSAVED_FILE).now.materials["brass"]
+    rescued = read_session(tmp_path / "store" / FILE).now.materials["brass"]
     assert rescued.model_dump(mode="json")["lobes"] == seen["edited"]["brass"]["lobes"]
-    assert UNSAVED_FILE in session.log()
+    assert FILE in session.log()
 
 
 def test_a_signal_ends_the_process_after_the_rescue():

@@ -121,7 +121,7 @@ def test_the_walk_mode(walk):
     state.materials.edits.change("brass", state.scene.materials["plaster"])
     check(walk, seen)
     wanted = {"cancel the film", "mx", "rename##new camera name", "smooth", "save##closing", "planes", "delete##path"}
-    wanted |= {"save session", "light follows", "bake edits", "apply##as baked", "x##evening", "set keys", "1.0 s##key"}
+    wanted |= {"light follows", "bake edits", "apply##as baked", "x##evening", "set keys", "1.0 s##key"}
     assert wanted <= set(seen) and len(seen) > 80
 
 

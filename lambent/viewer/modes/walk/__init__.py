@@ -20,11 +20,11 @@ def check(path: Path) -> None:
 
 def start(
     path: Path, name: str, screen: Screen, light_field_mb: float | None = None, policy: str = LEAST_RECENT,
-    sky_turn_deg: float = 0.0, replaced: tuple[str, ...] = (),
+    sky_turn_deg: float = 0.0, replaced: tuple[str, ...] = (), fresh: bool = False,
 ) -> Mode:  # fmt: skip
     """Start the mode on a store; parameters as in `mode.open_store`."""
     from lambent.viewer.modes.walk.mode import open_store
 
     return open_store(
-        path, "walk" if name == "walk" else "orbit", screen, light_field_mb, policy, sky_turn_deg, replaced
+        path, "walk" if name == "walk" else "orbit", screen, light_field_mb, policy, sky_turn_deg, replaced, fresh
     )

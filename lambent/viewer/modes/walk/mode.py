@@ -43,6 +43,7 @@ from lambent.viewer.modes.walk.panels import (
     view,
 )
 from lambent.viewer.modes.walk.pictures import Pictures
+from lambent.viewer.modes.walk.session.kept_view import restore
 from lambent.viewer.modes.walk.session.texturing import ENDINGS
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels import overlay, statistics
@@ -53,12 +54,13 @@ from lambent.viewer.screen import Screen, least
 
 def open_store(
     path: Path, movement: Movement, screen: Screen, light_field_mb: float | None = None, policy: str = LEAST_RECENT,
-    sky_turn_deg: float = 0.0, replaced: tuple[str, ...] = (),
+    sky_turn_deg: float = 0.0, replaced: tuple[str, ...] = (), fresh: bool = False,
 ) -> WalkMode:  # fmt: skip
     """Start the mode on a store with at least geometry and the scene record; else raise `UserError`.
 
     `light_field_mb` is the GPU memory for light field maps, cached by a `policy` of `baked.light_fields.map_cache`;
-    `sky_turn_deg` rotates the sky; `replaced` are meshes in place of objects (`scenes.replacement`).
+    `sky_turn_deg` rotates the sky; `replaced` are meshes in place of objects (`scenes.replacement`); `fresh` leaves the
+    store's session aside.
     """
     store = Store.open(path)
     baked = with_replacements(read_baked(store, light_field_mb, policy), parse_replacements(replaced))
@@ -71,10 +73,10 @@ def open_store(
     state.sky_turn_deg, state.replaced = sky_turn_deg, replaced
     from_scene = isinstance(store.documents.get(SOURCE), str) and not replaced
     state.rebaking.possible = from_scene and sky_turn_deg % 360 == 0  # the light map keeps the sky as baked
-    of_session = state.session.open([group.name for group in state.lights.groups])
-    state.missing = (*baked.missing, *state.missing, *of_session)
+    of_session = state.session.open([group.name for group in state.lights.groups], fresh=fresh)
+    state.missing = (*baked.missing, *state.missing, *of_session, *restore(state))
     state.texturing.textures, state.texturing.without_uv = baked.textures, without_uv(baked)
-    state.texturing.keeps = state.session.has_lock
+    state.texturing.keeps = lambda: state.session.has_lock
     state.notes, state.knows_noise = light_map_notes(store), baked.noise is not None
     geometry = Geometry(baked.positions, baked.faces, state.selection.objects)
     renderer = Renderer(open_device(device_needs(baked)), baked)
@@ -127,6 +129,8 @@ class WalkMode(Mode):
         lines = [] if filming is None else [f"film: frame {filming.done} of {filming.total}"]
         if recorder.on:
             lines.append(f"recording {self.screen.clock() - recorder.began_s:.0f} s   (R stops)")
+        if state.session.fault:
+            lines.append(state.session.fault)
         overlay.draw(self.screen, lines)
 
         if not imgui.is_any_item_active() and not self.input.moves_lamp:
@@ -173,12 +177,11 @@ class WalkMode(Mode):
         self.state.recordings.keep()
 
     def discard(self) -> None:
-        self.state.session.discard()
         self.state.recordings.drop()
 
     def rescue(self) -> None:
         if self.state.session.keeps:
-            rescued("the unsaved session", self.state.session.rescue)
+            rescued("the session", self.state.session.rescue)
         else:
             rescued("an unsaved material", lambda: self.state.materials.rescue(self.state.unsaved_materials))
         rescued("the recorded walk", self.state.recordings.rescue)
@@ -187,9 +190,8 @@ class WalkMode(Mode):
     def close(self) -> None:
         self.state.materials.close_editor()
         rescued("the recorded walk", self.state.recordings.rescue)
-        names = ", ".join(self.state.session.unsaved)
         self.state.session.close()
-        if names:
+        if names := ", ".join(self.state.session.unsaved):
             sys.stderr.write(f"lambent: note: changes not saved: {names}\n")
 
 

@@ -143,6 +143,7 @@ class Pictures(Pair):
         """The materials' textures and the light of the room."""
         lane, answers = self._lane, self._lane.shown.on and self._lane.shown.possible
         copied = self._rebaked is not None and self._rebaked.is_copied(lane.room)
+        self._state.rebaking.copied = copied
         return Appearance(lane.textures, lane.lamps, answers, copied)
 
     def _traced_kinds(self, wanted: FrameState) -> tuple[Kind, ...]:

@@ -1,11 +1,11 @@
-"""Lines above all panels: undo and redo, saving the session, and how exact the light of the edited room is."""
+"""Lines above all panels: undo and redo, whether the session is kept, and how exact the light of the edited room is."""
 
 from __future__ import annotations
 
 from imgui_bundle import imgui
 
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.panels.widgets import buttons, check, status
+from lambent.viewer.panels.widgets import buttons, check, status, wrapped
 
 # Usual texts at their longest, on estimated light and on a bake: they reserve the height of their lines.
 LONGEST = (
@@ -16,19 +16,12 @@ LONGEST = (
 
 def draw(state: WalkState) -> None:
     edits, session = state.materials.edits, state.session
-
-    def save() -> None:
-        session.save()
-
-    what = session.fault or "saves materials, light and stored states in the store; the next window starts with them"
     buttons([
         ("undo", edits.can_undo, edits.undo, "undoes the last change of a material or the light (Ctrl+Z)"),
         ("redo", edits.can_redo, edits.redo, "redoes the change (Ctrl+Shift+Z)"),
-        ("save session", not session.fault, save, f"{what} (Ctrl+S)"),
     ])  # fmt: skip
-    if session.unsaved:
-        imgui.same_line()
-        imgui.text_disabled("unsaved")
+    if session.fault:
+        wrapped([session.fault])
     _light(state)
 
 

@@ -23,6 +23,8 @@ class Rebaking:
         Whether the picture has the light of a bake for the present materials.
     said : bool
         Whether the bake is done and the line says how exact the picture is.
+    copied : bool
+        Whether the picture at rest has the light of the copy beside the store.
     """
 
     on: bool = True
@@ -31,3 +33,4 @@ class Rebaking:
     share: float | None = None
     exact: bool = False
     said: bool = False
+    copied: bool = False

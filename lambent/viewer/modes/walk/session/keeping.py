@@ -1,25 +1,40 @@
-"""The session of a store: opens and saves it, and backs up unsaved changes beside it.
+"""The session of a store, always current: written a moment after each change, and when the window closes.
 
-The first window on a store owns its session; another window shows it and can only save materials as documents.
+The first window on a store owns its session. Another one is read-only: it shows the session, and can save materials as
+documents. It takes over when the first has closed, if the file is still the one that it has read.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+import threading
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 from lambent.core.errors import UserError
 from lambent.store.kept.images import names_of_images, readable, remove_unused
-from lambent.store.kept.session import FILE, UNSAVED_FILE, SessionLock, WalkSession, read_session, write_session
+from lambent.store.kept.session import (
+    FILE,
+    FORMER_BACKUP,
+    KeptView,
+    SessionLock,
+    WalkSession,
+    read_session,
+    write_session,
+)
 from lambent.store.kept.states import images_of_variants
 from lambent.viewer.background.work import Work, pending
 from lambent.viewer.edits.edits import MaterialEdits, unused
 from lambent.viewer.screen import Screen
 
-QUIET_S = 1.5  # time without a change before unsaved changes are backed up
-BACK = "unsaved changes of the last window are restored: save them, or undo"
-ELSEWHERE = "another window has the session of this store open: here, only material documents can be saved"
-NO_STORE = "there is no store to save the session in"
+SOON_S = 1.5  # from the first change that is not written until it is; later changes do not put it off
+ASK_S = 2.0  # interval of asking whether another window has closed
+BACK = "unsaved changes of an earlier window are restored: undo takes them back"
+READ_ONLY = "read-only: another window has this store open; here, only material documents can be saved"
+CHANGED = "read-only: another window has changed the session; open the store again to go on from there"
+TAKEN = "the other window has closed: this one keeps the session from now on"
+NO_STORE = "there is no store to keep the session in"
+PARTS = ("now", "beside", "states")  # of a session, without its view
+FILES = (FILE, FORMER_BACKUP)
 
 
 class SessionKeeper:
@@ -28,73 +43,87 @@ class SessionKeeper:
     Attributes
     ----------
     fault : str
-        Reason why the session cannot be saved, in one line; else empty.
+        Reason why the session is not kept, in one line; else empty.
+    view : callable
+        The present view.
     """
 
-    def __init__(self, edits: MaterialEdits, folder: Path | None, screen: Screen) -> None:
-        self._edits, self._folder, self._screen = edits, folder, screen
+    def __init__(self, edits: MaterialEdits, folder: Path | None, screen: Screen, soon_s: float = SOON_S) -> None:
+        self._edits, self._folder, self._screen, self._soon_s = edits, folder, screen, soon_s
         self.fault = NO_STORE
-        self._kept = WalkSession()  # as saved
+        self.view: Callable[[], KeptView | None] = lambda: None
+        self._opened = self._latest = WalkSession()
+        self._written: WalkSession | None = None  # None: the file is not of this window's session
         self._foreign: dict[str, object] = {}  # materials of the present state that the store lacks
-        self._set_aside = False  # whether the unreadable session file must be renamed before saving
+        self._aside = False  # whether the present file must be renamed before the first write
         self._lock: SessionLock | None = None
-        self._seen = edits.session
-        self._due_s: float | None = None
-        self._is_written = False  # whether the backup file exists
+        self._stamp: object = None  # of the file, as read
+        self._asked_s = 0.0
         self._work: Work | None = None
+        self._hurry = threading.Event()
 
-    def open(self, groups: Collection[str] = ()) -> tuple[str, ...]:
-        """Open the session of the store with the backup of unsaved changes; return lines on problems.
+    def open(self, groups: Collection[str] = (), *, fresh: bool = False) -> tuple[str, ...]:
+        """Open the session of the store; return lines on problems. `fresh` begins with the store as baked.
 
-        `groups` are names of the store's light groups.
+        `groups` are names of the store's light groups. A file that is not shown, because it is damaged or for
+        `fresh`, is renamed at the first edit.
         """
         if self._folder is None:
             return ()
         self.fault = self._take_lock(self._folder)
         lines = [self.fault] if self.fault else []
         try:
-            self._kept = read_session(self._folder / FILE) or WalkSession()
+            self._stamp = _stamp_of(self._folder / FILE)
+            self._opened = read_session(self._folder / FILE) or WalkSession()
         except UserError as error:
-            self._set_aside = True
+            self._aside = True
             lines.append(f"the session cannot be read: {error}")
-        self._edits.begin_from(self._kept)
-        if not self.fault:
-            lines += self._take_unsaved(self._folder / UNSAVED_FILE)
+        if fresh:
+            self._aside, self._opened = True, WalkSession()
+        self._edits.begin_from(self._opened)
+        self._written = self._opened
+        if not self.fault and not fresh:
+            lines += self._take_former_backup(self._folder / FORMER_BACKUP)
         session = self._edits.session
-        self._foreign = {k: v for k, v in self._kept.now.materials.items() if k not in self._edits.scene}
+        self._foreign = {k: v for k, v in self._opened.now.materials.items() if k not in self._edits.scene}
         if unknown := sorted(
-            {*self._kept.unknown(self._edits.scene, groups), *session.unknown(self._edits.scene, groups)}
+            {*self._opened.unknown(self._edits.scene, groups), *session.unknown(self._edits.scene, groups)}
         ):
             lines.append(f"the session has {', '.join(unknown)}, which the store lacks: kept, not shown")
         faults = (readable(room.textures, self._folder)[1] for room in session.rooms)
         lines += dict.fromkeys(fault for of_room in faults for fault in of_room)
-        self._seen = session
         return tuple(lines)
+
+    @property
+    def opened_view(self) -> KeptView | None:
+        """The view of the opened session."""
+        return self._opened.view
 
     def _take_lock(self, folder: Path) -> str:
         """Make this window the owner of the session; return the reason of a failure, else an empty text."""
         try:
             self._lock = SessionLock(folder)
         except UserError as error:
-            return f"the session cannot be saved: {error}"
-        return "" if self._lock.held else ELSEWHERE
+            return f"read-only: the session cannot be kept: {error}"
+        return "" if self._lock.held else READ_ONLY
 
-    def _take_unsaved(self, file: Path) -> list[str]:
+    def _take_former_backup(self, file: Path) -> list[str]:
+        """Take the unsaved changes that a window of version 1 left; the file goes with the next write."""
         try:
             unsaved = read_session(file)
         except UserError as error:
             kept = _moved_aside(file)
-            return [f"unsaved changes of the last window cannot be read ({error}); the file was renamed to {kept.name}"]
+            return [f"unsaved changes of an earlier window cannot be read ({error}); the file is now {kept.name}"]
         if unsaved is None:
             return []
-        self._is_written = True
         self._edits.go_to(unsaved)
-        return [BACK] if self.unsaved else []
+        self._written = None
+        return [BACK] if self._edits.can_undo else []
 
     @property
     def session(self) -> WalkSession:
-        """The session to save."""
-        session = self._edits.session
+        """The session as it is now."""
+        session = self._edits.session.model_copy(update={"view": self.view() or self._opened.view})
         if not self._foreign:
             return session
         now = session.now.model_copy(update={"materials": {**self._foreign, **session.now.materials}})
@@ -102,11 +131,14 @@ class SessionKeeper:
 
     @property
     def unsaved(self) -> tuple[str, ...]:
-        """Names of unsaved parts of the session, for people; materials by name."""
+        """Names of edits that are lost with this window, for people; materials by name."""
+        if not self.fault:
+            return ()
         edits, kept = self._edits, self._kept
         names = [name for name in edits.scene if not self._is_saved(name)]
+        now, textures = edits.room.textures, kept.now.only(edits.scene).textures
         more = [
-            *((f"the texture of {name}", True) for name in self._unsaved_textures),
+            *((f"the texture of {name}", now.get(name) != textures.get(name)) for name in edits.scene),
             ("the lamps", edits.room.lamps != kept.now.lamps),
             ("the light mix", edits.light != kept.now.light),
             ("stored states", edits.stored != kept.states),
@@ -115,10 +147,9 @@ class SessionKeeper:
         return (*names, *(what for what, changed in more if changed))
 
     @property
-    def _unsaved_textures(self) -> list[str]:
-        """Materials whose textures differ from those of the saved session."""
-        now, kept = self._edits.room.textures, self._kept.now.only(self._edits.scene).textures
-        return [name for name in self._edits.scene if now.get(name) != kept.get(name)]
+    def _kept(self) -> WalkSession:
+        """The session on disk."""
+        return self._written or self._opened
 
     @property
     def has_lock(self) -> bool:
@@ -126,83 +157,114 @@ class SessionKeeper:
         return self._lock is not None and self._lock.held
 
     def _is_saved(self, name: str) -> bool:
-        """Whether a material equals that of the saved session, or its last saved document."""
+        """Whether a material equals that of the session on disk, or its last saved document."""
         now = self._edits.current(name)
         return now in (self._kept.now.materials.get(name, self._edits.scene[name]), self._edits.saved.get(name))
 
-    def save(self) -> bool:
-        """Write the session into the store; return whether it was saved."""
-        if self.fault or self._folder is None:
-            self._screen.say(f"session not saved: {self.fault}")
-            return False
-        self._edits.end_stroke()
-        self._finish()
-        try:
-            if not self._folder.is_dir():
-                raise UserError("store was deleted or moved", file=self._folder)
-            if self._set_aside:
-                self._screen.say(f"the unreadable session was renamed to {_moved_aside(self._folder / FILE).name}")
-                self._set_aside = False
-            write_session(self._folder / FILE, self.session)
-        except (UserError, OSError) as error:
-            self._screen.say(f"session not saved: {error}")
-            return False
-        self._kept = self.session
-        self._remove()
-        self._screen.say("saved the session in the store")
-        return True
-
     def tick(self) -> None:
-        """Back up unsaved changes, a while after the last change."""
+        """Take the end of a write, and begin one if anything has changed."""
         self._work = pending(self._work)
-        if self.fault or self._folder is None:
+        if self.fault == READ_ONLY:
+            self._ask()
+        if not self.has_lock:
             return
-        now_s, session = self._screen.clock(), self._edits.session
-        if session != self._seen:
-            self._seen, self._due_s = session, now_s + QUIET_S
-        if self._due_s is None or now_s < self._due_s or self._edits.in_stroke or self._work is not None:
+        self._latest = self.session
+        if self._work is None and self._is_due:
+            self._hurry.clear()
+            self._work = Work(lambda _: self._write_soon(), self._done, self._failed, self._screen.wake)
+
+    @property
+    def _is_due(self) -> bool:
+        """Whether the file is not current. One that is to be renamed stays until an edit replaces it."""
+        if self._latest == self._written:
+            return False
+        return not self._aside or any(getattr(self._latest, part) != getattr(self._opened, part) for part in PARTS)
+
+    def _ask(self) -> None:
+        """Take over from a window that has closed, if it has left the file as this one read it."""
+        if self._folder is None or self._screen.clock() - self._asked_s < ASK_S:
             return
-        self._due_s = None
-        if not self.unsaved:
-            self._remove()
-        elif self._folder.is_dir():
-            file, written = self._folder / UNSAVED_FILE, self.session
-            self._is_written = True
-            self._work = Work(lambda progress: write_session(file, written), lambda _: None, self._failed)
+        self._asked_s = self._screen.clock()
+        if self._take_lock(self._folder):
+            return
+        if _stamp_of(self._folder / FILE) == self._stamp:
+            self.fault = ""
+            self._screen.say(TAKEN)
+        else:
+            self.fault = CHANGED
+            self._release()
 
     def wait_s(self) -> float | None:
-        """Seconds until `tick` has something to do."""
-        return None if self._due_s is None else max(0.0, self._due_s - self._screen.clock())
+        """Seconds until `tick` has something to do although nothing happens; None: never."""
+        return max(0.0, self._asked_s + ASK_S - self._screen.clock()) if self.fault == READ_ONLY else None
+
+    def _write_soon(self) -> str:
+        self._hurry.wait(self._soon_s)
+        return self._write(self._latest)
+
+    def _write(self, session: WalkSession) -> str:
+        """Write a session; return a line on a renamed file, if any. Raises `UserError` on failure."""
+        folder, line = self._folder, ""
+        if folder is None or not folder.is_dir():
+            raise UserError("store was deleted or moved", file=folder)
+        try:
+            if self._aside:
+                moved = [_moved_aside(folder / name).name for name in FILES if (folder / name).exists()]
+                line, self._aside = f"the earlier session is now {', '.join(moved)}" if moved else "", False
+            write_session(folder / FILE, session)
+            (folder / FORMER_BACKUP).unlink(missing_ok=True)
+        except OSError as error:
+            raise UserError(f"cannot be written ({error.strerror})", file=folder / FILE) from error
+        self._written = session
+        return line
+
+    def _done(self, line: str) -> None:
+        self.fault = ""
+        if line:
+            self._screen.say(line)
+
+    def _failed(self, error: UserError) -> None:
+        fault = f"the session is not kept: {error}"
+        if fault != self.fault:
+            self._screen.say(fault)
+        self.fault = fault
+
+    def save(self) -> bool:
+        """Write the session at once; return whether the file is current."""
+        self._edits.end_stroke()
+        self._finish()
+        if self.has_lock:
+            self._latest = self.session
+            try:
+                self._done(self._write(self._latest) if self._is_due else "")
+            except UserError as error:
+                self._failed(error)
+        self._screen.say(self.fault or "the session is saved in the store")
+        return not self.fault
 
     def rescue(self) -> Iterator[str]:
-        """Back up unsaved changes of a lost window; yield the backup's place as text. May raise `UserError`."""
+        """Write the session of a lost window; yield its place as text. May raise `UserError`."""
         self._finish()
-        if not self.unsaved or self.fault or self._folder is None or not self._folder.is_dir():
-            return
-        write_session(self._folder / UNSAVED_FILE, self.session)
-        yield f"{self._folder / UNSAVED_FILE}; the next window on the store restores it"
+        self._latest = self.session
+        if self._is_due:
+            self._write(self._latest)
+            yield f"{self._folder}; the next window on the store shows it"
 
     @property
     def keeps(self) -> bool:
-        """Whether unsaved changes of a lost window are backed up in the store."""
-        return not self.fault and self._folder is not None and self._folder.is_dir()
-
-    def discard(self) -> None:
-        """Discard unsaved changes and their backup."""
-        self._finish()
-        self._due_s = None
-        self._remove()
+        """Whether changes are kept in the store."""
+        return self.has_lock and not self.fault and self._folder is not None and self._folder.is_dir()
 
     def close(self) -> None:
-        """Release the session to another window, and delete images that no saved state uses."""
-        self._finish()
-        if self._folder is not None and self.has_lock and not self._set_aside:
+        """Write the session, release it to another window, and delete images that no session uses."""
+        if self.keeps and self.save() and self._folder is not None:
             self._remove_images(self._folder)
+        self._finish()
         self._release()
 
     def _remove_images(self, folder: Path) -> None:
         try:
-            sessions = [read_session(folder / file) for file in (FILE, UNSAVED_FILE)]
+            sessions = [read_session(file) for file in folder.glob("session*.json")]
             rooms = [room for one in sessions if one is not None for room in one.rooms]
             used = {name for room in rooms for name in names_of_images(room.textures)}
             remove_unused(folder, used | images_of_variants(folder))
@@ -210,25 +272,27 @@ class SessionKeeper:
             self._screen.say(f"unused images of the store stay: {error}")
 
     def _finish(self) -> None:
+        """Wait until what is to be written is."""
         if self._work is not None:
+            self._hurry.set()
             self._work.wait()
             self._work = pending(self._work)
-
-    def _remove(self) -> None:
-        if self._is_written and self._folder is not None:
-            (self._folder / UNSAVED_FILE).unlink(missing_ok=True)
-            self._is_written = False
 
     def _release(self) -> None:
         if self._lock is not None:
             self._lock.release()
 
-    def _failed(self, error: UserError) -> None:
-        self._screen.say(f"unsaved changes could not be backed up: {error}")
+
+def _stamp_of(file: Path) -> object:
+    """A value that changes when a file is replaced; None without one."""
+    if not file.exists():
+        return None
+    found = file.stat()
+    return found.st_ino, found.st_mtime_ns, found.st_size
 
 
 def _moved_aside(file: Path) -> Path:
-    """Rename an unreadable file to a free name."""
+    """Rename a file that is not shown to a free name."""
     kept = file.with_name(f"{unused(file.parent, f'{file.stem}-kept', '.json')}.json")
     file.rename(kept)
     return kept

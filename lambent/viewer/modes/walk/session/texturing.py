@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -35,14 +35,14 @@ class Texturing:
         The scene's, by material.
     without_uv : collection of str
         Materials without texture coordinates.
-    keeps : bool
+    keeps : callable
         Whether images are copied into `store`; otherwise states name them where they are.
     """
 
     edits: MaterialEdits
     screen: Screen
     store: Path | None = None
-    keeps: bool = True
+    keeps: Callable[[], bool] = lambda: True
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)
     without_uv: Collection[str] = ()
     typed: str = ""  # path of an image, as typed
@@ -106,7 +106,7 @@ class Texturing:
             self.screen.say(f"{file.name} is the texture of {name}")
 
     def _kept(self, file: Path) -> str:
-        if self.store is None or not self.keeps:
+        if self.store is None or not self.keeps():
             return str(file)
         try:
             return kept_image(self.store, file)

@@ -1,46 +1,68 @@
-"""The session of a store: saved with it, opened with it, brought back after a crash; one window keeps it."""
+"""The session of a store: always current on disk, opened with it; one window keeps it, another is read-only."""
 
 import json
+import threading
 
 import pytest
 
 from lambent.core.errors import UserError
+from lambent.core.light.false_colour import Range
 from lambent.core.light.light_mix import GroupMix, LightMix
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
-from lambent.store.kept.session import FILE, UNSAVED_FILE, RoomState, WalkSession, read_session, write_session
+from lambent.scenes.scene import ImageTexture
+from lambent.store.kept.session import (
+    FILE,
+    FORMER_BACKUP,
+    KeptLook,
+    KeptView,
+    RoomState,
+    WalkSession,
+    read_session,
+    write_session,
+)
 from lambent.viewer.edits.edits import MaterialEdits
-from lambent.viewer.modes.walk.session.keeping import BACK, ELSEWHERE, QUIET_S, SessionKeeper
+from lambent.viewer.modes.walk.session.keeping import ASK_S, BACK, CHANGED, READ_ONLY, TAKEN, SessionKeeper
+from lambent.viewer.modes.walk.session.kept_view import restore, show_view, view_of
+from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.screen import Rect, Screen
 from tests.viewer.conftest import Clock
 
 SCENE = {"plaster": Material(name="plaster", kd=0.6), "brass": Material(name="brass", kd=0.1)}
 RED, BLUE = Material(name="plaster", kd=(0.7, 0.1, 0.1)), Material(name="plaster", kd=(0.1, 0.1, 0.7))
 DIM = LightMix({"lamp": GroupMix(intensity=0.5)})
+THERE = Camera("free", (1.0, 1.6, 2.0), (0.0, 1.0, 0.0), fov_y_deg=50.0)
+HOURS_S = 3600.0
 
 
 class Window:
-    """The edits of one window, and their keeper."""
+    """The edits of one window, and their keeper; it writes when `rest` or its end tells it to."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, **how):
         self.screen = Screen(folder, Clock(), Rect(0, 0, 400, 300))
         self.edits = MaterialEdits(SCENE)
-        self.keeper = SessionKeeper(self.edits, folder, self.screen)
-        self.lines = self.keeper.open(["lamp"])
+        self.keeper = SessionKeeper(self.edits, folder, self.screen, HOURS_S)
+        self.lines = self.keeper.open(["lamp"], **how)
 
     def paint(self, material):
         self.edits.change("plaster", material)
         self.edits.end_stroke()
 
     def rest(self):
-        """Time enough for what is unsaved to be written."""
-        self.keeper.tick()
-        self.screen.clock.now_s += QUIET_S
+        """Until what is due is written."""
         self.keeper.tick()
         self.keeper._finish()
 
     def die(self):
         """As by kill -9: the lock goes with the process, files stay."""
         self.keeper._release()
+
+    def look_around(self, camera):
+        self.keeper.view = lambda: KeptView(camera=camera)
+
+    @property
+    def said(self):
+        return [message.text for message in self.screen.messages]
 
 
 @pytest.fixture
@@ -50,82 +72,168 @@ def window(tmp_path):
     opened.keeper.close()
 
 
-def test_a_saved_session_is_there_again(window, tmp_path):
+def on_disk(folder):
+    return read_session(folder / FILE)
+
+
+def test_a_session_is_there_again(window, tmp_path):
     window.paint(RED)
     window.edits.mix(DIM)
     window.edits.end_stroke()
     window.edits.store("evening")
     window.edits.compare_with(RoomState())
-    assert set(window.keeper.unsaved) >= {"plaster", "the light mix", "stored states"}
-    assert window.keeper.save() and window.keeper.unsaved == ()
+    window.look_around(THERE)
+    assert window.keeper.unsaved == ()
     window.keeper.close()
     again = Window(tmp_path)
-    assert again.lines == () and again.keeper.unsaved == ()
+    assert again.lines == () and again.keeper.opened_view.camera == THERE
     assert again.edits.session == window.edits.session and again.edits.current("plaster") == RED
     assert not again.edits.can_undo
     again.keeper.close()
 
 
-def test_a_lost_window_leaves_its_changes_and_undo_brings_the_saved_ones_back(window, tmp_path):
+def test_a_window_that_only_opened_writes_nothing(window, tmp_path):
+    window.rest()
+    window.keeper.close()
+    assert [file.name for file in tmp_path.iterdir()] == [".session.lock"]
+
+
+def test_a_change_is_on_disk_when_a_window_dies_and_an_undo_too(window, tmp_path):
     window.paint(RED)
-    window.keeper.save()
+    window.rest()
     window.paint(BLUE)
+    window.rest()
+    assert on_disk(tmp_path).now.materials == {"plaster": BLUE}
+    window.edits.undo()
     window.rest()
     window.die()
     again = Window(tmp_path)
-    assert again.lines == (BACK,) and again.edits.current("plaster") == BLUE and again.keeper.unsaved == ("plaster",)
-    again.edits.undo()
-    assert again.edits.current("plaster") == RED and again.keeper.unsaved == ()
-    again.rest()
-    assert not (tmp_path / UNSAVED_FILE).exists(), "nothing is unsaved any more"
+    assert again.lines == () and again.edits.current("plaster") == RED
     again.keeper.close()
 
 
-def test_a_drag_is_written_when_it_is_over(window, tmp_path):
-    window.edits.change("plaster", RED)
+def test_a_drag_is_written_while_it_goes_on(window, tmp_path):
+    for kd in (0.2, 0.3, 0.4):
+        window.edits.change("plaster", Material(name="plaster", kd=kd))
+        window.rest()
+        assert window.edits.in_stroke and on_disk(tmp_path).now.materials["plaster"].kd == (kd,) * 3
+
+
+def test_later_changes_do_not_put_a_write_off_and_are_in_it(tmp_path, monkeypatch):
+    """The first change sets the time; what is written then is the last."""
+    waits, woken = [], threading.Event()
+    opened = Window(tmp_path)
+    opened.screen.wake = woken.set
+    monkeypatch.setattr(opened.keeper, "_hurry", Waits(waits))
+    opened.paint(RED)
+    opened.keeper.tick()
+    first = opened.keeper._work
+    opened.paint(BLUE)
+    opened.keeper.tick()
+    assert opened.keeper._work is first and not (tmp_path / FILE).exists()
+    opened.keeper._hurry.let_go()
+    assert woken.wait(60), "the window hears of it while it sleeps"
+    assert on_disk(tmp_path).now.materials == {"plaster": BLUE} and waits == [HOURS_S]
+    opened.keeper.tick()
+    assert opened.keeper._work is None
+    opened.keeper.close()
+
+
+class Waits:
+    """An event whose waits last until `let_go`, and are recorded."""
+
+    def __init__(self, waits):
+        self._waits, self._event, self.let_go = waits, threading.Event(), None
+        self.let_go = self.set = self._event.set
+
+    def clear(self):
+        self._event.clear()
+
+    def wait(self, seconds):
+        self._waits.append(seconds)
+        self._event.wait()
+
+
+def test_a_view_is_kept_like_an_edit(window, tmp_path):
+    window.look_around(THERE)
     window.rest()
-    assert not (tmp_path / UNSAVED_FILE).exists()
-    window.edits.end_stroke()
-    window.rest()
-    assert read_session(tmp_path / UNSAVED_FILE).now.materials == {"plaster": RED}
+    assert on_disk(tmp_path).view.camera == THERE
+
+
+def test_fresh_begins_as_baked_and_loses_nothing(window, tmp_path):
+    window.paint(RED)
+    window.keeper.close()
+    before = (tmp_path / FILE).read_bytes()
+    fresh = Window(tmp_path, fresh=True)
+    assert fresh.lines == () and dict(fresh.edits.edited) == {} and fresh.keeper.opened_view is None
+    fresh.look_around(THERE)
+    fresh.rest()
+    assert (tmp_path / FILE).read_bytes() == before, "to look around is no edit"
+    fresh.paint(BLUE)
+    fresh.rest()
+    assert on_disk(tmp_path).now.materials == {"plaster": BLUE} and on_disk(tmp_path).view.camera == THERE
+    assert (tmp_path / "session-kept-001.json").read_bytes() == before
+    assert fresh.said == ["the earlier session is now session-kept-001.json"]
+    fresh.keeper.close()
+
+
+def test_images_of_sessions_set_aside_stay(window, tmp_path, monkeypatch):
+    monkeypatch.setattr("lambent.viewer.modes.walk.session.keeping.images_of_variants", lambda folder: set())
+    (tmp_path / "images").mkdir()
+    for name in ("bricks-1.png", "tiles-2.png", "gone-3.png"):
+        (tmp_path / "images" / name).write_bytes(b"")
+    window.edits.show_texture("plaster", ImageTexture("bricks-1.png"))
+    window.keeper.save()
+    window.die()
+    fresh = Window(tmp_path, fresh=True)
+    fresh.edits.show_texture("brass", ImageTexture("tiles-2.png"))
+    fresh.keeper.close()
+    assert {file.name for file in (tmp_path / "images").iterdir()} == {"bricks-1.png", "tiles-2.png"}
+
+
+def test_a_second_window_is_read_only(window, tmp_path):
+    other = Window(tmp_path)
+    assert other.lines == (READ_ONLY,) and other.keeper.fault == READ_ONLY
+    other.paint(RED)
+    other.rest()
+    assert not other.keeper.save() and other.said[-1] == READ_ONLY
+    assert other.keeper.unsaved == ("plaster",), "to be asked for before it closes"
+    other.keeper.close()
     assert not (tmp_path / FILE).exists()
 
 
-def test_changes_are_written_once_they_rest(window, tmp_path):
-    window.paint(RED)
-    window.keeper.tick()
-    assert window.keeper.wait_s() == QUIET_S
-    window.screen.clock.now_s += 0.75 * QUIET_S
-    window.keeper.tick()
-    window.keeper._finish()
-    assert window.keeper.wait_s() == pytest.approx(QUIET_S / 4) and not (tmp_path / UNSAVED_FILE).exists()
-    window.screen.clock.now_s += QUIET_S
+def ask_again(window):
+    window.screen.clock.now_s += ASK_S
     assert window.keeper.wait_s() == 0
     window.keeper.tick()
-    window.keeper._finish()
-    assert window.keeper.wait_s() is None and (tmp_path / UNSAVED_FILE).exists()
 
 
-def test_discarding_keeps_the_saved_session_alone(window, tmp_path):
-    window.paint(RED)
-    window.keeper.save()
-    window.paint(BLUE)
-    window.rest()
-    window.keeper.discard()
-    assert not (tmp_path / UNSAVED_FILE).exists()
-    assert read_session(tmp_path / FILE).now.materials == {"plaster": RED}
-
-
-def test_one_window_keeps_the_session(window, tmp_path):
+def test_it_takes_over_from_a_window_that_has_closed(window, tmp_path):
     other = Window(tmp_path)
-    assert other.lines == (ELSEWHERE,)
-    other.paint(RED)
-    other.rest()
-    assert not other.keeper.save() and ELSEWHERE in other.screen.messages[-1].text
-    assert not (tmp_path / FILE).exists() and not (tmp_path / UNSAVED_FILE).exists()
+    ask_again(other)
+    assert other.keeper.fault == READ_ONLY
     window.keeper.close()
+    other.paint(BLUE)
+    ask_again(other)
+    assert other.keeper.fault == "" and other.said == [TAKEN] and other.keeper.wait_s() is None
+    other.rest()
+    assert on_disk(tmp_path).now.materials == {"plaster": BLUE} and other.keeper.unsaved == ()
     third = Window(tmp_path)
-    assert third.keeper.save()
+    assert third.lines == (READ_ONLY,)
+    other.keeper.close()
+
+
+def test_it_stays_read_only_if_the_session_has_changed(window, tmp_path):
+    other = Window(tmp_path)
+    window.paint(RED)
+    window.keeper.close()
+    other.paint(BLUE)
+    ask_again(other)
+    assert other.keeper.fault == CHANGED and other.keeper.wait_s() is None
+    other.keeper.close()
+    assert on_disk(tmp_path).now.materials == {"plaster": RED}
+    third = Window(tmp_path)
+    assert third.lines == (), "the lock is free"
     third.keeper.close()
 
 
@@ -137,32 +245,85 @@ def test_unknown_names_are_one_line_and_stay_in_the_file(window, tmp_path):
     again = Window(tmp_path)
     (line,) = again.lines
     assert "chrome, moon" in line and "\n" not in line
-    assert dict(again.edits.edited) == {"plaster": RED} and again.keeper.unsaved == ()
+    assert dict(again.edits.edited) == {"plaster": RED}
+    before = (tmp_path / FILE).stat().st_mtime_ns
+    again.rest()
+    assert (tmp_path / FILE).stat().st_mtime_ns == before
     again.paint(BLUE)
-    assert again.keeper.save()
-    saved = read_session(tmp_path / FILE).now
+    again.rest()
+    saved = on_disk(tmp_path).now
     assert saved.materials == {"chrome": chrome, "plaster": BLUE} and saved.light == mix
     again.keeper.close()
 
 
 def test_textures_of_variants_are_kept(window, tmp_path):
     window.edits.take(RoomState(materials={"plaster": RED}, textures={"plaster": "brass", "chrome": "brass"}))
-    assert window.edits.room.textures == {"plaster": "brass"} and "the texture of plaster" in window.keeper.unsaved
-    assert window.keeper.save() and read_session(tmp_path / FILE).now.textures == {"plaster": "brass"}
+    assert window.edits.room.textures == {"plaster": "brass"}
+    window.rest()
+    assert on_disk(tmp_path).now.textures == {"plaster": "brass"}
+
+
+def former(session):
+    """A session as version 1 wrote it."""
+    said = session.model_dump(mode="json", exclude={"view"})
+    return json.dumps({**said, "version": 1})
+
+
+def test_a_session_of_version_1_is_read_and_becomes_one_of_version_2(window, tmp_path):
+    window.keeper.close()
+    (tmp_path / FILE).write_text(former(WalkSession(now=RoomState(materials={"plaster": RED}))))
+    again = Window(tmp_path)
+    assert again.lines == () and again.edits.current("plaster") == RED and again.keeper.opened_view is None
+    again.paint(BLUE)
+    again.keeper.close()
+    assert json.loads((tmp_path / FILE).read_text())["version"] == 2
+
+
+def test_the_backup_of_version_1_is_folded_in_once(window, tmp_path):
+    window.keeper.close()
+    (tmp_path / FILE).write_text(former(WalkSession(now=RoomState(materials={"plaster": RED}))))
+    (tmp_path / FORMER_BACKUP).write_text(former(WalkSession(now=RoomState(materials={"plaster": BLUE}))))
+    again = Window(tmp_path)
+    assert again.lines == (BACK,) and again.edits.current("plaster") == BLUE
+    again.rest()
+    assert on_disk(tmp_path).now.materials == {"plaster": BLUE} and not (tmp_path / FORMER_BACKUP).exists()
+    again.edits.undo()
+    assert again.edits.current("plaster") == RED
+    again.keeper.close()
+
+
+def test_fresh_sets_the_backup_of_version_1_aside_too(window, tmp_path):
+    window.keeper.close()
+    (tmp_path / FORMER_BACKUP).write_text(former(WalkSession(now=RoomState(materials={"plaster": BLUE}))))
+    fresh = Window(tmp_path, fresh=True)
+    fresh.paint(RED)
+    fresh.keeper.close()
+    assert read_session(tmp_path / "session-unsaved-kept-001.json").now.materials == {"plaster": BLUE}
+    again = Window(tmp_path)
+    assert again.lines == () and again.edits.current("plaster") == RED
+    again.keeper.close()
 
 
 def edited(said, **changes):
     return {**said, **changes}
 
 
+def viewed(**changes):
+    return {"view": {**KeptView(camera=THERE).model_dump(mode="json"), **changes}}
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"version": 2}, "unknown version; found 2; expected 1"),
+        ({"version": 3}, "unknown version; found 3; expected 2"),
         ({"format": "lambent-views"}, "is not a session of a store"),
         ({"now": {"materials": {}, "light": {"groups": {"lamp": {"intensity": -1}}}}}, "intensity is out of range"),
         ({"shadows": True}, "unknown key"),
         ({"states": {"day": {"materials": {"plaster": {"kd": "red"}}}}}, "states.day.materials.plaster"),
+        (viewed(camera={"name": "free", "position": [2e9, 0, 0], "target": [0, 0, 0]}), "beyond 1e9 m"),
+        (viewed(look={"exposure_ev": 100}), "view.look.exposure_ev"),
+        (viewed(look={"scale": {"low": 5, "high": 1}}), "is not a luminance range; found 5:1"),
+        (viewed(size=[0, 100]), "view.size"),
     ],
 )
 def test_a_session_that_cannot_be_read_is_one_line_and_is_kept(window, tmp_path, change, words):
@@ -170,32 +331,51 @@ def test_a_session_that_cannot_be_read_is_one_line_and_is_kept(window, tmp_path,
     text = json.dumps(edited(WalkSession().model_dump(mode="json"), **change))
     (tmp_path / FILE).write_text(text)
     with pytest.raises(UserError) as raised:
-        read_session(tmp_path / FILE)
+        on_disk(tmp_path)
     assert words in str(raised.value) and "\n" not in str(raised.value)
     again = Window(tmp_path)
+    again.look_around(THERE)
+    again.rest()
     assert len(again.lines) == 1 and words in again.lines[0] and (tmp_path / FILE).read_text() == text
     again.paint(RED)
-    assert again.keeper.save()
+    again.rest()
     assert (tmp_path / "session-kept-001.json").read_text() == text
-    assert read_session(tmp_path / FILE).now.materials == {"plaster": RED}
+    assert on_disk(tmp_path).now.materials == {"plaster": RED}
     again.keeper.close()
 
 
-def test_unsaved_changes_that_cannot_be_read_are_moved_aside(window, tmp_path):
+def test_a_backup_that_cannot_be_read_is_moved_aside(window, tmp_path):
     window.keeper.close()
-    (tmp_path / UNSAVED_FILE).write_text("{")
+    (tmp_path / FORMER_BACKUP).write_text("{")
     again = Window(tmp_path)
     assert len(again.lines) == 1 and "session-unsaved-kept-001.json" in again.lines[0]
     assert (tmp_path / "session-unsaved-kept-001.json").read_text() == "{"
     again.keeper.close()
 
 
-def test_a_store_that_is_gone_is_said(window, tmp_path):
+def test_a_store_that_is_gone_is_said_and_not_made_anew(window, tmp_path):
     window.paint(RED)
     (tmp_path / ".session.lock").unlink()
     tmp_path.rmdir()
-    assert not window.keeper.save() and "store was deleted or moved" in window.screen.messages[-1].text
-    assert not window.keeper.keeps
+    window.rest()
+    window.rest()
+    said = [text for text in window.said if "store was deleted or moved" in text]
+    assert len(said) == 1, "once, although it is tried again"
+    assert window.keeper.fault in said and not window.keeper.keeps and window.keeper.unsaved == ("plaster",)
+    assert not tmp_path.exists()
+
+
+def test_a_disk_that_is_full_for_a_while_is_said_until_it_is_not(window, tmp_path, monkeypatch):
+    def full(*_):
+        raise UserError("cannot be written (No space left on device)", file=tmp_path / FILE)
+
+    window.paint(RED)
+    with monkeypatch.context() as context:
+        context.setattr("lambent.viewer.modes.walk.session.keeping.write_session", full)
+        window.rest()
+        assert "No space left" in window.keeper.fault and window.keeper.unsaved == ("plaster",)
+    window.rest()
+    assert window.keeper.fault == "" and on_disk(tmp_path).now.materials == {"plaster": RED}
 
 
 def test_a_folder_that_cannot_be_written_is_one_line(tmp_path, monkeypatch):
@@ -204,7 +384,54 @@ def test_a_folder_that_cannot_be_written_is_one_line(tmp_path, monkeypatch):
 
     monkeypatch.setattr("lambent.store.kept.session.os.open", refused)
     opened = Window(tmp_path)
-    assert opened.lines == (f"the session cannot be saved: {tmp_path}: cannot be written (Permission denied)",)
+    assert opened.lines == (
+        f"read-only: the session cannot be kept: {tmp_path}: cannot be written (Permission denied)",
+    )
     opened.paint(RED)
     opened.rest()
     assert opened.keeper.unsaved == ("plaster",) and not opened.keeper.keeps
+
+
+LOOK = KeptLook(
+    exposure_ev=-2.5, view_transform="false-colour", integrator="rings", show="specular", lookups={"table": "plain"},
+    planar="off", n=7, near_m=0.3, scale=Range(2.0, 90.0), noise_scale=Range(1.0, 9.0, False),
+)  # fmt: skip
+VIEW = KeptView(
+    camera=THERE, movement="orbit", flying=True, speed_m_s=2.0, eye_height_m=1.2, size=(400, 300), look=LOOK,
+    traces=False, light_follows=False, split=True, selected="table",
+)  # fmt: skip
+
+
+def test_the_view_is_shown_again(state, scene, screen, tmp_path):
+    state.session.open()
+    restore(state)
+    state.materials.edits.compare_with(RoomState())
+    assert show_view(state, VIEW) == () and view_of(state) == VIEW
+    state.session.close()
+    again = WalkState.of(scene, "walk", screen, tmp_path)
+    again.session.open()
+    assert restore(again) == () and view_of(again) == VIEW
+    again.session.close()
+
+
+def test_a_view_of_another_version_or_store_is_shown_as_far_as_it_goes(state):
+    look = LOOK.model_copy(update={"integrator": "photons", "lookups": {"table": "photons", "gone": "plain"}})
+    lines = show_view(state, VIEW.model_copy(update={"look": look, "selected": "gone"}))
+    assert lines == ("the session's integrator is not known here: photons",)
+    assert state.look.integrator == "lamps" and state.look.lookups == {} and state.selection.name is None
+    assert state.look.planar == "off" and not state.states.split, "there is no second state"
+
+
+def test_an_exposure_that_was_not_metered_yet_is_metered_again(state):
+    state.meter.expose_wanted = True
+    kept = view_of(state)
+    assert kept.look.exposure_ev is None
+    state.meter.expose_wanted = False
+    show_view(state, kept)
+    assert state.meter.expose_wanted
+
+
+def test_orbit_that_was_asked_for_stays(state):
+    state.navigation.movement = "orbit"
+    show_view(state, VIEW.model_copy(update={"movement": "walk"}))
+    assert state.navigation.movement == "orbit"

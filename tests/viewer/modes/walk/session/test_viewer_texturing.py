@@ -96,7 +96,6 @@ def test_an_image_is_copied_into_the_store_and_outlives_its_file(window, folder,
     assert window.edits.room.textures == {"plaster": ImageTexture(copy.name)}
     assert window.edits.current("plaster").kd == pytest.approx((1, 0, 0)), "the mean of the image"
     assert window.texturing.shown("plaster") == "bricks.png"
-    assert window.keeper.unsaved == ("plaster", "the texture of plaster")
     window.texturing.repeat("plaster", 3.0)
     window.texturing.repeat("plaster", 4.0)
     window.edits.end_stroke()
@@ -107,7 +106,7 @@ def test_an_image_is_copied_into_the_store_and_outlives_its_file(window, folder,
     window.keeper.close()
     picture.unlink()
     again = Window(folder)
-    assert again.lines == () and again.edits.room == window.edits.room and again.keeper.unsaved == ()
+    assert again.lines == () and again.edits.room == window.edits.room
     assert again.edits.room.textures["plaster"] == ImageTexture(copy.name, 4.0)
     assert with_paths(again.edits.room.textures, folder)["plaster"].file == str(copy.resolve())
     again.keeper.close()
@@ -123,9 +122,9 @@ def test_a_metal_has_less_room_for_an_image(window, picture):
     )
 
 
-def test_images_of_no_saved_state_are_deleted(window, folder, picture):
+def test_images_of_no_state_are_deleted(window, folder, picture):
     window.texturing.open("plaster", str(picture))
-    window.keeper.discard()
+    window.edits.undo()
     window.keeper.close()
     assert list((folder / IMAGES).iterdir()) == []
 
