@@ -16,9 +16,11 @@ from lambent.viewer.cameras import cameras
 from lambent.viewer.cameras.navigation import Navigation
 from lambent.viewer.edits.edits import MaterialEdits
 from lambent.viewer.screen import Screen
+from lambent.viewer.settings import LEAST_SCALE, MOST_SCALE
 
 CLICK_PX = 4.0  # a press that moves less than this is a click, not a drag
 LEFT, RIGHT, MIDDLE = 1, 2, 3
+SCALES = {"+": 1.1, "=": 1.1, "-": 1 / 1.1, "0": None}  # of letters and controls; None: as at first
 
 
 class Input:
@@ -65,6 +67,11 @@ class Input:
         self.dragged(dx, dy)
 
     @property
+    def dragging(self) -> bool:
+        """Whether a drag that began over the picture goes on."""
+        return self._button is not None and self._moved_px >= CLICK_PX
+
+    @property
     def pivot(self) -> Triple:
         """Centre of orbit and wheel."""
         return self.navigation.camera.target
@@ -94,12 +101,19 @@ class Input:
                 self.saved()
             elif key == "q":
                 self.screen.close_wanted = True
+            elif key in SCALES:
+                self._scale(SCALES[key])
         elif key == "p":
             self.screen.save_wanted = True
         elif key == "h":
             self.screen.panels_shown = not self.screen.panels_shown
         else:
             self.pressed_key(key)
+
+    def _scale(self, factor: float | None) -> None:
+        now = self.screen.remembered.now.scale
+        wanted = 1.0 if factor is None else round(min(max(now * factor, LEAST_SCALE), MOST_SCALE), 2)
+        self.screen.remember(scale=wanted)
 
     # Further events that a mode may handle.
 

@@ -1,4 +1,4 @@
-"""Layout of the window: the picture on the left, one column of panels on the right.
+"""Layout of the window: the picture on the left, one column of panels on the right; in the size *show*, the picture.
 
 A mode may show plots beside the picture and below it; the borders can be dragged.
 """
@@ -13,11 +13,12 @@ from imgui_bundle import imgui, implot
 
 from lambent.viewer.mode import Drawing, Mode, SidePlots, Textures
 from lambent.viewer.panels import closing
-from lambent.viewer.panels.widgets import explain, shadowed
-from lambent.viewer.screen import Rect
+from lambent.viewer.panels.widgets import explain, px, shadowed
+from lambent.viewer.screen import Rect, Screen
+from lambent.viewer.sizes import draw_control, has_sizes, shown_panels
 
 COLUMN_PX = 370  # logical pixels
-MOST_SHARE = 1 / 3  # largest share of a window's width for the column
+MOST_SHARE, SCALED_SHARE = 1 / 3, 1 / 2  # largest share of a window's width for the column; with larger letters
 LEAST_FONT = 0.8  # size of letters where the column is narrow
 LABEL_PX = 88
 BORDER_PX = 6  # between picture, disks and curves
@@ -41,9 +42,13 @@ PLOT_COLOURS = {
 }
 FIXED = (
     imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize
-    | imgui.WindowFlags_.no_collapse | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_nav
+    | imgui.WindowFlags_.no_collapse | imgui.WindowFlags_.no_saved_settings
 )  # fmt: skip
-_BARE = FIXED | imgui.WindowFlags_.no_background | imgui.WindowFlags_.no_scrollbar
+_BARE = FIXED | imgui.WindowFlags_.no_background | imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_nav
+SCALED = (
+    "window_padding", "frame_padding", "item_spacing", "item_inner_spacing", "cell_padding", "indent_spacing",
+    "scrollbar_size", "grab_min_size", "separator_text_padding",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -73,12 +78,25 @@ def set_style() -> None:
         plots.set_color_(shade, value)
 
 
+def scale_style(scale: float, fitting: float = 1.0) -> None:
+    """Scale letters and controls by `scale`, and letters once more to be `fitting` in a narrow window."""
+    style = imgui.get_style()
+    style.font_scale_main = fitting
+    if style.font_scale_dpi == scale:
+        return
+    style.font_scale_dpi, plain = scale, imgui.Style()
+    for name in SCALED:
+        size = getattr(plain, name)
+        setattr(style, name, (scale * size.x, scale * size.y) if isinstance(size, imgui.ImVec2) else scale * size)
+
+
 def regions(mode: Mode, width: float, height: float) -> Regions:
     """Divide a window of this size into regions."""
-    wide = min(COLUMN_PX, int(MOST_SHARE * width)) if mode.screen.panels_shown else 0
+    is_shown = bool(shown_panels(mode))
+    wide = _column_px(mode.screen.remembered.now.scale, width)[0] if is_shown else 0
     left, down = max(1, round(width) - wide), max(1, round(height))
     column = Rect(round(width) - wide, 0, wide, down)
-    if mode.side_plots is None or not mode.screen.panels_shown:
+    if mode.side_plots is None or not is_shown:
         return Regions(mode.drawing.within(Rect(0, 0, left, down)), column)
     across, below = round(mode.across * left), round(mode.down * down)
     right, under = across + BORDER_PX, below + BORDER_PX
@@ -86,22 +104,47 @@ def regions(mode: Mode, width: float, height: float) -> Regions:
     return Regions(mode.drawing.within(Rect(0, 0, max(1, across), max(1, below))), column, plots)
 
 
+def _column_px(scale: float, width: float) -> tuple[int, float]:
+    """Width of the column in a window of this width, and the size of its letters where that is narrow."""
+    wanted, most = COLUMN_PX * scale, min(MOST_SHARE * max(scale, 1.0), SCALED_SHARE) * width
+    return min(round(wanted), int(most)), max(LEAST_FONT, min(1.0, most / wanted))
+
+
 def draw(mode: Mode, textures: Textures | None = None) -> bool:
     """Draw the interface of one frame; return whether it captures the mouse, also over the picture."""
-    textures = textures or {}
+    textures, screen = textures or {}, mode.screen
     width, height = imgui.get_io().display_size
-    imgui.get_style().font_scale_main = max(LEAST_FONT, min(1.0, MOST_SHARE * width / COLUMN_PX))
+    screen.textures, scale = textures, screen.remembered.now.scale
+    scale_style(scale, _column_px(scale, width)[1])
     shared, side_plots = regions(mode, width, height), mode.side_plots
     dragged = _pictures(mode.drawing, shared.picture, textures)
     if side_plots is not None and shared.plots is not None:
         _draw_side_plots(mode, side_plots, *shared.plots, textures)
-    if mode.screen.panels_shown:
+    if shared.column.width:
         _window("panels", shared.column, FIXED)
         _column(mode)
         imgui.end()
     mode.draw_over(textures)
     closing.draw(mode)
-    return dragged or imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+    list_open = bool(imgui.is_popup_open("", imgui.PopupFlags_.any_popup))
+    follow_keys(screen, "panels" if shared.column.width else "bar", list_open or screen.list_open)
+    screen.list_open = list_open
+    return dragged or list_open
+
+
+def follow_keys(screen: Screen, window: str, list_open: bool) -> None:
+    """Give the keys to the controls of a window while `screen.by_keys`; Esc returns them, unless it closed a list."""
+    io, flag = imgui.get_io(), imgui.ConfigFlags_.nav_enable_keyboard
+    had = bool(io.config_flags & flag)
+    if had and imgui.is_key_pressed(imgui.Key.escape, False) and not list_open and not imgui.is_any_item_active():
+        screen.by_keys = False
+    if screen.by_keys and not had:
+        io.config_flags |= flag
+        imgui.set_window_focus(window)
+        imgui.set_nav_cursor_visible(True)
+    elif had and not screen.by_keys:
+        io.config_flags &= ~flag
+        imgui.set_window_focus(None)
 
 
 def _window(name: str, place: Rect, flags: int) -> None:
@@ -111,12 +154,15 @@ def _window(name: str, place: Rect, flags: int) -> None:
 
 
 def _column(mode: Mode) -> None:
-    imgui.push_item_width(-LABEL_PX)
+    if has_sizes(mode):
+        draw_control(mode.screen, imgui.get_content_region_avail().x)
     if mode.head is not None:
+        imgui.push_item_width(-px(LABEL_PX))
         mode.head()
-        imgui.begin_child("sections")
-        imgui.push_item_width(-LABEL_PX)
-    for panel in mode.panels:
+        imgui.pop_item_width()
+    imgui.begin_child("sections", (0, 0), imgui.ChildFlags_.nav_flattened)
+    imgui.push_item_width(-px(LABEL_PX))
+    for panel in shown_panels(mode):
         opened = imgui.collapsing_header(panel.title, imgui.TreeNodeFlags_.default_open if panel.opened else 0)
         was_opened, top_y = imgui.is_item_toggled_open(), imgui.get_item_rect_min().y
         explain(panel.meaning)
@@ -126,10 +172,8 @@ def _column(mode: Mode) -> None:
             imgui.pop_id()
         if was_opened:
             _scroll_to(top_y, imgui.get_cursor_screen_pos().y)
-    if mode.head is not None:
-        imgui.pop_item_width()
-        imgui.end_child()
     imgui.pop_item_width()
+    imgui.end_child()
 
 
 def _scroll_to(top_y: float, bottom_y: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -21,6 +22,7 @@ VIEW_TRANSFORMS = tuple(reversed(ALL_TRANSFORMS))
 SHOWS = tuple(SHOW)
 LOOKUPS = (AUTO, *look_ups())
 SAMPLE_COUNTS = tuple(n for n in RINGS if n <= 19)
+MOST_EV = 12.0  # of a slider, up and down
 OF_FRAMES = ("exposure_ev", "view_transform", "integrator", "show", "lookup", "planar", "n", "near_m")
 
 
@@ -29,6 +31,7 @@ class Look:
     """Settings of a `FrameState`, by its names, and of false colours: `noise_scale` is for the noise, in percent."""
 
     exposure_ev: float = 0.0
+    base_ev: float | None = None  # the exposure that steps count from; None: that of the start
     view_transform: str = VIEW_TRANSFORMS[0]
     integrator: str = INTEGRATORS[0]
     show: str = SHOWS[0]
@@ -40,6 +43,32 @@ class Look:
     near_m: float | None = None  # near clipping distance; None: by the scene's size
     scale: Range = field(default_factory=Range)
     noise_scale: Range = field(default_factory=lambda: Range(0.5, 50.0))
+
+    def __post_init__(self) -> None:
+        self.base_ev = self.exposure_ev if self.base_ev is None else self.base_ev
+
+    def expose(self, exposure_ev: float) -> None:
+        """Set the exposure, and count steps from it."""
+        self.exposure_ev = self.base_ev = exposure_ev
+
+    @property
+    def steps(self) -> float:
+        """The exposure in thirds of a stop from where steps count."""
+        return 3 * (self.exposure_ev - (self.base_ev or 0.0))
+
+    def step(self, by: int) -> None:
+        """Go to the next third of a stop, brighter (1) or darker (-1)."""
+        near = math.floor(self.steps + 1e-6) if by > 0 else math.ceil(self.steps - 1e-6)
+        exposure_ev = (self.base_ev or 0.0) + (near + by) / 3
+        self.exposure_ev = min(max(exposure_ev, -MOST_EV), MOST_EV)
+
+    @property
+    def said_exposure(self) -> str:
+        """The nearest third of a stop, as "+1 1/3 EV"."""
+        whole, part = divmod(abs(round(self.steps)), 3)
+        words = [*([str(whole)] if whole or not part else []), *([f"{part}/3"] if part else [])]
+        sign = "" if round(self.steps) == 0 else "+" if self.steps > 0 else "-"
+        return f"{sign}{' '.join(words)} EV"
 
     @property
     def quantity(self) -> Quantity:

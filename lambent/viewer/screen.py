@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lambent.viewer.pacing import BUDGET_S
+from lambent.viewer.settings import SIZES, Remembered, Size
 
 MESSAGE_S = 6.0
 
@@ -83,6 +84,36 @@ class Screen:
     asks_to_close: bool = False  # whether the question about unsaved work is shown
     closes: bool = False  # whether the question was answered and the window closes
     wake: Callable[[], None] = lambda: None  # draws a frame soon; any thread may call it
+    remembered: Remembered = field(default_factory=Remembered)
+    card_shown: bool = False  # whether the card of the first start is shown
+    by_keys: bool = False  # whether keys go to the controls instead of the picture
+    list_open: bool = False  # whether a list or a question lay over the last frame
+    images: dict[str, Any] = field(default_factory=dict)  # pictures of panels (H, W, 4), by name
+    textures: Mapping[str, Any] = field(default_factory=dict)  # of the layout and of `images`, once on the GPU
+
+    @property
+    def size(self) -> Size:
+        """The size of the window, see `sizes`."""
+        return self.remembered.now.size
+
+    @size.setter
+    def size(self, size: Size) -> None:
+        self.remember(size=size)
+
+    def next_size(self, step: int = 1) -> None:
+        """Go to the next size of the window, or `step` further."""
+        self.size = SIZES[(SIZES.index(self.size) + step) % len(SIZES)]
+
+    def remember(self, **changes: object) -> None:
+        """Change settings of the window, and keep them for the next one."""
+        self.remembered.set(**changes)
+        self.say_fault()
+
+    def say_fault(self) -> None:
+        """Say once why settings are not kept."""
+        if self.remembered.fault:
+            self.say(self.remembered.fault)
+            self.remembered.fault = ""
 
     def say(self, text: str) -> None:
         """Show a message for `MESSAGE_S` seconds."""

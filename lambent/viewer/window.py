@@ -13,6 +13,7 @@ from typing import Any
 import glfw
 import numpy as np
 import wgpu
+from imgui_bundle import imgui
 from rendercanvas.glfw import RenderCanvas, loop
 
 from lambent.viewer import layout
@@ -20,6 +21,7 @@ from lambent.viewer.interface import renderer
 from lambent.viewer.mode import Image, Mode
 from lambent.viewer.pacing import Beat
 from lambent.viewer.screen import least
+from lambent.viewer.settings import settings_file
 
 MAX_FPS = 60
 BEFORE_IMGUI = -100  # Dear ImGui's handlers (order -99) stop events, which would hide hovers from ours
@@ -51,6 +53,7 @@ class Window:
         context.configure(device=self._device, format=surface)
         self._imgui = renderer(self._device, self.canvas)
         self._imgui.set_gui(self._interface)
+        self._imgui.KEY_MAP = {**self._imgui.KEY_MAP, " ": imgui.Key.space}  # which wgpu's renderer lacks
         layout.set_style()
         self._context = context
         self._textures: dict[str, Any] = {}  # Dear ImGui textures, by the layout's names
@@ -66,6 +69,8 @@ class Window:
         self.canvas.add_event_handler(self._on_event, *EVENTS, order=BEFORE_IMGUI)
         self._woken = False  # by background work, since the last frame
         self.screen.wake = self._wake
+        self.screen.remembered.open(settings_file())
+        self.screen.say_fault()
         self._take_dropped_files()
         self._take_the_close_button()
 
@@ -140,6 +145,7 @@ class Window:
         wanted |= drawing.images
         if side_plots is not None:
             wanted |= side_plots.images
+        wanted |= self.screen.images
         known = {id(source): self._textures[name] for name, source in self._made_of.items()}
         shown = {id(source) for source in wanted.values()}
         # By their source: Dear ImGui forgets a view after the frame, also one that got another name in it.

@@ -44,7 +44,10 @@ class Clock:
 
 @pytest.fixture
 def screen(tmp_path):
-    return Screen(tmp_path, Clock(), Rect(0, 0, 400, 300))
+    """In the size that shows every number."""
+    shown = Screen(tmp_path, Clock(), Rect(0, 0, 400, 300))
+    shown.remember(size="measure", card_seen=True)
+    return shown
 
 
 @pytest.fixture

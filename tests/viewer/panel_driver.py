@@ -18,10 +18,13 @@ SIZE = (1400, 1600)
 
 
 class Frames:
-    """Dear ImGui frames of what `draw` draws. `rects[label]` is where a control was drawn last."""
+    """Dear ImGui frames of what `draw` draws.
+
+    `rects[label]` is where a control was drawn last; the one in `focused` has the keys.
+    """
 
     def __init__(self, monkeypatch, size):
-        self.rects = self.new_rects()
+        self.rects, self.focused = self.new_rects(), set()
         self._context = imgui.create_context()
         imgui.set_current_context(self._context)
         self.io = imgui.get_io()
@@ -29,7 +32,7 @@ class Frames:
         self.io.backend_flags |= imgui.BackendFlags_.renderer_has_textures
         self.io.display_size = size
         layout.set_style()
-        recording(monkeypatch.setattr, self.rects)
+        recording(monkeypatch.setattr, self.rects, self.focused)
         self.frame(2)
 
     def close(self):
@@ -45,6 +48,7 @@ class Frames:
     def frame(self, count=1):
         for _ in range(count):
             self.rects.clear()
+            self.focused.clear()
             self.io.delta_time = 1 / 30
             imgui.new_frame()
             self.draw()
@@ -97,14 +101,16 @@ def walk_mode(state, geometry):
     return WalkMode(state, WalkInput(state, geometry), Drawing(None))
 
 
-def recording(setattr_of, rects):
-    """Make Dear ImGui's controls note (x0, y0, x1, y1, width of the label) in `rects`."""
+def recording(setattr_of, rects, focused=None):
+    """Make Dear ImGui's controls note (x0, y0, x1, y1, width of the label) in `rects`, and their focus in `focused`."""
 
     def recorded(control):
         @functools.wraps(control)
         def call(label, *args, **kwargs):
             result = control(label, *args, **kwargs)
             low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+            if focused is not None and imgui.is_item_focused():
+                focused.add(label)
             rects[label] = (low.x, low.y, high.x, high.y, label_width(label))
             return result
 

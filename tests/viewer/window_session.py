@@ -14,6 +14,7 @@ from tests.viewer.panel_driver import point_of
 ROOT = Path(__file__).parents[2]
 PATIENCE_S = 120.0  # software adapters on a busy machine
 ASLEEP_S = 1.0  # without a frame
+MEASURE = {"size": "measure", "card_seen": True}
 MARK, INTERRUPT, SKIP = "F12", "F11", "F10"  # see watched_window
 
 
@@ -36,11 +37,17 @@ class VirtualScreen:
 
 
 class WindowSession:
-    """One run of `watched_window`. Positions are logical pixels of the window."""
+    """One run of `watched_window`. Positions are logical pixels of the window.
 
-    def __init__(self, screen, store, out, size=(640, 480), mode="walk"):
+    The window remembers `settings`; by default it shows every number, and no card.
+    """
+
+    def __init__(self, screen, store, out, size=(640, 480), mode="walk", settings=MEASURE):
         self.out = out
-        self._environment = {**os.environ, "DISPLAY": screen.name}
+        self.settings_file = out / "config" / "lambent" / "window.json"
+        self.settings_file.parent.mkdir(parents=True, exist_ok=True)
+        self.settings_file.write_text(json.dumps(settings))
+        self._environment = {**os.environ, "DISPLAY": screen.name, "XDG_CONFIG_HOME": str(out / "config")}
         self._environment.pop("WAYLAND_DISPLAY", None)
         command = [sys.executable, "-m", "tests.viewer.watched_window", store, out, f"{size[0]}x{size[1]}", mode]
         self._log = (out / "log.txt").open("w")

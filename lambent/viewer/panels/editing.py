@@ -25,6 +25,7 @@ from lambent.viewer.panels.widgets import (
     explain,
     path_field,
     press,
+    px,
     typed_field,
     wrapped,
 )
@@ -62,7 +63,7 @@ def _names(editor: Editor) -> None:
     imgui.text_unformatted(f"{editor.subject.material.name}{' *' if editor.subject.unsaved else ''}")
     explain("the material; * means unsaved changes")
     if editor.leave is not None:
-        imgui.same_line(imgui.get_content_region_avail().x - 46)
+        imgui.same_line(imgui.get_content_region_avail().x - px(46))
         if press("close##editor", "closes the editor; the material stays as it is", -1):
             editor.queue(editor.leave)
     text = f"{len(measurement.samples)} tuples of {measurement.samples.info.file}" if measurement else "no measurement"
@@ -76,7 +77,7 @@ def _error(editor: Editor) -> None:
     shown, measurement, subject = editor.shown, editor.measurement, editor.subject
     metric = METRICS[editor.metric]
     meaning = f"error metric, here and in a fit: {metric.source}, in {metric.unit}"
-    editor.metric = choice("##metric", editor.metric, tuple(METRICS), meaning, 104)
+    editor.metric = choice("##metric", editor.metric, tuple(METRICS), meaning, px(104))
     imgui.same_line()
     if measurement is None or shown.error is None:
         wrapped(["load a measurement to see the error"], DIM)
@@ -120,7 +121,7 @@ def _files(editor: Editor) -> None:
 
 def _numbers(editor: Editor, material: Material) -> tuple[Material, bool]:
     names = lobe_names(material)
-    imgui.set_next_item_width(-LABEL_PX - RANGE_PX)
+    imgui.set_next_item_width(-px(LABEL_PX + RANGE_PX))
     changed, name = imgui.input_text("name", material.name)
     explain("name of the material in its document")
     renamed = material.model_copy(update={"name": name}) if changed and name.strip() else material
@@ -141,11 +142,11 @@ def _numbers(editor: Editor, material: Material) -> tuple[Material, bool]:
             restrictions.fix(parameter, fixed)
         imgui.same_line()
         right = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x
-        imgui.push_item_width(-LABEL_PX - RANGE_PX)
+        imgui.push_item_width(-px(LABEL_PX + RANGE_PX))
         yield
         imgui.pop_item_width()
         if parameter not in DIFFUSE:
-            imgui.same_line(right - RANGE_PX)
+            imgui.same_line(right - px(RANGE_PX))
             retro = lobe is not None and editor.subject.material.lobes[lobe].retro
             _interval(editor, parameter, (parameters.RETRO if retro else parameters.LOBE)[attribute])
 
@@ -164,7 +165,7 @@ def _interval(editor: Editor, parameter: str, model: Parameter) -> None:
     if interval is None:
         return
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + imgui.get_frame_height() + imgui.get_style().item_spacing.x)
-    imgui.set_next_item_width(-LABEL_PX - RANGE_PX)
+    imgui.set_next_item_width(-px(LABEL_PX + RANGE_PX))
     log = model.scale == "log"
     changed, low, high = imgui.drag_float_range2(
         f"sought##{parameter}", *interval, 0.002 * (model.high - model.low), model.low, model.high,
@@ -183,12 +184,12 @@ def _heading(editor: Editor, index: int, lobe: Lobe) -> Lobe:
     imgui.same_line()
     meaning = "direction of the lobe: mirror direction, through the surface, or back to the light"
     room = imgui.get_content_region_avail().x
-    turned = choice("##kind", lobe.kind, KINDS, meaning, min(112, 0.37 * room))
+    turned = choice("##kind", lobe.kind, KINDS, meaning, min(px(112), 0.37 * room))
     if turned != lobe.kind:
         editor.queue(lambda: subject.turn_lobe(index, turned))
     imgui.same_line()
     meaning = "microfacet distribution: beckmann is bell-shaped, ggx has long tails"
-    kind = choice("##distribution", lobe.distribution, OF_LOBES, meaning, min(96, 0.3 * room))
+    kind = choice("##distribution", lobe.distribution, OF_LOBES, meaning, min(px(96), 0.3 * room))
     imgui.same_line()
     if press("remove", "removes the lobe; can be undone", -1):
         editor.queue(lambda: subject.remove_lobe(index))

@@ -9,12 +9,11 @@ from imgui_bundle import imgui
 from lambent.core.light.exposure import ev100_of
 from lambent.core.light.false_colour import LEAST, MOST, Range
 from lambent.realtime.planar.planar_integrators import CHOICES as PLANARS
-from lambent.viewer.look import INTEGRATORS, LOOKUPS, SAMPLE_COUNTS, VIEW_TRANSFORMS, Look
+from lambent.viewer.look import INTEGRATORS, LOOKUPS, MOST_EV, SAMPLE_COUNTS, VIEW_TRANSFORMS, Look
 from lambent.viewer.pacing import BUDGET_S
-from lambent.viewer.panels.widgets import check, choice, explain, slider
+from lambent.viewer.panels.widgets import check, choice, explain, press, slider
 from lambent.viewer.screen import Pace, Screen
 
-EXPOSURE_EV = 12.0  # range of the slider, up and down
 FRAME_MS = (8.0, 250.0)
 
 
@@ -31,8 +30,23 @@ def draw(look: Look, screen: Screen) -> None:
 def draw_exposure(look: Look, key: str = "") -> None:
     ev100 = f"EV100 {ev100_of(look.exposure_ev):.1f}"
     meaning = f"exposure in stops; now {ev100} (15 in the sun, 8 in a room by night)"
-    look.exposure_ev = slider(f"exposure{key}", look.exposure_ev, -EXPOSURE_EV, EXPOSURE_EV, meaning, unit=" EV")
-    imgui.text_disabled(ev100)
+    look.exposure_ev = slider(f"exposure{key}", look.exposure_ev, -MOST_EV, MOST_EV, meaning, unit=" EV")
+
+
+def draw_steps(look: Look) -> None:
+    """Draw the exposure in thirds of a stop, with a button for each direction."""
+    width = (imgui.get_content_region_avail().x - 2 * imgui.get_style().item_spacing.x) / 3
+    if press("darker", "by 1/3 EV (-)", width):
+        look.step(-1)
+    imgui.same_line()
+    left = imgui.get_cursor_pos_x()
+    imgui.align_text_to_frame_padding()
+    imgui.set_cursor_pos_x(left + (width - imgui.calc_text_size(look.said_exposure).x) / 2)
+    imgui.text_unformatted(look.said_exposure)
+    explain(f"exactly {look.exposure_ev:.3f} EV, EV100 {ev100_of(look.exposure_ev):.1f}; 0 is as opened or metered")
+    imgui.same_line(left + width + imgui.get_style().item_spacing.x)
+    if press("brighter", "by 1/3 EV (+)", width):
+        look.step(1)
 
 
 def draw_shown(look: Look) -> None:

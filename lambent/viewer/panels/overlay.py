@@ -23,14 +23,17 @@ FLAGS = (
 )  # fmt: skip
 
 
-def draw(screen: Screen, first: Sequence[str] = ()) -> None:
-    """Draw lines at the lower left: `first`, the messages, and the line on the picture at rest."""
-    last = [screen.at_rest] if screen.at_rest else []
+def draw(screen: Screen, first: Sequence[str] = (), above_px: float = 0.0) -> None:
+    """Draw lines at the lower left, `above_px` its edge: `first`, the messages, and how the picture at rest was made.
+
+    The last one has numbers that only the size *measure* shows.
+    """
+    last = [screen.at_rest] if screen.at_rest and screen.size == "measure" else []
     lines, picture = [*first, *(message.text for message in screen.messages), *last], screen.picture
     if not lines:
         return
     x, y = picture.point(0, 1)
-    imgui.set_next_window_pos((x + MARGIN_PX, y - MARGIN_PX), imgui.Cond_.always, (0, 1))
+    imgui.set_next_window_pos((x + MARGIN_PX, y - MARGIN_PX - above_px), imgui.Cond_.always, (0, 1))
     imgui.set_next_window_size_constraints((0, 0), (max(1, picture.width - 2 * MARGIN_PX), picture.height))
     imgui.set_next_window_bg_alpha(0.6)
     imgui.begin("messages", None, FLAGS)

@@ -13,7 +13,7 @@ from lambent.viewer.editor.editor import Editor
 from lambent.viewer.editor.matrix import Matrix, matrix
 from lambent.viewer.editor.shown import CHANNELS, SCALES, Curves, Plots
 from lambent.viewer.mode import SidePlots, Textures
-from lambent.viewer.panels.widgets import Colour, choice, coloured, explain
+from lambent.viewer.panels.widgets import Colour, choice, coloured, explain, px
 
 BRIGHTER_PX, BRIGHTER_STOPS = 120.0, (0.0, 20.0)
 GAP_PX = 2.0  # gap around a disk
@@ -102,11 +102,11 @@ def _words(laid: Matrix, kinds: list[str], origin: imgui.ImVec2) -> None:
 
 def _curves(editor: Editor, textures: Textures) -> None:
     plots, shown = editor.plots, editor.shown
-    scale = choice("##axis", plots.scale, SCALES, "scale of the p axis", 110)
+    scale = choice("##axis", plots.scale, SCALES, "scale of the p axis", px(110))
     if plots.scale != scale:
         plots.scale, plots.fit_axes = scale, True
     imgui.same_line()
-    plots.channel = choice("##channel", plots.channel, CHANNELS, "channels: their mean, all three, or one", 90)
+    plots.channel = choice("##channel", plots.channel, CHANNELS, "channels: their mean, all three, or one", px(90))
     imgui.same_line()
     if not shown.curves:  # before the first frame
         return

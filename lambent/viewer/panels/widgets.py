@@ -21,6 +21,11 @@ TOOLTIP_GAP_PX = 4.0
 AMBER, DIM = (1.0, 0.75, 0.35, 1.0), (0.62, 0.65, 0.70, 1.0)
 
 
+def px(size: float) -> float:
+    """A size in the scale of letters and controls."""
+    return float(size * imgui.get_style().font_scale_dpi)
+
+
 def choice(label: str, value: Word, options: Sequence[Word], meaning: str, width: float | None = None) -> Word:
     """A drop-down list."""
     if width is not None:
@@ -71,7 +76,7 @@ def rgb(label: str, value: Triple, high: float, meaning: str) -> Triple:
     imgui.push_id(label)
     swatch_px = imgui.get_frame_height()
     imgui.set_next_item_width(imgui.calc_item_width() - swatch_px - imgui.get_style().item_inner_spacing.x)
-    digits = "%.3f" if imgui.calc_item_width() > THREE_PX else "%.2f"
+    digits = "%.3f" if imgui.calc_item_width() > px(THREE_PX) else "%.2f"
     changed, moved = imgui.slider_float3("##values", list(value), 0.0, high, digits, imgui.SliderFlags_.always_clamp)
     explain(meaning)
     value = triple(moved) if changed else value

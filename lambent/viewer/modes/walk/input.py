@@ -39,9 +39,21 @@ SHORTCUTS = (
     ("Ctrl+Q", "close the window"),
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show the panels"),
+    ("M, Shift+M", "the next size of the window: show, design, measure; the one before"),
+    ("+, -", "brighter, darker by 1/3 EV"),
+    ("Tab", "the controls by arrows, Space and Enter; Esc returns to the picture"),
+    ("Ctrl++, Ctrl+-, Ctrl+0", "larger or smaller letters; as at first"),
+    ("F1", "show the first card again"),
+)
+CARD = (  # of the first start
+    "Walk with W A S D or the arrows, look around with the left mouse button.",
+    "Click a thing to change its material and to see the light that falls on it.",
+    "M changes the window: show for a client, design, measure with all numbers.",
+    "Drop files onto things: materials, measurements, images, luminaires. F1 shows this card.",
 )
 LARGE = 0.5  # radius / distance of objects from which on orbit turns about the clicked point, not the object's middle
 PIECE_PX = 12.0  # length of the pieces of a drag in orbit that are checked for walls
+STEPS = {"+": 1, "=": 1, "-": -1}  # of the exposure, 1/3 EV
 TAP_S = 0.05  # least time that a key press counts
 
 
@@ -193,8 +205,18 @@ class WalkInput(Input):
             navigation.flying = not navigation.flying
         elif key == "o":
             navigation.movement = "walk" if navigation.movement == "orbit" else "orbit"
+        elif key == "Escape" and self.screen.card_shown:
+            self.screen.card_shown = False
         elif key == "Escape":
             state.selection.choose(None)
+        elif key == "m":
+            self.screen.next_size(-1 if self._fast else 1)
+        elif key in STEPS:
+            state.look.step(STEPS[key])
+        elif key == "Tab":
+            self.screen.by_keys = True
+        elif key == "F1":
+            self.screen.card_shown = not self.screen.card_shown
         elif key == "v":
             state.recordings.save_view()
         elif key == "x":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -26,7 +27,7 @@ from lambent.viewer.cameras.navigation import Movement
 from lambent.viewer.cameras.picking import Geometry
 from lambent.viewer.mode import Drawing, Mode, Panel, SidePlots, Textures
 from lambent.viewer.modes.walk.comparison import error_scale
-from lambent.viewer.modes.walk.input import SHORTCUTS, WalkInput
+from lambent.viewer.modes.walk.input import CARD, SHORTCUTS, WalkInput
 from lambent.viewer.modes.walk.light.answering import AnsweringLight
 from lambent.viewer.modes.walk.panels import (
     compare,
@@ -39,6 +40,7 @@ from lambent.viewer.modes.walk.panels import (
     metering,
     room,
     scene,
+    show,
     states,
     view,
 )
@@ -46,10 +48,11 @@ from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.session.kept_view import restore
 from lambent.viewer.modes.walk.session.texturing import ENDINGS
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.panels import overlay, statistics
+from lambent.viewer.panels import card, overlay, statistics
 from lambent.viewer.panels.plots import side_plots
 from lambent.viewer.panels.widgets import rows
 from lambent.viewer.screen import Screen, least
+from lambent.viewer.sizes import SizedPanel
 
 
 def open_store(
@@ -116,7 +119,8 @@ class WalkMode(Mode):
 
     def draw_over(self, textures: Textures) -> None:
         state, place = self.state, self.screen.picture
-        overlay.over(place, textures.get("outline"))
+        if self.screen.size != "show":
+            overlay.over(place, textures.get("outline"))
         light_field.draw_over(state.fields, place, textures)
         lamps.draw_over(state.lamps, state.navigation.camera, place)
         marks.draw(state.marks, state.selected_parts, place, textures)
@@ -131,7 +135,11 @@ class WalkMode(Mode):
             lines.append(f"recording {self.screen.clock() - recorder.began_s:.0f} s   (R stops)")
         if state.session.fault:
             lines.append(state.session.fault)
-        overlay.draw(self.screen, lines)
+        bar_px = show.height_px(state, moving=self.moving, dragging=self.input.dragging)
+        overlay.draw(self.screen, lines, bar_px)
+        if bar_px:
+            show.draw(state, bar_px)
+        card.draw(self.screen, CARD)
 
         if not imgui.is_any_item_active() and not self.input.moves_lamp:
             state.materials.edits.end_stroke()
@@ -196,56 +204,59 @@ class WalkMode(Mode):
 
 
 def panels(state: WalkState) -> tuple[Panel, ...]:
-    """Panels of the column."""
+    """Panels of the column, sorted into the sizes of the window."""
     about = (state.missing, state.scene.warnings)
-    of_lamps = Panel("Lamps", partial(lamps.draw, state.lamps), "move, aim and exchange a lamp of the scene")
+    of_lamps = SizedPanel("Lamps", partial(lamps.draw, state.lamps), "move, aim and exchange a lamp of the scene")
     return (
-        Panel(
+        SizedPanel(
             "Material",
             partial(material.draw, state.selection, state.materials, state.texturing),
-            "the objects, and every parameter of the selected material",
+            "the objects, and the material of the selected one",
             opened=True,
         ),
-        Panel(
-            "States",
-            partial(states.draw, state.states, state.comparison, state.screen),
-            "store the room's state, restore it, compare states",
-        ),
-        Panel("View", partial(view.draw, state), "what the picture shows, and its exposure", opened=True),
-        Panel(
-            "Scene",
-            partial(scene.draw, state.navigation, state.recordings, *about),
-            "navigation, cameras, saved views and walks",
-            opened=True,
-        ),
-        Panel("Camera", partial(view.draw_camera, state), "field of view, walking speed, and marks over the picture"),
-        Panel(
+        SizedPanel(
             "Light",
             partial(lights.draw, state.lights, state.recordings),
             "each group of lamps: on or off, brightness, colour",
         ),
         *([of_lamps] if state.lamps.records else []),
-        Panel("Drawing", partial(view.draw_drawing, state), "how reflections are drawn, and how fast"),
-        Panel(
-            "Light field",
-            partial(light_field.draw, state),
-            "points around the selected object and their maps",
+        SizedPanel("View", partial(view.draw, state), "what the picture shows, and its exposure", opened=True),
+        SizedPanel(
+            "Scene",
+            partial(scene.draw, state.navigation, state.recordings, *about),
+            "navigation, cameras, saved views and walks",
+            opened=True,
         ),
-        Panel(
-            "Light meter",
-            partial(metering.draw, state.meter, state.look),
-            "luminance of the picture in numbers, and glare",
+        SizedPanel(
+            "States",
+            partial(states.draw, state.states, state.comparison, state.screen),
+            "store the room's state, restore it, compare states",
         ),
-        Panel("Compare", partial(compare.draw, state.comparison), "the picture compared with another"),
-        Panel(
+        SizedPanel(
             "Film",
             partial(film.draw, state.films, state.recordings, state.navigation, state.screen),
             "a film along the chosen camera path",
         ),
-        Panel(
+        *(SizedPanel(*of, sizes=("measure",)) for of in numbers(state)),
+        SizedPanel("Help", partial(rows, SHORTCUTS, "shortcuts"), "mouse and keys"),
+    )
+
+
+def numbers(state: WalkState) -> tuple[tuple[str, Callable[[], None], str], ...]:
+    """Titles, drawing and meaning of the panels of numbers and settings."""
+    return (
+        ("Camera", partial(view.draw_camera, state), "field of view, walking speed, and marks over the picture"),
+        ("Drawing", partial(view.draw_drawing, state), "how reflections are drawn, and how fast"),
+        ("Light field", partial(light_field.draw, state), "points around the selected object and their maps"),
+        (
+            "Light meter",
+            partial(metering.draw, state.meter, state.look),
+            "luminance of the picture in numbers, and glare",
+        ),
+        ("Compare", partial(compare.draw, state.comparison), "the picture compared with another"),
+        (
             "Statistics",
             lambda: statistics.draw(state.screen, state.materials.editor, state.notes),
             "cost of the last frame, and noise of the light map",
         ),
-        Panel("Help", partial(rows, SHORTCUTS, "shortcuts"), "mouse and keys"),
     )

@@ -342,7 +342,7 @@ class Pictures(Pair):
         if meter.expose_wanted and look.shows_noise:
             say("nothing to meter: the picture shows noise, not light")
         elif meter.expose_wanted and meter.reading is not None:
-            look.exposure_ev = meter.reading.exposure_ev
+            look.expose(meter.reading.exposure_ev)
         elif meter.expose_wanted:
             say("nothing to meter: the picture is black")
         if meter.fit_wanted and look.is_false_coloured and meter.reading is not None:

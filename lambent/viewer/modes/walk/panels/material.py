@@ -46,7 +46,8 @@ def draw(selection: Selection, materials: Materials, texturing: Texturing) -> No
 
 def _objects(selection: Selection) -> None:
     objects = selection.objects
-    imgui.begin_child("objects", (0, min(len(objects), LISTED) * imgui.get_text_line_height_with_spacing()))
+    height = min(len(objects), LISTED) * imgui.get_text_line_height_with_spacing()
+    imgui.begin_child("objects", (0, height), imgui.ChildFlags_.nav_flattened)
     for index, item in enumerate(objects):
         if listed(f"{item.name}##{index}", item.name == selection.name, f"selects {item.name}, of {item.material}"):
             selection.choose(item.name)

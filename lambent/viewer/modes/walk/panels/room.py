@@ -22,7 +22,10 @@ def draw(state: WalkState) -> None:
     ])  # fmt: skip
     if session.fault:
         wrapped([session.fault])
-    _light(state)
+    if state.screen.size == "measure":
+        _light(state)
+    else:
+        status([state.rebaking.line if state.rebaking.said else state.answering.said], LONGEST[:1])
 
 
 def _light(state: WalkState) -> None:

@@ -56,7 +56,7 @@ def _cameras(navigation: Navigation, recordings: Recordings) -> None:
     imgui.separator_text("cameras")
     cameras, own = recordings.cameras, len(recordings.views.scene.cameras)
     height = min(len(cameras), LISTED) * imgui.get_text_line_height_with_spacing()
-    imgui.begin_child("cameras", (0, height))
+    imgui.begin_child("cameras", (0, height), imgui.ChildFlags_.nav_flattened)
     for index, camera in enumerate(cameras):
         key = f"{index + 1}  " if index < 9 else "    "
         mark = "  (saved)" if index >= own else ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from lambent.core.light.exposure import ev100_of
 from lambent.store.contract import SIDES, noise_name
 from lambent.viewer.cameras.navigation import Navigation
 from lambent.viewer.look import LOOKUPS, Look
@@ -11,7 +12,15 @@ from lambent.viewer.modes.walk.light.metering import Meter
 from lambent.viewer.modes.walk.markers import Marks
 from lambent.viewer.modes.walk.panels import light_field
 from lambent.viewer.modes.walk.state import WalkState
-from lambent.viewer.panels.look import draw_exposure, draw_quality, draw_range, draw_reflections, draw_shown
+from lambent.viewer.panels.look import (
+    draw_exposure,
+    draw_quality,
+    draw_range,
+    draw_reflections,
+    draw_shown,
+    draw_steps,
+    draw_transform,
+)
 from lambent.viewer.panels.widgets import check, choice, explain, press, slider, wrapped
 
 FOV_DEG = (10.0, 120.0)
@@ -23,13 +32,22 @@ NO_NOISE = "the store lacks it; `lambent bake` of the same scene adds it from th
 def draw(state: WalkState) -> None:
     """Draw the choice of the shown light, exposure and view transform."""
     look, meter, screen = state.look, state.meter, state.screen
-    draw_exposure(look)
+    in_numbers = screen.size == "measure"
+    draw_steps(look)
+    if in_numbers:
+        draw_exposure(look)
     if press("meter", "sets the exposure so that the picture's log-average becomes middle grey"):
         meter.expose_wanted = True
     imgui.same_line()
     if press("save picture", "writes a PNG as shown, and an EXR of linear radiance (P)"):
         screen.save_wanted = True
-    draw_shown(look)
+    if in_numbers:
+        imgui.same_line()
+        imgui.text_disabled(f"EV100 {ev100_of(look.exposure_ev):.1f}")
+    if in_numbers:
+        draw_shown(look)
+    else:
+        draw_transform(look)
     if look.shows_noise and not state.knows_noise:
         wrapped([f"{noise_name(SIDES[0])}: {NO_NOISE}"])
     if look.is_false_coloured:
