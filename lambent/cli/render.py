@@ -149,6 +149,14 @@ def command(
         str,
         typer.Option(help="Variant of the scene, or a state stored in the window (saved: the last session)."),
     ] = "",
+    session: Annotated[
+        bool,
+        typer.Option(
+            "--session",
+            help="As the window on the store shows it: edits, lamps, light, camera, size, exposure and look, except "
+            "for what other options say.",
+        ),
+    ] = False,
     variants: Annotated[
         bool,
         typer.Option("--variants", help="Draw all variants into one contact sheet, each at --size. [640x360]"),
@@ -185,6 +193,8 @@ def command(
 
     Example: lambent render room.store --replace teapot=vase.obj -o vase.png
 
+    Example: lambent render room.store --session -o as-left.png
+
     Example: lambent render tray.store --edit tray.edits.json -o tray.png
     """
     from lambent import render
@@ -217,6 +227,16 @@ def command(
     )  # fmt: skip
     if edit is not None:
         _check_edit(context, edit)
+    left = None
+    if session:
+        for option, is_wrong in (
+            ("--variant", bool(variant)),
+            ("--variants", variants),
+            ("--scene", scene is not None),
+        ):
+            if is_wrong:
+                raise UserError("excludes --session", field=option, hint="leave out one")
+        settings, left = render.as_left(store, settings, _said_settings(context))
     settings.check()
     plain = not settings.is_false_coloured
     for option, is_wrong in (("--range", false_range is not None and plain), ("--linear", linear and plain)):
@@ -255,7 +275,7 @@ def command(
         elif variants:
             done = render.sheet(store, output, camera, settings, exposures=exposures, **common)
         else:
-            done = render.still(store, output, camera, settings, **common)
+            done = render.still(store, output, camera or left, settings, **common)
     exposed = "" if done.ev100 is None else f"EV100 {done.ev100:.1f}, "
     how = done.integrator if done.samples is None else f"{done.integrator}, {done.samples} samples"
     how += "" if done.noise is None else f", noise {100 * done.noise:.1f} %"
@@ -337,6 +357,18 @@ def _is_said(context: typer.Context, name: str) -> bool:
     """Whether an option was given on the command line."""
     source = context.get_parameter_source(name)
     return source is not None and source.name == "COMMANDLINE"
+
+
+def _said_settings(context: typer.Context) -> set[str]:
+    """Names of the settings that options give."""
+    of_options = {
+        "size": ("width", "height"), "integrator": ("integrator", "samples", "rebaked"), "samples": ("samples",),
+        "view": ("view",), "exposure": ("exposure_ev",), "ev100": ("exposure_ev",), "false_range": ("scale",),
+        "part": ("show", "view"),
+        "planar": ("planar",), "lookup": ("lookup", "lookups"), "light": ("light",), "recolour": ("rebaked",),
+        "texture": ("rebaked",), "sky_turn": ("rebaked",), "replace": ("rebaked",),
+    }  # fmt: skip
+    return {name for option, names in of_options.items() if _is_said(context, option) for name in names}
 
 
 def _check_edit(context: typer.Context, session: Path) -> None:

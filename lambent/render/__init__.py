@@ -9,9 +9,21 @@ sheet("room.store", "variants.png")
 radiance = images(Store.open("room.store"), Settings(integrator="path")).radiance(camera)
 """
 
+from lambent.render.as_left import as_left
 from lambent.render.edited import edited_still
 from lambent.render.images import Images, Settings
 from lambent.render.output import Rendered, film, images, still, write_frames
 from lambent.render.sheet import sheet
 
-__all__ = ["Images", "Rendered", "Settings", "edited_still", "film", "images", "sheet", "still", "write_frames"]
+__all__ = [
+    "Images",
+    "Rendered",
+    "Settings",
+    "as_left",
+    "edited_still",
+    "film",
+    "images",
+    "sheet",
+    "still",
+    "write_frames",
+]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
+from types import MappingProxyType
 
 from lambent.baked.answering.stored import NO_ANSWER, has_answer, read_answer
 from lambent.core.plain import Triple
@@ -14,6 +15,7 @@ from lambent.realtime.answering.texture_detail import without_uv
 from lambent.realtime.light.group_arrays import FIELDS_FOLLOW
 from lambent.realtime.renderer import Renderer
 from lambent.render.edits import edits_of
+from lambent.scenes.lamp_edits import LampEdit
 from lambent.scenes.looks.variants import textures_in_look
 from lambent.scenes.scene import Look
 from lambent.store.contract import needs_probe
@@ -31,32 +33,38 @@ class AppliedMaterials:
         Whether light follows the changed materials; otherwise a note says so once.
     """
 
-    def __init__(self, store: Store, renderer: Renderer, note: Callable[[str], None]) -> None:
+    def __init__(self, store: Store, renderer: Renderer, note: Callable[[str], None], *, follows: bool = True) -> None:
         self._store, self._renderer, self._note = store, renderer, note
         self._noted: set[str] = set()
-        self.answers = has_answer(store)
+        self.answers, self._follows = has_answer(store), follows
         self.materials: Mapping[str, Material] = {}
         self._looks: Mapping[str, Look] = {}
+        self._lamps: Mapping[int, LampEdit] = {}
 
-    def apply(self, looks: Mapping[str, Look], colours: Mapping[str, Triple], textures: Mapping[str, str]) -> None:
-        """Apply looks, then textures (`scenes.looks.retexturing`), then diffuse colours, and the light that follows.
+    def apply(
+        self, looks: Mapping[str, Look], colours: Mapping[str, Triple], textures: Mapping[str, str],
+        lamps: Mapping[int, LampEdit] = MappingProxyType({}),
+    ) -> None:  # fmt: skip
+        """Apply looks, then textures (`scenes.looks.retexturing`), diffuse colours, lamps, and the light that follows.
 
-        Materials left out stay as baked.
+        Materials and lamps left out stay as baked.
         """
         scene = self._renderer.scene
         edits = edits_of(scene.record.materials, scene.textures, self._without_uv, looks, colours, textures)
         changed, materials = edits.looks, edits.materials
-        if (changed, materials) == (self._looks, self.materials):
+        if (changed, materials, lamps) == (self._looks, self.materials, self._lamps):
             return
         if changed != self._looks:
             self._renderer.resources.show_textures(changed)
-        self._looks, self.materials = changed, materials
+        self._renderer.resources.changed_lamps.show(lamps)
+        self._looks, self.materials, self._lamps = changed, materials, lamps
         if changed or materials:
             self._note_limits(materials)
-        if self.answers:
+        if self.answers and self._follows:
             answer, shown = self._shown
             exchanged = {name: textures_in_look(name, look, scene.textures) for name, look in changed.items()}
-            shown.show(answer.lit(materials, exchanged))
+            pairs = self._renderer.resources.changed_lamps.pairs() if lamps else []
+            shown.show(answer.lit(materials, exchanged, answer.lamp_changes.of(pairs) if pairs else None))
 
     @cached_property
     def _without_uv(self) -> frozenset[str]:

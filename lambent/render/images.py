@@ -104,6 +104,12 @@ class Settings:
         and its light mix, unless `light` has one. Indirect light follows.
     looks : LookTrack, optional
         Looks of materials over the time of a film, overriding the variant's; indirect light follows.
+    lookups, near_m : mapping, float, optional
+        For drawn pictures: look-ups of single objects by name, and the near clipping distance.
+    follows : bool
+        Whether light of other surfaces follows changed materials.
+    rebaked : bool
+        For traced pictures: take the light of the copy in which the window has baked its edits again.
     replacements : tuple of Replacement
         Meshes that replace objects with light fields of their volume (`realtime.objects.replaced`).
     """
@@ -132,6 +138,10 @@ class Settings:
     textures: Mapping[str, str] = field(default_factory=dict)
     variant: str = ""
     looks: LookTrack | None = None
+    lookups: Mapping[str, str] = field(default_factory=dict)
+    near_m: float | None = None
+    follows: bool = True
+    rebaked: bool = False
     replacements: tuple[Replacement, ...] = ()
 
     @property

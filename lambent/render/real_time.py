@@ -30,10 +30,11 @@ from lambent.realtime.renderer import SUPERSAMPLES, Renderer
 from lambent.realtime.sun.turned_sky import under_turned_sky
 from lambent.render.applied_materials import AppliedMaterials
 from lambent.render.images import NOISE, Images, Settings
+from lambent.scenes.lamp_edits import LampEdit
 from lambent.scenes.looks.variants import variant_named
 from lambent.scenes.scene import Look, Variant
 from lambent.store.contract import SIDES, noise_name
-from lambent.store.kept.states import variants_of
+from lambent.store.kept.states import lamps_of, variants_of
 from lambent.store.store import Store
 
 METERED_PX = 256  # longer side of the picture for metering
@@ -60,8 +61,8 @@ class RealTime(Images):
             FrameState, width=settings.width, height=settings.height, integrator=settings.integrator,
             n=None if self._progressive else settings.samples,
             view_transform="filmic" if settings.is_false_coloured else settings.view, show=settings.show,
-            planar=settings.planar, covers=moving,
-            lookup=settings.lookup,
+            planar=settings.planar, covers=moving, lookup=settings.lookup, lookups=dict(settings.lookups),
+            near_m=settings.near_m,
         )  # fmt: skip
         lookup = known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup")
         baked = read_baked(store, settings.light_field_mb, settings.light_field_cache)
@@ -76,13 +77,16 @@ class RealTime(Images):
         self._renderer = Renderer(open_device(), baked)
         for text in self._renderer.missing:
             note(text)
-        self._applied, self._light = AppliedMaterials(store, self._renderer, note), settings.light or MixTrack()
+        self._applied = AppliedMaterials(store, self._renderer, note, follows=settings.follows)
+        self._store, self._light = store, settings.light or MixTrack()
         if (settings.recolour or settings.textures) and not self._applied.answers:
             read_answer(store)  # raises the error that names what is missing
         self._check_light(self._light, note)
         self._looks: Mapping[str, Look] = {}
+        self._lamps: Mapping[int, LampEdit] = {}
         if settings.variant:
             self._looks = variant_named(variants_of(store), settings.variant).looks
+            self._lamps = lamps_of(store, settings.variant)
 
     def _check_light(self, light: MixTrack, note: Callable[[str], None]) -> None:
         """Raise `UserError` if the store lacks a group of the mix; note light that the mix does not change."""
@@ -97,12 +101,13 @@ class RealTime(Images):
 
     def apply_variant(self, variant: Variant) -> None:
         self._light, self._looks = self.settings.light or MixTrack.of(variant.light), variant.looks
+        self._lamps = lamps_of(self._store, variant.name)
 
     def _state(self, camera: Camera) -> FrameState:
         """State of the next frame, once its materials and light are on the GPU."""
         track = self.settings.looks
         looks = {**self._looks, **(track.looks_at(self.time_s) if track else {})}
-        self._applied.apply(looks, self.settings.recolour, self.settings.textures)
+        self._applied.apply(looks, self.settings.recolour, self.settings.textures, self._lamps)
         light = self._light.factors_at(self.time_s)
         return self._frame(camera, light=light, materials=self._applied.materials, maps=self._renderer.light_version)
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from lambent.bake.running.again import rebaked_copy
 from lambent.baked.answering.stored import NO_ANSWER
 from lambent.core.arrays import Floats
 from lambent.core.interruption import is_interruption
@@ -16,10 +17,11 @@ from lambent.core.progress import Cancelled, Progress, silent
 from lambent.core.views.camera import Camera
 from lambent.render.edits import Edits, edits_of
 from lambent.render.images import PATH_TRACER, Images, Settings
+from lambent.scenes.lamp_edits import LampEdit, with_lamp_edits
 from lambent.scenes.looks.retexturing import materials_without_uv
 from lambent.scenes.looks.variants import variant_named
 from lambent.scenes.scene import Look, Variant
-from lambent.store.kept.states import variants_of
+from lambent.store.kept.states import lamps_of, variants_of
 from lambent.store.source import changed_inputs, scene_of
 from lambent.store.store import Store
 from lambent.traced.picture import TracedPicture
@@ -52,15 +54,27 @@ class TracedImages(Images):
         if changed := changed_inputs(store, self.scene):
             traced = f"{scene} is traced as it is now" if scene else AS_THE_FILE_IS
             note(f"changed since the bake: {', '.join(changed)}; {traced}")
-        how: dict[str, Any] = {"sky_turn_deg": settings.sky_turn_deg, "replacements": settings.replacements}
-        self._room = room_of_paths(self.scene, **how) if self._path else room_of_store(store, self.scene, **how)
+        self._store, self._lamps = store, lamps_of(store, settings.variant)
+        self._room = self._room_with(self._lamps)
         self._light, self._looks = settings.light or MixTrack(), dict[str, Look]()
         if settings.variant:
             self._looks = dict(variant_named(variants_of(store), settings.variant).looks)
         self._room.check(dict.fromkeys(self._light.groups, WHITE))
 
+    def _room_with(self, lamps: Mapping[int, LampEdit], before: TracedRoom | None = None) -> TracedRoom:
+        settings, store = self.settings, self._store
+        how: dict[str, Any] = {"sky_turn_deg": settings.sky_turn_deg, "replacements": settings.replacements}
+        if self._path:
+            return room_of_paths(with_lamp_edits(self.scene, lamps), **how)
+        if settings.rebaked:
+            copy = Store.open(rebaked_copy(store.folder))
+            return room_of_store(copy, with_lamp_edits(scene_of(copy), lamps))
+        return room_of_store(store, self.scene, lamps=lamps, before=before, **how)
+
     def apply_variant(self, variant: Variant) -> None:
         self._light, self._looks = self.settings.light or MixTrack.of(variant.light), dict(variant.looks)
+        if (lamps := lamps_of(self._store, variant.name)) != self._lamps:
+            self._room, self._lamps = self._room_with(lamps, self._room), lamps
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
         settings = self.settings
@@ -81,7 +95,9 @@ class TracedImages(Images):
     def room(self) -> TracedRoom:
         """The room in the state of the next image."""
         edits = self._edits()
-        self._room.set_materials(edits.looks, edits.materials)
+        if not self.settings.rebaked:
+            self._room.set_materials(edits.looks, edits.materials)
+            self._room.follow(self.settings.follows)
         self._room.mix(self._light.factors_at(self.time_s))
         if edits.materials and not self._room.answers:
             self._once(f"light between surfaces stays as baked: {NO_ANSWER}")

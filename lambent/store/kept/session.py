@@ -34,6 +34,7 @@ FORMAT: Literal["lambent-walk-session"] = "lambent-walk-session"
 VERSION: Literal[2] = 2
 READABLE = (1, VERSION)
 
+Stops = Annotated[float, Field(ge=-64, le=64)]
 Length = Annotated[float, Field(gt=0, le=1e9)]
 Pixels = Annotated[int, Field(ge=1, le=1 << 14)]
 
@@ -96,10 +97,12 @@ class RoomState(Strict):
 class KeptLook(Strict):
     """Exposure, view transform and method of a picture, by the names of `realtime.frame_state.FrameState`.
 
-    Without `exposure_ev`, the picture was not metered yet. Names are checked by who shows the picture.
+    Without `exposure_ev`, the picture was not metered yet; `base_ev` is where the window counts steps from. Names are
+    checked by who shows the picture.
     """
 
-    exposure_ev: Annotated[float, Field(ge=-64, le=64)] | None = None
+    exposure_ev: Stops | None = None
+    base_ev: Stops | None = None
     view_transform: str = "filmic"
     integrator: str = "lamps"
     show: str = "full"

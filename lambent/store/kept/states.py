@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
+from lambent.scenes.lamp_edits import LampEdit
 from lambent.scenes.scene import Look, Variant
 from lambent.store.contract import SceneRecord, scene_record
 from lambent.store.kept.images import names_of_images, with_located_images, with_paths
 from lambent.store.kept.session import FILE, RoomState, read_session
 from lambent.store.store import Store
 
-SAVED = "saved"  # name of the room as last saved
+SAVED = "saved"  # name of the room as the window shows it
 
 
 def variants_of(store: Store, *, saved: bool = True) -> tuple[Variant, ...]:
@@ -37,6 +39,13 @@ def images_of_variants(folder: Path) -> set[str]:
     variants = scene_record(Store.open(folder)).variants
     textures = ({name: look.textures for name, look in variant.looks.items()} for variant in variants)
     return {name for one in textures for name in names_of_images(one)}
+
+
+def lamps_of(store: Store, name: str) -> Mapping[int, LampEdit]:
+    """Edits of lamps in the session's state of this name; none for a variant of the scene."""
+    session = read_session(store.folder / FILE)
+    rooms = {} if session is None else {SAVED: session.now, **session.states}
+    return rooms[name].lamps if name in rooms else {}
 
 
 def says_light(store: Store, name: str) -> bool:

@@ -22,13 +22,14 @@ CHOICES = {
 def view_of(state: WalkState) -> KeptView:
     """The view that a window shows."""
     navigation, place, look = state.navigation, state.screen.picture, state.look
-    waits = state.meter.expose_wanted  # no exposure yet
-    kept = {name: getattr(look, name) for name in KeptLook.model_fields}
+    kept = {name: getattr(look, name) for name in KeptLook.model_fields} | {"lookups": dict(look.lookups)}
+    if state.meter.expose_wanted:  # no exposure yet
+        kept |= {"exposure_ev": None, "base_ev": None}
     return KeptView(
         camera=navigation.camera, movement=navigation.movement, flying=navigation.flying,
         speed_m_s=navigation.walker.speed_m_s, eye_height_m=navigation.walker.eye_height_m,
         size=(max(1, place.width), max(1, place.height)),
-        look=KeptLook(**{**kept, "lookups": dict(look.lookups), "exposure_ev": None if waits else look.exposure_ev}),
+        look=KeptLook(**kept),
         traces=state.screen.pace.traces, light_follows=state.answering.on, rebaked=state.rebaking.copied,
         split=state.states.split, selected=state.selection.name,
     )  # fmt: skip
@@ -68,8 +69,10 @@ def _movement(asked: Movement, kept: Movement) -> Movement:
 def show_look(look: Look, kept: KeptLook, objects: Collection[str]) -> tuple[str, ...]:
     """Set the look; return lines on methods that this version lacks."""
     unknown = [name for name, choices in CHOICES.items() if getattr(kept, name) not in choices]
-    for name in set(KeptLook.model_fields) - {*unknown, "lookups", "exposure_ev"}:
+    for name in set(KeptLook.model_fields) - {*unknown, "lookups", "exposure_ev", "base_ev"}:
         setattr(look, name, getattr(kept, name))
     look.lookups = {name: how for name, how in kept.lookups.items() if name in objects and how in LOOKUPS}
-    look.exposure_ev = look.exposure_ev if kept.exposure_ev is None else kept.exposure_ev
+    if kept.exposure_ev is not None:
+        look.expose(kept.base_ev if kept.base_ev is not None else kept.exposure_ev)
+        look.exposure_ev = kept.exposure_ev
     return tuple(f"the session's {name} is not known here: {getattr(kept, name)}" for name in unknown)

@@ -393,7 +393,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(tmp_path, monkeypatch):
 
 
 LOOK = KeptLook(
-    exposure_ev=-2.5, view_transform="false-colour", integrator="rings", show="specular", lookups={"table": "plain"},
+    exposure_ev=-2.5, base_ev=-3.0, view_transform="false-colour", integrator="rings", show="specular", lookups={"table": "plain"},
     planar="off", n=7, near_m=0.3, scale=Range(2.0, 90.0), noise_scale=Range(1.0, 9.0, False),
 )  # fmt: skip
 VIEW = KeptView(
