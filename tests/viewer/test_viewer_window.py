@@ -9,6 +9,8 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.pictures.images import read_image
+from lambent.store.kept.session import FILE, read_session
+from lambent.store.kept.views import read_views
 from tests.viewer.small_store import FRONT, write_small_store
 from tests.viewer.window_session import ROOT, WindowSession
 
@@ -89,20 +91,25 @@ def test_resize_and_picture(session):
     assert png[400:].mean() > png[:100].mean(), "the floor is lit, the sky above the wall is dark: upside down?"
 
 
-def test_close(window):
-    """Last, because it closes the window of the tests before; a material was changed."""
+def test_close(window, store):
+    """Last, because it closes the window of the tests before; a material was changed, and a walk recorded."""
     window.tool("key", "Escape")
     window.click(*BALL)
     window.wait_for(lambda state: state["selected"] == "ball")
     window.drag(window.point("mx", 0.5), window.point("mx", 0.8))
     window.wait_for(lambda state: state["edited"])
+    window.tool("key", "Escape", "r")
+    before = window.state()["camera"]["position"]
+    window.hold("s", lambda state: math.dist(state["camera"]["position"], before) > 0.1)
     window.tool("key", "ctrl+q")
     window.wait_for(lambda state: "stay##closing" in state["rects"])
     window.tool("key", "Escape")
     window.settle()
-    assert window.process.poll() is None and window.state()["selected"] == "ball", "the question took the key"
+    assert window.process.poll() is None, "the question took the key"
     assert window.close("discard") == 0
-    assert "note: changes not saved: brass" in window.log()
+    session = read_session(store / FILE)
+    assert set(session.now.materials) == {"brass"} and session.view.movement == "walk", "kept without a question"
+    assert math.dist(session.view.camera.position, before) > 0.1 and read_views(store).paths == ()
 
 
 def lobe_of(state):

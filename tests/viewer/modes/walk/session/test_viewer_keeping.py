@@ -393,8 +393,9 @@ def test_a_folder_that_cannot_be_written_is_one_line(tmp_path, monkeypatch):
 
 
 LOOK = KeptLook(
-    exposure_ev=-2.5, base_ev=-3.0, view_transform="false-colour", integrator="rings", show="specular", lookups={"table": "plain"},
-    planar="off", n=7, near_m=0.3, scale=Range(2.0, 90.0), noise_scale=Range(1.0, 9.0, False),
+    exposure_ev=-2.5, base_ev=-3.0, view_transform="false-colour", integrator="rings", show="specular",
+    lookups={"table": "plain"}, planar="off", n=7, near_m=0.3, scale=Range(2.0, 90.0),
+    noise_scale=Range(1.0, 9.0, False),
 )  # fmt: skip
 VIEW = KeptView(
     camera=THERE, movement="orbit", flying=True, speed_m_s=2.0, eye_height_m=1.2, size=(400, 300), look=LOOK,
