@@ -19,6 +19,7 @@ from lambent.core.plain import Triple, triple
 WHITE: Triple = (1.0, 1.0, 1.0)
 LEAST_K, MOST_K = 1667.0, 25000.0  # valid range of the fit to the Planckian locus
 MOST_INTENSITY = 1000.0
+MOST_DUV = 0.05  # in CIE 1960 (u, v)
 EXPECTED = "NAME=VALUE, with VALUE an intensity, off, 2700K, #rrggbb, or several joined by commas"
 Factors = Mapping[str, Triple]  # by group; groups left out stay as baked
 
@@ -51,13 +52,17 @@ class GroupMix:
             )
 
     @property
+    def tint(self) -> np.ndarray:
+        """Colour (3,) of white light in this mix, of any luminance."""
+        tint = np.array(self.colour, float)
+        return tint if self.temperature_k is None else tint * black_body(self.temperature_k)
+
+    @property
     def factor(self) -> Triple:
         """Factor on the group's light per channel, (3,)."""
         if not self.on:
             return 0.0, 0.0, 0.0
-        tint = np.array(self.colour, float)
-        if self.temperature_k is not None:
-            tint = tint * black_body(self.temperature_k)
+        tint = self.tint
         if (level := float(luminance(tint))) <= 0:  # a blue filter on candle light
             return 0.0, 0.0, 0.0
         return triple(tint * (self.intensity / level))
@@ -146,6 +151,24 @@ def black_body(temperature_k: float) -> np.ndarray:
         y = 3.0817580 * x**3 - 5.87338670 * x**2 + 3.75112997 * x - 0.37001483
     rgb = np.maximum(XYZ_TO_RGB @ np.array([x / y, 1.0, (1 - x - y) / y]), 0)
     return np.asarray(rgb / luminance(rgb))
+
+
+def nearest_temperature_k(rgb: np.ndarray) -> float | None:
+    """Correlated colour temperature of a linear colour (3,), to 1 %, within LEAST_K to MOST_K.
+
+    None where the distance from the Planckian locus exceeds MOST_DUV, beyond which CIE 15:2004 gives no temperature.
+    """
+    if not luminance(rgb) > 0:
+        return None
+    kelvin = np.geomspace(LEAST_K, MOST_K, 600)
+    off = np.linalg.norm(np.array([_uv(black_body(one)) for one in kelvin]) - _uv(np.asarray(rgb)), axis=1)
+    return float(kelvin[np.argmin(off)]) if off.min() <= MOST_DUV else None
+
+
+def _uv(rgb: np.ndarray) -> np.ndarray:
+    """CIE 1960 chromaticity (u, v) of a linear colour (3,)."""
+    x, y, z = np.linalg.solve(XYZ_TO_RGB, rgb)
+    return np.asarray(np.array([4 * x, 6 * y]) / (x + 15 * y + 3 * z))
 
 
 def parse_light(texts: Iterable[str]) -> MixTrack:

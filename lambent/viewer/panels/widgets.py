@@ -57,22 +57,22 @@ def listed(label: str, on: bool, meaning: str, flags: int = 0) -> bool:
 
 
 def slider(
-    label: str, value: float, low: float, high: float, meaning: str, *, log: bool = False, unit: str = ""
-) -> float:
-    """A slider; Ctrl+click to type a number, which is clamped to the range."""
+    label: str, value: float, low: float, high: float, meaning: str, *, log: bool = False, unit: str = "",
+    digits: int = 3,
+) -> float:  # fmt: skip
+    """A slider; Ctrl+click to type a number, which is clamped to the range. In `unit`, %% is the per cent sign."""
     flags = imgui.SliderFlags_.always_clamp
     if log:
         flags |= imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
-    changed, moved = imgui.slider_float(label, value, low, high, ("%.4g" if log else "%.3f") + unit, flags)
+    changed, moved = imgui.slider_float(
+        label, value, low, high, ("%.4g" if log and digits else f"%.{digits}f") + unit, flags
+    )
     explain(meaning)
     return min(max(moved, low), high) if changed else value
 
 
 def rgb(label: str, value: Triple, high: float, meaning: str) -> Triple:
-    """Three sliders of linear coefficients and a swatch that opens a colour picker.
-
-    The picker works on the displayed colour; coefficients above 1 keep their scale.
-    """
+    """Three sliders of linear coefficients and a `swatch`."""
     imgui.push_id(label)
     swatch_px = imgui.get_frame_height()
     imgui.set_next_item_width(imgui.calc_item_width() - swatch_px - imgui.get_style().item_inner_spacing.x)
@@ -80,10 +80,21 @@ def rgb(label: str, value: Triple, high: float, meaning: str) -> Triple:
     changed, moved = imgui.slider_float3("##values", list(value), 0.0, high, digits, imgui.SliderFlags_.always_clamp)
     explain(meaning)
     value = triple(moved) if changed else value
+    imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
+    imgui.pop_id()
+    return swatch(label, value, meaning, swatch_px)
+
+
+def swatch(label: str, value: Triple, meaning: str, width: float | None = None) -> Triple:
+    """A swatch of linear coefficients with its label; it opens a colour picker.
+
+    The picker works on the displayed colour; coefficients above 1 keep their scale.
+    """
+    imgui.push_id(label)
+    size = imgui.calc_item_width() if width is None else width, imgui.get_frame_height()
     scale = max(1.0, *value)
     shown = triple(srgb_encode(np.array(value) / scale))
-    imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
-    if imgui.color_button("##swatch", (*shown, 1.0), imgui.ColorEditFlags_.no_tooltip, (swatch_px, swatch_px)):
+    if imgui.color_button("##swatch", (*shown, 1.0), imgui.ColorEditFlags_.no_tooltip, size):
         imgui.open_popup("picker")
     explain(f"opens a colour picker for {label}")
     if imgui.begin_popup("picker"):
@@ -92,6 +103,7 @@ def rgb(label: str, value: Triple, high: float, meaning: str) -> Triple:
             value = triple(srgb_decode(np.array(colour)) * scale)
         imgui.end_popup()
     imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
+    imgui.align_text_to_frame_padding()
     imgui.text_unformatted(label.split("##")[0])
     explain(meaning)
     imgui.pop_id()

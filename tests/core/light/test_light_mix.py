@@ -5,7 +5,15 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.light.colour import luminance
-from lambent.core.light.light_mix import AS_BAKED, GroupMix, LightMix, MixTrack, black_body, parse_light
+from lambent.core.light.light_mix import (
+    AS_BAKED,
+    GroupMix,
+    LightMix,
+    MixTrack,
+    black_body,
+    nearest_temperature_k,
+    parse_light,
+)
 from lambent.scenes.loaders.mitsuba.colours import colour_of
 from lambent.scenes.loaders.mitsuba.document import Element
 
@@ -59,3 +67,15 @@ def test_tracks_change_evenly_between_the_times_of_each_group():
 def test_what_is_no_light_is_refused_in_one_line(texts, message):
     with pytest.raises(UserError, match=message):
         parse_light(texts)
+
+
+@pytest.mark.parametrize("kelvin", [1900, 2700, 4000, 6500, 15000])
+def test_the_nearest_temperature_of_a_black_body_is_its_own(kelvin):
+    assert nearest_temperature_k(7 * black_body(kelvin)) == pytest.approx(kelvin, rel=0.01)
+
+
+def test_a_tint_beside_the_locus_has_a_temperature_and_a_colour_has_none():
+    assert nearest_temperature_k(np.ones(3)) == pytest.approx(6504, rel=0.01), "D65"
+    assert nearest_temperature_k(black_body(3000) * (1, 1.1, 1)) == pytest.approx(3000, rel=0.1)
+    for colour in ((1, 0, 1), (0, 1, 0), (0, 0, 0)):
+        assert nearest_temperature_k(np.array(colour, float)) is None

@@ -42,10 +42,13 @@ def test_no_panel_is_lost_and_numbers_are_for_measuring(window, state):
         state.screen.size = size
         window.frame(2)
         shown[size] = {panel.title for panel in window.mode.panels if panel.title in window.rects}
-    assert shown["show"] == set() and shown["measure"] == {panel.title for panel in window.mode.panels}
+    assert shown["show"] == set() and shown["design"] | shown["measure"] == {
+        panel.title for panel in window.mode.panels
+    }
     assert shown["measure"] - shown["design"] == {
         "Camera", "Drawing", "Light field", "Light meter", "Compare", "Statistics",
     }  # fmt: skip
+    assert shown["design"] - shown["measure"] == {"Light on it"}, "which the Light meter has there"
 
 
 def test_a_key_and_a_control_switch_the_size_of_the_picture(window, state):

@@ -29,6 +29,7 @@ from lambent.viewer.mode import Drawing, Mode, Panel, SidePlots, Textures
 from lambent.viewer.modes.walk.comparison import error_scale
 from lambent.viewer.modes.walk.input import CARD, SHORTCUTS, WalkInput
 from lambent.viewer.modes.walk.light.answering import AnsweringLight
+from lambent.viewer.modes.walk.light.falling import FallingLight
 from lambent.viewer.modes.walk.panels import (
     compare,
     film,
@@ -45,6 +46,7 @@ from lambent.viewer.modes.walk.panels import (
     view,
 )
 from lambent.viewer.modes.walk.pictures import Pictures
+from lambent.viewer.modes.walk.session.finishes import Finishes
 from lambent.viewer.modes.walk.session.kept_view import restore
 from lambent.viewer.modes.walk.session.texturing import ENDINGS
 from lambent.viewer.modes.walk.state import WalkState
@@ -84,7 +86,8 @@ def open_store(
     geometry = Geometry(baked.positions, baked.faces, state.selection.objects)
     renderer = Renderer(open_device(device_needs(baked)), baked)
     pictures = Pictures(renderer, state, AnsweringLight(store, renderer, state.answering))
-    return WalkMode(state, WalkInput(state, geometry), pictures)
+    falling = FallingLight(baked, store, lambda: pictures.light_groups)
+    return WalkMode(state, WalkInput(state, geometry), pictures, falling)
 
 
 def light_map_notes(store: Store) -> tuple[str, ...]:
@@ -104,9 +107,11 @@ class WalkMode(Mode):
 
     input: WalkInput
 
-    def __init__(self, state: WalkState, input: WalkInput, drawing: Drawing) -> None:
-        super().__init__(state.scene.name, state.screen, input, drawing, panels(state))
-        self.state = state
+    def __init__(
+        self, state: WalkState, input: WalkInput, drawing: Drawing, falling: FallingLight | None = None
+    ) -> None:
+        super().__init__(state.scene.name, state.screen, input, drawing, panels(state, falling))
+        self.state, self.falling = state, falling
         self.head = partial(room.draw, state)
 
     @property
@@ -155,7 +160,7 @@ class WalkMode(Mode):
     def wait_s(self) -> float | None:
         editor = self.state.materials.editor
         busy = self.state.recordings.recorder.on or (editor is not None and editor.busy)
-        busy = busy or self.state.texturing.thumbnails.busy
+        busy = busy or self.state.texturing.thumbnails.busy or (self.falling is not None and self.falling.busy)
         return least(POLL_S if busy else None, self.state.session.wait_s())
 
     def drop(self, path: str) -> None:
@@ -203,20 +208,28 @@ class WalkMode(Mode):
             sys.stderr.write(f"lambent: note: changes not saved: {names}\n")
 
 
-def panels(state: WalkState) -> tuple[Panel, ...]:
+def panels(state: WalkState, falling: FallingLight | None) -> tuple[Panel, ...]:
     """Panels of the column, sorted into the sizes of the window."""
     about = (state.missing, state.scene.warnings)
+    light_on_it = partial(metering.draw_falling, falling, state)
     of_lamps = SizedPanel("Lamps", partial(lamps.draw, state.lamps), "move, aim and exchange a lamp of the scene")
     return (
         SizedPanel(
             "Material",
-            partial(material.draw, state.selection, state.materials, state.texturing),
+            partial(material.draw, state, Finishes(state.materials.edits, state.texturing, state.screen)),
             "the objects, and the material of the selected one",
             opened=True,
         ),
         SizedPanel(
+            "Light on it",
+            light_on_it,
+            "illuminance on the selected object, by light group",
+            opened=True,
+            sizes=("design",),
+        ),
+        SizedPanel(
             "Light",
-            partial(lights.draw, state.lights, state.recordings),
+            lambda: lights.draw(state.lights, state.recordings, in_numbers=state.screen.size == "measure"),
             "each group of lamps: on or off, brightness, colour",
         ),
         *([of_lamps] if state.lamps.records else []),
@@ -237,12 +250,12 @@ def panels(state: WalkState) -> tuple[Panel, ...]:
             partial(film.draw, state.films, state.recordings, state.navigation, state.screen),
             "a film along the chosen camera path",
         ),
-        *(SizedPanel(*of, sizes=("measure",)) for of in numbers(state)),
+        *(SizedPanel(*of, sizes=("measure",)) for of in numbers(state, light_on_it)),
         SizedPanel("Help", partial(rows, SHORTCUTS, "shortcuts"), "mouse and keys"),
     )
 
 
-def numbers(state: WalkState) -> tuple[tuple[str, Callable[[], None], str], ...]:
+def numbers(state: WalkState, light_on_it: Callable[[], None]) -> tuple[tuple[str, Callable[[], None], str], ...]:
     """Titles, drawing and meaning of the panels of numbers and settings."""
     return (
         ("Camera", partial(view.draw_camera, state), "field of view, walking speed, and marks over the picture"),
@@ -250,8 +263,8 @@ def numbers(state: WalkState) -> tuple[tuple[str, Callable[[], None], str], ...]
         ("Light field", partial(light_field.draw, state), "points around the selected object and their maps"),
         (
             "Light meter",
-            partial(metering.draw, state.meter, state.look),
-            "luminance of the picture in numbers, and glare",
+            partial(metering.draw, state.meter, state.look, light_on_it),
+            "illuminance on the selected object, luminance of the picture, glare",
         ),
         ("Compare", partial(compare.draw, state.comparison), "the picture compared with another"),
         (

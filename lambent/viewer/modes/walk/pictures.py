@@ -14,6 +14,7 @@ from lambent.core.pictures.images import write_shown
 from lambent.core.plain import triple
 from lambent.core.views.camera import CameraPath
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.light.group_arrays import GroupArrays
 from lambent.realtime.renderer import Renderer
 from lambent.viewer.background.work import POLL_S
 from lambent.viewer.mode import Divider
@@ -78,6 +79,11 @@ class Pictures(Pair):
         own = {} if before is None else {"before A": before}
         own |= {} if error is None else {"picture A": error}
         return {**self._state.marks.images, **self._outlining.images, **self._fields.images, **own}
+
+    @property
+    def light_groups(self) -> GroupArrays | None:
+        """Light maps by group of the present room, before the mix; None without groups."""
+        return self._renderer.mixer.groups
 
     @property
     def share(self) -> float:

@@ -6,21 +6,23 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from lambent.core.light.light_mix import AS_BAKED, LEAST_K, MOST_K, WHITE, GroupMix, LightMix
+from lambent.core.light.light_mix import AS_BAKED, LEAST_K, MOST_K, WHITE, GroupMix, LightMix, nearest_temperature_k
 from lambent.realtime.light.group_arrays import BAKE_GROUPS, FIELDS_FOLLOW, NO_GROUPS
 from lambent.store.light_groups import LightGroupRecord
 from lambent.viewer.cameras.navigation import PathPlay
 from lambent.viewer.modes.walk.light.light_keys import key_times
 from lambent.viewer.modes.walk.light.lights import Lights
 from lambent.viewer.modes.walk.views.recording import Recordings
-from lambent.viewer.panels.widgets import check, press, rgb, slider, wrapped
+from lambent.viewer.panels.widgets import check, explain, press, px, slider, swatch, wrapped
 
-BRIGHTEST = 4.0  # largest intensity of the slider, relative to the bake
+BRIGHTEST = 400.0  # per cent of the baked intensity, of the slider
+KELVIN_PX, FILTER_PX = 110.0, 44.0
 WARM_K, COOL_K = 1800.0, 12000.0  # range of the slider
 USUAL_K = 6500.0
 
 
-def draw(lights: Lights, recordings: Recordings) -> None:
+def draw(lights: Lights, recordings: Recordings, *, in_numbers: bool) -> None:
+    """Draw the panel; `in_numbers` adds each group's share of all light."""
     if not lights.groups:
         wrapped([f"{NO_GROUPS}: {BAKE_GROUPS}"])
         return
@@ -29,7 +31,7 @@ def draw(lights: Lights, recordings: Recordings) -> None:
         wrapped(["the light follows the shown walk; move to control it yourself"])
     for group in lights.groups:
         mix = lights.mix.of(group.name)
-        lights.mix = lights.mix.changed(group.name, _row(group, mix))
+        lights.mix = lights.mix.changed(group.name, _row(group, mix, in_numbers))
     imgui.begin_disabled(not lights.mix.groups)
     if press("reset all light", "resets all light groups to the bake", -1):
         lights.mix = LightMix()
@@ -61,29 +63,38 @@ def _keys(recordings: Recordings, play: PathPlay) -> None:
             recordings.drop_key(time_s)
 
 
-def _row(group: LightGroupRecord, mix: GroupMix) -> GroupMix:
+def _row(group: LightGroupRecord, mix: GroupMix, in_numbers: bool) -> GroupMix:
     """Draw one group; a change of a slider or colour switches it on."""
     name = group.name
-    imgui.separator_text(f"{name}  {group.share:.0%}")
+    imgui.separator_text(f"{name}  {group.share:.0%}" if in_numbers else name)
     members = ", ".join(group.members)
     on = check(f"on##{name}", mix.on, f"switches {members} on or off")
     imgui.same_line()
-    intensity = slider(
-        f"##times {name}", mix.intensity, 0.0, BRIGHTEST, f"intensity, relative to the bake: {members}", unit=" x"
-    )
+    meaning = f"brightness, 100 % as baked: {members}"
+    percent = slider(f"##times {name}", 100 * mix.intensity, 0.0, BRIGHTEST, meaning, unit=" %%", digits=0)
+    intensity = mix.intensity if percent == 100 * mix.intensity else percent / 100
     imgui.same_line()
     if press(f"reset##{name}", "resets this group to the bake", small=True):
         return AS_BAKED
-    is_tinted = check(
-        f"black body##{name}", mix.temperature_k is not None, "gives the light the colour of a black body"
-    )
-    kelvin = mix.temperature_k if is_tinted else None
-    if is_tinted:
-        meaning = "temperature of the black body: 2700 K is a light bulb, 6500 K daylight"
-        low, high = max(WARM_K, LEAST_K), min(COOL_K, MOST_K)
-        imgui.same_line()
-        kelvin = slider(f"##kelvin {name}", mix.temperature_k or USUAL_K, low, high, meaning, log=True, unit=" K")
-    colour = rgb(f"colour##{name}", mix.colour, 1.0, "colour filter; only its hue and saturation count")
+    kelvin = _temperature(name, mix)
+    imgui.same_line()
+    colour = swatch(f"filter##{name}", mix.colour, "colour filter; only its hue and saturation count", px(FILTER_PX))
     colour = colour if any(colour) else WHITE
+    if colour != WHITE:
+        near_k = nearest_temperature_k(mix.tint)
+        imgui.same_line()
+        imgui.text_disabled("a colour" if near_k is None else f"about {near_k:.0f} K")
+        explain("nearest colour temperature of white light under this filter, where there is one")
     changed = (intensity, colour) != (mix.intensity, mix.colour)
     return replace(mix, on=on or changed, intensity=intensity, temperature_k=kelvin, colour=colour)
+
+
+def _temperature(name: str, mix: GroupMix) -> float | None:
+    """Draw the switch of a colour temperature and its slider; None for the light as it is."""
+    meaning = "gives the light this colour temperature: 2700 K is a light bulb, 6500 K daylight"
+    if not check(f"K##{name}", mix.temperature_k is not None, meaning):
+        return None
+    low, high, now = max(WARM_K, LEAST_K), min(COOL_K, MOST_K), mix.temperature_k or USUAL_K
+    imgui.same_line()
+    imgui.set_next_item_width(px(KELVIN_PX))
+    return slider(f"##kelvin {name}", now, low, high, meaning, log=True, unit=" K", digits=0)

@@ -1,6 +1,8 @@
-"""The Light meter panel, and the luminance under the mouse."""
+"""The Light meter panel, the light on the selected object, and the luminance under the mouse."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 from imgui_bundle import imgui
@@ -9,8 +11,10 @@ from lambent.core.light.exposure import ev100_of
 from lambent.core.light.false_colour import number
 from lambent.core.light.photometry import photometric
 from lambent.viewer.look import Look
+from lambent.viewer.modes.walk.light.falling import FallingLight
 from lambent.viewer.modes.walk.light.glare import GlareMeter
 from lambent.viewer.modes.walk.light.metering import Meter
+from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels.overlay import SHADE
 from lambent.viewer.panels.widgets import explain, press, rows
 from lambent.viewer.screen import Rect
@@ -18,7 +22,36 @@ from lambent.viewer.screen import Rect
 GRAPH_PX = 90
 
 
-def draw(meter: Meter, look: Look) -> None:
+def draw_falling(falling: FallingLight | None, state: WalkState) -> None:
+    """Draw the illuminance on the selected object, whole and by light group."""
+    parts, edits = state.selected_parts, state.materials.edits
+    if not parts or falling is None:
+        imgui.text_disabled("select an object for the light that falls on it")
+        return
+    found = falling.follow(parts, waits=edits.in_stroke)
+    if found is None:
+        imgui.text_disabled("..." if falling.busy else "its light is not in the light map")
+        return
+    by_group, (low, high) = found.illuminance_lx(edits.light), found.range_lx(edits.light)
+    total = sum(by_group.values())
+    table = [("on average", f"{_said(total)} lx"), ("from, to", f"{_said(low)} to {_said(high)} lx")]
+    if len(by_group) > 1:
+        table += [(name, f"{_said(lx)} lx, {100 * lx / total if total else 0:.0f} %") for name, lx in by_group.items()]
+    rows(table, "falling")
+    explain("illuminance on the lit side; 5 % of the surface gets less than the first, 5 % more than the second number")
+    if found.note:
+        imgui.text_wrapped(found.note)
+
+
+def _said(lx: float) -> str:
+    """An illuminance with three digits."""
+    return f"{float(f'{lx:.3g}'):,.0f}" if lx >= 100 else f"{lx:.3g}"
+
+
+def draw(meter: Meter, look: Look, light_on_it: Callable[[], None]) -> None:
+    """Draw the panel, with the illuminance on the selected object."""
+    light_on_it()
+    imgui.separator()
     _glare(meter.glare)
     meter.wanted = True
     reading, unit = meter.reading, look.quantity.unit

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.plain import Triple
 from lambent.materials.factored.albedo import possible_kd
@@ -17,7 +16,7 @@ from lambent.scenes.scene import ImageTexture, MaterialTextures, Texture
 from lambent.store.kept.images import kept_image, located
 from lambent.viewer.editor.files import typed_path
 from lambent.viewer.edits.edits import MaterialEdits
-from lambent.viewer.modes.walk.session.thumbnails import Thumbnail, Thumbnails
+from lambent.viewer.modes.walk.session.thumbnails import Thumbnail, Thumbnails, texture_thumbnail
 from lambent.viewer.screen import Screen
 
 OWN, NONE = "its own", "none"
@@ -46,7 +45,9 @@ class Texturing:
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)
     without_uv: Collection[str] = ()
     typed: str = ""  # path of an image, as typed
-    thumbnails: Thumbnails = field(default_factory=Thumbnails)
+
+    def __post_init__(self) -> None:
+        self.thumbnails = Thumbnails(self.screen.images)
 
     def choices(self, name: str) -> dict[str, str | ImageTexture | None]:
         """What a material can show, by label; None for its own texture, or for none if it has no own."""
@@ -62,16 +63,16 @@ class Texturing:
         used = self.edits.room.textures.get(name)
         return next((label for label, of in self.choices(name).items() if of == used), NONE)
 
-    def thumbnail(self, name: str, of: str | ImageTexture | None) -> Thumbnail | None:
-        """The thumbnail of a choice of `choices`; None for none, and until it is made."""
+    def thumbnail(self, name: str, of: str | ImageTexture | None) -> str | None:
+        """Name of the thumbnail of a choice of `choices`, see `Thumbnails.get`; None for none."""
         if isinstance(of, ImageTexture):
-            image = located(of, self.store)
-            return self.thumbnails.get(image.file, lambda: _reflectance(*mean_and_detail(Path(image.file))))
+            file = Path(located(of, self.store).file)
+            return self.thumbnails.get(file, lambda: _thumbnail(*mean_and_detail(file)))
         source = name if of is None else of
         if source not in self.textures:
             return None
         kd, diffuse = self.edits.scene[source].kd, self.textures[source].diffuse
-        return self.thumbnails.get((source,), lambda: _reflectance(kd, diffuse))
+        return self.thumbnails.get((source,), lambda: _thumbnail(kd, diffuse))
 
     def choose(self, name: str, of: str | ImageTexture | None) -> None:
         """Show a texture, with its mean as the diffuse colour, as one stroke."""
@@ -122,9 +123,10 @@ class Texturing:
             self.edits.show_texture(name, replace(used, repeat=times))
 
 
-def _reflectance(mean: Triple, detail: Texture | None) -> Floats:
-    """Linear reflectance (H, W, 3) of a texture with this mean; an even one without detail."""
-    return np.asarray(mean, np.float32) * (np.ones((1, 1, 3), np.float32) if detail is None else detail.texels)
+def _thumbnail(mean: Triple, detail: Texture | None) -> Thumbnail:
+    """Thumbnail of a texture with this mean; an even one without detail."""
+    texels = np.ones((1, 1, 3), np.float32) if detail is None else detail.texels
+    return texture_thumbnail(np.asarray(mean, np.float32) * texels)
 
 
 def label_of(image: ImageTexture) -> str:

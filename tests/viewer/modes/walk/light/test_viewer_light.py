@@ -31,7 +31,7 @@ def test_each_group_is_switched_dimmed_and_tinted(panels, state):
     panels.drag("##times lamp", 0.25, 0.5)
     lamp = state.lights.mix.of("lamp")
     assert lamp.on and lamp.intensity == pytest.approx(2, abs=0.3), "who moves a slider wants to see it"
-    panels.click("black body##sky", 0.1)
+    panels.click("K##sky", 0.1)
     panels.frame()
     panels.drag("##kelvin sky", 0.6, 0.2)
     assert state.lights.mix.of("sky").temperature_k == pytest.approx(2600, abs=500)

@@ -1,6 +1,5 @@
 """The texture of a material exchanged in the window: choice, image, undo, session, and what is refused."""
 
-import time
 
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ from lambent.store.store import Store
 from lambent.viewer.edits.edits import MaterialEdits
 from lambent.viewer.modes.walk.session.keeping import SessionKeeper
 from lambent.viewer.modes.walk.session.texturing import NONE, OWN, Texturing
-from lambent.viewer.modes.walk.session.thumbnails import SIDE, thumbnail
+from lambent.viewer.modes.walk.session.thumbnails import SIDE, texture_thumbnail
 from lambent.viewer.screen import Rect, Screen
 from tests.viewer.conftest import Clock
 from tests.viewer.small_store import write_small_store
@@ -190,21 +189,24 @@ def test_thumbnails_are_made_in_the_background(window, picture, folder):
     choices = texturing.choices("plaster")
     assert texturing.thumbnail("plaster", choices[NONE]) is None and not texturing.thumbnails.busy
     red, oak = choices["bricks.png"], choices["of oak"]
-    assert texturing.thumbnail("plaster", red) is None and texturing.thumbnails.busy, "the frame does not wait"
+    assert texturing.thumbnail("plaster", red) not in window.screen.images and texturing.thumbnails.busy, "no waiting"
 
     def made(of):
-        while (found := texturing.thumbnail("plaster", of)) is None:
-            time.sleep(0.01)
-        return found
+        while texturing.thumbnails.busy or (name := texturing.thumbnail("plaster", of)) not in known():
+            texturing.thumbnail("plaster", of)
+        return window.screen.images.get(name)
 
-    assert (made(red) == (255, 0, 0)).all() and made(red).shape == (SIDE, SIDE, 3)
+    def known():
+        return {*window.screen.images, *texturing.thumbnails.failed}
+
+    assert (made(red) == (255, 0, 0, 255)).all() and made(red).shape == (SIDE, SIDE, 4)
     expected = np.round(255 * srgb_encode(np.array(SCENE["oak"].kd)))
-    assert np.abs(made(oak).astype(int) - expected).max() <= 1
-    assert len(made(ImageTexture(str(folder / "gone.png")))) == 0, "no picture, and no error"
+    assert np.abs(made(oak)[..., :3].astype(int) - expected).max() <= 1
+    assert made(ImageTexture(str(folder / "gone.png"))) is None, "no picture, and no error"
 
 
 def test_thumbnails_of_large_textures_show_all_of_them():
     texels = np.zeros((700, 900, 3), np.float16)
     texels[:350, :, 0], texels[350:, :, 2] = 1, 1
-    found = thumbnail(texels)
+    found = texture_thumbnail(texels)[..., :3]
     assert (found[: SIDE // 2 - 1] == (255, 0, 0)).all() and (found[SIDE // 2 + 1 :] == (0, 0, 255)).all()
