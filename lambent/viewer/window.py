@@ -6,7 +6,7 @@ Importing this needs a display.
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -71,7 +71,7 @@ class Window:
         self.screen.wake = self._wake
         self.screen.remembered.open(settings_file())
         self.screen.say_fault()
-        self._take_dropped_files()
+        glfw.set_drop_callback(self.canvas._window, self._dropped)  # type: ignore[arg-type]
         self._take_the_close_button()
 
     def run(self) -> None:
@@ -168,17 +168,18 @@ class Window:
         self._device.queue.write_texture({"texture": texture}, image, rows, (width, height, 1))
         return texture.create_view()
 
-    def _take_dropped_files(self) -> None:
-        """Pass dropped files to the mode; the canvas has no event for them."""
-
-        def dropped(_: object, paths: Any) -> None:
-            with self._watched():
-                for path in paths:
-                    self.mode.drop(path)
-            self._extra_frames = SETTLE_FRAMES
-            self.canvas.request_draw()
-
-        glfw.set_drop_callback(self.canvas._window, dropped)  # type: ignore[arg-type]
+    def _dropped(self, window: Any, paths: Sequence[str]) -> None:
+        """Pass dropped files to the mode, and where the mouse is; the canvas has no event for them."""
+        # While another program drags, the canvas tells of no moves.
+        shares = (at / size for at, size in zip(glfw.get_cursor_pos(window), glfw.get_window_size(window), strict=True))
+        x, y = (share * size for share, size in zip(shares, self.canvas.get_logical_size(), strict=True))
+        with self._watched():
+            moved = {"event_type": "pointer_move", "x": x, "y": y}
+            self.mode.input.handle(moved, ui_has_mouse=self._popup_open, ui_has_keys=False)
+            for path in paths:
+                self.mode.drop(path)
+        self._extra_frames = SETTLE_FRAMES
+        self.canvas.request_draw()
 
     def _take_the_close_button(self) -> None:
         """Ask before the window closes with unsaved work."""

@@ -11,7 +11,7 @@ from lambent.core.errors import UserError
 from lambent.core.pictures.images import read_image
 from lambent.store.kept.session import FILE, read_session
 from lambent.store.kept.views import read_views
-from tests.viewer.small_store import FRONT, write_small_store
+from tests.viewer.small_store import FRONT, MATERIALS, write_small_store
 from tests.viewer.window_session import ROOT, WindowSession
 
 pytestmark = pytest.mark.slow
@@ -69,6 +69,15 @@ def test_a_slider_changes_the_material_and_not_the_camera(session):
     assert session.state()["camera"] == before["camera"]
     session.drag((100, 100), (160, 100))
     session.wait_for(lambda state: state["camera"] != before["camera"])
+
+
+def test_a_file_goes_to_the_object_that_it_is_dropped_onto(session, tmp_path):
+    MATERIALS["brass"].model_copy(update={"kd": (0, 0, 0.5), "lobes": ()}).save(tmp_path / "blue.json")
+    session.drop(tmp_path / "blue.json", *BALL)
+    state = session.wait_for(lambda state: state["selected"] == "ball" and state["edited"])
+    assert state["edited"]["brass"]["kd"] == [0, 0, 0.5] and state["editor"] is None
+    session.tool("key", "ctrl+z")
+    session.wait_for(lambda state: state["edited"] == {})
 
 
 def test_it_rests_then_sleeps_and_wakes(session):

@@ -28,6 +28,7 @@ FEW_LIGHTS = (100, 400)  # of a small view
 MARK = "F12"  # a key that means nothing: what was sent before it has arrived when it does
 INTERRUPT = "F11"  # another: Ctrl-C, while the next frame is drawn to the window
 SKIP = "F10"  # another: the display has no image for the next frame
+DROP = "F9"  # another: the file named in OUT/dropped.txt is dropped where the mouse is
 
 
 class WatchedWindow(window.Window):
@@ -43,6 +44,8 @@ class WatchedWindow(window.Window):
         super()._on_event(event)
         self.marks_seen += event["event_type"] == "key_down" and event["key"] == MARK
         self.interrupt |= event["event_type"] == "key_down" and event["key"] == INTERRUPT
+        if event["event_type"] == "key_down" and event["key"] == DROP:
+            self._dropped(self.canvas._window, [(out / "dropped.txt").read_text()])
         self.skip |= event["event_type"] == "key_down" and event["key"] == SKIP
 
     def _clear(self):

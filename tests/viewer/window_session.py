@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 PATIENCE_S = 120.0  # software adapters on a busy machine
 ASLEEP_S = 1.0  # without a frame
 MEASURE = {"size": "measure", "card_seen": True}
-MARK, INTERRUPT, SKIP = "F12", "F11", "F10"  # see watched_window
+MARK, INTERRUPT, SKIP, DROP = "F12", "F11", "F10", "F9"  # see watched_window
 
 
 def missing_tools():
@@ -104,6 +104,13 @@ class WindowSession:
             return time.monotonic() - last[1] > ASLEEP_S
 
         return self.wait_for(asleep)
+
+    def drop(self, file, x, y):
+        """Drop a file onto a place of the window."""
+        (self.out / "dropped.txt").write_text(str(file))
+        self.move(x, y)
+        self.tool("key", DROP)
+        self.settle()
 
     def move(self, x, y):
         self.tool("mousemove", "--window", self.id, round(x), round(y))

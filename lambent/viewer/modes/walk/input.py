@@ -11,6 +11,7 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.plain import Triple, triple
 from lambent.core.views.camera import Camera, rays_through
+from lambent.store.contract import ObjectRecord
 from lambent.viewer.cameras import cameras
 from lambent.viewer.cameras.framing import framed
 from lambent.viewer.cameras.picking import Geometry
@@ -54,6 +55,7 @@ CARD = (  # of the first start
 LARGE = 0.5  # radius / distance of objects from which on orbit turns about the clicked point, not the object's middle
 PIECE_PX = 12.0  # length of the pieces of a drag in orbit that are checked for walls
 STEPS = {"+": 1, "=": 1, "-": -1}  # of the exposure, 1/3 EV
+DROP_PX = 60.0  # from a lamp to where a file is dropped onto it
 TAP_S = 0.05  # least time that a key press counts
 
 
@@ -110,14 +112,34 @@ class WalkInput(Input):
         return self._button is not None and self._lamp is not None
 
     def choose_lamp_under_cursor(self) -> None:
-        """Choose the lamp whose mark is under the mouse, if there is one."""
+        """Choose the nearest lamp around the mouse, also one whose mark is not shown."""
         if (cursor := self._state.meter.cursor) is not None:
-            self._lamp_at(*self.screen.picture.point(*cursor))
+            self._lamp_at(*self.screen.picture.point(*cursor), reach_px=DROP_PX)
 
-    def _lamp_at(self, x: float, y: float) -> int | None:
+    def _lamp_at(self, x: float, y: float, reach_px: float | None = None) -> int | None:
         place, state = self.screen.picture, self._state
         at = x - place.x, y - place.y
-        return state.lamps.pick(state.navigation.camera, at, (max(1, place.width), max(1, place.height)))
+        return state.lamps.pick(state.navigation.camera, at, (max(1, place.width), max(1, place.height)), reach_px)
+
+    def _under(self, x: float, y: float) -> tuple[ObjectRecord | None, Floats]:
+        """The object at a point of the picture, and the place (3,) that was hit there."""
+        camera, place = self.navigation.camera, self.screen.picture
+        towards = rays_through(camera, x, y, place.width, place.height)
+        found, distance_m = self._geometry.hit(camera.position, towards)
+        return found, np.array(camera.position) + (distance_m if found is not None else 0.0) * towards
+
+    @property
+    def is_over_sky(self) -> bool:
+        """Whether the mouse is over the picture, and over no object there."""
+        cursor, place = self._state.meter.cursor, self.screen.picture
+        return cursor is not None and self._under(cursor[0] * place.width, cursor[1] * place.height)[0] is None
+
+    def select_under_cursor(self) -> None:
+        """Select the object under the mouse; keep the selection where there is none."""
+        cursor, place = self._state.meter.cursor, self.screen.picture
+        if cursor is not None:
+            found, _ = self._under(cursor[0] * place.width, cursor[1] * place.height)
+            self._state.selection.choose(found.name if found is not None else self._state.selection.name)
 
     def dragged(self, dx: float, dy: float) -> None:
         divider = self._state.divider
@@ -137,11 +159,11 @@ class WalkInput(Input):
         if self._on_divider or self._lamp is not None:
             return
         camera, place = self.navigation.camera, self.screen.picture
-        towards = rays_through(camera, x, y, place.width, place.height)
-        found, distance_m = self._geometry.hit(camera.position, towards)
+        found, hit = self._under(x, y)
+        distance_m = math.inf if found is None else math.dist(hit, camera.position)
         if self._state.lamps.aiming:
             if found is not None:
-                self._state.lamps.aim_at(triple(np.array(camera.position) + distance_m * towards))
+                self._state.lamps.aim_at(triple(hit))
             return
         at_px = (x - place.x, y - place.y)
         if self._state.fields.pick(camera, at_px, (place.width, place.height), distance_m):
@@ -150,8 +172,7 @@ class WalkInput(Input):
             self._state.selection.choose(None)
             return
         radius_m = math.dist(*found.bounds) / 2
-        at = triple(np.array(camera.position) + distance_m * towards)
-        self._state.selection.choose(found.name, at if radius_m > LARGE * distance_m else None)
+        self._state.selection.choose(found.name, triple(hit) if radius_m > LARGE * distance_m else None)
 
     @property
     def pivot(self) -> Triple:

@@ -17,7 +17,6 @@ from lambent.realtime.objects.replaced import with_replacements
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.resources import device_needs
 from lambent.realtime.sun.turned_sky import under_turned_sky
-from lambent.scenes.photometry.files import ENDINGS as LUMINAIRES
 from lambent.scenes.replacement import parse_replacements
 from lambent.store.source import SOURCE
 from lambent.store.store import Store
@@ -26,6 +25,7 @@ from lambent.viewer.background.work import POLL_S
 from lambent.viewer.cameras.navigation import Movement
 from lambent.viewer.cameras.picking import Geometry
 from lambent.viewer.mode import Drawing, Mode, Panel, SidePlots, Textures
+from lambent.viewer.modes.walk import dropping
 from lambent.viewer.modes.walk.comparison import error_scale
 from lambent.viewer.modes.walk.input import CARD, SHORTCUTS, WalkInput
 from lambent.viewer.modes.walk.light.answering import AnsweringLight
@@ -48,7 +48,6 @@ from lambent.viewer.modes.walk.panels import (
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.session.finishes import Finishes
 from lambent.viewer.modes.walk.session.kept_view import restore
-from lambent.viewer.modes.walk.session.texturing import ENDINGS
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels import card, overlay, statistics
 from lambent.viewer.panels.plots import side_plots
@@ -110,7 +109,8 @@ class WalkMode(Mode):
     def __init__(
         self, state: WalkState, input: WalkInput, drawing: Drawing, falling: FallingLight | None = None
     ) -> None:
-        super().__init__(state.scene.name, state.screen, input, drawing, panels(state, falling))
+        self.finishes = Finishes(state.materials.edits, state.texturing, state.screen)
+        super().__init__(state.scene.name, state.screen, input, drawing, panels(state, falling, self.finishes))
         self.state, self.falling = state, falling
         self.head = partial(room.draw, state)
 
@@ -164,19 +164,7 @@ class WalkMode(Mode):
         return least(POLL_S if busy else None, self.state.session.wait_s())
 
     def drop(self, path: str) -> None:
-        """Exchange a lamp, show an image on the selected object's material, or open a file in the material's editor."""
-        name, materials = self.state.selection.material, self.state.materials
-        if path.lower().endswith(LUMINAIRES):
-            self.input.choose_lamp_under_cursor()
-            self.state.lamps.exchange(path)
-        elif path.lower().endswith(ENDINGS):
-            self.state.texturing.open(name, path)
-        elif materials.editor is not None:
-            materials.editor.files.open(path)
-        elif name is not None:
-            materials.open_editor(name, path)
-        else:
-            self.screen.say("select an object first: the file opens in the editor of its material")
+        dropping.drop(path, self.state, self.input, self.finishes)
 
     @property
     def unsaved(self) -> tuple[str, ...]:
@@ -208,7 +196,7 @@ class WalkMode(Mode):
             sys.stderr.write(f"lambent: note: changes not saved: {names}\n")
 
 
-def panels(state: WalkState, falling: FallingLight | None) -> tuple[Panel, ...]:
+def panels(state: WalkState, falling: FallingLight | None, finishes: Finishes) -> tuple[Panel, ...]:
     """Panels of the column, sorted into the sizes of the window."""
     about = (state.missing, state.scene.warnings)
     light_on_it = partial(metering.draw_falling, falling, state)
@@ -216,7 +204,7 @@ def panels(state: WalkState, falling: FallingLight | None) -> tuple[Panel, ...]:
     return (
         SizedPanel(
             "Material",
-            partial(material.draw, state, Finishes(state.materials.edits, state.texturing, state.screen)),
+            partial(material.draw, state, finishes),
             "the objects, and the material of the selected one",
             opened=True,
         ),

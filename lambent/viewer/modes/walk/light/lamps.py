@@ -53,13 +53,16 @@ class Lamps:
         """(n, 3) positions of all lamps, m."""
         return np.array([self.of(record.number).position for record in self.records]).reshape(-1, 3)
 
-    def pick(self, camera: Camera, at_px: tuple[float, float], size: Size) -> int | None:
-        """Choose the lamp whose mark is at a point of a picture of this size; return its number, None for none."""
-        if not self.shown or not self.records:
+    def pick(self, camera: Camera, at_px: tuple[float, float], size: Size, reach_px: float | None = None) -> int | None:
+        """Choose the lamp whose mark is at a point of a picture of this size; return its number, None for none.
+
+        Within `reach_px`, a lamp is found whose mark is not shown, too.
+        """
+        if not (self.shown or reach_px) or not self.records:
             return None
         at, depths_m = projected(camera, self.places, size)
         off_px = np.where(depths_m > NEAR_M, np.linalg.norm(at * size - at_px, axis=1), np.inf)
-        if off_px.min() > REACH_PX:
+        if off_px.min() > (reach_px or REACH_PX):
             return None
         self.chosen = self.records[int(np.argmin(off_px))].number
         return self.chosen
@@ -81,7 +84,7 @@ class Lamps:
     def exchange(self, text: str) -> None:
         """Give the chosen lamp the light of an IES or EULUMDAT file, as one stroke."""
         if self.chosen is None:
-            self.say("choose a lamp in the Lamps panel first: the file becomes its luminaire")
+            self.say("drop it onto a lamp, or choose one in the Lamps panel: the file becomes its luminaire")
             return
         try:
             file = typed_path(text).absolute()

@@ -112,7 +112,9 @@ def test_a_dropped_file_becomes_the_chosen_lamps_luminaire(panels, state, tmp_pa
     file.write_text(IES)
     broken.write_text("no")
     panels.mode.drop(str(file))
-    assert "choose a lamp" in state.screen.messages[-1].text and not state.materials.edits.room.lamps
+    assert (
+        "drop it onto a lamp, or choose one" in state.screen.messages[-1].text and not state.materials.edits.room.lamps
+    )
     state.lamps.chosen = 3
     panels.mode.drop(str(file))
     assert state.lamps.of(3) == LampEdit(PLACE, (0, -1, 0), 0.0, str(file))
@@ -120,6 +122,23 @@ def test_a_dropped_file_becomes_the_chosen_lamps_luminaire(panels, state, tmp_pa
     assert "luminaire not shown" in state.screen.messages[-1].text and "broken.ldt" in state.screen.messages[-1].text
     assert state.lamps.of(3).file == str(file)
     assert state.session.unsaved == ("the lamps",)
+
+
+def test_a_file_is_dropped_onto_a_lamp_whose_mark_is_not_shown(panels, state, tmp_path):
+    file = tmp_path / "wide.ies"
+    file.write_text(IES)
+    (x, y), place = mark(state), state.screen.picture
+    panels.click("Lamps", 0.3)
+    panels.frame(2)
+    assert not state.lamps.shown
+    state.meter.cursor = ((x + 200 - place.x) / place.width, (y - place.y) / place.height)
+    panels.mode.drop(str(file))
+    assert state.lamps.chosen is None and "drop it onto a lamp" in state.screen.messages[-1].text
+    state.meter.cursor = ((x + 30 - place.x) / place.width, (y - place.y) / place.height)
+    panels.mode.drop(str(file))
+    assert (
+        state.lamps.of(3).file == str(file) and "wide.ies is the luminaire of lamp 4" in state.screen.messages[-1].text
+    )
 
 
 def test_a_session_keeps_lamps_and_reads_files_without_them(tmp_path):
