@@ -7,7 +7,7 @@ dictionaries, positions in logical pixels of the window.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lambent.core.plain import Triple
@@ -15,11 +15,14 @@ from lambent.core.views.camera import Camera
 from lambent.viewer.cameras import cameras
 from lambent.viewer.cameras.navigation import Navigation
 from lambent.viewer.edits.edits import MaterialEdits
+from lambent.viewer.gamepad import PadState
 from lambent.viewer.screen import Screen
 from lambent.viewer.settings import LEAST_SCALE, MOST_SCALE
 
 CLICK_PX = 4.0  # a press that moves less than this is a click, not a drag
 LEFT, RIGHT, MIDDLE = 1, 2, 3
+NOTCH = 100.0  # of a wheel, in the canvas' unit
+SCROLL_PX = 40.0  # of a drag that turns as a notch sideways does
 SCALES = {"+": 1.1, "=": 1.1, "-": 1 / 1.1, "0": None}  # of letters and controls; None: as at first
 
 
@@ -55,9 +58,8 @@ class Input:
             if self._button == LEFT and self._moved_px < CLICK_PX:
                 self.clicked(x - place.x, y - place.y)
             self._button = None
-        elif kind == "wheel" and over and self.navigation.movement == "orbit":
-            camera, bounds = self.navigation.camera, self.navigation.bounds
-            self.navigation.move(cameras.zoom(camera, -event["dy"] / 100, bounds, self.pivot))
+        elif kind == "wheel" and over:
+            self.scrolled(event["dx"] / NOTCH, -event["dy"] / NOTCH, event["modifiers"])
 
     def _drag(self, x: float, y: float) -> None:
         dx, dy = x - self._at[0], y - self._at[1]
@@ -65,6 +67,17 @@ class Input:
             return  # not yet a drag
         self._at, self._moved_px = (x, y), self._moved_px + math.hypot(dx, dy)
         self.dragged(dx, dy)
+
+    def scrolled(self, right: float, up: float, modifiers: Sequence[str]) -> None:
+        """Scroll by notches of a wheel, or parts of them with two fingers: in orbit nearer or farther, and sideways."""
+        if self.navigation.movement != "orbit":
+            return
+        if right:
+            self.navigation.move(self.turned(-SCROLL_PX * right, 0.0))
+        self.navigation.move(cameras.zoom(self.navigation.camera, up, self.navigation.bounds, self.pivot))
+
+    def steer(self, pad: PadState, dt_s: float) -> None:
+        """Answer a gamepad for `dt_s` seconds."""
 
     @property
     def dragging(self) -> bool:

@@ -129,22 +129,27 @@ def draw(mode: Mode, textures: Textures | None = None) -> bool:
     list_open = bool(imgui.is_popup_open("", imgui.PopupFlags_.any_popup))
     follow_keys(screen, "panels" if shared.column.width else "bar", list_open or screen.list_open)
     screen.list_open = list_open
-    return dragged or list_open
+    return dragged or list_open or bool(imgui.is_window_hovered(imgui.HoveredFlags_.any_window))
 
 
 def follow_keys(screen: Screen, window: str, list_open: bool) -> None:
-    """Give the keys to the controls of a window while `screen.by_keys`; Esc returns them, unless it closed a list."""
+    """Give the keys to the controls of a window while `screen.by_keys`.
+
+    A click returns them to the picture, and Esc, unless it closed a list.
+    """
     io, flag = imgui.get_io(), imgui.ConfigFlags_.nav_enable_keyboard
     had = bool(io.config_flags & flag)
-    if had and imgui.is_key_pressed(imgui.Key.escape, False) and not list_open and not imgui.is_any_item_active():
+    escaped = imgui.is_key_pressed(imgui.Key.escape, False) and not list_open and not imgui.is_any_item_active()
+    if had and (escaped or imgui.is_mouse_clicked(imgui.MouseButton_.left)):
         screen.by_keys = False
-    if screen.by_keys and not had:
+    if screen.by_keys and not (had and imgui.is_window_focused(imgui.FocusedFlags_.any_window)):
         io.config_flags |= flag
         imgui.set_window_focus(window)
         imgui.set_nav_cursor_visible(True)
     elif had and not screen.by_keys:
         io.config_flags &= ~flag
-        imgui.set_window_focus(None)
+        if escaped:  # a click has the focus where it is
+            imgui.set_window_focus(None)
 
 
 def _window(name: str, place: Rect, flags: int) -> None:

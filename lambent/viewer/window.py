@@ -17,6 +17,7 @@ from imgui_bundle import imgui
 from rendercanvas.glfw import RenderCanvas, loop
 
 from lambent.viewer import layout
+from lambent.viewer.gamepad import GlfwPads, PadWatch
 from lambent.viewer.interface import renderer
 from lambent.viewer.mode import Image, Mode
 from lambent.viewer.pacing import Beat
@@ -73,11 +74,14 @@ class Window:
         self.screen.say_fault()
         glfw.set_drop_callback(self.canvas._window, self._dropped)  # type: ignore[arg-type]
         self._take_the_close_button()
+        self._pad = PadWatch(GlfwPads(glfw), loop.call_later, self._wake)
+        glfw.set_joystick_callback(self._pad.connected)
 
     def run(self) -> None:
         """Show the window until it is closed; raise the first error."""
         self.canvas.request_draw(self._draw)
         loop.call_soon(_interrupt_between_frames)
+        loop.call_soon(self._pad.connected)
         loop.run()
         if self._error is not None:
             raise self._error
@@ -119,6 +123,7 @@ class Window:
         """Advance the mode to the present time."""
         now_s = self.screen.clock()
         since_last_s, self._drawn_s = now_s - self._drawn_s, now_s
+        self.mode.input.steer(self._pad.now, since_last_s if self._moving else 0.0)
         self.mode.advance(since_last_s if self._moving else 0.0)  # a sleep before the first step is no walking
         if self.screen.close_wanted or self.screen.closes:
             self._want_close()

@@ -109,16 +109,18 @@ def walk(
     bounds: Bounds,
     floor_y: float | None,
     flying: bool = False,
-    fast: bool = False,
+    fast: float = 1.0,
+    stick: tuple[float, float] = (0.0, 0.0),
     allowed: Callable[[np.ndarray, np.ndarray], np.ndarray] = lambda eye, step: step,
 ) -> Camera:
-    """Move for `dt_s` seconds by the held `keys` (names as in `KEYS`; others are ignored).
+    """Move for `dt_s` seconds by the held `keys` (names as in `KEYS`; others are ignored) and a gamepad's stick.
 
     On foot, the eye moves horizontally as far as `allowed(eye, step)` permits, and settles at eye height above
     `floor_y` (None: the scene's lowest point). Flying, it moves along the line of sight and, by other keys, up and
     down, through all obstacles.
     """
-    right, up, forward = np.sum([KEYS[key] for key in keys if key in KEYS] or [(0, 0, 0)], axis=0)
+    held = [KEYS[key] for key in keys if key in KEYS]
+    right, up, forward = np.sum([(stick[0], 0, stick[1]), *held], axis=0)
     if not (right or forward or (up and flying)):
         return camera
     dt_s = min(dt_s, LONGEST_STEP_S)
@@ -127,8 +129,8 @@ def walk(
     step = step + np.array([0, up if flying else 0, 0])
     length = float(np.linalg.norm(step))
     if length > 0:
-        step = step / length
-    eye, step = np.array(camera.position), step * (walker.speed_m_s * (FAST if fast else 1.0)) * dt_s
+        step = step / (length if held else max(length, 1.0))
+    eye, step = np.array(camera.position), step * (walker.speed_m_s * fast) * dt_s
     eye = eye + (step if flying else allowed(eye, step))
     if not flying:
         eye_y = (bounds[0][1] if floor_y is None else floor_y) + walker.eye_height_m

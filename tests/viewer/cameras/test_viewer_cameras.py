@@ -85,7 +85,7 @@ def test_walking_does_not_depend_on_the_frame_rate(flying):
 def test_walking_speed_and_direction():
     one_second = walked(EYE, {"w"}, 1, 10)
     assert one_second.position == pytest.approx((0, 1.6, 2 - cameras.WALK_M_S))
-    assert walked(EYE, {"w"}, 0.5, 10, fast=True).position[2] == pytest.approx(2 - 1.5 * cameras.WALK_M_S)
+    assert walked(EYE, {"w"}, 0.5, 10, fast=cameras.FAST).position[2] == pytest.approx(2 - 1.5 * cameras.WALK_M_S)
     assert walked(EYE, {"ArrowRight"}, 1, 10).position == pytest.approx((cameras.WALK_M_S, 1.6, 2))
     assert walked(EYE, {"w", "s"}, 1, 10) == EYE
     assert walked(EYE, {"p"}, 1, 10) == EYE
@@ -115,7 +115,7 @@ def test_the_eye_follows_the_floor_on_foot_only():
 
 @given(st.sets(st.sampled_from(sorted(cameras.KEYS))), PIXELS, st.booleans())
 def test_nobody_walks_through_the_bounds(keys, dx, flying):
-    camera = walked(cameras.look(EYE, dx, 0), keys, 20, 100, flying=flying, fast=True)
+    camera = walked(cameras.look(EYE, dx, 0), keys, 20, 100, flying=flying, fast=cameras.FAST)
     low, high = np.array(ROOM)
     assert np.all(camera.position > low) and np.all(camera.position < high)
 

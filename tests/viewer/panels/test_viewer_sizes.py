@@ -89,6 +89,15 @@ def test_the_bar_plays_a_film(window, state):
     assert not state.navigation.playing and state.navigation.path.path.name == "tour"
 
 
+def test_a_press_on_the_bar_or_the_card_is_none_on_the_picture(window, state):
+    state.screen.size, state.screen.card_shown = "show", True
+    window.frame(2)
+    for label, over in (("design##size", True), ("begin", True), (None, False)):
+        window.move(*(window.point(label) if label else (100, 100)))
+        window.frame()
+        assert window.popup_open == over, label
+
+
 def test_lists_have_what_there_is_to_choose(window, state):
     state.screen.size = "show"
     window.frame()
@@ -133,6 +142,25 @@ def test_the_bar_is_reached_by_keys_alone(window, state):
     assert not state.screen.by_keys
     window.frame(2)
     assert not window.io.want_capture_keyboard, "the keys walk again"
+
+
+def test_the_keys_stay_with_the_controls_from_size_to_size_until_a_click(window, state):
+    state.screen.size = "design"
+    tap(window, "Tab")
+    press(window, imgui.Key.tab)
+    press(window, imgui.Key.left_arrow)
+    press(window, imgui.Key.space)
+    assert state.screen.size == "show"
+    press(window, imgui.Key.tab)
+    assert window.focused and window.focused <= set(window.rects)
+    window.move(100, 100)
+    window.button(True)
+    window.button(False)
+    window.frame(2)
+    assert not state.screen.by_keys and not window.io.want_capture_keyboard
+    tap(window, "Tab")
+    window.click("play")
+    assert not state.screen.by_keys and state.navigation.playing, "the click counts"
 
 
 @pytest.mark.parametrize("size", SIZES)

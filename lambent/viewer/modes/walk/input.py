@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,9 @@ from lambent.store.contract import ObjectRecord
 from lambent.viewer.cameras import cameras
 from lambent.viewer.cameras.framing import framed
 from lambent.viewer.cameras.picking import Geometry
-from lambent.viewer.input import CLICK_PX, LEFT, Input
+from lambent.viewer.gamepad import PadState
+from lambent.viewer.input import CLICK_PX, LEFT, SCROLL_PX, Input
+from lambent.viewer.modes.walk import offers
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.modes.walk.views.walls import Walls
 
@@ -27,7 +30,9 @@ SHORTCUTS = (
     ("G", "fly, or return to the floor"),
     ("left drag", "look around; in orbit: turn about the selected object or the target"),
     ("right, middle drag", "pan (orbit)"),
-    ("wheel", "move towards the orbit's centre, or away"),
+    ("wheel, two fingers", "step ahead or back, sideways: turn; in orbit: nearer or farther"),
+    ("pinch, Ctrl+wheel", "change the field of view"),
+    ("gamepad", "sticks walk and look, triggers slow down and speed up; A next view, B next variant, Start next size"),
     ("click", "select the object under the mouse"),
     ("drag a lamp's mark", "move the lamp in the plane of the view (Lamps panel)"),
     ("Esc", "clear the selection"),
@@ -56,6 +61,9 @@ LARGE = 0.5  # radius / distance of objects from which on orbit turns about the 
 PIECE_PX = 12.0  # length of the pieces of a drag in orbit that are checked for walls
 STEPS = {"+": 1, "=": 1, "-": -1}  # of the exposure, 1/3 EV
 DROP_PX = 60.0  # from a lamp to where a file is dropped onto it
+FOV_DEG = (10.0, 120.0)
+NOTCH_S = 0.15  # of walking, for a notch of the wheel
+PAD_PX_S, PAD_NOTCHES_S = 400.0, 6.0  # of a drag that turns as a whole deflection does; of a wheel
 TAP_S = 0.05  # least time that a key press counts
 
 
@@ -69,10 +77,12 @@ class WalkInput(Input):
         self._tapped: set[str] = set()  # pressed since the last step; may be released before a slow frame ends
         self._fast = self._on_divider = self._flew = False
         self._lamp: int | None = None  # the lamp that the mouse holds
+        self._pushed: frozenset[str] = frozenset()  # buttons of a gamepad
+        self._steered = False  # whether its sticks move the eye
 
     @property
     def walking(self) -> bool:
-        return any(key in cameras.KEYS for key in self.held | self._tapped)
+        return self._steered or any(key in cameras.KEYS for key in self.held | self._tapped)
 
     def walk(self, dt_s: float) -> None:
         """Move the eye by the held keys for `dt_s` seconds; after flying, return to the floor."""
@@ -87,14 +97,60 @@ class WalkInput(Input):
         if flew and walks and not flying and not navigation.playing:
             floor_y = self._walls.floor_below(camera.position, height_m)
             navigation.move(camera := cameras.standing(camera, bounds, floor_y, height_m))
-        if not keys or not walks:
-            return
+        if keys and walks:
+            self._step(keys, dt_s, cameras.FAST if self._fast else 1.0)
+
+    def _step(
+        self, keys: AbstractSet[str], dt_s: float, fast: float = 1.0, stick: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
+        navigation, flying = self.navigation, self.navigation.flying
+        camera, height_m = navigation.camera, navigation.walker.eye_height_m
         floor_y = None if flying else self._walls.floor_below(camera.position, height_m)
         moved = cameras.walk(
-            camera, navigation.walker, keys, dt_s, bounds=bounds, floor_y=floor_y, flying=flying,
-            fast=self._fast, allowed=lambda eye, step: self._walls.allowed(eye, step, height_m),
+            camera, navigation.walker, keys, dt_s, bounds=navigation.bounds, floor_y=floor_y, flying=flying, fast=fast,
+            stick=stick, allowed=lambda eye, step: self._walls.allowed(eye, step, height_m),
         )  # fmt: skip
         navigation.move(moved)
+
+    def scrolled(self, right: float, up: float, modifiers: Sequence[str]) -> None:
+        """On foot, step ahead or back, and turn sideways; with Ctrl, as a pinch says it, change the field of view."""
+        navigation = self.navigation
+        if "Control" in modifiers and up:
+            fov_deg = navigation.camera.fov_y_deg * cameras.ZOOM_PER_STEP**up
+            navigation.set_fov(min(max(fov_deg, FOV_DEG[0]), FOV_DEG[1]))
+        elif navigation.movement == "orbit":
+            super().scrolled(right, up, modifiers)
+        else:
+            if right:
+                navigation.move(cameras.look(navigation.camera, SCROLL_PX * right, 0.0))
+            if up:
+                self._step({"w" if up > 0 else "s"}, NOTCH_S * abs(up))
+
+    def steer(self, pad: PadState, dt_s: float) -> None:
+        """Walk by the left stick, look by the right one; a button acts once for each press."""
+        self._push(pad.pressed - self._pushed)
+        self._pushed, self._steered = pad.pressed, pad.moves
+        dt_s = min(dt_s, cameras.LONGEST_STEP_S)
+        (across, ahead), (right, up) = pad.left, pad.right
+        turn_px = dt_s * PAD_PX_S
+        if not pad.moves or not dt_s:
+            return
+        if self.navigation.movement == "orbit":
+            self.navigation.move(self.turned(-turn_px * right, turn_px * up))
+            super().scrolled(0.0, PAD_NOTCHES_S * dt_s * ahead, ())
+            return
+        self.navigation.move(cameras.look(self.navigation.camera, turn_px * right, -turn_px * up))
+        fast = cameras.FAST**pad.faster / cameras.FAST**pad.slower
+        self._step(set(), dt_s, fast, (across, ahead))
+
+    def _push(self, buttons: AbstractSet[str]) -> None:
+        state = self._state
+        chosen = offers.views(state).next() if "A" in buttons else None
+        chosen = offers.variants(state.states).next() if "B" in buttons else chosen
+        if "Start" in buttons:
+            self.screen.next_size()
+        if chosen is not None:
+            self.screen.say(chosen)
 
     def pointed(self, at: tuple[float, float] | None) -> None:
         self._state.meter.cursor = at

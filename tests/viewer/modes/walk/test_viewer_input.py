@@ -11,7 +11,8 @@ from lambent.core.views.camera import camera_axes
 from lambent.viewer.cameras import cameras
 from lambent.viewer.cameras.framing import framed
 from lambent.viewer.cameras.navigation import PathPlay
-from lambent.viewer.modes.walk.input import WalkInput
+from lambent.viewer.input import SCROLL_PX
+from lambent.viewer.modes.walk.input import FOV_DEG, NOTCH_S, WalkInput
 from lambent.viewer.modes.walk.markers import projected
 
 
@@ -137,16 +138,47 @@ def test_framing_looks_for_a_line_of_sight_that_is_free(state):
     assert 0.1 < math.dist(blocked.position, blocked.target) < 0.3
 
 
-def test_the_wheel_zooms_in_orbit_only(mouse, state):
+def test_the_wheel_zooms_in_orbit(mouse, state):
     before = state.navigation.camera
-    send(mouse, "wheel", x=10, y=10, dx=0, dy=-100)
-    assert state.navigation.camera == before
     state.navigation.movement = "orbit"
     send(mouse, "wheel", x=10, y=10, dx=0, dy=-100)
     assert math.dist(state.navigation.camera.position, before.target) < math.dist(before.position, before.target)
     near = state.navigation.camera
     send(mouse, "wheel", ui=True, x=10, y=10, dx=0, dy=-100)
     assert state.navigation.camera == near
+
+
+def test_two_fingers_turn_in_orbit(mouse, state):
+    state.navigation.movement, before = "orbit", state.navigation.camera
+    send(mouse, "wheel", x=10, y=10, dx=37.5, dy=0)
+    after = state.navigation.camera
+    assert math.dist(after.position, before.target) == pytest.approx(math.dist(before.position, before.target))
+    turned = cameras.yaw_pitch(after)[0] - cameras.yaw_pitch(before)[0]
+    assert turned == pytest.approx(-0.375 * SCROLL_PX * cameras.TURN_RAD_PX)
+
+
+def test_on_foot_the_wheel_steps_and_two_fingers_sideways_turn(mouse, state):
+    before = state.navigation.camera
+    send(mouse, "wheel", x=10, y=10, dx=0, dy=-100)
+    step = np.subtract(state.navigation.camera.position, before.position)
+    ahead = cameras.direction(cameras.yaw_pitch(before)[0], 0.0)
+    assert step[[0, 2]] @ ahead[[0, 2]] == pytest.approx(NOTCH_S * state.navigation.walker.speed_m_s)
+    send(mouse, "wheel", x=10, y=10, dx=0, dy=10_000)
+    assert cameras.is_within(state.navigation.camera.position, state.scene.bounds), "a flick passes no wall"
+    here = state.navigation.camera
+    send(mouse, "wheel", x=10, y=10, dx=100, dy=0)
+    assert state.navigation.camera.position == here.position
+    assert cameras.yaw_pitch(state.navigation.camera)[0] > cameras.yaw_pitch(here)[0]
+
+
+def test_a_pinch_changes_the_field_of_view_in_its_range(mouse, state):
+    before = state.navigation.camera
+    send(mouse, "wheel", x=10, y=10, dx=0, dy=-50, modifiers=("Control",))
+    after = state.navigation.camera
+    assert after.position == before.position and 0.9 < after.fov_y_deg / before.fov_y_deg < 1
+    for dy, most in ((-5000, FOV_DEG[0]), (5000, FOV_DEG[1])):
+        send(mouse, "wheel", x=10, y=10, dx=0, dy=dy, modifiers=("Control",))
+        assert state.navigation.camera.fov_y_deg == most
 
 
 def test_what_begins_over_the_interface_belongs_to_it(mouse, state):

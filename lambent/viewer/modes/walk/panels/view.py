@@ -8,6 +8,7 @@ from lambent.core.light.exposure import ev100_of
 from lambent.store.contract import SIDES, noise_name
 from lambent.viewer.cameras.navigation import Navigation
 from lambent.viewer.look import LOOKUPS, Look
+from lambent.viewer.modes.walk.input import FOV_DEG
 from lambent.viewer.modes.walk.light.metering import Meter
 from lambent.viewer.modes.walk.markers import Marks
 from lambent.viewer.modes.walk.panels import light_field
@@ -23,7 +24,6 @@ from lambent.viewer.panels.look import (
 )
 from lambent.viewer.panels.widgets import check, choice, explain, press, slider, wrapped
 
-FOV_DEG = (10.0, 120.0)
 SPEED_M_S, EYE_M = (0.1, 10.0), (0.1, 3.0)
 NEAR_M = (0.001, 5.0)
 NO_NOISE = "the store lacks it; `lambent bake` of the same scene adds it from the stored samples"
