@@ -6,11 +6,12 @@ Angles are in radians, colours linear Rec.709. File names are absolute or relati
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
+from lambent.core.discovery import known
 from lambent.core.errors import UserError, invalid
 from lambent.core.inputs import parse_json, read_bytes
 from lambent.core.strict import Strict
@@ -21,6 +22,8 @@ from lambent.materials.document import Material
 from lambent.materials.factored.curve import END_RAD, KNOTS, Curve, angles_rad
 from lambent.scenes.sky.triangle_lights import FEWEST, MOST
 from lambent.store.consistency import is_usable
+from lambent.store.kept.session import FORMAT as STORES
+from lambent.store.kept.session import session_from
 
 LIMIT_BYTES, VERSION = 256 << 20, 1
 MOST_MATERIALS, MOST_LAYERS, MOST_PARAMETERS = 1000, 4096, 100
@@ -158,14 +161,29 @@ class SessionDocument(Strict):
 
 
 def load_document(path: Path) -> SessionDocument:
-    """Read a session document.
+    """Read a session document, or that of a view of a store's session: STORE/session.json, or session.json:CAMERA.
 
     Raises
     ------
     UserError
         If the file is not JSON, not a session, of another version, too large, or has an unknown or invalid field.
     """
-    data = parse_json(read_bytes(path, LIMIT_BYTES), path)
+    named = not path.exists() and ":" in path.name
+    file, view = (path.with_name(path.name.rpartition(":")[0]), path.name.rpartition(":")[2]) if named else (path, None)
+    data = parse_json(read_bytes(file, LIMIT_BYTES), file)
+    if not (isinstance(data, dict) and data.get("format") == STORES):
+        return document_from(data, path)
+    edited = session_from(data, file).edited
+    if view is None and len(edited) != 1:
+        raise UserError(
+            "which edited view?", file=file, got=", ".join(edited) or "none", expected=f"{file.name}:CAMERA"
+        )
+    name = next(iter(edited)) if view is None else known("view", view, edited)
+    return document_from(edited[name].document, file)
+
+
+def document_from(data: Any, path: Path) -> SessionDocument:
+    """The session of a parsed document; errors, which are those of `load_document`, name `path`."""
     if not isinstance(data, dict) or "format" not in data:
         raise UserError("not a session of edits", file=path, expected="an object with a format")
     if (version := data.get("version", VERSION)) != VERSION:

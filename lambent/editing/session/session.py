@@ -109,7 +109,12 @@ class Session:
             If the document is unusable (`document.load_document`), names curves, terms or parameters that its materials
             do not have, or a table that is missing or has changed.
         """
-        session = cls(load_document(path), path.parent, factorise)
+        return cls.of(load_document(path), path, factorise)
+
+    @classmethod
+    def of(cls, document: SessionDocument, path: Path, factorise: Factorise | None = None) -> Session:
+        """A session of a document in the file `path`, with all curves; raises as `open`."""
+        session = cls(document, path.parent, factorise)
         for name in session.document.materials:
             try:
                 session.editable(name)
@@ -122,15 +127,18 @@ class Session:
         return session
 
     def save(self, path: Path) -> None:
-        """Write the session, atomically. File names are made relative to its new folder, where possible."""
-        document, target = self.document, path.parent
+        """Write the session, atomically, `placed` in its new folder."""
+        write_text(path, json.dumps(self.placed(path.parent).model_dump(mode="json"), indent=1) + "\n")
+
+    def placed(self, target: Path) -> SessionDocument:
+        """The document with file names relative to the folder `target`, where possible."""
+        document = self.document
         changes: dict[str, Any] = {"scene": self._moved(document.scene, target)}
         if document.environment is not None:
             file = self._moved(document.environment.file, target)
             changes["environment"] = document.environment.model_copy(update={"file": file})
         changes["materials"] = {name: self._moved_source(one, target) for name, one in document.materials.items()}
-        saved = document.model_copy(update=changes)
-        write_text(path, json.dumps(saved.model_dump(mode="json"), indent=1) + "\n")
+        return document.model_copy(update=changes)
 
     @property
     def document(self) -> SessionDocument:

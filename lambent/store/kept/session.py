@@ -149,8 +149,21 @@ class KeptView(Strict):
         return self
 
 
+class EditedView(Strict):
+    """A view whose materials are edited in place: a `lambent.editing` session document, of files by the store's folder.
+
+    `room` has the materials of the current state then, which the document started from, or which show its edits.
+    """
+
+    document: dict[str, Any]
+    room: dict[str, Material] = Field(default_factory=dict)
+
+
 class WalkSession(Strict):
-    """Content of a session file: the current state, the one compared with it, stored states by name, and the view."""
+    """Content of a session file: the current state, the one compared with it, stored states by name, and the view.
+
+    `edited` are views edited in place, by their camera's name.
+    """
 
     format: Literal["lambent-walk-session"] = FORMAT
     version: Literal[2] = VERSION
@@ -158,6 +171,7 @@ class WalkSession(Strict):
     beside: RoomState | None = None
     states: dict[str, RoomState] = Field(default_factory=dict)
     view: KeptView | None = None
+    edited: dict[str, EditedView] = Field(default={}, exclude_if=lambda one: not one)
 
     @property
     def rooms(self) -> list[RoomState]:

@@ -24,11 +24,13 @@ def start(path: Path, name: str, screen: Screen, **options: Any) -> Mode:
     """Start the mode on a scene, a store or a session; options as in `subject.opened`."""
     from lambent.realtime.gpu.device import open_device
     from lambent.viewer.modes.edit.drawing import EditDrawing
+    from lambent.viewer.modes.edit.in_place import InPlace
     from lambent.viewer.modes.edit.mode import EditMode
     from lambent.viewer.modes.edit.shown import backend_of
     from lambent.viewer.modes.edit.state import EditState
-    from lambent.viewer.modes.edit.subject import opened
+    from lambent.viewer.modes.edit.subject import kind_of, opened
 
-    subject, device = opened(path, screen.folder, **options), open_device()
-    state = EditState(subject, screen, backend=backend_of(device))
+    keeper = InPlace(path, screen) if kind_of(path) == "store" else None
+    subject, device = opened(path, screen.folder, keeper=keeper, **options), open_device()  # locks end with the process
+    state = EditState(subject, screen, backend=backend_of(device), keeper=keeper)
     return EditMode(state, EditDrawing(device, state))

@@ -18,6 +18,7 @@ from lambent.materials.factored.terms import Editable
 from lambent.viewer.background.work import Work, pending
 from lambent.viewer.editor.files import kind_of, typed_path
 from lambent.viewer.edits.edits import unused
+from lambent.viewer.modes.edit.in_place import InPlace
 from lambent.viewer.modes.edit.subject import SESSION_ENDING
 from lambent.viewer.screen import Screen
 
@@ -44,14 +45,19 @@ class Files:
         File of the session; None before the first save.
     exported : ExportedMaterial or None
         The last exported material.
+    keeper : InPlace or None
+        Keeps the session in the one of its store, if that was opened.
     """
 
-    def __init__(self, session: Session, screen: Screen, name: str, home: Path | None) -> None:
+    def __init__(
+        self, session: Session, screen: Screen, name: str, home: Path | None, keeper: InPlace | None = None
+    ) -> None:
         self._session, self._screen, self._tables = session, screen, Tables()
         self._stem = plain_name(name, "scene")
         self.home = home
         self.exported: ExportedMaterial | None = None
         self.exported_to: Path | None = None
+        self.keeper = keeper
         self.typed: dict[str, str] = {}
         self._work: Work | None = None
         self._saved = session.document
@@ -67,21 +73,28 @@ class Files:
 
     @property
     def unsaved(self) -> bool:
-        """Whether the session has changed since it was opened or saved."""
-        return self._session.document != self._saved
+        """Whether the session has changed since it was opened or saved, and is not kept."""
+        return self._session.document != self._saved and not (self.keeper is not None and self.keeper.keeps)
 
     def poll(self) -> None:
-        """Handle the end of the running task."""
+        """Handle the end of the running task, and keep the session."""
         self._work = pending(self._work)
+        if self.keeper is not None:
+            self.keeper.tick()
 
     def close(self) -> None:
-        """Cancel the running task."""
+        """Cancel the running task, and release the store's session."""
         if self._work is not None:
             self._work.cancel()
             self._work = None
+        if self.keeper is not None:
+            self.keeper.close()
 
     def save(self) -> None:
-        """Write the session to its file, or to a new file with the next free number."""
+        """Write the session to its store or file, or to a new file with the next free number."""
+        if self.keeper is not None and self.keeper.keeps:
+            self.keeper.save()
+            return
         target, document = self.home or self._unused(self._stem), self._session.document
         try:
             self._session.save(target)
@@ -91,9 +104,11 @@ class Files:
             self.home, self._saved = target, document
             self._screen.say(f"saved {target}")
 
-    def rescue(self) -> Iterator[Path]:
-        """Write an unsaved session to a new file, because the window is about to be lost."""
-        if self.unsaved:
+    def rescue(self) -> Iterator[Path | str]:
+        """Write the session to its store, or an unsaved one to a new file, because the window is about to be lost."""
+        if self.keeper is not None and self.keeper.keeps:
+            yield from self.keeper.rescue()
+        elif self.unsaved:
             file = self._unused(f"{self._stem}-rescued")
             self._session.save(file)
             yield file
@@ -106,11 +121,16 @@ class Files:
             names = ", ".join(changed) or "the environment"
             sys.stderr.write(f"lambent: note: changes not saved: {names}\n")
 
-    def export(self, material: str) -> None:
-        """Write the edited material as a document; lobes are fitted in the background."""
+    def export(self, material: str, *, into_room: bool = False) -> None:
+        """Write the edited material as a document, or show it in the room; lobes are fitted in the background."""
         session = Session(self._session.document, self._session.folder, self._tables)
 
         def done(found: ExportedMaterial) -> None:
+            self.exported, self.exported_to = found, None
+            if into_room and self.keeper is not None:
+                self.keeper.show_in_room(material, found.material)
+                self._screen.say(f"the room shows {material} as edited: {found.verdict}")
+                return
             folder = self._screen.folder
             file = folder / f"{unused(folder, plain_name(material), '.json')}.json"
             try:
@@ -118,7 +138,7 @@ class Files:
             except (UserError, OSError) as error:
                 self._screen.say(f"not exported: {error}")
                 return
-            self.exported, self.exported_to = found, file
+            self.exported_to = file
             self._screen.say(f"saved {file}: {found.verdict}")
 
         self._begin(lambda: export(session, material), f"fitting {material}", done, "not exported")

@@ -80,6 +80,8 @@ class EditMode(Mode):
     def __init__(self, state: EditState, drawing: Drawing) -> None:
         super().__init__(state.subject.name, state.screen, EditInput(state), drawing, columns(state))
         self.state = state
+        if state.files.keeper is not None:
+            self.head = partial(panels.draw_head, state.files.keeper)
 
     @property
     def moving(self) -> bool:
@@ -94,6 +96,7 @@ class EditMode(Mode):
             POLL_S if state.busy else None,
             LOOK_S if state.painter.busy else None,
             OUTLINED_S / 2 if state.selection_is_new else None,
+            state.files.keeper.wait_s() if state.files.keeper is not None else None,
         )
 
     def draw_over(self, textures: Textures) -> None:
@@ -109,7 +112,8 @@ class EditMode(Mode):
     def _lines(self) -> list[str]:
         """Lines on background work and its errors."""
         state = self.state
-        lines = [line for line in (state.trouble, state.painter.notice) if line]
+        fault = "" if state.files.keeper is None else state.files.keeper.fault
+        lines = [line for line in (fault, state.trouble, state.painter.notice) if line]
         if state.baking is not None:
             lines.append(state.baking.line)
         elif state.loading.busy:
@@ -134,7 +138,7 @@ class EditMode(Mode):
         self.state.files.save()
 
     def rescue(self) -> None:
-        rescued("the unsaved session", self.state.files.rescue)
+        rescued("the session", self.state.files.rescue)
         self.state.stop_baking()
 
     def close(self) -> None:

@@ -7,6 +7,7 @@ from functools import partial
 from imgui_bundle import imgui
 
 from lambent.viewer.modes.edit.curves.editor import CurveEditor
+from lambent.viewer.modes.edit.in_place import InPlace
 from lambent.viewer.modes.edit.state import OFF, EditState
 from lambent.viewer.panels import look as looks
 from lambent.viewer.panels.widgets import (
@@ -24,6 +25,11 @@ from lambent.viewer.panels.widgets import (
 
 HISTORY = ("undo", "redo")
 LEAST_CHOICE_PX = 80.0
+
+
+def draw_head(keeper: InPlace) -> None:
+    """Draw lines on the store's session, where it is not kept or not taken over whole."""
+    wrapped([line for line in (keeper.fault, *keeper.lines) if line], AMBER)
 
 
 def draw_scene(state: EditState) -> None:
@@ -125,9 +131,12 @@ def draw_look(state: EditState) -> None:
 
 def draw_files(state: EditState) -> None:
     """Draw saving of the session and export of the material."""
-    files = state.files
+    files, keeper = state.files, state.files.keeper
+    kept = "to the room", not files.busy and bool(state.material), lambda: files.export(state.material, into_room=True)
+    saved = "save session", True, files.save, "saves the session (Ctrl+S); never overwrites another session's file"
     buttons([
-        ("save session", True, files.save, "saves the session (Ctrl+S); never overwrites another session's file"),
+        saved if keeper is None or not keeper.keeps else
+        (*kept, "lets the walk and stills show the material as edited, with fitted lobes where needed"),
         ("export", not files.busy and bool(state.material), lambda: files.export(state.material),
          "saves the edited material as a document for all other commands, with fitted lobes where needed"),
     ])  # fmt: skip
@@ -135,13 +144,11 @@ def draw_files(state: EditState) -> None:
         coloured(files.home.name + (" (changed)" if files.unsaved else ""), DIM)
     if files.busy:
         coloured(files.doing, DIM)
-    if files.exported is not None and files.exported_to is not None:
-        found = files.exported
+    if (found := files.exported) is not None:
         shares = [(f"error, {name}", f"{share:.2%}") for name, share in found.shares.items()]
         fitted = ", ".join(found.fitted) or "none: exact"
-        rows(
-            [("file", files.exported_to.name), ("fitted", fitted), ("verdict", str(found.verdict)), *shares], "exported"
-        )
+        to = "the room" if files.exported_to is None else files.exported_to.name
+        rows([("to", to), ("fitted", fitted), ("verdict", str(found.verdict)), *shares], "exported")
         wrapped(found.warnings, AMBER)
 
 

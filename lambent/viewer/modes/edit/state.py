@@ -19,6 +19,7 @@ from lambent.viewer.look import Look
 from lambent.viewer.mode import Divider
 from lambent.viewer.modes.edit.baking import LIGHTS, Baking
 from lambent.viewer.modes.edit.files import Files
+from lambent.viewer.modes.edit.in_place import InPlace
 from lambent.viewer.modes.edit.interreflections import SHOWN, Bounced
 from lambent.viewer.modes.edit.loading import Loading, ViewMap
 from lambent.viewer.modes.edit.painter import Frame, Materials, Painter, Wish, checked
@@ -74,6 +75,7 @@ class EditState:
         lights: Sequence[int] = LIGHTS,
         bake: Callable[..., Baking] = Baking,
         backend: Backend | None = None,
+        keeper: InPlace | None = None,
     ) -> None:
         self.subject, self.session, self.screen, self.lights = subject, subject.session, screen, tuple(lights)
         self.look = Look(exposure_ev=subject.scene.exposure_ev or 0.0, shows=("full",))
@@ -86,7 +88,10 @@ class EditState:
         self.painter = Painter(self.session.document.size[::-1], backend=backend)
         self.loading = Loading(self.painter, subject.store)
         self.baking: Baking | None = None
-        self.files = Files(self.session, screen, subject.name, subject.home)
+        self.files = Files(self.session, screen, subject.name, subject.home, keeper)
+        if keeper is not None:
+            keeper.begin(self.session, self.look)
+            self._metered = self._metered or keeper.has_exposure
         self._bake = bake
         self.bounced = Bounced(self.painter, bake)
         self._sources: Sequence[object] = ()  # sources of materials at the last check of transport

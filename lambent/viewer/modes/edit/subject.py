@@ -20,6 +20,7 @@ from lambent.scenes.scene import Scene
 from lambent.store.kept.views import read_views
 from lambent.store.source import SURROUNDINGS, materials_in_views, scene_of
 from lambent.store.store import MANIFEST, Store
+from lambent.viewer.modes.edit.in_place import InPlace
 from lambent.viewer.picture import LARGEST_PX
 
 Kind = Literal["scene", "store", "session"]
@@ -88,6 +89,7 @@ def opened(
     picture: tuple[int, int] | None = None,
     store: Path | None = None,
     crease_deg: float | None = None,
+    keeper: InPlace | None = None,
 ) -> Subject:
     """Open a path.
 
@@ -102,6 +104,8 @@ def opened(
         Folder for transport; by default the opened store itself, or for a scene a new store in `folder`.
     crease_deg
         As for `load_scene`; by default the session's.
+    keeper
+        Of a store's session, with the edits of the view and the room's materials; by default the scene's materials.
 
     Raises
     ------
@@ -125,10 +129,14 @@ def opened(
     lit_by = Surroundings(file=str(environment.resolve())) if environment is not None else kept
     if environment is not None and not environment.is_file():
         raise UserError("file does not exist", file=environment, field="--environment")
+    if keeper is not None:
+        where = camera_named(scene, base, camera)
+        session = keeper.view(where, scene.materials, folder / plain_name(scene.name, "scene"))
     if session is None:
         where = camera_named(scene, base, camera)
         merged = _merged_in(base, scene)
-        materials = {o.material: scene.materials[o.material] for o in scene.merged(merged).objects}
+        names = {o.material: scene.materials[o.material] for o in scene.merged(merged).objects}
+        materials = {name: keeper.material(name, one) if keeper else one for name, one in names.items()}
         begun = Session.new(_lasting(place), where, materials, size=picture or SIZE, environment=lit_by)
         kept_too = {"merged": merged, "crease_deg": crease_deg}
         session = Session(begun.document.model_copy(update=kept_too))

@@ -37,7 +37,7 @@ def view_of(state: WalkState) -> KeptView:
 
 def restore(state: WalkState) -> tuple[str, ...]:
     """Show the view of the opened session, and keep it from now on; return lines as `show_view`."""
-    lines = show_view(state, state.session.opened_view)
+    lines = show_view(state, state.session.opened.view)
     state.session.view = partial(view_of, state)
     return lines
 

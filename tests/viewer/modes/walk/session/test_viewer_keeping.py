@@ -22,7 +22,8 @@ from lambent.store.kept.session import (
     write_session,
 )
 from lambent.viewer.edits.edits import MaterialEdits
-from lambent.viewer.modes.walk.session.keeping import ASK_S, BACK, CHANGED, READ_ONLY, TAKEN, SessionKeeper
+from lambent.viewer.edits.session_file import ASK_S, CHANGED, READ_ONLY, TAKEN
+from lambent.viewer.modes.walk.session.keeping import BACK, SessionKeeper
 from lambent.viewer.modes.walk.session.kept_view import restore, show_view, view_of
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.screen import Rect, Screen
@@ -86,7 +87,7 @@ def test_a_session_is_there_again(window, tmp_path):
     assert window.keeper.unsaved == ()
     window.keeper.close()
     again = Window(tmp_path)
-    assert again.lines == () and again.keeper.opened_view.camera == THERE
+    assert again.lines == () and again.keeper.opened.view.camera == THERE
     assert again.edits.session == window.edits.session and again.edits.current("plaster") == RED
     assert not again.edits.can_undo
     again.keeper.close()
@@ -165,7 +166,7 @@ def test_fresh_begins_as_baked_and_loses_nothing(window, tmp_path):
     window.keeper.close()
     before = (tmp_path / FILE).read_bytes()
     fresh = Window(tmp_path, fresh=True)
-    assert fresh.lines == () and dict(fresh.edits.edited) == {} and fresh.keeper.opened_view is None
+    assert fresh.lines == () and dict(fresh.edits.edited) == {} and fresh.keeper.opened.view is None
     fresh.look_around(THERE)
     fresh.rest()
     assert (tmp_path / FILE).read_bytes() == before, "to look around is no edit"
@@ -273,7 +274,7 @@ def test_a_session_of_version_1_is_read_and_becomes_one_of_version_2(window, tmp
     window.keeper.close()
     (tmp_path / FILE).write_text(former(WalkSession(now=RoomState(materials={"plaster": RED}))))
     again = Window(tmp_path)
-    assert again.lines == () and again.edits.current("plaster") == RED and again.keeper.opened_view is None
+    assert again.lines == () and again.edits.current("plaster") == RED and again.keeper.opened.view is None
     again.paint(BLUE)
     again.keeper.close()
     assert json.loads((tmp_path / FILE).read_text())["version"] == 2
@@ -371,7 +372,7 @@ def test_a_disk_that_is_full_for_a_while_is_said_until_it_is_not(window, tmp_pat
 
     window.paint(RED)
     with monkeypatch.context() as context:
-        context.setattr("lambent.viewer.modes.walk.session.keeping.write_session", full)
+        context.setattr("lambent.viewer.edits.session_file.write_session", full)
         window.rest()
         assert "No space left" in window.keeper.fault and window.keeper.unsaved == ("plaster",)
     window.rest()

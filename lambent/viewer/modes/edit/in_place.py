@@ -1,0 +1,126 @@
+"""A store's session with the edits of one of its views, and the room's materials as they start from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from lambent.core.errors import UserError
+from lambent.core.views.camera import Camera
+from lambent.editing.session.document import EditedMaterial, OfDocument, SessionDocument, document_from, load_document
+from lambent.editing.session.session import Session
+from lambent.materials.document import Material
+from lambent.store.kept.session import FILE, EditedView, WalkSession
+from lambent.viewer.edits.session_file import SOON_S, SessionFile
+from lambent.viewer.look import Look
+from lambent.viewer.screen import Screen
+
+
+class InPlace(SessionFile):
+    """The session file of a store, whose edited view is the `Session` of `begin`.
+
+    Attributes
+    ----------
+    store : Path
+        The store's folder.
+    lines : list of str
+        Lines on problems.
+    """
+
+    def __init__(self, store: Path, screen: Screen, soon_s: float = SOON_S) -> None:
+        super().__init__(store, screen, soon_s)
+        self.store, self.lines = store, [line for line in self.read(store) if line != self.fault]
+        self._now = self.opened.now
+        self._foreign: dict[str, EditedMaterial] = {}  # materials of the view that the scene lacks
+        self._edited: Session | None = None
+        self._look = Look()
+        self._begun: SessionDocument | None = None  # as it need not be written
+        self._of: tuple[object, object] | None = None  # document and materials of the section
+        self._section: EditedView | None = None
+
+    def material(self, name: str, of_scene: Material) -> Material:
+        """The material of the room."""
+        return self._now.materials.get(name, of_scene)
+
+    def view(self, camera: Camera, materials: Mapping[str, Material], former: Path) -> Session | None:
+        """The edits of a view, from the session or else once from a `former` file; None if there are none.
+
+        `materials` are the scene's, by name. One that was edited in the room since then starts from there.
+
+        Raises
+        ------
+        UserError
+            If the edits cannot be used.
+        """
+        said, file = self.opened.edited.get(camera.name), self.store / FILE
+        if said is None:
+            return self._former(camera, former)
+        document = document_from(said.document, file)
+        self._foreign = {name: one for name, one in document.materials.items() if name not in materials}
+        known = {name: one for name, one in document.materials.items() if name in materials}
+        place = {"scene": str(self.store.resolve()), "materials": known}
+        session = Session.of(document.model_copy(update=place), file)
+        for name in known:
+            before, now = said.room.get(name, materials[name]), self.material(name, materials[name])
+            if now != before:
+                if known[name].source != OfDocument(material=before):  # the room shows the edits
+                    session.reset(name)
+                session.become(name, now)
+        return Session(session.document, self.store)
+
+    def _former(self, camera: Camera, like: Path) -> Session | None:
+        """The last of the files `like` NAME-001.edits.json that edits this view of the store."""
+        for file in sorted(like.parent.glob(f"{like.name}-*.edits.json"), reverse=True):
+            try:
+                document = load_document(file)
+                if (file.parent / document.scene).resolve() == self.store.resolve() and document.camera == camera:
+                    found = Session.of(document, file).placed(self.store)
+                    self.lines.append(f"the edits of {file.name} are in the store's session from now on")
+                    return Session(found.model_copy(update={"scene": str(self.store.resolve())}), self.store)
+            except UserError as error:
+                self.lines.append(f"not taken into the store's session: {error}")
+        return None
+
+    def begin(self, session: Session, look: Look) -> None:
+        """Keep these edits, and the exposure and view transform of the `look`, which are the session's first."""
+        self._edited, self._look, view = session, look, self.opened.view
+        is_kept = session.document.camera.name in self.opened.edited
+        unedited = all(one == EditedMaterial(source=one.source) for one in session.document.materials.values())
+        self._begun = session.document if is_kept or unedited else None
+        if view is not None:
+            look.view_transform, look.scale = view.look.view_transform, view.look.scale
+        if view is not None and view.look.exposure_ev is not None:
+            look.exposure_ev, look.base_ev = view.look.exposure_ev, view.look.base_ev
+
+    @property
+    def has_exposure(self) -> bool:
+        """Whether the session has an exposure."""
+        return self.opened.view is not None and self.opened.view.look.exposure_ev is not None
+
+    def show_in_room(self, name: str, material: Material) -> None:
+        """Let the room have a material as it is edited here."""
+        self._now = self._now.model_copy(update={"materials": {**self._now.materials, name: material}})
+        self._begun = None  # the edits are those of the room now
+
+    @property
+    def session(self) -> WalkSession:
+        changes: dict[str, object] = {"now": self._now}
+        if self.opened.view is not None:
+            view, look = self.opened.view, self._look
+            shown: dict[str, object] = {"view_transform": look.view_transform, "scale": look.scale}
+            shown |= {"exposure_ev": look.exposure_ev, "base_ev": look.base_ev} if self.has_exposure else {}
+            changes["view"] = view.model_copy(update={"look": view.look.model_copy(update=shown)})
+        if self._edited is not None and self._edited.document is not self._begun:
+            section, name = self._section_of(self._edited), self._edited.document.camera.name
+            changes["edited"] = {**self.opened.edited, name: section}
+        return self.opened.model_copy(update=changes)
+
+    def _section_of(self, session: Session) -> EditedView:
+        of = session.document, self._now
+        if self._section is None or self._of is None or any(a is not b for a, b in zip(of, self._of, strict=True)):
+            document = session.placed(self.store)
+            materials = {**self._foreign, **document.materials}
+            whole = document.model_copy(update={"scene": ".", "materials": materials})  # also of a store that moves
+            room = {name: one for name, one in self._now.materials.items() if name in document.materials}
+            self._of, self._section = of, EditedView(document=whole.model_dump(mode="json"), room=room)
+        return self._section
